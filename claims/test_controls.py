@@ -1,0 +1,43 @@
+"""Controls of our own: a harness whose claims cannot fail proves nothing."""
+
+import pytest
+
+from evoclaims import claim
+
+TASKS = ["n_parity", "simple_alu"]
+
+
+@claim(
+    "C1",
+    says="Random search, with the encoding and the evaluations of CMA-ES, does not solve 6-parity",
+    where="control",
+    smoke="Random search, with the encoding and the evaluations of CMA-ES, does not solve 3-parity",
+)
+def test_random_search_does_not_solve_parity(trials, verdict):
+    random_search = trials("random_search", on="n_parity_direct")
+    verdict(random_search.does_not_solve_the_last_level.in_most_trials())
+
+
+@claim(
+    "C2",
+    says="A network built by hand is right on every row of every level, and its negation on none",
+    where="control",
+    smoke="The same on 3-parity and the first three levels of Simple ALU",
+)
+@pytest.mark.parametrize("task", TASKS)
+def test_a_right_circuit_scores_one_and_a_wrong_one_zero(trials, verdict, task):
+    right = trials("hand_built", on=task)
+    wrong = trials("hand_built_negated", on=task)
+    verdict(right.success_everywhere_is(1.0).in_every_trial() & wrong.success_everywhere_is(0.0).in_every_trial())
+
+
+@claim(
+    "C5",
+    says="Trials of one method, split into halves at random, are found different no more often than chance allows",
+    where="control",
+    smoke="The same with the smoke tier's trials",
+)
+@pytest.mark.parametrize("method", ["cma_es", "ppo", "random_search"])
+def test_a_method_is_not_better_than_itself(trials, verdict, method):
+    runs = trials(method, on="n_parity")
+    verdict(runs.mean_success.never_above_itself())

@@ -1,0 +1,20 @@
+"""Nisioti, Pedersen, Plantec, Montero, Risi: When Does Neuroevolution Outcompete Reinforcement Learning in Transfer
+Learning Tasks? GECCO 2025."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from evoclaims.judging.protocol import FIXED_10, SEQUENTIAL
+from evoclaims.suite.reproduction import Reproduction, Tier
+from reproductions.nisioti2025 import stepping_gates
+
+REPRODUCTION = Reproduction(
+    name="nisioti2025",
+    title="When Does Neuroevolution Outcompete Reinforcement Learning in Transfer Learning Tasks?",
+    folder=Path(__file__).parent,
+    tiers={
+        "smoke": Tier(conditions=stepping_gates.SMOKE, protocol=FIXED_10),
+        "full": Tier(conditions=stepping_gates.FULL, protocol=SEQUENTIAL),
+    },
+)

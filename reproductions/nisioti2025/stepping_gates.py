@@ -1,0 +1,83 @@
+"""Figs. 3 and 4: what is run on the stepping gates, at the paper's size ("full") and scaled down ("smoke").
+
+Hyperparameters are the paper's tables (appendix A); training lengths, which the paper omits, are the published code's.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+from evoclaims.envs.gates.alu import SimpleAlu
+from evoclaims.envs.gates.circuit import Circuit
+from evoclaims.envs.gates.parity import NParity
+from evoclaims.methods.base import Method
+from evoclaims.methods.cma_es import CmaEs
+from evoclaims.methods.hand_built import HandBuilt
+from evoclaims.methods.ppo import Ppo
+from evoclaims.methods.random_search import RandomSearch
+from evoclaims.networks.all_skips import AllSkips
+from evoclaims.trials.budget import Budget
+from evoclaims.trials.spec import Condition, Progression
+
+Conditions = dict[tuple[str, str], Condition]
+
+
+def _on_every_task(
+    parity: Circuit, alu: Circuit, method: Method[Any], parity_budget: Budget, alu_budget: Budget
+) -> Conditions:
+    """Put a method on N-parity and Simple ALU with the curriculum, and on N-parity's last level directly."""
+    on: list[tuple[str, Circuit, Progression, Budget]] = [
+        ("n_parity", parity, "curriculum", parity_budget),
+        ("simple_alu", alu, "curriculum", alu_budget),
+        ("n_parity_direct", parity, "direct", parity_budget),
+    ]
+    return {(method.name, task): Condition(method, circuit, path, budget) for task, circuit, path, budget in on}
+
+
+def _sampled(circuit: Any) -> Any:
+    """Return the circuit as reinforcement learning meets it: episodes of one random row (§3.1)."""
+    return replace(circuit, sampling="sampled")
+
+
+def _hand_built(parity: Circuit, alu: Circuit) -> Conditions:
+    """Put the hand-built networks (control C2) on every level of both tasks: there is nothing to train."""
+    look = Budget(generations=1, reports=1)
+    built = [_on_every_task(parity, alu, HandBuilt(negated=negated), look, look) for negated in (False, True)]
+    return {**built[0], **built[1]}
+
+
+def _full() -> Conditions:
+    """Return the paper's own size."""
+    parity, alu = NParity(bits=6), SimpleAlu()
+    network = AllSkips(hidden=24)  # §A.3: "24 hidden neurons and all skip connections present"
+    evolution = (Budget(generations=5_000), Budget(generations=10_000))
+    learning = (Budget(environment_steps=150_000_000), Budget(environment_steps=450_000_000))
+    return {
+        **_on_every_task(parity, alu, CmaEs(population=256, network=network), *evolution),
+        **_on_every_task(parity, alu, RandomSearch(population=256, network=network), *evolution),
+        **_on_every_task(_sampled(parity), _sampled(alu), Ppo(), *learning),
+        **_hand_built(parity, alu),
+    }
+
+
+def _smoke() -> Conditions:
+    """Return the scaled-down instances: 3-parity and the first three operations of the ALU.
+
+    A whole budget takes seconds on one core; PPO takes larger steps on smaller batches, since it gets a few hundred
+    updates where the paper gives hundreds of thousands.
+    """
+    parity, alu = NParity(bits=3), SimpleAlu(level_count=3)
+    network = AllSkips(hidden=16)
+    ppo = Ppo(environments=256, batch_size=256, minibatches=8, learning_rate=3e-3)
+    generations, steps = Budget(generations=200), Budget(environment_steps=600_000)
+    return {
+        **_on_every_task(parity, alu, CmaEs(population=256, network=network), generations, generations),
+        **_on_every_task(parity, alu, RandomSearch(population=256, network=network), generations, generations),
+        **_on_every_task(_sampled(parity), _sampled(alu), ppo, steps, steps),
+        **_hand_built(parity, alu),
+    }
+
+
+FULL = _full()
+SMOKE = _smoke()

@@ -1,0 +1,45 @@
+"""Canonical JSON and content hashes: the same value always gives the same bytes and the same name."""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import json
+import math
+from typing import Any
+
+
+def as_plain(value: Any) -> Any:
+    """Turn frozen dataclasses, tuples and scalars into plain JSON values.
+
+    A dataclass becomes its fields; fields whose metadata holds `canonical=False` are left out. NaN and the
+    infinities become the strings "nan", "inf", "-inf", since JSON has no word for them.
+
+    Raises:
+        TypeError: for a value that has no canonical form (an array, a function, a set).
+    """
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        return {
+            field.name: as_plain(getattr(value, field.name))
+            for field in dataclasses.fields(value)
+            if field.metadata.get("canonical", True)
+        }
+    if isinstance(value, dict):
+        return {str(key): as_plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [as_plain(item) for item in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return repr(float(value))
+    if value is None or isinstance(value, bool | int | float | str):
+        return value
+    raise TypeError(f"{type(value).__name__} has no canonical JSON form: {value!r}")
+
+
+def canonical_json(value: Any) -> str:
+    """Return `value` as JSON with sorted keys and no spaces, in ASCII."""
+    return json.dumps(as_plain(value), sort_keys=True, separators=(",", ":"), allow_nan=False)
+
+
+def content_hash(value: Any) -> str:
+    """Return the SHA-256 of the canonical JSON of `value`, as 64 hexadecimal digits."""
+    return hashlib.sha256(canonical_json(value).encode("ascii")).hexdigest()

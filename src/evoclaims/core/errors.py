@@ -1,0 +1,21 @@
+"""Errors meant for people: each carries one sentence that says what was wrong and what to do."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+
+
+class UserError(Exception):
+    """Something a user can cause and mend; shown as its message alone, without a traceback."""
+
+
+class UnknownNameError(UserError):
+    """A name that nothing is registered under; the message lists the known names."""
+
+    def __init__(self, kind: str, name: str, known: Iterable[str]) -> None:
+        """Build the sentence for `kind` (such as "method"), the wrong `name` and the `known` ones."""
+        names = sorted(known)
+        near = difflib.get_close_matches(name, names, n=1)
+        guess = f" Did you mean {near[0]!r}?" if near else ""
+        super().__init__(f"There is no {kind} named {name!r}.{guess} Known: {', '.join(names)}.")

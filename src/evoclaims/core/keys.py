@@ -1,0 +1,35 @@
+"""Named streams of random keys: each use has a name, and a new name shifts no other stream."""
+
+from __future__ import annotations
+
+import hashlib
+from typing import Final
+
+import jax
+
+TRAINING: Final = "training"
+EVALUATION: Final = "evaluation"
+
+
+def _stable_int(name: str) -> int:
+    """Hash `name` to 32 bits, the same on every machine and in every version of Python."""
+    return int.from_bytes(hashlib.sha256(name.encode()).digest()[:4], "big")
+
+
+def stream(key: jax.Array, name: str) -> jax.Array:
+    """Return the key of the stream called `name` under `key` (a typed key, shape [])."""
+    return jax.random.fold_in(key, _stable_int(name))
+
+
+def streams(key: jax.Array, *names: str) -> tuple[jax.Array, ...]:
+    """Return one key per name: `mutate_key, eval_key = streams(key, "mutate", "eval")`."""
+    return tuple(stream(key, name) for name in names)
+
+
+def trial_key(seed: int, purpose: str) -> jax.Array:
+    """Return the root key of a trial for one purpose.
+
+    Training's and evaluation's keys come from different streams of the same seed, so that no evaluation can
+    meet a state that training has drawn.
+    """
+    return stream(jax.random.key(seed), purpose)

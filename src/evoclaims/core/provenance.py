@@ -1,0 +1,131 @@
+"""Where a number came from: code revision, versions, device, machine and the flags that change results."""
+
+from __future__ import annotations
+
+import copy
+import functools
+import importlib.metadata
+import os
+import platform
+import re
+import subprocess
+from pathlib import Path
+from typing import Any, Final
+
+PACKAGES: Final = (
+    "evoclaims",
+    "jax",
+    "jaxlib",
+    "numpy",
+    "flax",
+    "optax",
+    "brax",
+    "evosax",
+    "qdax",
+    "mujoco",
+    "mujoco-mjx",
+    "scipy",
+    "statsmodels",
+    "pandas",
+)
+GIT_SECONDS: Final = 5.0
+"""How long git may take; on a slow network folder a missing revision is better than a stalled run."""
+
+
+def collect() -> dict[str, Any]:
+    """Return the provenance of this process as plain JSON, looked up once and copied for each caller.
+
+    Returns:
+        "git" ({"sha", "dirty"} of the repository around the current folder, or None), "versions" (by package
+        name, None where absent, and "python"), "device" ({"platform", "kind", "count"}), "machine" (a string
+        such as "Linux x86_64 AMD EPYC 7B13"), "xla_flags" (string or None), "matmul_precision" (string or None)
+        and "x64" (bool).
+    """
+    return copy.deepcopy(_collected())
+
+
+@functools.cache
+def _collected() -> dict[str, Any]:
+    """Look everything up; cached because git and the device do not change under a running process."""
+    import jax  # here, so that reading records and `--help` need not wait for it
+
+    config: Any = jax.config  # its options are attributes that the type stubs do not list
+    precision = config.jax_default_matmul_precision
+    return {
+        "git": git_state(),
+        "versions": versions(),
+        "device": _device(),
+        "machine": machine_class(),
+        "xla_flags": os.environ.get("XLA_FLAGS"),
+        "matmul_precision": None if precision is None else str(precision),
+        "x64": bool(config.jax_enable_x64),
+    }
+
+
+def git_state() -> dict[str, Any] | None:
+    """Return {"sha", "dirty"} of the repository around the current folder, or None when git cannot tell.
+
+    "sha" is None before the first commit. "dirty" means that a tracked file differs from that commit; untracked
+    files do not count, as with `git describe --dirty`.
+    """
+    if _git("rev-parse", "--is-inside-work-tree") != "true":
+        return None
+    status = _git("status", "--porcelain", "--untracked-files=no")
+    if status is None:
+        return None
+    sha = _git("rev-parse", "--verify", "--quiet", "HEAD")
+    known = sha is not None and re.fullmatch(r"[0-9a-f]{40,64}", sha) is not None
+    return {"sha": sha if known else None, "dirty": status != ""}
+
+
+def _git(*arguments: str) -> str | None:
+    """Return what a read-only git command prints, or None when it is absent, slow or fails."""
+    try:
+        done = subprocess.run(
+            ["git", "-c", "core.fsmonitor=false", *arguments],
+            capture_output=True,
+            stdin=subprocess.DEVNULL,
+            timeout=GIT_SECONDS,
+            check=True,
+            env={**os.environ, "GIT_OPTIONAL_LOCKS": "0"},  # never take the index lock from a user's own git
+        )
+    except (OSError, subprocess.SubprocessError):
+        return None
+    return done.stdout.decode(errors="replace").strip()
+
+
+def versions() -> dict[str, str | None]:
+    """Return the installed version of every package that can change a result (None where absent), and Python's."""
+    return {"python": platform.python_version(), **{name: _version(name) for name in PACKAGES}}
+
+
+def _version(package: str) -> str | None:
+    """Return the installed version of `package`, or None."""
+    try:
+        return importlib.metadata.version(package)
+    except importlib.metadata.PackageNotFoundError:
+        return None
+
+
+def _device() -> dict[str, Any]:
+    """Return platform, kind and count of JAX's default devices."""
+    import jax
+
+    devices = jax.devices()
+    return {"platform": devices[0].platform, "kind": devices[0].device_kind, "count": len(devices)}
+
+
+def machine_class() -> str:
+    """Return operating system, architecture and processor model: machines that should agree to the bit."""
+    return " ".join(f"{platform.system()} {platform.machine()} {_processor()}".split())
+
+
+def _processor() -> str:
+    """Return the processor's model name as the operating system words it (empty when it does not say)."""
+    try:
+        for line in Path("/proc/cpuinfo").read_text(errors="replace").splitlines():
+            if line.startswith("model name"):
+                return line.partition(":")[2].strip()
+    except OSError:
+        pass  # not Linux
+    return platform.processor()

@@ -1,0 +1,39 @@
+"""Frozen dataclasses that jax sees as trees of arrays."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any, TypeVar, dataclass_transform
+
+import jax
+import jax.numpy as jnp
+
+T = TypeVar("T")
+
+
+def static(**kwargs: Any) -> Any:
+    """Mark a field that is part of the tree's structure and not an array: hashable, compared by equality."""
+    return dataclasses.field(metadata={"static": True}, **kwargs)
+
+
+@dataclass_transform(frozen_default=True, field_specifiers=(dataclasses.field, static))
+def pytree(cls: type[T]) -> type[T]:
+    """Turn a class into a frozen dataclass registered as a jax pytree; fields made by `static()` are structure."""
+    frozen = dataclasses.dataclass(frozen=True)(cls)
+    fields = dataclasses.fields(frozen)  # type: ignore[arg-type]
+    jax.tree_util.register_dataclass(
+        frozen,
+        data_fields=[f.name for f in fields if not f.metadata.get("static")],
+        meta_fields=[f.name for f in fields if f.metadata.get("static")],
+    )
+    return frozen
+
+
+def strong(tree: T) -> T:
+    """Give every leaf a strong dtype, so that a loop carries what it was given and nothing compiles twice."""
+    return jax.tree.map(lambda leaf: jnp.asarray(leaf, dtype=jnp.result_type(leaf)), tree)
+
+
+def select(condition: jax.Array, on_true: T, on_false: T) -> T:
+    """Choose between two trees of the same structure by a scalar condition (shape [])."""
+    return jax.tree.map(lambda a, b: jnp.where(condition, a, b), on_true, on_false)

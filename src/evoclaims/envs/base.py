@@ -1,0 +1,88 @@
+"""What a task is: a list of levels, an environment to act in, and an examination that says how well a policy does."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Protocol
+
+from jaxtyping import Array, Bool, Float, Int, PRNGKeyArray
+
+from evoclaims.core.pytree import pytree
+
+PolicyFn = Callable[[Float[Array, " observation"]], Float[Array, " action"]]
+"""A policy with its parameters bound: one observation in, one action out; vmap it for batches."""
+
+
+@pytree
+class TaskState:
+    """The state of one episode.
+
+    Attributes:
+        observation: what the policy sees, shape [observation_size].
+        reward: reward of the step just made.
+        terminated: the task itself ended the episode.
+        truncated: the horizon ended it.
+        inner: whatever the task needs to go on.
+    """
+
+    observation: Float[Array, " observation"]
+    reward: Float[Array, ""]
+    terminated: Bool[Array, ""]
+    truncated: Bool[Array, ""]
+    inner: Any
+
+
+@pytree
+class Episode:
+    """What a policy got out of a task.
+
+    Attributes:
+        fitness: the episode's reward as evolution maximizes it.
+        success: share of the level that is right, in [0, 1]; the level is solved at exactly 1.
+    """
+
+    fitness: Float[Array, ""]
+    success: Float[Array, ""]
+
+
+class Task(Protocol):
+    """A task, as pure functions of explicit state; frozen and hashable, so that programs can close over it.
+
+    Levels are counted from 0. `level` arguments are traced integers of shape [].
+    """
+
+    @property
+    def name(self) -> str:
+        """The registered name."""
+
+    @property
+    def revision(self) -> int:
+        """Raised whenever the task computes something else."""
+
+    @property
+    def levels(self) -> int:
+        """Number of levels."""
+
+    @property
+    def observation_size(self) -> int:
+        """Length of an observation."""
+
+    @property
+    def action_size(self) -> int:
+        """Length of an action."""
+
+    @property
+    def horizon(self) -> int:
+        """Most environment steps in an episode."""
+
+    def reset(self, key: PRNGKeyArray, level: Int[Array, ""]) -> TaskState:
+        """Start an episode at `level`."""
+
+    def step(self, state: TaskState, action: Float[Array, " action"]) -> TaskState:
+        """Act once. The caller resets a state that is terminated or truncated."""
+
+    def episode(self, policy: PolicyFn, key: PRNGKeyArray, level: Int[Array, ""]) -> Episode:
+        """Run one whole training episode of `policy`: one evaluation of an individual in evolution."""
+
+    def examine(self, policy: PolicyFn, key: PRNGKeyArray, level: Int[Array, ""]) -> Episode:
+        """Score `policy` on `level`: the test that decides level-ups and final results, the same for every method."""

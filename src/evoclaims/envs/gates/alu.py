@@ -1,0 +1,109 @@
+"""Simple ALU: one circuit that switches between logical operations by control bits (§3.1.2 of the paper)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import ClassVar, Literal, get_args
+
+import numpy as np
+
+from evoclaims.core.errors import UnknownNameError, UserError
+from evoclaims.envs.gates.circuit import Circuit, Sampling
+from evoclaims.envs.gates.truth_table import Operation, TruthTable, bits_of, number_of
+
+WIDTH = 4
+"""Bits of data in, of data out, and of control."""
+
+OperationList = Literal["paper", "published_code"]
+MultiplexerReading = Literal["paper", "published_code"]
+
+
+def _add(amount: int) -> Operation:
+    """Return the operation that adds `amount` modulo 16."""
+    return Operation(
+        "increment" if amount > 0 else "decrement",
+        WIDTH,
+        WIDTH,
+        lambda bits: bits_of((number_of(bits) + amount) % 2**WIDTH, WIDTH),
+    )
+
+
+MULTIPLEXER = Operation("multiplexer", 3, 1, lambda x: (x[1] if x[0] else x[2],))
+# The published code reads the select bit from the inactive fourth bit, which is always 0: the output is the middle
+# active bit, whatever the other two say.
+MULTIPLEXER_AS_PUBLISHED = Operation("multiplexer", 3, 1, lambda x: (x[1],))
+NAND = Operation("nand", 2, 1, lambda x: (1 - (x[0] & x[1]),))
+NOT = Operation("not", 1, 1, lambda x: (1 - x[0],))
+AND = Operation("and", 2, 1, lambda x: (x[0] & x[1],))
+XOR = Operation("xor", 2, 1, lambda x: (x[0] ^ x[1],))
+XAX = Operation("xax", 3, 1, lambda x: ((x[0] ^ x[1]) & (x[1] ^ x[2]),))
+INCREMENT = _add(1)
+DECREMENT = _add(-1)
+SHIFT_LEFT = Operation("shift left", WIDTH, WIDTH, lambda x: (*x[1:], 0))
+SHIFT_RIGHT = Operation("shift right", WIDTH, WIDTH, lambda x: (0, *x[:-1]))
+
+OPERATIONS: dict[OperationList, tuple[Operation, ...]] = {
+    "paper": (MULTIPLEXER, NAND, NOT, AND, XOR, INCREMENT, DECREMENT, SHIFT_LEFT, SHIFT_RIGHT),
+    "published_code": (MULTIPLEXER, NAND, NOT, AND, XOR, XAX, INCREMENT, DECREMENT, SHIFT_LEFT),
+}
+
+
+@dataclass(frozen=True)
+class SimpleAlu(Circuit):
+    """Level k asks for operations 0 … k together.
+
+    An observation is the operation's index in 4 bits, most significant first, then 4 data bits of which an operation
+    with i inputs uses the last i (the others are 0). An operation with o outputs is scored on the first o of 4.
+
+    Attributes:
+        level_count: how many of the nine operations to ask for, from 1.
+        operations: the paper's list, or the published code's, which has XAX and no shift right.
+        multiplexer: the paper's, or the published code's, whose select bit is always 0.
+        sampling: see `Circuit`.
+    """
+
+    name: ClassVar[str] = "simple_alu"
+    revision: ClassVar[int] = 1
+
+    level_count: int = 9
+    operations: OperationList = "paper"
+    multiplexer: MultiplexerReading = "paper"
+    sampling: Sampling = "exhaustive"
+
+    def __post_init__(self) -> None:
+        """Check the sizes and names."""
+        if self.operations not in OPERATIONS:
+            raise UnknownNameError("operation list", self.operations, OPERATIONS)
+        if self.multiplexer not in get_args(MultiplexerReading):
+            raise UnknownNameError("multiplexer reading", self.multiplexer, get_args(MultiplexerReading))
+        if not 1 <= self.level_count <= len(OPERATIONS[self.operations]):
+            raise UserError(f"Simple ALU has 1 to {len(OPERATIONS[self.operations])} levels, not {self.level_count}.")
+        super().__post_init__()
+
+    @cached_property
+    def operation_list(self) -> tuple[Operation, ...]:
+        """The operations asked for, in the order of the levels."""
+        operations = OPERATIONS[self.operations][: self.level_count]
+        if self.multiplexer == "published_code":
+            return (MULTIPLEXER_AS_PUBLISHED, *operations[1:])
+        return operations
+
+    @cached_property
+    def table(self) -> TruthTable:
+        """The operations' tables one after the other, so that a level is a prefix."""
+        inputs, targets, active, rows_at_level = [], [], [], []
+        for index, operation in enumerate(self.operation_list):
+            for number in range(2**operation.inputs):
+                data = bits_of(number, operation.inputs)
+                unused = (0,) * (WIDTH - operation.outputs)
+                inputs.append((*bits_of(index, WIDTH), *(0,) * (WIDTH - operation.inputs), *data))
+                targets.append((*operation.compute(data), *unused))
+                active.append((1,) * operation.outputs + unused)
+            rows_at_level.append(len(inputs))
+        return TruthTable(
+            inputs=np.array(inputs, dtype=np.float32),
+            targets=np.array(targets, dtype=bool),
+            active=np.array(active, dtype=bool),
+            rows_at_level=tuple(rows_at_level),
+        )

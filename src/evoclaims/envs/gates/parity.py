@@ -1,0 +1,46 @@
+"""N-parity: the sum modulo 2 of a growing number of bits (§3.1.1 of the paper)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import ClassVar
+
+import numpy as np
+
+from evoclaims.core.errors import UserError
+from evoclaims.envs.gates.circuit import Circuit, Sampling
+from evoclaims.envs.gates.truth_table import TruthTable, bits_of
+
+
+@dataclass(frozen=True)
+class NParity(Circuit):
+    """Level k (0 … bits − 2) asks for the parity of the last k + 2 bits; the others are 0.
+
+    Attributes:
+        bits: N, from 2 to 12.
+        sampling: see `Circuit`.
+    """
+
+    name: ClassVar[str] = "n_parity"
+    revision: ClassVar[int] = 1
+
+    bits: int = 6
+    sampling: Sampling = "exhaustive"
+
+    def __post_init__(self) -> None:
+        """Check the size."""
+        if not 2 <= self.bits <= 12:
+            raise UserError(f"N-parity takes 2 to 12 bits, not {self.bits}.")
+        super().__post_init__()
+
+    @cached_property
+    def table(self) -> TruthTable:
+        """All 2^bits rows in counting order, so that level k is the first 2^(k + 2) of them."""
+        rows = np.array([bits_of(number, self.bits) for number in range(2**self.bits)])
+        return TruthTable(
+            inputs=rows.astype(np.float32),
+            targets=(rows.sum(axis=1, keepdims=True) % 2).astype(bool),
+            active=np.ones((len(rows), 1), dtype=bool),
+            rows_at_level=tuple(2 ** (level + 2) for level in range(self.bits - 1)),
+        )

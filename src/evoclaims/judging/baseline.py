@@ -1,0 +1,158 @@
+"""Has anything drifted? New trials against committed reference trials of the same condition."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+from evoclaims.core.canonical import as_plain
+from evoclaims.judging.exact import rank_attainable, rank_test
+from evoclaims.judging.multiplicity import holm
+from evoclaims.judging.sample import UnreadableTrialError, read_number
+from evoclaims.trials.result import TrialResult
+
+ALPHA = 0.01
+MIN_REFERENCES = 10
+
+DriftStatus = Literal["no drift", "drift", "underpowered", "no reference", "not run", "error"]
+"""Only "no drift" is a pass; "underpowered" means that no values could have shown drift after the correction."""
+
+
+@dataclass(frozen=True)
+class DriftCase:
+    """One condition to check.
+
+    Attributes:
+        label: a short name, such as "cma_es on n_parity".
+        condition: the condition's id; references of another id are left out (their code or budget differs).
+        new: trials of now.
+        reference: committed trials.
+        metrics: names in `TrialResult.metrics`.
+    """
+
+    label: str
+    condition: str
+    new: tuple[TrialResult, ...]
+    reference: tuple[TrialResult, ...]
+    metrics: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class DriftRow:
+    """One metric of one condition; p is two-sided and None where nothing was tested, p_holm is Holm-adjusted."""
+
+    label: str
+    metric: str
+    n_new: int
+    n_ref: int
+    status: DriftStatus
+    p: float | None = None
+    p_holm: float | None = None
+    detail: str = ""
+
+    @property
+    def drifted(self) -> bool:
+        """Whether the suite-wide test found a drift."""
+        return self.status == "drift"
+
+
+@dataclass(frozen=True)
+class DriftReport:
+    """One row per condition and metric, judged together at `alpha`."""
+
+    rows: tuple[DriftRow, ...]
+    alpha: float
+
+    @property
+    def drifted(self) -> bool:
+        """Whether any row drifted."""
+        return any(row.drifted for row in self.rows)
+
+    @property
+    def unchecked(self) -> tuple[DriftRow, ...]:
+        """Rows that say nothing either way, and so are no pass."""
+        return tuple(row for row in self.rows if row.status not in ("no drift", "drift"))
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the report as strict JSON."""
+        plain: dict[str, Any] = as_plain(self)
+        return plain
+
+
+@dataclass(frozen=True)
+class _Tested:
+    """A row whose rank test has run; waits for the correction over the suite."""
+
+    label: str
+    metric: str
+    n_new: int
+    n_ref: int
+    p: float
+
+
+def check_drift(cases: Sequence[DriftCase], alpha: float = ALPHA) -> DriftReport:
+    """Test every metric of every case: exact two-sided rank test, Holm over all rows that could be tested.
+
+    A failed trial ranks below all others on either side. New trials whose seeds are among the references repeat them
+    where the code is unchanged; such ties only make the test more cautious.
+
+    Args:
+        cases: conditions to check.
+        alpha: familywise error of the whole report.
+    """
+    entries = [_test(case, metric) for case in cases for metric in case.metrics]
+    tested = [entry for entry in entries if isinstance(entry, _Tested)]
+    adjusted = iter(holm([entry.p for entry in tested]))
+    rows = [
+        _corrected(entry, next(adjusted), len(tested), alpha) if isinstance(entry, _Tested) else entry
+        for entry in entries
+    ]
+    return DriftReport(tuple(rows), alpha)
+
+
+def _test(case: DriftCase, metric: str) -> _Tested | DriftRow:
+    """Run the rank test of one metric, or say in a row why it cannot run."""
+    new = [trial for trial in case.new if trial.condition == case.condition]
+    reference = [trial for trial in case.reference if trial.condition == case.condition]
+
+    def row(status: DriftStatus, detail: str) -> DriftRow:
+        return DriftRow(case.label, metric, len(new), len(reference), status, detail=detail)
+
+    if not new:
+        return row("not run", "no new trial of this condition")
+    if len(reference) < MIN_REFERENCES:
+        others = len(case.reference) - len(reference)
+        return row(
+            "no reference",
+            f"{len(reference)} reference trials of this condition, {MIN_REFERENCES} needed"
+            + (f" ({others} of another fingerprint left out)" if others else ""),
+        )
+    crashed = [trial.seed for trial in (*new, *reference) if trial.status == "crashed"]
+    if crashed:
+        return row("error", f"trials crashed: seeds {', '.join(map(str, crashed))}")
+    if any(trial.status == "done" and metric not in trial.metrics for trial in (*new, *reference)):
+        return row("error", f"a finished trial has no metric {metric!r}")
+    try:
+        values, stored = (
+            [read_number(trial, f"{case.label}: {metric}", lambda t: t.metrics[metric], -math.inf) for trial in side]
+            for side in (new, reference)
+        )
+    except UnreadableTrialError as error:
+        return row("error", str(error))
+    p = min(1.0, 2 * min(rank_test(values, stored).p, rank_test(stored, values).p))
+    return _Tested(case.label, metric, len(new), len(reference), p)
+
+
+def _corrected(entry: _Tested, p_holm: float, tests: int, alpha: float) -> DriftRow:
+    """Turn a tested row into its status, given its adjusted p."""
+    smallest = 2 * rank_attainable(entry.n_new, entry.n_ref) * tests
+    status: DriftStatus = "drift" if p_holm <= alpha else "underpowered" if smallest > alpha else "no drift"
+    detail = (
+        f"the smallest p that {entry.n_new} against {entry.n_ref} trials allow is {smallest:.3g} "
+        f"after correction for {tests} tests"
+        if status == "underpowered"
+        else ""
+    )
+    return DriftRow(entry.label, entry.metric, entry.n_new, entry.n_ref, status, entry.p, p_holm, detail)

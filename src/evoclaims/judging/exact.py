@@ -1,0 +1,136 @@
+"""The two exact primitives that decide claims: the rank test and the binomial test. Float64 on the host."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from itertools import groupby
+from typing import Literal, get_args
+
+from scipy.stats import binomtest
+
+from evoclaims.judging.counting import digit_width, unpack, upper_tails
+
+Alternative = Literal["greater", "less"]
+
+
+@dataclass(frozen=True)
+class ExactTest:
+    """A one-sided exact test.
+
+    Attributes:
+        p: probability under the null of a result at least this extreme.
+        attainable_p: the smallest p that the sample sizes (and, where the null conditions on them, the ties) allow.
+    """
+
+    p: float
+    attainable_p: float
+
+
+def rank_test(a: Sequence[float], b: Sequence[float]) -> ExactTest:
+    """Test whether A lies above B: the one-sided exact permutation Mann-Whitney test on mid-ranks.
+
+    The null, that A is stochastically no larger than B, makes every split of the pooled values equally likely; the
+    splits are counted, ties included, by dynamic programming over the doubled U statistic (the doubled mid-rank sum
+    less a constant), never approximated. `attainable_p` is the p of the most extreme split of the pooled values.
+
+    Args:
+        a: values of A, shape [n]; infinities rank as such.
+        b: values of B, shape [m].
+
+    Raises:
+        ValueError: when a side is empty or a value is NaN, which has no rank.
+    """
+    if not len(a) or not len(b):
+        raise ValueError("A rank test needs at least one value on each side.")
+    if any(math.isnan(value) for value in (*a, *b)):
+        raise ValueError("A rank test cannot rank NaN.")
+    pooled = sorted([(float(value), 1) for value in a] + [(float(value), 0) for value in b])
+    ties: list[int] = []
+    doubled_u = b_below = 0
+    for _, group in groupby(pooled, key=lambda entry: entry[0]):
+        sides = [side for _, side in group]
+        from_a = sum(sides)
+        from_b = len(sides) - from_a
+        doubled_u += from_a * (2 * b_below + from_b)
+        b_below += from_b
+        ties.append(len(sides))
+    tails = _doubled_u_tails(len(a), tuple(ties))
+    return ExactTest(p=tails[doubled_u], attainable_p=tails[-1])
+
+
+@lru_cache(maxsize=512)
+def _doubled_u_tails(n: int, ties: tuple[int, ...]) -> tuple[float, ...]:
+    """Return P(2U >= u) for u = 0 .. the largest attainable 2U.
+
+    Args:
+        n: values of A; the others are B's.
+        ties: sizes of the groups of equal pooled values, in rising order of the value.
+    """
+    m = sum(ties) - n
+    width = digit_width(math.comb(n + m, n))
+    # ways[i] packs, digit u, the number of ways to hand i of the values so far to A with 2U = u.
+    ways = {0: 1}
+    below = 0
+    for size in ties:
+        grown: dict[int, int] = {}
+        for i, packed in ways.items():
+            b_below = below - i
+            for j in range(max(0, size - (m - b_below)), min(size, n - i) + 1):
+                shift = width * j * (2 * b_below + size - j)
+                grown[i + j] = grown.get(i + j, 0) + ((packed * math.comb(size, j)) << shift)
+        ways = grown
+        below += size
+    counts = unpack(ways[n], width, 2 * n * m + 1)
+    while not counts[-1]:
+        counts.pop()
+    return upper_tails(counts)
+
+
+def rank_attainable(n: int, m: int) -> float:
+    """Return the smallest one-sided p of the rank test for `n` against `m` values without ties: 1 / C(n + m, n)."""
+    return 1 / math.comb(n + m, n)
+
+
+@lru_cache(maxsize=4096)
+def binomial_test(k: int, n: int, p0: float, alternative: Alternative = "greater") -> ExactTest:
+    """Test a probability of success by the exact binomial test.
+
+    Args:
+        k: successes.
+        n: trials, at least 1.
+        p0: the null's probability, strictly between 0 and 1.
+        alternative: "greater" tests P(success) > p0, "less" tests P(success) < p0.
+
+    Raises:
+        ValueError: for another alternative, or numbers outside their ranges.
+    """
+    if alternative not in get_args(Alternative):
+        raise ValueError(f"No alternative {alternative!r}; known: {', '.join(get_args(Alternative))}.")
+    if not 0 < p0 < 1:
+        raise ValueError(f"The null's probability lies strictly between 0 and 1, unlike {p0}.")
+    extreme = n if alternative == "greater" else 0
+    return ExactTest(
+        p=float(binomtest(k, n, p0, alternative).pvalue),
+        attainable_p=float(binomtest(extreme, n, p0, alternative).pvalue),
+    )
+
+
+def sign_test(k: int, n: int) -> ExactTest:
+    """Test whether a median lies on the side where `k` of `n` trials lie (the closed side counts its edge).
+
+    If the median lay strictly beyond the edge, at most half of all trials would fall on the side: so the test is
+    binomial with p0 = 1/2.
+    """
+    return binomial_test(k, n, 0.5, "greater")
+
+
+def clopper_pearson(k: int, n: int, alpha: float = 0.05) -> tuple[float, float]:
+    """Return the exact interval of a proportion, each end a one-sided bound at `alpha`.
+
+    So 10 of 10 at 0.05 gives (0.741, 1.0): the level of the whole interval is 1 - 2 alpha.
+    """
+    interval = binomtest(k, n).proportion_ci(confidence_level=1 - 2 * alpha, method="exact")
+    return float(interval.low), float(interval.high)

@@ -1,0 +1,30 @@
+"""The hash of everything that is fixed before the trials: goalposts do not move silently."""
+
+from __future__ import annotations
+
+from evoclaims.core.canonical import content_hash
+from evoclaims.judging.assertion import Assertion
+from evoclaims.judging.protocol import Protocol
+
+JUDGING_REVISION = 1
+"""Raised when a kind's tests change, so that old verdicts are not taken for new ones."""
+
+
+def fingerprint(assertion: Assertion, protocol: Protocol, *, claim: str = "", tier: str = "") -> str:
+    """Return the fingerprint of a claim, 64 hexadecimal digits.
+
+    Args:
+        assertion: its kind, measures and margins, with the ids of its conditions.
+        protocol: looks with their alpha, margins, p0 and seeds.
+        claim: the claim's id, such as "G1".
+        tier: "smoke" or "full".
+    """
+    return content_hash(
+        {
+            "judging": JUDGING_REVISION,
+            "claim": claim,
+            "tier": tier,
+            "assertion": assertion.plain(),
+            "protocol": protocol,
+        }
+    )

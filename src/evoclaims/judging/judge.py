@@ -1,0 +1,183 @@
+"""The judge: looks at the trials as the protocol says, attainability first, and ends with exactly one outcome."""
+
+from __future__ import annotations
+
+from bisect import bisect_left
+
+from evoclaims.judging.assertion import Assertion, Finding
+from evoclaims.judging.counting import MAX_TRIALS
+from evoclaims.judging.fingerprint import fingerprint
+from evoclaims.judging.protocol import Look, Protocol
+from evoclaims.judging.sample import Source, Trials, UnreadableTrialError
+from evoclaims.judging.verdict import Outcome, PValues, Verdict
+from evoclaims.trials.result import TrialResult
+
+
+def judge(assertion: Assertion, protocol: Protocol, *, claim: str = "", tier: str = "") -> Verdict:
+    """Judge an assertion.
+
+    At each look the smallest attainable p comes first: where neither direction can be decided, no trial is fetched.
+    The first decisive look ends it, and so does a look after which no outcome of the remaining trials could change
+    the verdict (curtailment).
+
+    Args:
+        assertion: what is claimed.
+        protocol: looks, margins and seeds, fixed beforehand.
+        claim: the claim's id, for the fingerprint.
+        tier: the claim's tier, for the fingerprint.
+
+    Raises:
+        Exception: whatever a source raises when it is asked for trials.
+    """
+    mark = fingerprint(assertion, protocol, claim=claim, tier=tier)
+    looks = assertion.looks(protocol)
+    verdict = _underpowered(assertion, protocol, mark)
+    for index, look in enumerate(looks):
+        if not _decidable(assertion.attainable(look.n, protocol), look.alpha):
+            continue
+        trials = {source.fingerprint: _fetch(source, protocol.seeds(look.n)) for source in assertion.sources()}
+        crashed = _crashed(assertion, trials)
+        if crashed:
+            return Verdict(Outcome.ERROR, crashed, assertion.describe(), mark, n=look.n)
+        try:
+            finding = assertion.find(trials, protocol, look.alpha)
+        except UnreadableTrialError as error:
+            return Verdict(Outcome.ERROR, str(error), assertion.describe(), mark, n=look.n)
+        outcome = finding.p.outcome(look.alpha)
+        reason = _reason(finding, look, assertion, protocol)
+        verdict = _verdict(outcome, reason, finding, look, assertion, mark)
+        if outcome is not Outcome.INCONCLUSIVE:
+            return verdict
+        settled = _settled(assertion, trials, looks[index + 1 :], protocol)
+        if settled is not None:
+            final, note = settled
+            return _verdict(final, f"{note}; {reason}", finding, look, assertion, mark)
+    return verdict
+
+
+def attainability(assertion: Assertion, protocol: Protocol) -> tuple[tuple[Look, PValues], ...]:
+    """Return the smallest p, for and against, that each look can give; needs no trial."""
+    return tuple((look, assertion.attainable(look.n, protocol)) for look in assertion.looks(protocol))
+
+
+def needed_trials(assertion: Assertion, protocol: Protocol) -> int | None:
+    """Return the fewest trials a side at which the last look could support the assertion; None if none can."""
+    alpha = protocol.last.alpha
+    # No kind's attainable p rises with n, so the sizes that suffice form the upper part of the range.
+    below = bisect_left(
+        range(1, MAX_TRIALS + 1), True, key=lambda n: assertion.attainable(n, protocol).supported <= alpha
+    )
+    return below + 1 if below < MAX_TRIALS else None
+
+
+def _decidable(attainable: PValues, alpha: float) -> bool:
+    """Whether at least one direction is available."""
+    return attainable.supported <= alpha or attainable.refuted <= alpha
+
+
+def _fetch(source: Source, seeds: tuple[int, ...]) -> tuple[TrialResult, ...]:
+    """Return the trials of `seeds` in their order, whatever order the source gives them in."""
+    by_seed = {trial.seed: trial for trial in source.fetch(seeds)}
+    if sorted(by_seed) != sorted(seeds):
+        raise ValueError(f"{source.label} returned the seeds {sorted(by_seed)} when asked for {list(seeds)}.")
+    return tuple(by_seed[seed] for seed in seeds)
+
+
+def _crashed(assertion: Assertion, trials: Trials) -> str:
+    """Return a sentence that names the crashed trials, or nothing."""
+    crashes = [
+        f"{source.label} (seed {trial.seed})"
+        for source in assertion.sources()
+        for trial in trials[source.fingerprint]
+        if trial.status == "crashed"
+    ]
+    return f"trials crashed: {', '.join(crashes)}" if crashes else ""
+
+
+def _settled(
+    assertion: Assertion, trials: Trials, later: tuple[Look, ...], protocol: Protocol
+) -> tuple[Outcome, str] | None:
+    """Return the verdict that every completion of the trials would reach, or None while it is open."""
+    for look in later:
+        low, high = assertion.bounds(trials, look.n, protocol)
+        for_open, against_open = low.supported <= look.alpha, low.refuted <= look.alpha
+        if high.supported <= look.alpha and not against_open:
+            return Outcome.SUPPORTED, _stopped(look)
+        if high.refuted <= look.alpha and not for_open:
+            return Outcome.REFUTED, _stopped(look)
+        if for_open or against_open:
+            return None
+    return (Outcome.INCONCLUSIVE, _stopped(later[-1])) if later else None
+
+
+def _stopped(look: Look) -> str:
+    """Return the note of a curtailed verdict."""
+    return f"stopped early: no outcome of the trials up to n = {look.n} could change the verdict"
+
+
+def _reason(finding: Finding, look: Look, assertion: Assertion, protocol: Protocol) -> str:
+    """Say why a look came out as it did."""
+    p, attainable, at = finding.p, finding.attainable, f"alpha = {look.alpha:g} at n = {look.n}"
+    outcome = p.outcome(look.alpha)
+    facts = "; ".join(entry.detail for entry in finding.evidence if entry.p is None)
+    if facts and all(entry.p is None for entry in finding.evidence):
+        return facts
+    if outcome is Outcome.SUPPORTED:
+        return f"p = {p.supported:.3g} <= {at}"
+    if outcome is Outcome.REFUTED:
+        return f"p = {p.refuted:.3g} against it <= {at}"
+    if p.supported <= look.alpha:
+        return f"the evidence contradicts itself: p = {p.supported:.3g} for and {p.refuted:.3g} against, {at}"
+    if not _decidable(attainable, look.alpha):
+        return f"underpowered: with these ties the smallest attainable p is {min(_both(attainable)):.3g} > {at}"
+    evidence = f"the evidence: p = {p.supported:.3g} for and {p.refuted:.3g} against, {at}"
+    if assertion.attainable(look.n, protocol).supported > look.alpha:
+        return f"{evidence}; underpowered for support: {_needs(assertion, protocol)}"
+    if attainable.supported > look.alpha:
+        return f"{evidence}; with these ties support is out of reach"
+    return evidence
+
+
+def _both(p: PValues) -> tuple[float, float]:
+    """Return both p values."""
+    return p.supported, p.refuted
+
+
+def _needs(assertion: Assertion, protocol: Protocol) -> str:
+    """Say how many trials support would take."""
+    needed = needed_trials(assertion, protocol)
+    if needed is None:
+        return f"no n up to {MAX_TRIALS} suffices at alpha = {protocol.last.alpha:g}"
+    return f"needs n = {needed} at alpha = {protocol.last.alpha:g}"
+
+
+def _underpowered(assertion: Assertion, protocol: Protocol, mark: str) -> Verdict:
+    """Return the verdict of a protocol none of whose looks can decide."""
+    look, attainable = attainability(assertion, protocol)[-1]
+    return Verdict(
+        outcome=Outcome.INCONCLUSIVE,
+        reason=f"underpowered: {_needs(assertion, protocol)}",
+        describe=assertion.describe(),
+        fingerprint=mark,
+        alpha=look.alpha,
+        attainable_p=attainable.supported,
+        attainable_p_refuted=attainable.refuted,
+    )
+
+
+def _verdict(outcome: Outcome, reason: str, finding: Finding, look: Look, assertion: Assertion, mark: str) -> Verdict:
+    """Fill in the numbers of a look; a fact (no part of which was tested) has no p."""
+    tested = any(entry.p is not None for entry in finding.evidence)
+    return Verdict(
+        outcome=outcome,
+        reason=reason,
+        describe=assertion.describe(),
+        fingerprint=mark,
+        n=look.n,
+        alpha=look.alpha,
+        p=finding.p.supported if tested else None,
+        attainable_p=finding.attainable.supported if tested else None,
+        p_refuted=finding.p.refuted if tested else None,
+        attainable_p_refuted=finding.attainable.refuted if tested else None,
+        evidence=finding.evidence,
+    )

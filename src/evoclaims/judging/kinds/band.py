@@ -1,0 +1,101 @@
+"""band(lo, hi): the median of a measure lies in a closed interval."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from evoclaims.core.errors import UserError
+from evoclaims.judging.assertion import Assertion, Finding
+from evoclaims.judging.effect import median_interval
+from evoclaims.judging.exact import sign_test
+from evoclaims.judging.protocol import Protocol
+from evoclaims.judging.sample import Source, Trials
+from evoclaims.judging.verdict import Evidence, Interval, PValues
+
+if TYPE_CHECKING:
+    from evoclaims.judging.measure import Measure
+
+
+@dataclass(frozen=True)
+class Band(Assertion):
+    """The median lies in [lo, hi], both ends finite (a failed trial, worst of all, must lie outside).
+
+    Supported when both one-sided sign tests reject (at n = 10 and alpha = 0.05: at least 9 trials >= lo and at least
+    9 <= hi). Refuted when a sign test puts the median below lo or above hi, each at alpha / 2.
+    """
+
+    measure: Measure
+    lo: float
+    hi: float
+    kind: ClassVar[str] = "band"
+
+    def __post_init__(self) -> None:
+        """Reject an empty or an open band."""
+        if not -math.inf < self.lo <= self.hi < math.inf:
+            raise UserError(
+                f"A band runs from a finite lower end to a finite higher one, unlike [{self.lo}, {self.hi}]: "
+                "state a one-sided bound as an event that stays()."
+            )
+
+    def describe(self) -> str:
+        """Return "the median of A lies in [lo, hi]"."""
+        return f"the median of {self.measure.describe()} lies in [{self.lo:g}, {self.hi:g}]"
+
+    def sources(self) -> tuple[Source, ...]:
+        """Return the condition."""
+        return (self.measure.source,)
+
+    def plain(self) -> dict[str, Any]:
+        """Return the kind, the measure and the ends."""
+        return {"kind": self.kind, "measure": self.measure.plain(), "lo": float(self.lo), "hi": float(self.hi)}
+
+    def attainable(self, n: int, protocol: Protocol) -> PValues:
+        """Return the p of all trials inside, and of all trials beyond one end."""
+        return PValues(_p(0, 0, n).supported, _p(n, 0, n).refuted)
+
+    def bounds(self, trials: Trials, n: int, protocol: Protocol) -> tuple[PValues, PValues]:
+        """Bound p by new trials that all lie inside, all below or all above."""
+        values = self.measure.sample(trials).values
+        below, above = self._outside(values)
+        new = n - len(values)
+        inside, lower, higher = _p(below, above, n), _p(below + new, above, n), _p(below, above + new, n)
+        return (
+            PValues(inside.supported, min(lower.refuted, higher.refuted)),
+            PValues(max(lower.supported, higher.supported), inside.refuted),
+        )
+
+    def find(self, trials: Trials, protocol: Protocol, alpha: float) -> Finding:
+        """Run the sign tests."""
+        sample = self.measure.sample(trials)
+        below, above = self._outside(sample.values)
+        n = len(sample.values)
+        p, attainable = _p(below, above, n), self.attainable(n, protocol)
+        evidence = Evidence(
+            kind=self.kind,
+            describe=self.describe(),
+            outcome=p.outcome(alpha),
+            samples=(sample,),
+            n=n,
+            alpha=alpha,
+            p=p.supported,
+            attainable_p=attainable.supported,
+            p_refuted=p.refuted,
+            attainable_p_refuted=attainable.refuted,
+            intervals=(Interval("median, 95% percentile bootstrap", *median_interval(sample.values)),),
+            detail=f"{below} below, {n - below - above} inside, {above} above",
+        )
+        return Finding(p, attainable, (evidence,))
+
+    def _outside(self, values: Sequence[float]) -> tuple[int, int]:
+        """Return how many values lie below and above the band."""
+        return sum(value < self.lo for value in values), sum(value > self.hi for value in values)
+
+
+def _p(below: int, above: int, n: int) -> PValues:
+    """Return the sign tests' p for a median inside (both must reject) and outside (either may, so doubled)."""
+    inside = max(sign_test(n - below, n).p, sign_test(n - above, n).p)
+    outside = min(sign_test(below, n).p, sign_test(above, n).p)
+    return PValues(inside, min(1.0, 2 * outside))

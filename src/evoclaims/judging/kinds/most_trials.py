@@ -1,0 +1,101 @@
+"""solves and stays: an event holds with a probability of at least p0."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from evoclaims.core.errors import UserError
+from evoclaims.judging.assertion import Assertion, Finding
+from evoclaims.judging.exact import binomial_test, clopper_pearson
+from evoclaims.judging.protocol import Protocol
+from evoclaims.judging.sample import Source, Trials
+from evoclaims.judging.verdict import Evidence, Interval, PValues
+
+if TYPE_CHECKING:
+    from evoclaims.judging.measure import Event
+
+
+@dataclass(frozen=True)
+class MostTrials(Assertion):
+    """The part that `Solves` and `Stays` share: P(event) is tested against p0 by the exact binomial test, both ways.
+
+    Attributes:
+        event: what must hold; it does not hold in a failed trial.
+        p0: overrides the protocol's p0 when it is not None.
+    """
+
+    event: Event
+    p0: float | None = None
+
+    def __post_init__(self) -> None:
+        """Reject a probability that no test can use."""
+        if self.p0 is not None and not 0 < self.p0 < 1:
+            raise UserError(f"p0 lies strictly between 0 and 1 (default 0.7), unlike {self.p0}.")
+
+    def describe(self) -> str:
+        """Return "E in most trials"."""
+        return f"{self.event.describe()} in most trials"
+
+    def sources(self) -> tuple[Source, ...]:
+        """Return the condition."""
+        return (self.event.source,)
+
+    def plain(self) -> dict[str, Any]:
+        """Return the kind, the event and the overriding p0."""
+        return {"kind": self.kind, "event": self.event.plain(), "p0": self.p0}
+
+    def attainable(self, n: int, protocol: Protocol) -> PValues:
+        """Return the p of n successes, and of none."""
+        return PValues(self._p(n, n, protocol).supported, self._p(0, n, protocol).refuted)
+
+    def bounds(self, trials: Trials, n: int, protocol: Protocol) -> tuple[PValues, PValues]:
+        """Bound p by new trials in which the event always, or never, holds."""
+        values = self.event.sample(trials).values
+        fewest = round(sum(values))
+        never, always = self._p(fewest, n, protocol), self._p(fewest + n - len(values), n, protocol)
+        return PValues(always.supported, never.refuted), PValues(never.supported, always.refuted)
+
+    def find(self, trials: Trials, protocol: Protocol, alpha: float) -> Finding:
+        """Run the binomial test both ways."""
+        sample = self.event.sample(trials)
+        n, k = len(sample.values), round(sum(sample.values))
+        p, attainable = self._p(k, n, protocol), self.attainable(n, protocol)
+        evidence = Evidence(
+            kind=self.kind,
+            describe=self.describe(),
+            outcome=p.outcome(alpha),
+            samples=(sample,),
+            n=n,
+            alpha=alpha,
+            p=p.supported,
+            attainable_p=attainable.supported,
+            p_refuted=p.refuted,
+            attainable_p_refuted=attainable.refuted,
+            intervals=(Interval("P(event), Clopper-Pearson, each end at 0.05", *clopper_pearson(k, n)),),
+            detail=f"holds in {k} of {n} trials, against p0 = {self._null(protocol):g}",
+        )
+        return Finding(p, attainable, (evidence,))
+
+    def _null(self, protocol: Protocol) -> float:
+        """Return the p0 in force."""
+        return protocol.p0 if self.p0 is None else self.p0
+
+    def _p(self, k: int, n: int, protocol: Protocol) -> PValues:
+        """Return the binomial p of `k` successes in `n`, for and against."""
+        p0 = self._null(protocol)
+        return PValues(binomial_test(k, n, p0, "greater").p, binomial_test(k, n, p0, "less").p)
+
+
+@dataclass(frozen=True)
+class Solves(MostTrials):
+    """A feat that most trials achieve."""
+
+    kind: ClassVar[str] = "solves"
+
+
+@dataclass(frozen=True)
+class Stays(MostTrials):
+    """A bound that most trials keep."""
+
+    kind: ClassVar[str] = "stays"

@@ -1,0 +1,99 @@
+"""self-comparison: a control that compares a condition with itself, to see that the judge does not cry wolf."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import combinations
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
+
+from evoclaims.judging.assertion import Assertion, Finding
+from evoclaims.judging.exact import binomial_test, rank_attainable
+from evoclaims.judging.kinds.greater import compare
+from evoclaims.judging.protocol import Look, Protocol
+from evoclaims.judging.sample import Source, Trials
+from evoclaims.judging.verdict import Evidence, Outcome, PValues
+
+if TYPE_CHECKING:
+    from evoclaims.judging.measure import Measure
+
+MOST_SPLITS = math.comb(10, 5)
+SPLIT_SEED = 20250714
+"""Fixed, so that the same trials always meet the same splits."""
+
+
+@dataclass(frozen=True)
+class SelfComparison(Assertion):
+    """The measure is never above itself: splits of its trials into two halves go through the judge of `greater`.
+
+    All splits of up to ten trials are judged, a fixed sample of splits beyond. Supported when the share that comes
+    out supported is at most alpha; where the splits are only a sample, refuted when an exact binomial test at alpha
+    says that the share of all splits exceeds alpha.
+    """
+
+    measure: Measure
+    kind: ClassVar[str] = "self-comparison"
+
+    def describe(self) -> str:
+        """Return "A is never judged above itself"."""
+        return f"{self.measure.describe()} is never judged above itself"
+
+    def sources(self) -> tuple[Source, ...]:
+        """Return the condition."""
+        return (self.measure.source,)
+
+    def plain(self) -> dict[str, Any]:
+        """Return the kind and the measure."""
+        return {"kind": self.kind, "measure": self.measure.plain()}
+
+    def looks(self, protocol: Protocol) -> tuple[Look, ...]:
+        """Return the last look alone: the control has no trial to save."""
+        return (protocol.last,)
+
+    def attainable(self, n: int, protocol: Protocol) -> PValues:
+        """Return the smallest p of one split, for both: a control whose splits cannot come out supported is empty."""
+        smallest = rank_attainable(n // 2, n - n // 2) if n > 1 else 1.0
+        return PValues(smallest, smallest)
+
+    def find(self, trials: Trials, protocol: Protocol, alpha: float) -> Finding:
+        """Judge the splits and compare the share of supported ones with alpha."""
+        sample = self.measure.sample(trials)
+        n = len(sample.values)
+        judged = above = 0
+        for half in _halves(n):
+            chosen = set(half)
+            rest = [value for index, value in enumerate(sample.values) if index not in chosen]
+            comparison = compare([sample.values[index] for index in half], rest, protocol.a12_margin)
+            above += comparison.p.outcome(alpha) is Outcome.SUPPORTED
+            judged += 1
+        excessive = above / judged > alpha
+        if math.comb(n, n // 2) > MOST_SPLITS:
+            excessive = binomial_test(above, judged, alpha, "greater").p <= alpha
+        p = PValues(1.0, 0.0) if excessive else PValues(0.0, 1.0)
+        evidence = Evidence(
+            kind=self.kind,
+            describe=self.describe(),
+            outcome=p.outcome(alpha),
+            samples=(sample,),
+            n=n,
+            alpha=alpha,
+            p=None,
+            attainable_p=None,
+            p_refuted=None,
+            attainable_p_refuted=None,
+            detail=f"{above} of {judged} splits into halves came out supported (share {above / judged:.3g})",
+        )
+        return Finding(p, PValues(0.0, 0.0), (evidence,))
+
+
+def _halves(n: int) -> Iterator[tuple[int, ...]]:
+    """Yield the indices of one half of each split."""
+    if math.comb(n, n // 2) <= MOST_SPLITS:
+        yield from combinations(range(n), n // 2)
+        return
+    rng = np.random.default_rng(SPLIT_SEED)
+    for _ in range(MOST_SPLITS):
+        yield tuple(int(index) for index in rng.permutation(n)[: n // 2])

@@ -1,0 +1,85 @@
+"""trend: a profile falls (or rises) with the level."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from evoclaims.core.errors import UnknownNameError
+from evoclaims.judging.assertion import Assertion, Finding
+from evoclaims.judging.kendall import Direction, trend_attainable, trend_test
+from evoclaims.judging.protocol import Protocol
+from evoclaims.judging.sample import Source, Trials
+from evoclaims.judging.verdict import Evidence, PValues
+
+if TYPE_CHECKING:
+    from evoclaims.judging.measure import Profile
+
+_OPPOSITE: dict[Direction, Direction] = {"falls": "rises", "rises": "falls"}
+
+
+@dataclass(frozen=True)
+class Trend(Assertion):
+    """The profile falls, or rises, with the level: exact permutation test of the rank correlation within trials.
+
+    Refuted by the same test the other way.
+    """
+
+    profile: Profile
+    direction: Direction
+    kind: ClassVar[str] = "trend"
+
+    def __post_init__(self) -> None:
+        """Reject an unknown direction."""
+        if self.direction not in _OPPOSITE:
+            raise UnknownNameError("direction", self.direction, _OPPOSITE)
+
+    def describe(self) -> str:
+        """Return "P falls with the level"."""
+        return f"{self.profile.describe()} {self.direction} with the level"
+
+    def sources(self) -> tuple[Source, ...]:
+        """Return the condition."""
+        return (self.profile.source,)
+
+    def plain(self) -> dict[str, Any]:
+        """Return the kind, the profile and the direction."""
+        return {"kind": self.kind, "profile": self.profile.plain(), "direction": self.direction}
+
+    def attainable(self, n: int, protocol: Protocol) -> PValues:
+        """Return the p of a strict trend in every trial, either way."""
+        strict = trend_attainable(n, self.profile.size)
+        return PValues(strict, strict)
+
+    def bounds(self, trials: Trials, n: int, protocol: Protocol) -> tuple[PValues, PValues]:
+        """Bound p from below by new trials that follow the trend strictly.
+
+        Among new rows a strict one makes the most inversions, and ties would only remove chance inversions from the
+        null: so no other row lowers p further.
+        """
+        rows = self.profile.rows(trials)
+        falling = tuple(float(-level) for level in range(self.profile.size))
+        rising = tuple(reversed(falling))
+        new = n - len(rows)
+        fall = trend_test(rows + (falling,) * new, "falls").p
+        rise = trend_test(rows + (rising,) * new, "rises").p
+        return PValues(*((fall, rise) if self.direction == "falls" else (rise, fall))), PValues(1.0, 1.0)
+
+    def find(self, trials: Trials, protocol: Protocol, alpha: float) -> Finding:
+        """Run the trend test both ways."""
+        rows = self.profile.rows(trials)
+        test, reverse = trend_test(rows, self.direction), trend_test(rows, _OPPOSITE[self.direction])
+        p, attainable = PValues(test.p, reverse.p), PValues(test.attainable_p, reverse.attainable_p)
+        evidence = Evidence(
+            kind=self.kind,
+            describe=self.describe(),
+            outcome=p.outcome(alpha),
+            samples=self.profile.samples(trials),
+            n=len(rows),
+            alpha=alpha,
+            p=p.supported,
+            attainable_p=attainable.supported,
+            p_refuted=p.refuted,
+            attainable_p_refuted=attainable.refuted,
+        )
+        return Finding(p, attainable, (evidence,))

@@ -1,0 +1,120 @@
+"""Where numbers come from: a source of trials, and what is read from each trial."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Protocol
+
+from evoclaims.judging.effect import median
+from evoclaims.trials.result import TrialResult
+
+
+class Source(Protocol):
+    """A condition whose trials can be asked for by seed.
+
+    Attributes:
+        label: a short name, such as "cma_es on n_parity".
+        fingerprint: id of the condition: equal fingerprints mean the same trials.
+    """
+
+    @property
+    def label(self) -> str:
+        """A short name for tables and sentences."""
+
+    @property
+    def fingerprint(self) -> str:
+        """Id of the condition."""
+
+    def fetch(self, seeds: Sequence[int]) -> Sequence[TrialResult]:
+        """Return one trial per seed, in any order; runs what is missing, or raises where nothing may run."""
+
+
+Trials = Mapping[str, tuple[TrialResult, ...]]
+"""Fetched trials by the fingerprint of their source, in the order of their seeds."""
+
+
+class UnreadableTrialError(Exception):
+    """A finished trial whose number cannot be judged; its claim ends as an error, never as a zero."""
+
+
+@dataclass(frozen=True)
+class Sample:
+    """What was read from every trial of one condition, for the record.
+
+    Attributes:
+        label: what was measured, such as "cma_es on n_parity: mean success".
+        seeds: shape [n].
+        values: one number a trial, shape [n]; an event that held is 1.0. A failed trial has the worst value.
+        median: median of `values`.
+        failed: seeds of the diverged or timed-out trials.
+    """
+
+    label: str
+    seeds: tuple[int, ...]
+    values: tuple[float, ...]
+    median: float
+    failed: tuple[int, ...]
+
+
+def is_failed(trial: TrialResult) -> bool:
+    """Whether the trial ended without a result of its own (diverged or timed out)."""
+    return trial.status != "done"
+
+
+class _Numbers(Mapping[str, Any]):
+    """A trial's numbers by name; meeting NaN is an error, since any comparison with it is silently false."""
+
+    def __init__(self, numbers: Mapping[str, Any], where: str) -> None:
+        self._numbers = numbers
+        self._where = where
+
+    def __getitem__(self, name: str) -> Any:
+        value = self._numbers[name]
+        if any(math.isnan(number) for number in (value if isinstance(value, list | tuple) else (value,))):
+            raise UnreadableTrialError(f"{name!r} is NaN in {self._where}.")
+        return value
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._numbers)
+
+    def __len__(self) -> int:
+        return len(self._numbers)
+
+
+def checked(trial: TrialResult) -> TrialResult:
+    """Return the trial with metrics and levels that raise `UnreadableTrialError` where NaN is read."""
+    where = f"the finished trial of seed {trial.seed} (id {trial.id[:12]})"
+    return replace(trial, metrics=_Numbers(trial.metrics, where), levels=_Numbers(trial.levels, where))
+
+
+def read_number(trial: TrialResult, what: str, read: Callable[[TrialResult], float], worst: float) -> float:
+    """Return what `read` finds in a finished trial, or `worst` for a failed one.
+
+    Raises:
+        UnreadableTrialError: when a finished trial holds NaN.
+    """
+    return worst if is_failed(trial) else ranked(float(read(checked(trial))), trial, what)
+
+
+def ranked(value: float, trial: TrialResult, what: str) -> float:
+    """Return `value` if it has a rank.
+
+    Raises:
+        UnreadableTrialError: when it is NaN.
+    """
+    if math.isnan(value):
+        raise UnreadableTrialError(f"{what} is NaN in the finished trial of seed {trial.seed} (id {trial.id[:12]}).")
+    return value
+
+
+def sample(label: str, trials: Sequence[TrialResult], values: Sequence[float]) -> Sample:
+    """Return the record of `values`, one for each of `trials`."""
+    return Sample(
+        label=label,
+        seeds=tuple(trial.seed for trial in trials),
+        values=tuple(float(value) for value in values),
+        median=median(values),
+        failed=tuple(trial.seed for trial in trials if is_failed(trial)),
+    )

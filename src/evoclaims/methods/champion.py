@@ -1,0 +1,77 @@
+"""Evaluating populations of flat parameter vectors, and remembering the best one seen."""
+
+from __future__ import annotations
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Bool, Float, Int, PRNGKeyArray
+
+from evoclaims.core.pytree import pytree, select
+from evoclaims.envs.base import Episode, PolicyFn, Task
+from evoclaims.methods.base import Policy
+from evoclaims.networks.base import Network
+
+
+@pytree
+class Champion:
+    """The best individual seen, judged on the current level.
+
+    Attributes:
+        parameters: its flat vector.
+        episode: how it did when it was last evaluated.
+    """
+
+    parameters: Float[Array, " parameters"]
+    episode: Episode
+
+
+def policy_of(network: Network, task: Task, parameters: Float[Array, " parameters"]) -> PolicyFn:
+    """Bind parameters to a network of the task's sizes."""
+    return lambda observation: network.apply(parameters, observation, task.action_size)
+
+
+def evaluate(
+    network: Network, task: Task, key: PRNGKeyArray, level: Int[Array, ""], population: Float[Array, "n parameters"]
+) -> Episode:
+    """Run one training episode per individual; the leaves of the result have shape [n]."""
+    keys = jax.random.split(key, population.shape[0])
+    return jax.vmap(lambda p, k: task.episode(policy_of(network, task, p), k, level))(population, keys)
+
+
+def first_champion(parameters: Float[Array, " parameters"]) -> Champion:
+    """Return a champion that any evaluated individual beats."""
+    return Champion(
+        parameters=parameters, episode=Episode(fitness=jnp.array(-jnp.inf), success=jnp.zeros((), jnp.float32))
+    )
+
+
+def evaluate_with_champion(
+    network: Network,
+    task: Task,
+    key: PRNGKeyArray,
+    level: Int[Array, ""],
+    population: Float[Array, "n parameters"],
+    champion: Champion,
+) -> tuple[Episode, Champion, Bool[Array, ""]]:
+    """Evaluate a population and its champion together, and let the best of them be champion.
+
+    The old champion is evaluated anew, because the level may have moved since. A tie goes to the newcomer.
+
+    Returns:
+        The population's episodes (leaves [n]), the new champion, and whether all fitnesses are finite.
+    """
+    everyone = jnp.concatenate([population, champion.parameters[None]])
+    episodes = evaluate(network, task, key, level, everyone)
+    winner = jnp.argmax(episodes.fitness)
+    best = Champion(parameters=everyone[winner], episode=jax.tree.map(lambda x: x[winner], episodes))
+    healthy = jnp.all(jnp.isfinite(episodes.fitness)) & jnp.all(jnp.isfinite(population))
+    kept = select(healthy, best, champion)
+    return jax.tree.map(lambda x: x[:-1], episodes), kept, healthy
+
+
+def champion_policy(network: Network, task: Task, champion: Champion) -> Policy:
+    """Return the champion as a policy."""
+    return Policy(
+        parameters=champion.parameters,
+        function=lambda parameters, observation: network.apply(parameters, observation, task.action_size),
+    )

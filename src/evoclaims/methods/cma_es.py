@@ -1,0 +1,100 @@
+"""CMA-ES (Hansen 2016, arXiv:1604.00772) by evosax, over the parameters of a fixed network."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import jax
+import jax.numpy as jnp
+from evosax.algorithms.distribution_based.cma_es import CMA_ES
+from jaxtyping import Array, Float, Int, PRNGKeyArray
+
+from evoclaims.core.keys import streams
+from evoclaims.core.pytree import pytree, strong
+from evoclaims.envs.base import Task
+from evoclaims.methods.base import Policy, Progress
+from evoclaims.methods.champion import Champion, champion_policy, evaluate_with_champion, first_champion
+from evoclaims.networks.all_skips import AllSkips
+from evoclaims.networks.base import Network
+
+
+@pytree
+class CmaEsState:
+    """The search distribution (evosax's own state) and the best individual seen."""
+
+    distribution: Any
+    champion: Champion
+
+
+def ordinal_weights(
+    population: Float[Array, "n parameters"], fitness: Float[Array, " n"], state: Any, params: Any
+) -> Float[Array, " n"]:
+    """Give the i-th best individual the i-th recombination weight, ties in order of index.
+
+    evosax's default averages the ranks of ties; on a thresholded fitness most of a population ties, the averaged weights
+    cancel, and the step size collapses. Individuals are drawn independently, so breaking ties by index is
+    breaking them at random.
+    """
+    return params.weights[jnp.argsort(jnp.argsort(fitness, stable=True), stable=True)]
+
+
+@dataclass(frozen=True)
+class CmaEs:
+    """evosax's CMA-ES with its default parameters and ordinal recombination weights.
+
+    Attributes:
+        population: individuals per generation (λ).
+        network: the encoding.
+    """
+
+    name: ClassVar[str] = "cma_es"
+    revision: ClassVar[int] = 1
+
+    population: int = 256
+    network: Network = AllSkips()
+
+    def init(self, key: PRNGKeyArray, task: Task) -> CmaEsState:
+        """Start from N(0, 1), evosax's default; the key is not used."""
+        search, params = self._search(task)
+        mean = jnp.zeros(self.network.size(task.observation_size, task.action_size))
+        return CmaEsState(distribution=strong(search.init(key, mean, params)), champion=first_champion(mean))
+
+    def step(
+        self, key: PRNGKeyArray, task: Task, level: Int[Array, ""], state: CmaEsState
+    ) -> tuple[CmaEsState, Progress]:
+        """Sample, evaluate and update for one generation."""
+        ask_key, episode_key, tell_key = streams(key, "ask", "episode", "tell")
+        search, params = self._search(task)
+        population, distribution = search.ask(ask_key, state.distribution, params)
+        episodes, champion, healthy = evaluate_with_champion(
+            self.network, task, episode_key, level, population, state.champion
+        )
+        # evosax minimizes.
+        distribution, _ = search.tell(tell_key, population, -episodes.fitness, distribution, params)
+        progress = Progress(
+            fitness=champion.episode.fitness,
+            success=champion.episode.success,
+            healthy=healthy & jnp.all(jnp.isfinite(distribution.mean)),
+            metrics={"step_size": distribution.std},
+        )
+        return CmaEsState(distribution=strong(distribution), champion=champion), progress
+
+    def best(self, task: Task, state: CmaEsState) -> Policy:
+        """Return the champion."""
+        return champion_policy(self.network, task, state.champion)
+
+    def cost(self, task: Task) -> int:
+        """Return the environment steps of one generation, at the longest episode."""
+        return self.population * task.horizon
+
+    def _search(self, task: Task) -> tuple[CMA_ES, Any]:
+        """Build evosax's algorithm and its default parameters for the task's encoding."""
+        size = self.network.size(task.observation_size, task.action_size)
+        search = CMA_ES(self.population, jnp.zeros(size), fitness_shaping_fn=ordinal_weights, metrics_fn=_no_metrics)
+        return search, search.default_params
+
+
+def _no_metrics(*_: Any) -> dict[str, jax.Array]:
+    """Compute none of evosax's metrics."""
+    return {}

@@ -1,0 +1,86 @@
+"""Collecting experience: parallel environments that restart by themselves, in Brax's `Transition` layout."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+from brax.training.types import Transition
+from jaxtyping import Array, Int, PRNGKeyArray
+
+from evoclaims.core.keys import streams
+from evoclaims.core.pytree import pytree, select
+from evoclaims.envs.base import Task, TaskState
+
+Act = Callable[[Array, Array], tuple[Array, Any]]
+"""A stochastic policy, as Brax's `make_inference_fn` gives it: (observations, key) -> (actions, extras)."""
+
+
+@pytree
+class Interaction:
+    """Parallel episodes under way.
+
+    Attributes:
+        states: leaves have a leading axis [environments].
+        level: the level they were started at.
+    """
+
+    states: TaskState
+    level: Int[Array, ""]
+
+    @staticmethod
+    def start(task: Task, key: PRNGKeyArray, level: Int[Array, ""], environments: int) -> Interaction:
+        """Start `environments` episodes at `level`."""
+        keys = jax.random.split(key, environments)
+        return Interaction(
+            states=jax.vmap(task.reset, in_axes=(0, None))(keys, level),
+            level=level,
+        )
+
+    def at_level(self, task: Task, key: PRNGKeyArray, level: Int[Array, ""]) -> Interaction:
+        """Return the same episodes, or fresh ones when the level has moved."""
+        fresh = Interaction.start(task, key, level, self.states.reward.shape[0])
+        return select(level != self.level, fresh, self)
+
+
+def collect(
+    task: Task, act: Act, key: PRNGKeyArray, interaction: Interaction, rounds: int, unroll_length: int
+) -> tuple[Interaction, Transition]:
+    """Act for `rounds` × `unroll_length` steps in every environment.
+
+    Returns:
+        The episodes as they stand, and transitions whose leaves have shape [rounds × environments, unroll_length, …]:
+        one trajectory a row, as Brax's loss wants them.
+    """
+
+    def one_step(interaction: Interaction, key: Array) -> tuple[Interaction, Transition]:
+        act_key, reset_key = streams(key, "act", "reset")
+        states = interaction.states
+        action, extras = act(states.observation, act_key)
+        reached = jax.vmap(task.step)(states, action)
+        transition = Transition(
+            observation=states.observation,
+            action=action,
+            reward=reached.reward,
+            discount=1.0 - reached.terminated.astype(jnp.float32),
+            next_observation=reached.observation,
+            extras={
+                "policy_extras": extras,
+                "state_extras": {"truncation": reached.truncated.astype(jnp.float32)},
+            },
+        )
+        fresh = Interaction.start(task, reset_key, interaction.level, interaction.states.reward.shape[0])
+        ended = reached.terminated | reached.truncated
+        states = jax.vmap(select)(ended, fresh.states, reached)
+        return Interaction(states=states, level=interaction.level), transition
+
+    keys = jax.random.split(key, rounds * unroll_length)
+    interaction, data = jax.lax.scan(one_step, interaction, keys)
+
+    def by_trajectory(leaf: Array) -> Array:
+        timed = leaf.reshape(rounds, unroll_length, *leaf.shape[1:])
+        return jnp.swapaxes(timed, 1, 2).reshape(-1, unroll_length, *leaf.shape[2:])
+
+    return interaction, jax.tree.map(by_trajectory, data)

@@ -1,0 +1,233 @@
+"""PPO (Schulman et al. 2017, arXiv:1707.06347): Brax's networks, loss and running statistics in a loop of our own.
+
+Brax's `ppo.train` drives the device from the host and trains one agent; here one training step is a pure function, so
+that the engine can run many trials in one program and move the curriculum's level on the device.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import partial
+from typing import Any, ClassVar
+
+import jax
+import jax.numpy as jnp
+import optax
+from brax.training.acme import running_statistics, specs
+from brax.training.agents.ppo import losses, networks
+from jaxtyping import Array, Float, Int, PRNGKeyArray
+
+from evoclaims.core.errors import UserError
+from evoclaims.core.keys import stream, streams
+from evoclaims.core.pytree import pytree, select, strong
+from evoclaims.envs.base import Episode, Task
+from evoclaims.methods.base import Policy, Progress
+from evoclaims.methods.collect import Interaction, collect
+
+
+@pytree
+class PpoState:
+    """Networks, optimizer, observation statistics and the environments being interacted with."""
+
+    networks: Any
+    optimizer: Any
+    statistics: Any
+    interaction: Interaction
+    steps: Int[Array, ""]
+
+
+@dataclass(frozen=True)
+class LevelTest:
+    """When and how PPO's policy is tested for moving up a level.
+
+    Attributes:
+        every: training steps between tests.
+        sampled_episodes: 0 for the deterministic policy under the task's own examination; otherwise how many training
+            episodes of the *stochastic* policy must all be without error, as in the authors' published code (128).
+    """
+
+    every: int = 1
+    sampled_episodes: int = 0
+
+
+@dataclass(frozen=True)
+class Ppo:
+    """Clipped-surrogate policy gradient; the defaults are the paper's table for the stepping gates (§A.4).
+
+    Attributes:
+        policy_layers: widths of the policy's hidden layers (swish).
+        value_layers: widths of the value network's hidden layers; the paper is silent, the published code has 7 × 32.
+        environments: episodes run in parallel.
+        unroll_length: steps of each environment between two looks at the policy.
+        batch_size: trajectories in a minibatch.
+        minibatches: minibatches in a pass.
+        updates_per_batch: passes over the collected data.
+        discounting, learning_rate, entropy_cost, reward_scaling, gae_lambda, clipping: as in Brax.
+        normalize_observations: whether running statistics whiten the observation.
+        level_test: the test for moving up a level.
+    """
+
+    name: ClassVar[str] = "ppo"
+    revision: ClassVar[int] = 1
+
+    policy_layers: tuple[int, ...] = (4,) * 6
+    value_layers: tuple[int, ...] = (32,) * 7
+    environments: int = 4096
+    unroll_length: int = 1
+    batch_size: int = 2048
+    minibatches: int = 32
+    updates_per_batch: int = 4
+    discounting: float = 1.0
+    learning_rate: float = 3e-4
+    entropy_cost: float = 1e-2
+    reward_scaling: float = 1.0
+    gae_lambda: float = 0.95
+    clipping: float = 0.3
+    normalize_observations: bool = False
+    level_test: LevelTest = LevelTest()
+
+    def __post_init__(self) -> None:
+        """Check that the collected data fill the minibatches."""
+        if self.batch_size * self.minibatches % self.environments:
+            raise UserError(
+                f"PPO's batch_size × minibatches ({self.batch_size} × {self.minibatches}) must be a multiple of "
+                f"environments ({self.environments})."
+            )
+
+    def init(self, key: PRNGKeyArray, task: Task) -> PpoState:
+        """Draw the networks' parameters and start the environments at level 0."""
+        policy_key, value_key, reset_key = streams(key, "policy", "value", "reset")
+        net = self._networks(task)
+        parameters = losses.PPONetworkParams(
+            policy=net.policy_network.init(policy_key), value=net.value_network.init(value_key)
+        )
+        statistics = running_statistics.init_state(specs.Array((task.observation_size,), jnp.dtype("float32")))
+        return strong(
+            PpoState(
+                networks=parameters,
+                optimizer=self._optimizer().init(parameters),
+                statistics=statistics,
+                interaction=Interaction.start(task, reset_key, jnp.zeros((), jnp.int32), self.environments),
+                steps=jnp.zeros((), jnp.int32),
+            )
+        )
+
+    def step(
+        self, key: PRNGKeyArray, task: Task, level: Int[Array, ""], state: PpoState
+    ) -> tuple[PpoState, Progress]:
+        """Collect batch_size × minibatches trajectories, then pass over them updates_per_batch times."""
+        reset_key, act_key, train_key, test_key = streams(key, "reset", "act", "train", "test")
+        interaction = state.interaction.at_level(task, reset_key, level)
+        act = networks.make_inference_fn(self._networks(task))((state.statistics, state.networks.policy))
+        rounds = self.batch_size * self.minibatches // self.environments
+        interaction, data = collect(task, act, act_key, interaction, rounds, self.unroll_length)
+        statistics = state.statistics
+        if self.normalize_observations:
+            statistics = running_statistics.update(statistics, data.observation)
+        parameters, optimizer = self._train(train_key, task, data, statistics, state.networks, state.optimizer)
+        after = strong(
+            PpoState(
+                networks=parameters,
+                optimizer=optimizer,
+                statistics=statistics,
+                interaction=interaction,
+                steps=state.steps + 1,
+            )
+        )
+        tested = self._test(test_key, task, level, after)
+        # A policy of NaNs still answers something, so that its fitness looks finite: ask the parameters themselves.
+        finite = jax.tree.map(lambda leaf: jnp.all(jnp.isfinite(leaf)), parameters)
+        return after, Progress(
+            fitness=tested.fitness,
+            success=tested.success,
+            healthy=jnp.all(jnp.stack(jax.tree.leaves(finite))),
+            metrics={"training_reward": jnp.mean(data.reward)},
+        )
+
+    def best(self, task: Task, state: PpoState) -> Policy:
+        """Return the current deterministic policy."""
+        make = networks.make_inference_fn(self._networks(task))
+
+        def function(parameters: Any, observation: Float[Array, " observation"]) -> Float[Array, " action"]:
+            action, _ = make(parameters, deterministic=True)(observation, jax.random.key(0))
+            return action
+
+        return Policy(parameters=(state.statistics, state.networks.policy), function=function)
+
+    def cost(self, task: Task) -> int:
+        """Return the environment steps collected in one training step."""
+        return self.batch_size * self.minibatches * self.unroll_length
+
+    def _networks(self, task: Task) -> networks.PPONetworks:
+        """Build Brax's policy and value networks for the task's sizes."""
+        return networks.make_ppo_networks(
+            task.observation_size,
+            task.action_size,
+            preprocess_observations_fn=running_statistics.normalize if self.normalize_observations else _unchanged,
+            policy_hidden_layer_sizes=self.policy_layers,
+            value_hidden_layer_sizes=self.value_layers,
+        )
+
+    def _optimizer(self) -> optax.GradientTransformation:
+        """Adam, as in Brax."""
+        return optax.adam(self.learning_rate)
+
+    def _train(
+        self, key: PRNGKeyArray, task: Task, data: Any, statistics: Any, parameters: Any, optimizer: Any
+    ) -> tuple[Any, Any]:
+        """Run updates_per_batch passes of stochastic gradient descent over `data` (leaves [trajectories, time, …])."""
+        loss = partial(
+            losses.compute_ppo_loss,
+            ppo_network=self._networks(task),
+            entropy_cost=self.entropy_cost,
+            discounting=self.discounting,
+            reward_scaling=self.reward_scaling,
+            gae_lambda=self.gae_lambda,
+            clipping_epsilon=self.clipping,
+        )
+        adam = self._optimizer()
+
+        def descend(carry: tuple[Any, Any], minibatch: tuple[Array, Array]) -> tuple[tuple[Any, Any], None]:
+            parameters, optimizer = carry
+            chosen, loss_key = minibatch
+            # Gathering rows here, minibatch by minibatch, moves each row once; the order is drawn once for all leaves.
+            rows = jax.tree.map(lambda leaf: jnp.take(leaf, chosen, axis=0), data)
+            gradient, _ = jax.grad(loss, has_aux=True)(parameters, statistics, rows, loss_key)
+            update, optimizer = adam.update(gradient, optimizer)
+            return (optax.apply_updates(parameters, update), optimizer), None
+
+        def one_pass(carry: tuple[Any, Any], pass_key: Array) -> tuple[tuple[Any, Any], None]:
+            order_key, loss_key = streams(pass_key, "order", "loss")
+            order = jax.random.permutation(order_key, self.batch_size * self.minibatches)
+            batches = order.reshape(self.minibatches, self.batch_size)
+            return jax.lax.scan(descend, carry, (batches, jax.random.split(loss_key, self.minibatches)))
+
+        keys = jax.random.split(key, self.updates_per_batch)
+        (parameters, optimizer), _ = jax.lax.scan(one_pass, (parameters, optimizer), keys)
+        return parameters, optimizer
+
+    def _test(self, key: PRNGKeyArray, task: Task, level: Int[Array, ""], state: PpoState) -> Episode:
+        """Test the policy on the current level; between tests success is 0, so that the level stays."""
+        examined = task.examine(self.best(task, state), key, level)
+        success = examined.success
+        if self.level_test.sampled_episodes:
+            act = networks.make_inference_fn(self._networks(task))((state.statistics, state.networks.policy))
+            keys = jax.random.split(stream(key, "sampled test"), self.level_test.sampled_episodes)
+
+            def rewarded(key: Array) -> Array:
+                reset_key, act_key, episode_key = streams(key, "reset", "act", "episode")
+                start = task.reset(reset_key, level)
+                return task.step(start, act(start.observation, act_key)[0]).reward
+
+            success = jnp.mean(jax.vmap(rewarded)(keys) >= 0)
+        due = state.steps % self.level_test.every == 0
+        return select(
+            due,
+            Episode(fitness=examined.fitness, success=success),
+            Episode(fitness=examined.fitness, success=jnp.zeros_like(success)),
+        )
+
+
+def _unchanged(observation: Array, statistics: Any) -> Array:
+    """Leave the observation as it is."""
+    return observation

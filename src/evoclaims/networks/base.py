@@ -1,0 +1,19 @@
+"""What a network with a fixed shape is: a flat vector of parameters and a function."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+from jaxtyping import Array, Float
+
+
+class Network(Protocol):
+    """A frozen, hashable description of a network whose parameters are one flat vector."""
+
+    def size(self, inputs: int, outputs: int) -> int:
+        """Return the number of parameters."""
+
+    def apply(
+        self, parameters: Float[Array, " parameters"], observation: Float[Array, " inputs"], outputs: int
+    ) -> Float[Array, " outputs"]:
+        """Map one observation to one output."""

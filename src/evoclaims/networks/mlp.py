@@ -1,0 +1,48 @@
+"""Multilayer perceptrons, with or without a direct path from inputs to outputs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+
+@dataclass(frozen=True)
+class Mlp:
+    """Dense tanh layers of the given widths, tanh output.
+
+    Parameters, layer by layer: weights [outputs, inputs] row by row, then biases; with `skip` the weights from
+    observation to outputs, [outputs, inputs], come last.
+
+    Attributes:
+        layers: widths of the hidden layers.
+        skip: whether the observation also feeds the outputs directly.
+    """
+
+    name: str = field(default="mlp", init=False)
+    layers: tuple[int, ...] = (32, 32, 32, 32)
+    skip: bool = False
+
+    def size(self, inputs: int, outputs: int) -> int:
+        """Return the number of parameters."""
+        widths = (inputs, *self.layers, outputs)
+        dense = sum((fan_in + 1) * fan_out for fan_in, fan_out in zip(widths, widths[1:], strict=False))
+        return dense + inputs * outputs * self.skip
+
+    def apply(
+        self, parameters: Float[Array, " parameters"], observation: Float[Array, " inputs"], outputs: int
+    ) -> Float[Array, " outputs"]:
+        """Map one observation to outputs in (-1, 1)."""
+        signal, start = observation, 0
+        widths = (*self.layers, outputs)
+        for depth, width in enumerate(widths):
+            fan_in = signal.shape[-1]
+            weights = parameters[start : start + fan_in * width].reshape(width, fan_in)
+            start += fan_in * width
+            potential = weights @ signal + parameters[start : start + width]
+            start += width
+            if self.skip and depth == len(widths) - 1:
+                potential = potential + parameters[start:].reshape(outputs, observation.shape[-1]) @ observation
+            signal = jnp.tanh(potential)
+        return signal

@@ -1,0 +1,269 @@
+"""The pytest plugin: claims as tests, tiers as markers, verdicts as outcomes.
+
+Nothing heavy is imported here at the top: pytest loads this file in every run of an environment that has evoclaims.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Generator
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from evoclaims.core.errors import UnknownNameError, UserError
+from evoclaims.pytest_summary import ATTRIBUTE, Summary
+
+if TYPE_CHECKING:
+    from evoclaims.suite.group import TrialGroup
+    from evoclaims.suite.live import LiveLine
+    from evoclaims.suite.report import ClaimReport
+    from evoclaims.suite.session import Session, Verdicts
+
+TIERS = ("smoke", "full")
+_session: pytest.StashKey[Session] = pytest.StashKey()
+_line: pytest.StashKey[LiveLine] = pytest.StashKey()
+_verdicts: pytest.StashKey[Verdicts] = pytest.StashKey()
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Add the options."""
+    group = parser.getgroup("claims", "claims of a paper (evoclaims)")
+    group.addoption("--claims-storage", metavar="DIR", default=".evoclaims", help="folder of trials (.evoclaims)")
+    group.addoption("--claims-tier", metavar="TIER", help="judge this tier's claims: smoke or full; as -m TIER")
+    group.addoption("--claims-trials", metavar="N", type=int, help="judge by one look at N trials a condition")
+    group.addoption("--claims-only", metavar="IDS", help="judge only these claims, such as G1,G7")
+    group.addoption("--claims-device", metavar="DEVICE", default="auto", help="auto (default), cpu or gpu")
+    group.addoption("--claims-json", metavar="FILE", help="write all verdicts to FILE")
+    group.addoption(
+        "--claims-undecided",
+        choices=("report", "fail"),
+        default="report",
+        help="whether inconclusive claims end the run with status 1 (default: report)",
+    )
+    group.addoption("--claims-stored", action="store_true", help="judge from stored trials alone; run nothing")
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Register the markers."""
+    for line in (
+        "smoke: claims at reduced budgets",
+        "full: claims at the paper's budgets; only run when asked for",
+        "claim(claim): the claim that a test checks (set by @claim)",
+        "claim_expect(expectation): an accepted outcome (set by expected(...))",
+    ):
+        config.addinivalue_line("markers", line)
+    if not hasattr(config, "workerinput"):  # an xdist worker leaves the summary to its controller
+        config.pluginmanager.register(Summary(config, make_session), "claims-summary")
+    tier = config.getoption("claims_tier")
+    if tier is not None and tier not in TIERS:
+        raise pytest.UsageError(str(UnknownNameError("tier", tier, TIERS)))
+
+
+def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
+    """Run each claim once per tier."""
+    if metafunc.definition.get_closest_marker("claim") is None:
+        return
+    if "claim_tier" not in metafunc.fixturenames:
+        raise pytest.UsageError(
+            f"{metafunc.definition.nodeid} is a claim but takes neither the fixture `trials` nor `verdict`."
+        )
+    metafunc.parametrize("claim_tier", [pytest.param(tier, marks=getattr(pytest.mark, tier)) for tier in TIERS])
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Leave out other tiers and claims; the full tier is only kept when it was asked for by name."""
+    claims = {item: item.get_closest_marker("claim").args[0] for item in items if item.get_closest_marker("claim")}  # type: ignore[union-attr]
+    wanted = _wanted_claims(config, {claim.id for claim in claims.values()})
+    tiers = _wanted_tiers(config)
+    dropped = [
+        item for item, claim in claims.items() if claim.id not in wanted or tiers.isdisjoint(_tiers_of(item))
+    ]
+    if dropped:
+        config.hook.pytest_deselected(items=dropped)
+        items[:] = [item for item in items if item not in set(dropped)]
+
+
+def _tiers_of(item: pytest.Item) -> set[str]:
+    """Return the tier that a claim test runs at."""
+    return {mark.name for mark in item.iter_markers() if mark.name in TIERS}
+
+
+def _wanted_tiers(config: pytest.Config) -> set[str]:
+    """Return the tiers that the options leave; "full" only when --claims-tier or -m names it positively."""
+    tier = config.getoption("claims_tier")
+    if tier is not None:
+        return {tier}
+    named = re.sub(r"\bnot\s+full\b", "", config.getoption("markexpr") or "")
+    return set(TIERS) if re.search(r"\bfull\b", named) else {"smoke"}
+
+
+def _wanted_claims(config: pytest.Config, known: set[str]) -> set[str]:
+    """Return the ids that --claims-only leaves."""
+    option = config.getoption("claims_only")
+    if option is None:
+        return known
+    wanted = {name.strip() for name in option.split(",") if name.strip()}
+    for name in sorted(wanted - known):
+        raise pytest.UsageError(str(UnknownNameError("claim", name, known or {"(none collected)"})))
+    return wanted
+
+
+def pytest_collection_finish(session: pytest.Session) -> None:
+    """Find out before the first trial whether anything is in the way."""
+    config = session.config
+    if not any(item.get_closest_marker("claim") for item in session.items) or config.option.collectonly:
+        return
+    try:
+        make_session(config)
+    except UserError as error:
+        raise pytest.UsageError(str(error)) from error
+
+
+def make_session(config: pytest.Config) -> Session:
+    """Load the project's reproduction and check store, device and sizes."""
+    if _session in config.stash:
+        return config.stash[_session]
+    from evoclaims.suite.config import load_config, load_reproduction
+    from evoclaims.suite.live import LiveLine
+    from evoclaims.suite.modes import RunMissing, StoredOnly
+    from evoclaims.suite.session import Session
+    from evoclaims.trials import devices
+    from evoclaims.trials.progress import ignore
+    from evoclaims.trials.store import Store
+
+    devices.configure()
+    store = Store(config.invocation_params.dir / config.getoption("claims_storage"))
+    line = LiveLine(config.get_terminal_writer()) if config.pluginmanager.has_plugin("terminalreporter") else None
+    mode: Any = RunMissing(store, config.getoption("claims_device"), line or ignore)
+    if config.getoption("claims_stored"):
+        mode = StoredOnly(store)
+    made = Session(load_reproduction(load_config(config.rootpath)), store, mode, config.getoption("claims_trials"))
+    made.protocol("smoke")
+    mode.check()
+    config.stash[_session] = made
+    if line is not None:
+        config.stash[_line] = line
+    return made
+
+
+@pytest.fixture
+def claim_tier() -> str:
+    """The tier that a claim is judged at; parametrized for every claim."""
+    raise UserError("The fixtures `trials` and `verdict` are for tests marked with @claim(...).")
+
+
+@pytest.fixture
+def trials(request: pytest.FixtureRequest, claim_tier: str) -> Callable[..., TrialGroup]:
+    """Return `trials(method, on=task)`: a condition's trials, run when a verdict needs them."""
+    session = make_session(request.config)
+
+    def group(method: str, *, on: str) -> TrialGroup:
+        return session.group(method, on, claim_tier)
+
+    return group
+
+
+@pytest.fixture
+def verdict(request: pytest.FixtureRequest, claim_tier: str) -> Verdicts:
+    """Return `verdict(assertion)`, which judges the claim."""
+    from evoclaims.suite.claim import claim_of
+    from evoclaims.suite.session import Verdicts
+
+    session, claim = make_session(request.config), claim_of(request.node)
+    assert claim is not None  # claim_tier exists for claims alone
+    case = _case(request.node)
+    line = request.config.stash.get(_line, None)
+
+    def settle(assertion: Any) -> ClaimReport:
+        try:
+            return session.settle(claim, case, claim_tier, assertion)
+        finally:
+            if line is not None:
+                line.close()
+
+    verdicts = request.node.stash[_verdicts] = Verdicts(settle)
+    return verdicts
+
+
+def _case(item: pytest.Item) -> str:
+    """Return a test's parameters without the tier, such as "n_parity"."""
+    callspec = getattr(item, "callspec", None)
+    return "-".join(part for part in callspec.id.split("-") if part not in TIERS) if callspec else ""
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(
+    item: pytest.Item, call: pytest.CallInfo[None]
+) -> Generator[None, pytest.TestReport, pytest.TestReport]:
+    """Turn what became of a claim into the test's outcome, without a traceback."""
+    report = yield
+    if item.get_closest_marker("claim") is None or (report.when != "call" and not report.failed):
+        return report
+    if report.skipped or (call.excinfo and call.excinfo.errisinstance(KeyboardInterrupt)):
+        return report
+    claimed = _claim_report(item, call)
+    setattr(report, ATTRIBUTE, claimed.to_json())
+    undecided = claimed.outcome == "inconclusive" and item.config.getoption("claims_undecided") == "fail"
+    failed = claimed.failed or undecided
+    report.outcome = "failed" if failed else "passed"
+    expected_failure = call.excinfo is None or call.excinfo.errisinstance(UserError)
+    if expected_failure:
+        report.longrepr = f"{claimed.name} ({claimed.tier}) is {claimed.outcome}: {claimed.reason}" if failed else None
+    report.user_properties += [
+        ("claim", claimed.claim),
+        ("tier", claimed.tier),
+        ("verdict", claimed.outcome),
+        ("reason", claimed.reason),
+        ("n", claimed.n),
+        ("p", (claimed.verdict or {}).get("p")),
+        ("evidence", claimed.evidence),
+    ]
+    return report
+
+
+def _claim_report(item: pytest.Item, call: pytest.CallInfo[None]) -> ClaimReport:
+    """Return what became of a claim test: its verdict, or the error in the way of one."""
+    from evoclaims.suite.claim import claim_of, expectation_of
+    from evoclaims.suite.report import broken, expecting, save
+
+    claim, tier = claim_of(item), next(iter(_tiers_of(item)))
+    assert claim is not None
+    verdicts = item.stash.get(_verdicts, None)
+    report = verdicts.report if verdicts else None
+    if call.excinfo is not None:
+        report = broken(claim, _case(item), tier, _sentence(call.excinfo))
+    elif report is None:
+        report = broken(claim, _case(item), tier, "the test ended without calling verdict(...), so it judged nothing")
+    report = expecting(report, expectation_of(item, tier))
+    session = item.config.stash.get(_session, None)
+    if session is None or item.config.getoption("claims_stored"):
+        return report
+    try:
+        return save(report, session.store.root)
+    except UserError:
+        return report  # a full disk must not hide the verdict
+
+
+def _sentence(excinfo: pytest.ExceptionInfo[BaseException]) -> str:
+    """Return an exception as one line."""
+    text = str(excinfo.value).strip().splitlines()
+    return text[0] if text and excinfo.errisinstance(UserError) else f"{excinfo.typename}: {text[0] if text else ''}"
+
+
+def pytest_report_teststatus(
+    report: pytest.CollectReport | pytest.TestReport, config: pytest.Config
+) -> tuple[str, str, str | tuple[str, dict[str, bool]]] | None:
+    """Show a claim's verdict in place of passed and failed."""
+    plain = getattr(report, ATTRIBUTE, None)
+    if plain is None:
+        return None
+    from evoclaims.judging.verdict import Outcome
+    from evoclaims.suite.report import ClaimReport
+
+    claimed = ClaimReport.from_json(plain)
+    outcome = Outcome(claimed.outcome)
+    words = f"{outcome}, as accepted" if claimed.as_expected else str(outcome)
+    colour = {"red": True} if report.failed else {"green": True} if outcome == Outcome.SUPPORTED else {"yellow": True}
+    return words, outcome.symbol, (words.upper(), colour)

@@ -1,0 +1,98 @@
+"""The end of a run: verdict table, comparison with the reference trials, JSON report, exit status."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+import pytest
+
+from evoclaims.core.errors import UserError
+
+if TYPE_CHECKING:
+    from evoclaims.judging.baseline import DriftReport
+    from evoclaims.judging.tripwire import DigestCheck
+    from evoclaims.suite.report import ClaimReport
+    from evoclaims.suite.session import Session
+
+ATTRIBUTE: Final = "claim_report"
+"""Name under which a test's report carries the claim's, also from an xdist worker to its controller."""
+
+
+class Summary:
+    """Gathers the claims' reports of a run, in the process that talks to the user, and ends the run with them."""
+
+    def __init__(self, config: pytest.Config, make_session: Callable[[pytest.Config], Session]) -> None:
+        """Start empty."""
+        self._config = config
+        self._make_session = make_session
+        self.reports: list[ClaimReport] = []
+        self._drift: tuple[DriftReport, DigestCheck] | None = None
+        self._troubles: list[str] = []
+
+    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
+        """Note what became of a claim."""
+        from evoclaims.suite.report import ClaimReport
+
+        plain = getattr(report, ATTRIBUTE, None)
+        if plain is not None:
+            self.reports.append(ClaimReport.from_json(plain))
+
+    @pytest.hookimpl(tryfirst=True)
+    def pytest_sessionfinish(self, session: pytest.Session) -> None:
+        """Compare with the reference trials, write the JSON report and settle the exit status.
+
+        0: nothing refuted, nothing drifted. 1: something was refuted without being accepted, broke, or drifted.
+        5 (pytest's "no tests"): no trial was looked at, so that nothing was measured.
+        """
+        if not self.reports:
+            return
+        try:
+            self._drift = self._make_session(self._config).drift(self.reports)
+            self._write_json()
+        except UserError as error:
+            self._troubles.append(str(error))
+        failed = self._troubles or (self._drift is not None and self._drift[0].drifted)
+        if session.exitstatus == pytest.ExitCode.OK:
+            if failed:
+                session.exitstatus = pytest.ExitCode.TESTS_FAILED
+            elif not any(report.n for report in self.reports):
+                session.exitstatus = pytest.ExitCode.NO_TESTS_COLLECTED
+
+    def pytest_terminal_summary(self, terminalreporter: Any) -> None:
+        """Print the verdict table and what lies behind it."""
+        if not self.reports:
+            return
+        from evoclaims.suite import table
+
+        writer = self._config.get_terminal_writer()
+        width, colour = writer.fullwidth, writer.hasmarkup
+        terminalreporter.section("claims")
+        terminalreporter.write_line(table.verdict_table(self.reports, width, colour))
+        terminalreporter.write_line("")
+        explained = table.explanations(self.reports, width, colour)
+        if explained:
+            terminalreporter.write_line(explained)
+            terminalreporter.write_line("")
+        if self._drift is not None:
+            drift, digests = self._drift
+            terminalreporter.write_line(table.drift_lines(drift, len(digests.changed), digests.compared))
+        for trouble in self._troubles:
+            terminalreporter.write_line(f"error: {trouble}", red=True)
+        terminalreporter.write_line(f"claims: {table.totals(self.reports)}", bold=True)
+        if not any(report.n for report in self.reports):
+            terminalreporter.write_line("No trial was looked at: nothing was measured.", red=True)
+
+    def _write_json(self) -> None:
+        """Write all verdicts to the file that --claims-json names."""
+        from evoclaims.core.files import write_atomically
+
+        name = self._config.getoption("claims_json")
+        if name is None:
+            return
+        drift = self._drift[0].to_json() if self._drift else None
+        plain = {"schema": 1, "claims": [report.to_json() for report in self.reports], "drift": drift}
+        path = Path(self._config.invocation_params.dir) / name
+        write_atomically(path, (json.dumps(plain, indent=1, sort_keys=True) + "\n").encode())

@@ -1,0 +1,90 @@
+"""Where a project keeps its reproduction and its claims: `[tool.evoclaims]` in its pyproject.toml."""
+
+from __future__ import annotations
+
+import importlib
+import sys
+import tomllib
+from dataclasses import dataclass
+from pathlib import Path
+
+from evoclaims.core.errors import UserError
+from evoclaims.suite.reproduction import Reproduction
+
+
+@dataclass(frozen=True)
+class SuiteConfig:
+    """The project's settings.
+
+    Attributes:
+        root: the project's folder, put on the import path.
+        reproduction: module that holds `REPRODUCTION`.
+        claims: folder of claim tests, relative to `root`.
+    """
+
+    root: Path
+    reproduction: str
+    claims: str = "claims"
+
+
+def find_root(start: Path) -> Path:
+    """Return the nearest folder at or above `start` whose pyproject.toml has `[tool.evoclaims]`.
+
+    Raises:
+        UserError: when there is none.
+    """
+    for folder in (start, *start.parents):
+        if "evoclaims" in _tool_tables(folder / "pyproject.toml"):
+            return folder
+    raise UserError(
+        f"No pyproject.toml at or above {start} has a [tool.evoclaims] table. Go to a project with claims, or add the "
+        'table: reproduction = "package.module" (which holds REPRODUCTION) and claims = "folder".'
+    )
+
+
+def load_config(root: Path) -> SuiteConfig:
+    """Read the settings of the project in `root`.
+
+    Raises:
+        UserError: when the table is missing or has other keys.
+    """
+    table = _tool_tables(root / "pyproject.toml").get("evoclaims")
+    if not isinstance(table, dict) or "reproduction" not in table or not set(table) <= {"reproduction", "claims"}:
+        raise UserError(
+            f"{root / 'pyproject.toml'} needs a [tool.evoclaims] table with reproduction = \"package.module\" and, if "
+            'it is not "claims", claims = "folder"; no other keys.'
+        )
+    return SuiteConfig(root=root, **table)
+
+
+def load_reproduction(config: SuiteConfig) -> Reproduction:
+    """Import the project's reproduction.
+
+    Raises:
+        UserError: when the module or its `REPRODUCTION` is missing.
+    """
+    if str(config.root) not in sys.path:
+        sys.path.insert(0, str(config.root))
+    try:
+        module = importlib.import_module(config.reproduction)
+    except ModuleNotFoundError as error:
+        if error.name is None or not config.reproduction.startswith(error.name):
+            raise
+        raise UserError(
+            f"There is no module {config.reproduction!r} in {config.root}, which [tool.evoclaims] names."
+        ) from error
+    found = getattr(module, "REPRODUCTION", None)
+    if not isinstance(found, Reproduction):
+        raise UserError(f"The module {config.reproduction!r} has no REPRODUCTION = Reproduction(...).")
+    return found
+
+
+def _tool_tables(path: Path) -> dict[str, object]:
+    """Return the tables under [tool] in a pyproject.toml; empty when there is no such file."""
+    try:
+        tool = tomllib.loads(path.read_text(encoding="utf-8")).get("tool", {})
+    except FileNotFoundError:
+        return {}
+    except (OSError, ValueError) as error:
+        raise UserError(f"Cannot read {path}: {error}.") from error
+    return tool if isinstance(tool, dict) else {}

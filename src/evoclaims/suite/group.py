@@ -1,0 +1,97 @@
+"""The trials of one condition as a claim speaks of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+from evoclaims.judging.measure import Event, Measure, Profile
+from evoclaims.trials.result import TrialResult
+from evoclaims.trials.spec import Condition
+
+Fetch = Callable[[Condition, Sequence[int]], Sequence[TrialResult]]
+
+
+@dataclass(frozen=True, eq=False)
+class TrialGroup:
+    """Trials that are run only when a verdict needs them, and what can be read from each.
+
+    Attributes:
+        method, task: the names by which a claim asked for them.
+        condition: what is run.
+        get: how trials are had: run, or read from the store.
+    """
+
+    method: str
+    task: str
+    condition: Condition
+    get: Fetch = field(repr=False)
+
+    @property
+    def label(self) -> str:
+        """A short name, such as "cma_es on n_parity"."""
+        return f"{self.method} on {self.task}"
+
+    @property
+    def fingerprint(self) -> str:
+        """The condition's id."""
+        return self.condition.id
+
+    def fetch(self, seeds: Sequence[int]) -> Sequence[TrialResult]:
+        """Return one trial per seed."""
+        return self.get(self.condition, seeds)
+
+    @property
+    def success(self) -> Profile:
+        """Success of the final policy on each level's own table."""
+        return Profile(self, "success", lambda t: t.levels["success"], self.condition.task.levels)
+
+    @property
+    def mean_success(self) -> Measure:
+        """Success of the final policy, averaged over the levels."""
+        return self._metric("mean_success", "mean success over levels")
+
+    @property
+    def last_success(self) -> Measure:
+        """Success of the final policy on the last level."""
+        return self._metric("last_success", "success on the last level")
+
+    @property
+    def furthest_solved(self) -> Measure:
+        """Highest level solved while training; -1 for none."""
+        return self._metric("furthest_solved", "furthest level solved")
+
+    @property
+    def furthest_reached(self) -> Measure:
+        """Highest level trained on."""
+        return self._metric("furthest_reached", "furthest level reached")
+
+    @property
+    def solves_every_level(self) -> Event:
+        """The final policy is right on every row of every level."""
+        return self.success_everywhere_is(1.0)
+
+    @property
+    def solves_the_last_level(self) -> Event:
+        """The last level was solved while training."""
+        last = self.condition.task.levels - 1
+        return Event(self, "solves the last level", lambda t: t.metrics["furthest_solved"] == last)
+
+    @property
+    def does_not_solve_the_last_level(self) -> Event:
+        """The last level was never solved."""
+        last = self.condition.task.levels - 1
+        return Event(self, "does not solve the last level", lambda t: t.metrics["furthest_solved"] < last)
+
+    def solves_no_level_beyond(self, level: int) -> Event:
+        """No level above `level` (counted from 0) was solved while training."""
+        return Event(self, f"solves no level beyond {level}", lambda t: t.metrics["furthest_solved"] <= level)
+
+    def success_everywhere_is(self, value: float) -> Event:
+        """The final policy's success is exactly `value` on every level."""
+        name = "solves every level" if value == 1.0 else f"success is {value:g} on every level"
+        return Event(self, name, lambda t: all(x == value for x in t.levels["success"]))
+
+    def _metric(self, key: str, name: str) -> Measure:
+        """Return the measure that reads one of the record's metrics."""
+        return Measure(self, name, lambda t: t.metrics[key])

@@ -1,0 +1,56 @@
+"""How a claim's trials are had: by running them, or from the store alone."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from evoclaims.core.errors import UserError
+from evoclaims.trials import devices
+from evoclaims.trials.progress import Watcher
+from evoclaims.trials.result import TrialResult
+from evoclaims.trials.runner import run
+from evoclaims.trials.spec import Condition, TrialSpec
+from evoclaims.trials.store import Store
+
+
+class NotStoredError(Exception):
+    """Trials are missing and may not be run; ends a claim as "not run"."""
+
+
+@dataclass(frozen=True)
+class RunMissing:
+    """Run what the store lacks."""
+
+    store: Store
+    device: str
+    watch: Watcher
+
+    def check(self) -> None:
+        """Find out before the first trial whether the store can be written and the device is there."""
+        self.store.check_writable()
+        devices.choose(self.device)
+
+    def __call__(self, condition: Condition, seeds: Sequence[int]) -> Sequence[TrialResult]:
+        """Return one trial per seed."""
+        return run(condition, seeds, self.store, devices.choose(self.device), self.watch)
+
+
+@dataclass(frozen=True)
+class StoredOnly:
+    """Read the store and run nothing."""
+
+    store: Store
+
+    def check(self) -> None:
+        """A store that is a file cannot be read."""
+        if self.store.root.exists() and not self.store.root.is_dir():
+            raise UserError(f"The trial store {self.store.root} is a file, not a folder: name another with --storage.")
+
+    def __call__(self, condition: Condition, seeds: Sequence[int]) -> Sequence[TrialResult]:
+        """Return one trial per seed, or raise `NotStoredError`."""
+        found = [self.store.get(TrialSpec(condition, seed).id) for seed in seeds]
+        results = [result for result in found if result is not None]
+        if len(results) < len(seeds):
+            raise NotStoredError(f"{len(seeds) - len(results)} of {len(seeds)} trials of {condition.label} are missing")
+        return results

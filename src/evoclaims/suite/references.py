@@ -1,0 +1,62 @@
+"""Committed reference trials: one JSON record a line, in reference/<tier>/<method>-<task>.jsonl of a reproduction."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+from evoclaims.core.errors import UserError
+from evoclaims.core.files import write_atomically
+from evoclaims.judging.baseline import DriftCase, DriftReport, check_drift
+from evoclaims.judging.tripwire import DigestCheck, compare_digests
+from evoclaims.trials.records import RecordError, dump, parse
+from evoclaims.trials.result import TrialResult
+
+METRICS = ("mean_success", "environment_steps")
+"""What the drift check compares: how well a trial ended, and how long it took."""
+
+
+def path_of(folder: Path, tier: str, method: str, task: str) -> Path:
+    """Return where the reference trials of a method on a task lie."""
+    return folder / tier / f"{method}-{task}.jsonl"
+
+
+def load(path: Path) -> tuple[TrialResult, ...]:
+    """Read reference trials; none when there is no such file.
+
+    Raises:
+        UserError: when a line is torn or edited.
+    """
+    try:
+        lines = path.read_bytes().splitlines()
+    except FileNotFoundError:
+        return ()
+    results = []
+    for number, line in enumerate(lines, start=1):
+        try:
+            results.append(parse(line))
+        except RecordError as error:
+            raise UserError(
+                f"Line {number} of {path} is no reference trial: {error.reason}. Restore the file from version "
+                "control, or write it anew with `evoclaims reference`."
+            ) from error
+    return tuple(results)
+
+
+def write(path: Path, results: Iterable[TrialResult]) -> None:
+    """Write reference trials in the order of seeds."""
+    ordered = sorted(results, key=lambda result: result.seed)
+    write_atomically(path, b"".join(dump(result).rstrip(b"\n") + b"\n" for result in ordered))
+
+
+def drift_case(folder: Path, tier: str, method: str, task: str, new: Sequence[TrialResult]) -> DriftCase:
+    """Pair new trials of one condition (at least one) with its reference trials."""
+    reference = load(path_of(folder, tier, method, task))
+    return DriftCase(f"{method} on {task} ({tier})", new[0].condition, tuple(new), reference, METRICS)
+
+
+def compare(cases: Sequence[DriftCase]) -> tuple[DriftReport, DigestCheck]:
+    """Check all cases for drift, and for trials that are no longer the same to the bit."""
+    checks = [compare_digests(case.new, case.reference) for case in cases]
+    changed = tuple(change for check in checks for change in check.changed)
+    return check_drift(cases), DigestCheck(sum(check.compared for check in checks), changed)

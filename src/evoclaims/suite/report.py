@@ -1,0 +1,147 @@
+"""What became of one claim test, as plain data that crosses processes and goes into files."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from evoclaims.core.canonical import as_plain
+from evoclaims.core.files import write_atomically
+from evoclaims.judging.assertion import Assertion
+from evoclaims.judging.judge import attainability
+from evoclaims.judging.protocol import Protocol
+from evoclaims.judging.verdict import Outcome, Verdict
+from evoclaims.suite.claim import Claim, Expectation
+from evoclaims.suite.group import TrialGroup
+from evoclaims.trials.spec import TrialSpec
+
+
+@dataclass(frozen=True)
+class ClaimReport:
+    """One claim, at one tier, with one set of parameters.
+
+    Attributes:
+        claim: id of the claim.
+        case: the parameters, such as "n_parity"; empty without any.
+        tier: "smoke" or "full".
+        statement: what was judged: the paper's sentence, or its scaled-down version.
+        where: place in the paper.
+        outcome, reason: the verdict in short.
+        expected, because: an accepted outcome, if there is one.
+        verdict: the whole verdict as JSON; None when the test broke before judging.
+        sources: for each condition: "method", "task", "condition" (id) and "trials" (ids).
+        attainable: for each look: "n", "alpha", and the smallest p for ("supported") and against ("refuted").
+        evidence: path of the file that holds all this.
+    """
+
+    claim: str
+    case: str
+    tier: str
+    statement: str
+    where: str
+    outcome: str
+    reason: str
+    expected: str | None = None
+    because: str = ""
+    verdict: dict[str, Any] | None = None
+    sources: tuple[dict[str, Any], ...] = ()
+    attainable: tuple[dict[str, Any], ...] = ()
+    evidence: str = ""
+
+    @property
+    def name(self) -> str:
+        """Id and parameters, such as "G1[n_parity]"."""
+        return f"{self.claim}[{self.case}]" if self.case else self.claim
+
+    @property
+    def as_expected(self) -> bool:
+        """Whether the outcome has been accepted beforehand."""
+        return self.expected == self.outcome
+
+    @property
+    def failed(self) -> bool:
+        """Whether this ends the run with status 1: refuted or broken, and not accepted."""
+        return self.outcome in (Outcome.REFUTED, Outcome.ERROR) and not self.as_expected
+
+    @property
+    def n(self) -> int:
+        """Trials a side that were looked at."""
+        return int(self.verdict["n"]) if self.verdict else 0
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the report as plain JSON."""
+        plain: dict[str, Any] = as_plain(self)
+        return plain
+
+    @staticmethod
+    def from_json(plain: dict[str, Any]) -> ClaimReport:
+        """Return the report that `to_json` gave."""
+        return ClaimReport(
+            **{**plain, "sources": tuple(plain["sources"]), "attainable": tuple(plain["attainable"])}
+        )
+
+
+def judged(
+    claim: Claim, case: str, tier: str, assertion: Assertion, protocol: Protocol, verdict: Verdict
+) -> ClaimReport:
+    """Build the report of a claim that was judged."""
+    groups = [source for source in assertion.sources() if isinstance(source, TrialGroup)]
+    seeds = protocol.seeds(verdict.n)
+    return ClaimReport(
+        claim=claim.id,
+        case=case,
+        tier=tier,
+        statement=claim.statement(tier),
+        where=claim.where,
+        outcome=str(verdict.outcome),
+        reason=verdict.reason,
+        verdict=verdict.to_json(),
+        sources=tuple(_source(group, seeds) for group in groups),
+        attainable=tuple(
+            {"n": look.n, "alpha": look.alpha, "supported": p.supported, "refuted": p.refuted}
+            for look, p in attainability(assertion, protocol)
+        ),
+    )
+
+
+def broken(claim: Claim, case: str, tier: str, reason: str) -> ClaimReport:
+    """Build the report of a claim whose test broke before it was judged."""
+    return ClaimReport(
+        claim=claim.id,
+        case=case,
+        tier=tier,
+        statement=claim.statement(tier),
+        where=claim.where,
+        outcome=str(Outcome.ERROR),
+        reason=reason,
+    )
+
+
+def expecting(report: ClaimReport, expectation: Expectation | None) -> ClaimReport:
+    """Add an accepted outcome to a report."""
+    if expectation is None:
+        return report
+    return replace(report, expected=str(expectation.outcome), because=expectation.because)
+
+
+def save(report: ClaimReport, root: Path) -> ClaimReport:
+    """Write the report under `root`/verdicts and return it with the path filled in."""
+    name = re.sub(r"[^A-Za-z0-9_.-]+", "-", report.name).strip("-")
+    path = root / "verdicts" / report.tier / f"{name}.json"
+    saved = replace(report, evidence=str(path))
+    write_atomically(path, (json.dumps(saved.to_json(), indent=1, sort_keys=True) + "\n").encode())
+    return saved
+
+
+def _source(group: TrialGroup, seeds: Sequence[int]) -> dict[str, Any]:
+    """Describe one condition of a report."""
+    return {
+        "method": group.method,
+        "task": group.task,
+        "condition": group.fingerprint,
+        "trials": [TrialSpec(group.condition, seed).id for seed in seeds],
+    }

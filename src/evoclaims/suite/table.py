@@ -1,0 +1,104 @@
+"""Verdicts as a table for the terminal."""
+
+from __future__ import annotations
+
+import io
+from collections import Counter
+from collections.abc import Sequence
+
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from evoclaims.judging.baseline import DriftReport
+from evoclaims.judging.verdict import Outcome
+from evoclaims.suite.report import ClaimReport
+
+_COLOURS = {
+    Outcome.SUPPORTED: "green",
+    Outcome.REFUTED: "red",
+    Outcome.INCONCLUSIVE: "yellow",
+    Outcome.ERROR: "bold red",
+    Outcome.NOT_RUN: "dim",
+}
+
+
+def verdict_table(reports: Sequence[ClaimReport], width: int, colour: bool) -> str:
+    """Return the table: claim, sentence, verdict, n, effect, p against the attainable p, and where the evidence lies."""
+    table = Table(expand=True, show_lines=False, pad_edge=False, box=None)
+    for heading, options in {
+        "claim": {"no_wrap": True},
+        "what is claimed": {"ratio": 3},
+        "verdict": {"no_wrap": True},
+        "n": {"justify": "right"},
+        "A12": {"justify": "right"},
+        "p (attainable)": {"no_wrap": True},
+        "evidence": {"ratio": 2, "overflow": "fold", "style": "dim"},
+    }.items():
+        table.add_column(heading, **options)  # type: ignore[arg-type]
+    for report in sorted(reports, key=lambda r: (r.tier, r.claim[:1], len(r.claim), r.claim, r.case)):
+        outcome = Outcome(report.outcome)
+        mark = f"{outcome.symbol} {outcome}" + (" (expected)" if report.as_expected else "")
+        table.add_row(
+            escape(report.name),
+            escape(f"{report.statement} ({report.where})"),
+            f"[{_COLOURS[outcome]}]{mark}[/]",
+            str(report.n) if report.n else "–",
+            _effect(report),
+            _p_values(report),
+            escape(report.evidence),
+        )
+    return _rendered(table, width, colour)
+
+
+def explanations(reports: Sequence[ClaimReport], width: int, colour: bool) -> str:
+    """Return a line for every verdict that is not plainly supported: why, and what was accepted."""
+    lines = []
+    for report in reports:
+        if report.outcome == Outcome.SUPPORTED and report.expected in (None, report.outcome):
+            continue
+        note = ""
+        if report.expected is not None:
+            kept = "accepted" if report.as_expected else f"no longer {report.expected}, which was accepted"
+            note = f" [{kept}: {report.because}]"
+        lines.append(f"{Outcome(report.outcome).symbol} {report.name}: {report.reason}{note}")
+    return _rendered("\n".join(escape(line) for line in lines), width, colour) if lines else ""
+
+
+def totals(reports: Sequence[ClaimReport]) -> str:
+    """Return the counts in one line, such as "3 supported, 1 refuted"."""
+    counts = Counter(report.outcome for report in reports)
+    return ", ".join(f"{counts[outcome]} {outcome}" for outcome in Outcome if counts[outcome]) or "no verdicts"
+
+
+def drift_lines(drift: DriftReport, changed: int, compared: int) -> str:
+    """Return what the comparison with the committed reference trials found."""
+    found = [f"DRIFT in {row.label}: {row.metric}, p = {row.p_holm:.2g} (Holm)" for row in drift.rows if row.drifted]
+    unchecked = sorted({f"not checked: {row.label}: {row.detail or row.status}" for row in drift.unchecked})
+    tested = len(drift.rows) - len(drift.unchecked)
+    head = f"reference trials: {tested} comparisons, {len(found)} drifted (exact rank tests, Holm, α = {drift.alpha:g})"
+    bits = f"to the bit: {compared} trials compared with the same machine and versions, {changed} changed"
+    return "\n".join([head, *found, *unchecked, bits])
+
+
+def _effect(report: ClaimReport) -> str:
+    """Return the effect size of a claim's first comparison."""
+    effects = [part["a12"] for part in (report.verdict or {}).get("evidence", ()) if part["a12"] is not None]
+    return f"{effects[0]:.2f}" if effects else "–"
+
+
+def _p_values(report: ClaimReport) -> str:
+    """Return p for the claim, and the smallest p that its trials could have given."""
+    verdict = report.verdict or {}
+    p, attainable = verdict.get("p"), verdict.get("attainable_p")
+    if p is None:
+        return "–"
+    return f"{p:.2g}" + (f" ({attainable:.2g})" if attainable is not None else "")
+
+
+def _rendered(content: Table | str, width: int, colour: bool) -> str:
+    """Return rich content as text."""
+    file = io.StringIO()
+    console = Console(file=file, width=max(width, 60), force_terminal=colour, color_system="standard" if colour else None)
+    console.print(content, highlight=False)
+    return file.getvalue().rstrip("\n")

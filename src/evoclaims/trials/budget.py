@@ -1,0 +1,44 @@
+"""How long a trial may train and how often it reports."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from evoclaims.core.errors import UserError
+
+
+@dataclass(frozen=True)
+class Budget:
+    """The training length of one trial, in the method's own unit; exactly one of the two is set.
+
+    Attributes:
+        generations: steps of the method, for evolution (one generation a step).
+        environment_steps: interactions with the task, for reinforcement learning; rounded up to whole steps of
+            the method.
+        reports: points on the training curve; the host reads the device this many times.
+    """
+
+    generations: int | None = None
+    environment_steps: int | None = None
+    reports: int = 50
+
+    def __post_init__(self) -> None:
+        """Reject budgets that name no length, two lengths, or one below 1."""
+        lengths = [x for x in (self.generations, self.environment_steps) if x is not None]
+        if len(lengths) != 1 or lengths[0] < 1 or self.reports < 1:
+            raise UserError(
+                "A budget names exactly one of generations and environment_steps, at least 1, and at least one "
+                f"report; this one has generations={self.generations}, "
+                f"environment_steps={self.environment_steps}, reports={self.reports}."
+            )
+
+    def steps(self, cost: int) -> int:
+        """Return the number of steps of a method that spends `cost` environment steps on each."""
+        if self.generations is not None:
+            return self.generations
+        assert self.environment_steps is not None
+        return -(-self.environment_steps // cost)
+
+    def chunk(self, cost: int) -> int:
+        """Return how many steps run on the device between two reports."""
+        return -(-self.steps(cost) // self.reports)

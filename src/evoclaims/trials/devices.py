@@ -1,0 +1,58 @@
+"""Choosing the hardware, and the settings of jax that every trial runs under."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Any, Final
+
+import jax
+
+from evoclaims.core.errors import UnknownNameError, UserError
+
+DEVICE_NAMES: Final = ("auto", "cpu", "gpu")
+MATMUL_PRECISION: Final = "highest"
+"""Full float32: the tensor cores' default of 10-bit mantissas would make CMA-ES's covariances noise."""
+
+
+def configure() -> None:
+    """Prepare jax before its first use: one CPU device per core, and a compilation cache that outlives the process.
+
+    Does nothing that a user has already decided (JAX_COMPILATION_CACHE_DIR, a device count in XLA_FLAGS, a jax that
+    has already started).
+    """
+    config: Any = jax.config
+    if config.jax_compilation_cache_dir is None:
+        home = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+        config.update("jax_compilation_cache_dir", str(home / "evoclaims" / "xla"))
+        config.update("jax_persistent_cache_min_compile_time_secs", 0.2)
+        # jax would otherwise evict nothing and warn about nothing; a broken cache must not break a run.
+        config.update("jax_raise_persistent_cache_errors", False)
+    if "xla_force_host_platform_device_count" not in os.environ.get("XLA_FLAGS", ""):
+        try:
+            config.update("jax_num_cpu_devices", len(os.sched_getaffinity(0)))
+        except RuntimeError:
+            pass  # jax has started: its devices stay as they are
+
+
+def choose(name: str) -> list[jax.Device]:
+    """Return the devices called `name`: "auto" takes GPUs where there are any.
+
+    Raises:
+        UserError: when a GPU is asked for, here or by JAX_PLATFORMS, and jax sees none.
+    """
+    if name not in DEVICE_NAMES:
+        raise UnknownNameError("device", name, DEVICE_NAMES)
+    try:
+        return list(jax.devices(None if name == "auto" else name))
+    except RuntimeError as error:
+        asked = f"JAX_PLATFORMS={os.environ['JAX_PLATFORMS']}" if "JAX_PLATFORMS" in os.environ else f"device {name!r}"
+        raise UserError(
+            f"There is no device for {asked}: jax {jax.__version__} sees none of that kind. Install jax for CUDA "
+            '(pip install "jax[cuda13]", Python 3.12) on a machine with a GPU, or ask for the device "cpu".'
+        ) from error
+
+
+def layout_for(devices: list[jax.Device]) -> str:
+    """Return how trials are laid out on these devices (see `program.over_trials`)."""
+    return "loop" if devices[0].platform == "cpu" else "vector"

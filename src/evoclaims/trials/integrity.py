@@ -1,0 +1,161 @@
+"""Reading a whole store back: every record and champion checked, leftovers listed, bad files moved aside."""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+import os
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final, Literal
+
+from evoclaims.core.errors import UserError
+from evoclaims.trials.notice import fresh
+from evoclaims.trials.records import is_hash, printable
+from evoclaims.trials.store import DamagedFileError, Store
+
+SETTLED_SECONDS: Final = 60.0
+"""A half-written file younger than this may be another process at work, so it is no leftover yet."""
+
+Kind = Literal["record", "champion", "checkpoint", "leftover"]
+
+
+@dataclass(frozen=True)
+class Problem:
+    """One file that should not be as it is.
+
+    Attributes:
+        path: the file.
+        kind: "record", "champion" or "checkpoint" for a bad one; "leftover" for harmless remains of a kill.
+        reason: a clause that says what is wrong.
+        moved_to: where the repair has put the file, or None.
+    """
+
+    path: Path
+    kind: Kind
+    reason: str
+    moved_to: Path | None = None
+
+    def __str__(self) -> str:
+        """Return one line for the terminal."""
+        moved = f" (moved to {printable(self.moved_to)})" if self.moved_to else ""
+        return f"{self.kind} {printable(self.path)}: {self.reason}{moved}"
+
+
+def verify(
+    store: Store, repair: bool, checkpoint_fault: Callable[[Path], str | None] = lambda path: None
+) -> list[Problem]:
+    """Read everything in `store` back and list what is wrong with it.
+
+    Args:
+        store: the store; one that does not exist yet has no problems.
+        repair: move every file listed into `<root>/quarantine/`; nothing is ever deleted.
+        checkpoint_fault: says what is wrong with a checkpoint file, or None when it can be resumed.
+
+    Returns:
+        One problem per file, records first.
+
+    Raises:
+        UserError: when the root is a file, or a bad file cannot be moved.
+    """
+    if store.root.exists() and not store.root.is_dir():
+        raise UserError(f"The trial store {printable(store.root)} is a file, not a folder; name the folder instead.")
+    checks = (_records(store), _champions(store), _checkpoints(store, checkpoint_fault), _leftovers(store))
+    found: dict[Path, Problem] = {}
+    for problem in itertools.chain.from_iterable(checks):
+        found.setdefault(problem.path, problem)
+    problems = sorted(found.values(), key=lambda problem: (_ORDER[problem.kind], problem.path))
+    if not repair:
+        return problems
+    return [dataclasses.replace(problem, moved_to=_set_aside(store, problem.path)) for problem in problems]
+
+
+_ORDER: Final[dict[Kind, int]] = {"record": 0, "champion": 1, "checkpoint": 2, "leftover": 3}
+
+
+def _records(store: Store) -> Iterator[Problem]:
+    """Check every record, and its champion with it: neither is of use without the other."""
+    for path in store.record_paths():
+        try:
+            result = store.read(path)
+        except DamagedFileError as error:
+            yield Problem(path, "record", error.reason)
+            if _is_record(store, path) and store.champion_path(path.stem).exists():
+                yield Problem(store.champion_path(path.stem), "champion", "its trial's record cannot be used")
+            continue
+        if result is None:
+            continue
+        try:
+            store.champion_of(result)
+        except DamagedFileError as error:
+            yield Problem(path, "record", "its champion cannot be used, so the trial has to be run again")
+            if error.path.exists():
+                yield Problem(error.path, "champion", error.reason)
+
+
+def _is_record(store: Store, path: Path) -> bool:
+    """Whether `path` is named and placed as a record is, so that the champion of that name goes with it."""
+    return is_hash(path.stem) and path == store.record_path(path.stem)
+
+
+def _champions(store: Store) -> Iterator[Problem]:
+    """Find champions that belong to no record: foreign ones, and those of a run killed between the two files."""
+    for path in store.champion_paths():
+        if not is_hash(path.stem) or path != store.champion_path(path.stem):
+            yield Problem(path, "champion", "its name or place is not that of a champion")
+        elif not os.path.lexists(store.record_path(path.stem)) and _settled(path):
+            yield Problem(path, "leftover", "it has no record, so its run was stopped before the trial was stored")
+
+
+def _checkpoints(store: Store, fault: Callable[[Path], str | None]) -> Iterator[Problem]:
+    """Ask `fault` about every checkpoint file."""
+    for path in sorted(store.checkpoints.rglob("*")):
+        if path.is_file() and not path.name.startswith("."):
+            reason = fault(path)
+            if reason is not None:
+                yield Problem(path, "checkpoint", printable(reason))
+
+
+def _leftovers(store: Store) -> Iterator[Problem]:
+    """Find files that a kill left half-written, and notices of processes that are gone."""
+    for path in sorted(store.root.rglob(".*.tmp")):
+        if _quarantine(store) not in path.parents and _settled(path):
+            yield Problem(path, "leftover", "its writer was stopped before the file was whole")
+    for path in sorted((store.root / "running").glob("*")):
+        if not path.name.startswith(".") and fresh(path) is None and path.exists():
+            yield Problem(path, "leftover", "the process that it announces is gone")
+
+
+def _settled(path: Path) -> bool:
+    """Whether `path` is old enough that nobody can still be busy with it."""
+    try:
+        return time.time() - path.lstat().st_mtime > SETTLED_SECONDS
+    except OSError:
+        return False
+
+
+def _quarantine(store: Store) -> Path:
+    """Return the folder that bad files are moved to."""
+    return store.root / "quarantine"
+
+
+def _set_aside(store: Store, path: Path) -> Path | None:
+    """Move `path` into the quarantine under a free name; None when it is gone already."""
+    folder = _quarantine(store)
+    name = path.name.lstrip(".")
+    target, count = folder / name, 0
+    while os.path.lexists(target):
+        count += 1
+        target = folder / f"{name}.{count}"
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        os.rename(path, target)
+    except FileNotFoundError:
+        return None
+    except OSError as error:
+        raise UserError(
+            f"Cannot move {printable(path)} to {printable(folder)}: {error.strerror or error}; move it by hand."
+        ) from error
+    return target

@@ -1,0 +1,153 @@
+"""The three programs of a condition (start, advance, score), written for one trial and laid out over many."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Bool, Float, Int
+
+from evoclaims.core.keys import EVALUATION, TRAINING, streams, trial_key
+from evoclaims.core.pytree import pytree, strong
+from evoclaims.envs.base import Episode
+from evoclaims.methods.base import Progress
+from evoclaims.trials import curriculum
+from evoclaims.trials.rollout import score_every_level
+from evoclaims.trials.spec import Condition
+
+
+@pytree
+class TrialState:
+    """Everything a trial needs to go on; stacked over trials, this is what a checkpoint holds.
+
+    Attributes:
+        seed: the trial's seed; all its keys derive from it.
+        method: the method's own state.
+        ascent: where it stands in the levels.
+        steps: steps of the method taken.
+        last: what the last step reported.
+        diverged: whether a number has stopped being finite.
+        idle: True for a lane that only fills the batch.
+    """
+
+    seed: Int[Array, ""]
+    method: Any
+    ascent: curriculum.Ascent
+    steps: Int[Array, ""]
+    last: Progress
+    diverged: Bool[Array, ""]
+    idle: Bool[Array, ""]
+
+
+@pytree
+class Report:
+    """What the host reads after each chunk: small scalars per trial."""
+
+    steps: Int[Array, ""]
+    level: Int[Array, ""]
+    fitness: Float[Array, ""]
+    success: Float[Array, ""]
+    metrics: Mapping[str, Float[Array, ""]]
+    ended: Bool[Array, ""]
+    diverged: Bool[Array, ""]
+
+
+@pytree
+class Score:
+    """What the host reads of a trial that has ended.
+
+    Attributes:
+        final: the champion's episodes, leaves [levels].
+        parameters: the champion's parameters.
+        solved_at: see `curriculum.Ascent`.
+    """
+
+    final: Episode
+    parameters: Any
+    solved_at: Int[Array, " levels"]
+
+
+@dataclass(frozen=True)
+class Program:
+    """The pure functions of one condition, each for a single trial."""
+
+    condition: Condition
+
+    def start(self, seed: Int[Array, ""], idle: Bool[Array, ""]) -> TrialState:
+        """Build the state of a trial that has not taken a step."""
+        method, task = self.condition.method, self.condition.task
+        init_key, probe_key = streams(trial_key(seed, TRAINING), "init", "probe")
+        state = strong(method.init(init_key, task))
+        ascent = curriculum.start(task.levels, self.condition.progression)
+        progress = jax.eval_shape(lambda: method.step(probe_key, task, ascent.level, state)[1])
+        return TrialState(
+            seed=seed,
+            method=state,
+            ascent=ascent,
+            steps=jnp.zeros((), jnp.int32),
+            last=jax.tree.map(lambda leaf: jnp.zeros(leaf.shape, leaf.dtype), progress),
+            diverged=jnp.zeros((), bool),
+            idle=idle,
+        )
+
+    def advance(self, trial: TrialState, until: Int[Array, ""]) -> tuple[TrialState, Report]:
+        """Take steps until the trial has ended or has taken `until` of them."""
+        method, task = self.condition.method, self.condition.task
+        training_key = streams(trial_key(trial.seed, TRAINING), "step")[0]
+
+        def running(trial: TrialState) -> Bool[Array, ""]:
+            return ~self._ended(trial) & (trial.steps < until)
+
+        def step(trial: TrialState) -> TrialState:
+            key = jax.random.fold_in(training_key, trial.steps)
+            state, progress = method.step(key, task, trial.ascent.level, trial.method)
+            steps = trial.steps + 1
+            healthy = progress.healthy & jnp.isfinite(progress.fitness)
+            return TrialState(
+                seed=trial.seed,
+                method=strong(state),
+                ascent=curriculum.climb(trial.ascent, jnp.where(healthy, progress.success, 0.0), steps),
+                steps=steps,
+                last=strong(progress),
+                diverged=~healthy,
+                idle=trial.idle,
+            )
+
+        trial = jax.lax.while_loop(running, step, trial)
+        return trial, Report(
+            steps=trial.steps,
+            level=trial.ascent.level,
+            fitness=trial.last.fitness,
+            success=trial.last.success,
+            metrics=trial.last.metrics,
+            ended=self._ended(trial),
+            diverged=trial.diverged,
+        )
+
+    def score(self, trial: TrialState) -> Score:
+        """Judge the trial's champion on every level, with keys that training never sees."""
+        task = self.condition.task
+        policy = self.condition.method.best(task, trial.method)
+        final = score_every_level(task, policy, trial_key(trial.seed, EVALUATION))
+        return Score(final=final, parameters=policy.parameters, solved_at=trial.ascent.solved_at)
+
+    def _ended(self, trial: TrialState) -> Bool[Array, ""]:
+        """Whether no further step will be taken."""
+        return trial.ascent.finished | trial.diverged | trial.idle | (trial.steps >= self.condition.steps)
+
+
+def over_trials(function: Callable[..., Any], layout: str) -> Callable[..., Any]:
+    """Lay a single-trial function out over a leading trial axis of all its arguments.
+
+    "loop" runs the trials one after the other inside one program: on a CPU, whose cores one trial already fills, this
+    costs nothing, gives each trial the same bits whatever the batch, and a trial that has ended costs nothing.
+    "vector" runs them side by side: on an accelerator a step's time is mostly launches, which they share.
+    """
+    layouts: dict[str, Callable[..., Any]] = {
+        "loop": lambda *arguments: jax.lax.map(lambda one: function(*one), arguments),
+        "vector": jax.vmap(function),
+    }
+    return layouts[layout]

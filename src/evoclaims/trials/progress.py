@@ -1,0 +1,43 @@
+"""What a run tells whoever watches it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+
+@dataclass(frozen=True)
+class RunProgress:
+    """The state of a batch after a chunk.
+
+    Attributes:
+        condition: label of the condition.
+        phase: "compiling", "resuming", "training" or "waiting …".
+        trials: trials in the batch; `ended` of them have ended.
+        steps: steps of the method taken by the furthest trial, of `total_steps`.
+        best: highest success on the level being trained; None before the first report.
+        level: highest level being trained, of `levels`.
+        seconds_left: estimate for the batch; None while unknown.
+    """
+
+    condition: str
+    phase: str
+    trials: int
+    ended: int = 0
+    steps: int = 0
+    total_steps: int = 0
+    best: float | None = None
+    level: int = 0
+    levels: int = 0
+    seconds_left: float | None = None
+
+
+class Watcher(Protocol):
+    """Receives progress; must be quick and must not raise."""
+
+    def __call__(self, progress: RunProgress) -> None:
+        """Take note of one report."""
+
+
+def ignore(progress: RunProgress) -> None:
+    """Watch nothing."""

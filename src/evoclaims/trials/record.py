@@ -1,0 +1,100 @@
+"""Making the record of a trial that has ended."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from datetime import UTC, datetime
+from typing import Any
+
+import jax
+import numpy as np
+from numpy.typing import NDArray
+
+from evoclaims.core.provenance import collect
+from evoclaims.trials.arrays import pack
+from evoclaims.trials.curriculum import NEVER
+from evoclaims.trials.devices import MATMUL_PRECISION
+from evoclaims.trials.program import Report, Score
+from evoclaims.trials.result import TrialResult, digest
+from evoclaims.trials.spec import TrialSpec
+
+
+def curve_point(spec_cost: int, report: Report, lane: int) -> dict[str, float]:
+    """Return one point of a lane's training curve; `spec_cost` is the environment steps of one step."""
+    steps = int(report.steps[lane])
+    return {
+        "steps": steps,
+        "environment_steps": steps * spec_cost,
+        "level": int(report.level[lane]),
+        "fitness": float(report.fitness[lane]),
+        "success": float(report.success[lane]),
+        **{name: float(values[lane]) for name, values in report.metrics.items()},
+    }
+
+
+def make_result(
+    spec: TrialSpec,
+    report: Report,
+    score: Score,
+    lane: int,
+    curves: Mapping[str, Sequence[float]],
+    timing: Mapping[str, Any],
+    devices: Sequence[jax.Device],
+) -> tuple[TrialResult, dict[str, NDArray[Any]]]:
+    """Return the record of the trial in `lane`, and its champion's parameters by name.
+
+    Metrics of every task with levels:
+        mean_success, last_success: of the final policy, over all levels and on the last.
+        last_fitness: of the final policy on the last level.
+        furthest_solved: highest level solved while training, -1 for none.
+        furthest_reached: highest level trained on.
+        steps, environment_steps: spent until the trial ended.
+    """
+    cost = spec.condition.method.cost(spec.condition.task)
+    success, fitness = np.asarray(score.final.success)[lane], np.asarray(score.final.fitness)[lane]
+    solved_at = np.asarray(score.solved_at)[lane]
+    solved = np.flatnonzero(solved_at != NEVER)
+    steps = int(report.steps[lane])
+    metrics = {
+        "mean_success": float(np.mean(success, dtype=np.float64)),
+        "last_success": float(success[-1]),
+        "last_fitness": float(fitness[-1]),
+        "furthest_solved": float(solved[-1]) if len(solved) else -1.0,
+        "furthest_reached": float(report.level[lane]),
+        "steps": float(steps),
+        "environment_steps": float(steps * cost),
+    }
+    levels = {
+        "success": tuple(map(float, success)),
+        "fitness": tuple(map(float, fitness)),
+        "solved_at": tuple(float(x * cost) if x != NEVER else float(NEVER) for x in solved_at),
+    }
+    champion = named_leaves(jax.tree.map(lambda leaf: np.asarray(leaf)[lane], score.parameters))
+    status = "diverged" if bool(report.diverged[lane]) else "done"
+    plain_curves = {name: tuple(map(float, values)) for name, values in curves.items()}
+    result = TrialResult(
+        id=spec.id,
+        condition=spec.condition.id,
+        spec=spec.plain,
+        seed=spec.seed,
+        status=status,
+        metrics=metrics,
+        levels=levels,
+        curves=plain_curves,
+        digest=digest(status, metrics, levels, plain_curves, pack(champion)),
+        timing={**timing, "ended": datetime.now(UTC).isoformat(timespec="seconds")},
+        provenance=provenance(devices),
+    )
+    return result, champion
+
+
+def provenance(devices: Sequence[jax.Device]) -> dict[str, Any]:
+    """Return the process's provenance, with the devices and the precision that the trials really use."""
+    device = {"platform": devices[0].platform, "kind": devices[0].device_kind, "count": len(devices)}
+    return {**collect(), "device": device, "matmul_precision": MATMUL_PRECISION}
+
+
+def named_leaves(tree: Any) -> dict[str, NDArray[Any]]:
+    """Return the leaves of a tree by their paths, such as "[0].mean"."""
+    leaves, _ = jax.tree_util.tree_flatten_with_path(tree)
+    return {jax.tree_util.keystr(path) or "parameters": np.asarray(leaf) for path, leaf in leaves}

@@ -1,0 +1,20 @@
+"""The one protocol by which every method's final policy is judged."""
+
+from __future__ import annotations
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import PRNGKeyArray
+
+from evoclaims.envs.base import Episode, Task
+from evoclaims.methods.base import Policy
+
+
+def score_every_level(task: Task, policy: Policy, key: PRNGKeyArray) -> Episode:
+    """Examine a policy on each level's own terms; the leaves of the result have shape [levels].
+
+    The key must come from the trial's evaluation stream, which training never draws from.
+    """
+    levels = jnp.arange(task.levels, dtype=jnp.int32)
+    keys = jax.random.split(key, task.levels)
+    return jax.vmap(lambda k, level: task.examine(policy, k, level))(keys, levels)

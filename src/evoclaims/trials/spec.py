@@ -1,0 +1,100 @@
+"""What a trial is: a method on a task, under a curriculum or not, for a budget, from a seed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Literal, get_args
+
+from evoclaims.core.canonical import as_plain, content_hash
+from evoclaims.core.errors import UnknownNameError, UserError
+from evoclaims.envs.base import Task
+from evoclaims.methods.base import Method
+from evoclaims.trials.budget import Budget
+
+Progression = Literal["curriculum", "direct"]
+
+ENGINE_REVISION = 1
+"""Raised when the engine changes what a trial computes, so that old records are not taken for new ones."""
+
+
+def _described(component: Any) -> dict[str, Any]:
+    """Return name, revision and parameters of a method or task, as plain JSON."""
+    return {"name": component.name, "revision": component.revision, "parameters": as_plain(component)}
+
+
+@dataclass(frozen=True)
+class Condition:
+    """Everything that a group of trials shares; the seed alone tells them apart.
+
+    Attributes:
+        method: the algorithm with its frozen hyperparameters.
+        task: the task with its frozen parameters.
+        progression: "curriculum" starts at level 0 and climbs; "direct" stays on the last level.
+        budget: training length and reports.
+    """
+
+    method: Method[Any]
+    task: Task
+    progression: Progression
+    budget: Budget
+
+    def __post_init__(self) -> None:
+        """Reject an unknown progression."""
+        if self.progression not in get_args(Progression):
+            raise UnknownNameError("progression", self.progression, get_args(Progression))
+
+    @cached_property
+    def plain(self) -> dict[str, Any]:
+        """The condition as plain JSON: what its id hashes."""
+        return {
+            "engine": ENGINE_REVISION,
+            "method": _described(self.method),
+            "task": _described(self.task),
+            "progression": self.progression,
+            "budget": as_plain(self.budget),
+        }
+
+    @cached_property
+    def id(self) -> str:
+        """SHA-256 of the canonical JSON of the condition, revisions included."""
+        return content_hash(self.plain)
+
+    @property
+    def label(self) -> str:
+        """A short name for progress lines and tables, such as "cma_es on n_parity"."""
+        suffix = " (direct)" if self.progression == "direct" else ""
+        return f"{self.method.name} on {self.task.name}{suffix}"
+
+    @property
+    def steps(self) -> int:
+        """Steps of the method in the whole budget."""
+        return self.budget.steps(self.method.cost(self.task))
+
+    @property
+    def environment_steps(self) -> int:
+        """Environment steps of one trial that spends the whole budget."""
+        return self.steps * self.method.cost(self.task)
+
+
+@dataclass(frozen=True)
+class TrialSpec:
+    """One trial: a condition and a seed (0 or above)."""
+
+    condition: Condition
+    seed: int
+
+    def __post_init__(self) -> None:
+        """Reject negative seeds."""
+        if self.seed < 0:
+            raise UserError(f"A seed is 0 or above, not {self.seed}.")
+
+    @cached_property
+    def plain(self) -> dict[str, Any]:
+        """The specification as plain JSON: what its id hashes."""
+        return {**self.condition.plain, "seed": self.seed}
+
+    @cached_property
+    def id(self) -> str:
+        """SHA-256 of the canonical JSON of the specification."""
+        return content_hash(self.plain)

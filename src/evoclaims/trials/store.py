@@ -1,0 +1,225 @@
+"""The trial store: one sealed JSON file per trial, named by its content hash, and the champion beside it.
+
+No locks and no server: files are whole or absent, and a file's name follows from its contents, so that several
+processes may share a store and a store copied over another merges with it.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import os
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final, Literal
+
+from numpy.typing import NDArray
+
+from evoclaims.core.errors import UserError
+from evoclaims.core.files import write_atomically
+from evoclaims.trials.arrays import pack, unpack
+from evoclaims.trials.records import RecordError, dump, is_hash, parse, printable
+from evoclaims.trials.result import TrialResult
+
+DEFAULT_ROOT: Final = Path(".evoclaims")
+
+Put = Literal["stored", "present", "differs"]
+"""What became of a trial handed to the store: written; there already, equal to the bit; there with another digest."""
+
+
+class DamagedFileError(UserError):
+    """A file of the store is torn, edited or foreign; `path` is the file and `reason` a clause that says why."""
+
+    def __init__(self, path: Path, reason: str) -> None:
+        """Build the sentence that names the file and the way out."""
+        super().__init__(
+            f"Cannot use {printable(path)}: {reason}; run `evoclaims verify`, which moves the file aside so that "
+            "the trial is run again."
+        )
+        self.path = path
+        self.reason = reason
+
+
+@dataclass(frozen=True)
+class Store:
+    """Trials under one folder; making a `Store` touches no file, so that a read-only one can be read.
+
+    Attributes:
+        root: the folder; it need not exist yet.
+    """
+
+    root: Path = DEFAULT_ROOT
+
+    @property
+    def checkpoints(self) -> Path:
+        """The folder of interrupted conditions' checkpoints."""
+        return self.root / "checkpoints"
+
+    def record_path(self, trial_id: str) -> Path:
+        """Return where the record of `trial_id` belongs; a `UserError` for a text that is not an id."""
+        return self.root / "trials" / _checked(trial_id)[:2] / f"{trial_id}.json"
+
+    def champion_path(self, trial_id: str) -> Path:
+        """Return where the champion of `trial_id` belongs; a `UserError` for a text that is not an id."""
+        return self.root / "champions" / _checked(trial_id)[:2] / f"{trial_id}.npz"
+
+    def check_writable(self) -> None:
+        """Write and remove a small file, so that a bad folder is found before an hour of training, not after.
+
+        Raises:
+            UserError: when the root is a file, cannot be written, or the disk is full.
+        """
+        probe = self.root / f".writable.{os.getpid()}.tmp"
+        try:
+            if self.root.exists() and not self.root.is_dir():
+                raise UserError(
+                    f"The trial store {printable(self.root)} is a file, not a folder: name another with "
+                    "--claims-storage (pytest) or --storage (evoclaims)."
+                )
+            write_atomically(probe, bytes(4096))
+            probe.unlink(missing_ok=True)
+        except OSError as error:
+            raise UserError(
+                f"Cannot write to the trial store {printable(self.root)}: {error.strerror or error}. Name another "
+                "folder with --claims-storage (pytest) or --storage (evoclaims)."
+            ) from error
+
+    def get(self, trial_id: str) -> TrialResult | None:
+        """Return the stored trial, or None when there is none.
+
+        Raises:
+            DamagedFileError: when its file is torn, edited, foreign or unreadable.
+        """
+        return self.read(self.record_path(trial_id))
+
+    def read(self, path: Path) -> TrialResult | None:
+        """Return the trial in the record file `path` of this store, or None when the file is not there.
+
+        Raises:
+            DamagedFileError: as for `get`, and when the file is not named and placed as a record is.
+        """
+        if not is_hash(path.stem) or path != self.record_path(path.stem):
+            raise DamagedFileError(path, "its name or place is not that of a trial record")
+        try:
+            data = path.read_bytes()
+        except FileNotFoundError:
+            return None
+        except OSError as error:
+            raise DamagedFileError(path, f"it cannot be read ({error.strerror or error})") from error
+        try:
+            result = parse(data)
+        except RecordError as error:
+            raise DamagedFileError(path, error.reason) from error
+        if result.id != path.stem:
+            raise DamagedFileError(path, f"it holds another trial, {result.id}")
+        return result
+
+    def put(self, result: TrialResult, champion: Mapping[str, Any]) -> Put:
+        """Store a trial and its champion's parameters (named arrays of any shape; empty for none).
+
+        The champion is written first, so that a record that exists is complete. A trial that is there already
+        stays as it is, whatever its digest, with one exception: a crash is no outcome of the trial, so a trial
+        run again after a crash takes its place.
+
+        Returns:
+            "stored", "present" (there already with an equal digest) or "differs" (there with another digest).
+
+        Raises:
+            UserError: when the disk is full or read-only, or the record that is there is damaged.
+            ValueError: when `result` or `champion` has no sound record.
+        """
+        packed = pack(champion) if champion else b""
+        sealed = dataclasses.replace(result, champion=hashlib.sha256(packed).hexdigest() if packed else "")
+        record = dump(sealed)
+        try:
+            parse(record)
+        except RecordError as error:  # a mistake in the program: found here rather than by the next reader
+            raise ValueError(str(error)) from error
+        present = self.get(result.id)
+        if present is not None and (present.status != "crashed" or present.digest == result.digest):
+            return "present" if present.digest == result.digest else "differs"
+        if packed:
+            write_atomically(self.champion_path(result.id), packed)
+        write_atomically(self.record_path(result.id), record)
+        return "stored"
+
+    def champion(self, trial_id: str) -> dict[str, NDArray[Any]]:
+        """Return the champion's parameters by name (empty when the trial has none).
+
+        Raises:
+            UserError: when there is no such trial.
+            DamagedFileError: when the record or the champion is missing, torn or swapped.
+        """
+        result = self.get(trial_id)
+        if result is None:
+            raise UserError(f"There is no trial {trial_id} in {printable(self.root)}.")
+        return self.champion_of(result)
+
+    def champion_of(self, result: TrialResult) -> dict[str, NDArray[Any]]:
+        """Return the champion's parameters of a trial read from this store; raises as `champion` does."""
+        if not result.champion:
+            return {}
+        path = self.champion_path(result.id)
+        try:
+            data = path.read_bytes()
+        except OSError as error:
+            raise DamagedFileError(path, f"it cannot be read ({error.strerror or error})") from error
+        if hashlib.sha256(data).hexdigest() != result.champion:
+            raise DamagedFileError(path, "it is not the champion that the trial's record names")
+        try:
+            return unpack(data)
+        except ValueError as error:
+            raise DamagedFileError(path, f"it is {error}") from error
+
+    def ids(self) -> tuple[str, ...]:
+        """Return the sorted ids of the stored trials, by file name alone; the files are not opened."""
+        paths = self.record_paths()
+        return tuple(path.stem for path in paths if is_hash(path.stem) and path == self.record_path(path.stem))
+
+    def results(self, errors: list[DamagedFileError]) -> Iterator[TrialResult]:
+        """Iterate over every sound trial in the order of ids; append one error to `errors` for each bad file."""
+        for path in self.record_paths():
+            try:
+                result = self.read(path)
+            except DamagedFileError as error:
+                errors.append(error)
+                continue
+            if result is not None:
+                yield result
+
+    def record_paths(self) -> Iterator[Path]:
+        """Iterate over all that lies where records belong, strange entries included (hidden ones left out)."""
+        return _walk(self.root / "trials")
+
+    def champion_paths(self) -> Iterator[Path]:
+        """Iterate over all that lies where champions belong, strange entries included (hidden ones left out)."""
+        return _walk(self.root / "champions")
+
+
+def _checked(trial_id: str) -> str:
+    """Return `trial_id` when it is one; anything else might climb out of the store's folder."""
+    if not is_hash(trial_id):
+        raise UserError(f"{trial_id!r} is not a trial's id: an id is 64 lower-case hexadecimal digits.")
+    return trial_id
+
+
+def _walk(top: Path) -> Iterator[Path]:
+    """Iterate over `top/<two hex digits>/*`, sorted; an entry that is no such folder is given itself."""
+    for entry in _entries(top):
+        if re.fullmatch(r"[0-9a-f]{2}", entry.name) and entry.is_dir():
+            yield from _entries(entry)
+        else:
+            yield entry
+
+
+def _entries(folder: Path) -> list[Path]:
+    """Return what is in `folder`, sorted; the folder itself when it cannot be listed."""
+    try:
+        names = sorted(os.listdir(folder))
+    except FileNotFoundError:
+        return []
+    except OSError:
+        return [folder]
+    return [folder / name for name in names if not name.startswith(".")]

@@ -1,0 +1,127 @@
+"""Provenance is complete, plain JSON, and never stops a run."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import jax
+import numpy
+import pytest
+
+from evoclaims.core import provenance
+
+
+@pytest.fixture
+def repository(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """An empty git repository that is the current folder."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("GIT_CONFIG_GLOBAL", os.devnull)
+    subprocess.run(["git", "init", "--quiet"], check=True)
+    return tmp_path
+
+
+def commit(folder: Path, text: str) -> None:
+    """Commit a file `code.py` with `text`."""
+    (folder / "code.py").write_text(text)
+    who = ["-c", "user.name=someone", "-c", "user.email=someone@example.org"]
+    subprocess.run(["git", "add", "code.py"], check=True)
+    subprocess.run(["git", *who, "commit", "--quiet", "-m", "a change"], check=True)
+
+
+def test_provenance_is_plain_json_with_every_part() -> None:
+    found = provenance.collect()
+    assert json.loads(json.dumps(found)) == found
+    assert set(found) == {"git", "versions", "device", "machine", "xla_flags", "matmul_precision", "x64"}
+
+
+def test_versions_name_every_package_and_say_null_for_an_absent_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(provenance, "PACKAGES", ("numpy", "evoclaims-no-such-package"))
+    versions = provenance.versions()
+    assert versions["numpy"] == numpy.__version__
+    assert versions["evoclaims-no-such-package"] is None
+    assert versions["python"] is not None
+
+
+def test_the_device_is_the_one_jax_uses() -> None:
+    devices = jax.devices()
+    assert provenance.collect()["device"] == {
+        "platform": devices[0].platform,
+        "kind": devices[0].device_kind,
+        "count": len(devices),
+    }
+
+
+def test_a_caller_that_changes_its_copy_changes_no_other() -> None:
+    provenance.collect()["versions"]["numpy"] = "changed"
+    assert provenance.collect()["versions"]["numpy"] == numpy.__version__
+
+
+def test_the_lookup_happens_once_per_process(monkeypatch: pytest.MonkeyPatch) -> None:
+    provenance.collect()
+    monkeypatch.setattr(provenance, "git_state", lambda: pytest.fail("looked up again"))
+    provenance.collect()
+
+
+def test_the_machine_class_is_one_line_that_starts_with_the_system() -> None:
+    machine = provenance.machine_class()
+    assert machine.split()[0] in {"Linux", "Darwin", "Windows"}
+    assert machine == " ".join(machine.split())
+
+
+def test_a_clean_repository_gives_its_commit(repository: Path) -> None:
+    commit(repository, "x = 1\n")
+    head = subprocess.run(["git", "rev-parse", "HEAD"], capture_output=True, text=True, check=True).stdout.strip()
+    assert provenance.git_state() == {"sha": head, "dirty": False}
+
+
+def test_an_edited_tracked_file_makes_the_repository_dirty(repository: Path) -> None:
+    commit(repository, "x = 1\n")
+    (repository / "code.py").write_text("x = 2\n")
+    state = provenance.git_state()
+    assert state is not None
+    assert state["dirty"] is True
+
+
+def test_an_untracked_file_does_not_make_the_repository_dirty(repository: Path) -> None:
+    commit(repository, "x = 1\n")
+    (repository / "notes.txt").write_text("results\n")
+    state = provenance.git_state()
+    assert state is not None
+    assert state["dirty"] is False
+
+
+def test_a_repository_without_commits_has_no_sha(repository: Path) -> None:
+    assert provenance.git_state() == {"sha": None, "dirty": False}
+
+
+def test_a_folder_outside_any_repository_has_no_git_state(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("GIT_CEILING_DIRECTORIES", str(tmp_path.parent))
+    assert provenance.git_state() is None
+
+
+def test_a_machine_without_git_has_no_git_state(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setenv("PATH", str(tmp_path))
+    assert provenance.git_state() is None
+
+
+def test_a_git_that_hangs_has_no_git_state(monkeypatch: pytest.MonkeyPatch) -> None:
+    def hang(*arguments: Any, **options: Any) -> None:
+        assert options["timeout"] == provenance.GIT_SECONDS
+        raise subprocess.TimeoutExpired("git", provenance.GIT_SECONDS)
+
+    monkeypatch.setattr(subprocess, "run", hang)
+    assert provenance.git_state() is None
+
+
+def test_a_git_that_prints_nonsense_gives_no_sha(monkeypatch: pytest.MonkeyPatch) -> None:
+    def nonsense(arguments: list[str], **options: Any) -> subprocess.CompletedProcess[bytes]:
+        text = b"true" if "--is-inside-work-tree" in arguments else b"\xff warning: strange"
+        return subprocess.CompletedProcess(arguments, 0, stdout=text)
+
+    monkeypatch.setattr(subprocess, "run", nonsense)
+    assert provenance.git_state() == {"sha": None, "dirty": True}

@@ -1,0 +1,194 @@
+"""The judge: attainability first, looks, curtailment, errors."""
+
+from __future__ import annotations
+
+import math
+from itertools import product
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from evoclaims.judging.judge import attainability, judge, needed_trials
+from evoclaims.judging.protocol import FIXED_10, SEQUENTIAL, Look, Protocol
+from evoclaims.judging.verdict import Outcome
+
+HIGH, LOW = [float(i) for i in range(10, 20)], [float(i) for i in range(10)]
+
+
+def test_an_underpowered_claim_is_never_looked_at(source) -> None:
+    a, b = source("a", HIGH), source("b", LOW)
+    verdict = judge(a.score() > b.score(), Protocol.fixed(2))
+    assert verdict.outcome is Outcome.INCONCLUSIVE
+    assert verdict.reason == "underpowered: needs n = 3 at alpha = 0.05"
+    assert a.asked == b.asked == []
+    assert (verdict.n, verdict.attainable_p) == (0, pytest.approx(1 / 6))
+
+
+@pytest.mark.parametrize(
+    ("kind", "n"), [("greater", 3), ("solves", 9), ("band", 5), ("trend", 2), ("equivalent", 3), ("exact", 1)]
+)
+def test_the_needed_trials_are_the_fewest_that_could_support(source, kind, n) -> None:
+    a, b = source("a", HIGH), source("b", LOW)
+    assertion = {
+        "greater": lambda: a.score() > b.score(),
+        "solves": lambda: a.solved().in_most_trials(),
+        "band": lambda: a.score().between(0, 1),
+        "trend": lambda: a.success(3).falls(),
+        "equivalent": lambda: a.score().equivalent_to(b.score(), margin=1.0),
+        "exact": lambda: a.solved().in_every_trial(),
+    }[kind]()
+    assert needed_trials(assertion, FIXED_10) == n
+    ((look, p),) = attainability(assertion, Protocol.fixed(n))
+    assert p.supported <= look.alpha
+
+
+def test_support_that_no_size_reaches_is_said_so(source) -> None:
+    event = source("a", [0.5] * 10).solved()
+    assertion = event.in_most_trials(p0=0.999)
+    assert needed_trials(assertion, FIXED_10) is None
+    assert "no n up to 100 suffices" in judge(source("a", [1.0] * 10).solved().stays(p0=0.999), FIXED_10).reason
+
+
+def test_a_direction_out_of_reach_is_named_in_the_reason(source) -> None:
+    verdict = judge(source("a", [1.0] * 5).solved().in_most_trials(), Protocol.fixed(5))
+    assert verdict.outcome is Outcome.INCONCLUSIVE
+    assert "underpowered for support: needs n = 9" in verdict.reason
+
+
+def test_ties_that_leave_no_direction_open_are_underpowered(source) -> None:
+    verdict = judge(source("a", [1.0] * 10).score() > source("b", [1.0] * 10).score(), FIXED_10)
+    assert verdict.outcome is Outcome.INCONCLUSIVE
+    assert verdict.reason.startswith("underpowered: with these ties")
+    assert verdict.attainable_p == 1.0
+
+
+def test_a_clear_difference_ends_at_the_first_look(source) -> None:
+    a, b = source("a", HIGH), source("b", LOW)
+    verdict = judge(a.score() > b.score(), SEQUENTIAL)
+    assert (verdict.outcome, verdict.n, verdict.alpha) == (Outcome.SUPPORTED, 5, 0.01)
+    assert a.asked == b.asked == [(0, 1, 2, 3, 4)]
+
+
+def test_an_open_claim_goes_on_to_the_next_look(source) -> None:
+    a, b = source("a", [0.5, *HIGH[1:]]), source("b", LOW)
+    verdict = judge(a.score() > b.score(), SEQUENTIAL)
+    assert (verdict.outcome, verdict.n, verdict.alpha) == (Outcome.SUPPORTED, 10, 0.04)
+    assert a.asked == [tuple(range(5)), tuple(range(10))]
+
+
+def test_a_look_that_can_decide_nothing_is_skipped(source) -> None:
+    a, b = source("a", HIGH), source("b", LOW)
+    verdict = judge(a.score() > b.score(), Protocol((Look(2, 0.01), Look(10, 0.04))))
+    assert (verdict.outcome, a.asked) == (Outcome.SUPPORTED, [tuple(range(10))])
+
+
+def test_seeds_start_where_the_protocol_says(source, trial) -> None:
+    a = source("a", LOW)
+    judge(a.solved().in_every_trial(), Protocol((Look(3, 0.05),), first_seed=4))
+    assert a.asked == [(4, 5, 6)]
+
+
+def test_four_of_five_solved_is_curtailed_since_nothing_can_change_the_verdict(source) -> None:
+    a = source("a", [1.0, 1.0, 0.0, 1.0, 1.0] + [1.0] * 5)
+    verdict = judge(a.solved().in_most_trials(), SEQUENTIAL)
+    assert (verdict.outcome, verdict.n) == (Outcome.INCONCLUSIVE, 5)
+    assert "stopped early" in verdict.reason
+    assert a.asked == [(0, 1, 2, 3, 4)]
+
+
+def test_a_verdict_that_every_completion_reaches_is_given_early(source) -> None:
+    # 8 of 9 have p = 0.0195 at p0 = 0.5: not decisive at 0.003, but even 8 of 10 (p = 0.055) is at 0.06.
+    looks = (Look(9, 0.003), Look(10, 0.06))
+    supported = judge(source("a", [1.0] * 8 + [0.0]).solved().stays(p0=0.5), Protocol(looks))
+    refuted = judge(source("a", [0.0] * 8 + [1.0]).solved().stays(p0=0.5), Protocol(looks))
+    assert [(v.outcome, v.n) for v in (supported, refuted)] == [(Outcome.SUPPORTED, 9), (Outcome.REFUTED, 9)]
+    assert "stopped early" in supported.reason
+
+
+def test_an_open_completion_is_not_curtailed(source) -> None:
+    a = source("a", [1.0] * 10)
+    assert judge(a.solved().in_most_trials(), SEQUENTIAL).outcome is Outcome.SUPPORTED
+    assert a.asked == [tuple(range(5)), tuple(range(10))]
+
+
+def test_a_claim_that_can_still_be_refuted_goes_on(source) -> None:
+    a = source("a", [1.0, 1.0] + [0.0] * 8)
+    verdict = judge(a.solved().in_most_trials(), SEQUENTIAL)
+    assert (verdict.outcome, verdict.n) == (Outcome.REFUTED, 10)
+
+
+@pytest.mark.parametrize("kind", ["solves", "band", "greater", "falls", "and", "or"])
+@given(data=st.data())
+@settings(deadline=None, max_examples=10, suppress_health_check=[HealthCheck.function_scoped_fixture])
+def test_bounds_hold_for_every_completion(kind, data, source) -> None:
+    """Every completion of 2 trials to 4 gives p between the bounds (values from a small alphabet)."""
+    rows = list(product([0.0, 1.0, 2.0], repeat=2)) if kind == "falls" else ["diverged", 0.5, 1.0, 7.0]
+    old = data.draw(st.lists(st.sampled_from(rows), min_size=2, max_size=2))
+    other = data.draw(st.lists(st.sampled_from(rows), min_size=4, max_size=4))
+
+    def assertion(values):  # type: ignore[no-untyped-def]
+        a, b = source("a", values), source("b", other)
+        return {
+            "solves": lambda: a.solved().in_most_trials(),
+            "band": lambda: a.score().between(1, 2),
+            "greater": lambda: a.score() > b.score(),
+            "falls": lambda: a.success(2).falls(),
+            "and": lambda: a.solved().stays() & a.score().between(1, 2),
+            "or": lambda: a.solved().stays() | a.score().between(1, 2),
+        }[kind]()
+
+    def trials(claim, n):  # type: ignore[no-untyped-def]
+        return {s.fingerprint: tuple(s.fetch(range(n))) for s in claim.sources()}
+
+    early = assertion(old)
+    low, high = early.bounds(trials(early, 2), 4, FIXED_10)
+    for new in product(rows, repeat=2):
+        full = assertion([*old, *new])
+        p = full.find(trials(full, 4), FIXED_10, 0.05).p
+        assert low.supported - 1e-12 <= p.supported <= high.supported + 1e-12
+        assert low.refuted - 1e-12 <= p.refuted <= high.refuted + 1e-12
+
+
+def test_the_order_in_which_a_source_returns_trials_does_not_matter(source) -> None:
+    a, b = [3.0, 1, 4, 1, 5, 9, 2, 6, 5, 3], [2.0, 7, 1, 8, 2, 8, 1, 8, 2, 8]
+    verdicts = [
+        judge(source("a", a, backwards).score() > source("b", b).score(), FIXED_10) for backwards in (False, True)
+    ]
+    assert verdicts[0] == verdicts[1]
+
+
+def test_a_crashed_trial_makes_the_verdict_an_error(source) -> None:
+    verdict = judge(source("a", [*HIGH[:9], "crashed"]).score() > source("b", LOW).score(), FIXED_10)
+    assert verdict.outcome is Outcome.ERROR
+    assert verdict.reason == "trials crashed: a (seed 9)"
+
+
+def test_nan_in_a_finished_trial_makes_the_verdict_an_error(source) -> None:
+    verdict = judge(source("a", [*HIGH[:9], math.nan]).solved().stays(), FIXED_10)
+    assert verdict.outcome is Outcome.ERROR
+    assert "NaN" in verdict.reason
+
+
+def test_what_a_source_raises_reaches_the_caller(source) -> None:
+    with pytest.raises(KeyError):
+        judge(source("a", [1.0]).solved().in_every_trial(), Protocol.fixed(3))
+
+
+def test_a_source_that_returns_other_seeds_is_a_mistake(source, trial) -> None:
+    a = source("a", LOW)
+    a.trials[2] = trial(7, 1.0)
+    with pytest.raises(ValueError, match="returned the seeds"):
+        judge(a.solved().in_every_trial(), Protocol.fixed(3))
+
+
+def test_a_condition_named_twice_is_fetched_once(source) -> None:
+    a = source("a", [1.0] * 10)
+    judge(a.solved().stays() & a.score().between(0, 2), FIXED_10)
+    assert a.asked == [tuple(range(10))]
+
+
+def test_a_control_beside_a_test_waits_for_every_trial(source) -> None:
+    a = source("a", [1.0] * 10)
+    verdict = judge(a.solved().in_every_trial() & a.score().between(0, 2), SEQUENTIAL)
+    assert (verdict.outcome, a.asked) == (Outcome.SUPPORTED, [tuple(range(10))])

@@ -1,0 +1,204 @@
+"""Each kind of assertion comes out as the table of the specification says."""
+
+from __future__ import annotations
+
+import math
+from itertools import product
+
+import pytest
+
+from evoclaims.judging.judge import judge
+from evoclaims.judging.protocol import FIXED_10, Protocol
+from evoclaims.judging.verdict import Outcome
+
+SUPPORTED, REFUTED, INCONCLUSIVE = Outcome.SUPPORTED, Outcome.REFUTED, Outcome.INCONCLUSIVE
+RISING = [float(i) for i in range(10)]
+
+
+def shifted(by: float) -> list[float]:
+    return [value + by for value in RISING]
+
+
+@pytest.mark.parametrize(
+    ("a", "b", "outcome"),
+    [
+        (shifted(20), RISING, SUPPORTED),
+        (RISING, shifted(20), REFUTED),
+        (shifted(0.5), RISING, INCONCLUSIVE),
+        (RISING, shifted(0.5), REFUTED),  # below in every seed pair: the declared effect is rejected, not the rank
+        (RISING, RISING, INCONCLUSIVE),
+        (RISING, ["diverged"] * 10, SUPPORTED),
+        (["timeout"] * 10, RISING, REFUTED),
+    ],
+)
+def test_greater(source, a, b, outcome) -> None:
+    verdict = judge(source("a", a).score() > source("b", b).score(), FIXED_10)
+    assert verdict.outcome is outcome
+
+
+def test_greater_reports_every_value_and_its_effect(source) -> None:
+    verdict = judge(source("a", shifted(20)).score() > source("b", RISING).score(), FIXED_10)
+    (evidence,) = verdict.evidence
+    assert [sample.values for sample in evidence.samples] == [tuple(shifted(20)), tuple(RISING)]
+    assert (evidence.n, evidence.a12, evidence.cliffs_delta) == (10, 1.0, 1.0)
+    assert evidence.p == evidence.attainable_p == verdict.p == pytest.approx(5.4e-6, rel=0.01)
+    assert evidence.outcome is SUPPORTED
+    assert "10 of 10 seed pairs" in evidence.detail
+
+
+def test_below_is_above_with_the_sides_swapped(source) -> None:
+    a, b = source("a", RISING).score(), source("b", shifted(3)).score()
+    assert judge(a < b, FIXED_10).to_json() == judge(b > a, FIXED_10).to_json()
+
+
+def test_evidence_both_ways_decides_neither(source) -> None:
+    # A ranks above B over all pairs, but seed by seed mostly just below: the pairs reject the margin.
+    a = [10.0, 20, 30, 40, 50, 60, 70, 80, 90, 100]
+    b = [11.0, 21, 31, 41, 51, 61, 0, 0, 0, 0]
+    wide = Protocol(looks=FIXED_10.looks, a12_margin=0.75)
+    verdict = judge(source("a", a).score() > source("b", b).score(), wide)
+    assert verdict.p is not None
+    assert verdict.p_refuted is not None
+    assert max(verdict.p, verdict.p_refuted) <= 0.05
+    assert verdict.outcome is INCONCLUSIVE
+    assert "contradicts itself" in verdict.reason
+
+
+@pytest.mark.parametrize(
+    ("successes", "outcome"), [(10, SUPPORTED), (9, INCONCLUSIVE), (5, INCONCLUSIVE), (4, REFUTED)]
+)
+@pytest.mark.parametrize("word", ["in_most_trials", "stays"])
+def test_solves_and_stays(source, word, successes, outcome) -> None:
+    event = source("a", [1.0] * successes + ["diverged"] * (10 - successes)).solved()
+    verdict = judge(getattr(event, word)(), FIXED_10)
+    assert verdict.outcome is outcome
+    assert verdict.evidence[0].kind == {"in_most_trials": "solves", "stays": "stays"}[word]
+
+
+def test_an_overriding_p0_takes_the_place_of_the_protocols(source) -> None:
+    event = source("a", [1.0] * 9 + [0.0]).solved()
+    assert judge(event.in_most_trials(p0=0.5), FIXED_10).outcome is SUPPORTED
+    assert judge(event.in_most_trials(), Protocol(FIXED_10.looks, p0=0.5)).outcome is SUPPORTED
+
+
+@pytest.mark.parametrize(
+    ("values", "outcome"),
+    [
+        ([5.0] * 10, SUPPORTED),
+        ([4.0] * 5 + [6.0] * 5, SUPPORTED),
+        ([5.0] * 9 + [0.0], SUPPORTED),
+        ([5.0] * 8 + [0.0] * 2, INCONCLUSIVE),
+        ([5.0] * 8 + [0.0, 9.0], SUPPORTED),  # nine at or above 4, nine at or below 6
+        ([5.0] * 2 + [9.0] * 8, INCONCLUSIVE),
+        ([5.0] + [9.0] * 9, REFUTED),
+        ([5.0] + ["diverged"] * 9, REFUTED),
+    ],
+)
+def test_band(source, values, outcome) -> None:
+    assert judge(source("a", values).score().between(4, 6), FIXED_10).outcome is outcome
+
+
+@pytest.mark.parametrize(
+    ("rows", "outcome"),
+    [
+        ([(1.0, 0.8, 0.6, 0.5)] * 10, SUPPORTED),
+        ([(0.5, 0.6, 0.8, 1.0)] * 10, REFUTED),
+        ([(1.0, 0.5, 0.5, 1.0)] * 10, INCONCLUSIVE),
+        (["diverged"] * 10, INCONCLUSIVE),
+    ],
+)
+def test_trend(source, rows, outcome) -> None:
+    profile = source("a", rows).success(4)
+    assert judge(profile.falls(), FIXED_10).outcome is outcome
+    mirrored = {SUPPORTED: REFUTED, REFUTED: SUPPORTED, INCONCLUSIVE: INCONCLUSIVE}
+    assert judge(profile.rises(), FIXED_10).outcome is mirrored[outcome]
+
+
+def test_a_trend_reports_every_level(source) -> None:
+    verdict = judge(source("a", [(1.0, 0.5)] * 10).success(2).falls(), FIXED_10)
+    assert [sample.median for sample in verdict.evidence[0].samples] == [1.0, 0.5]
+
+
+@pytest.mark.parametrize(
+    ("a", "outcome"),
+    [
+        (RISING, SUPPORTED),
+        (shifted(30), REFUTED),
+        (shifted(-30), REFUTED),
+        (shifted(8), INCONCLUSIVE),
+        (["diverged"] * 10, REFUTED),
+    ],
+)
+def test_equivalent(source, a, outcome) -> None:
+    assertion = source("a", a).score().equivalent_to(source("b", RISING).score(), margin=8.0)
+    assert judge(assertion, FIXED_10).outcome is outcome
+
+
+def test_equivalence_is_refuted_at_half_of_alpha(source) -> None:
+    # Three against three: a complete separation has p = 0.05, which alpha / 2 does not allow.
+    assertion = source("a", shifted(30)).score().equivalent_to(source("b", RISING).score(), margin=8.0)
+    assert judge(assertion, Protocol.fixed(3)).outcome is INCONCLUSIVE
+
+
+@pytest.mark.parametrize(("last", "outcome"), [(1.0, SUPPORTED), (0.0, REFUTED), ("diverged", REFUTED)])
+def test_exact_needs_every_trial_and_reports_no_p(source, last, outcome) -> None:
+    verdict = judge(source("a", [1.0, 1.0, last]).solved().in_every_trial(), Protocol.fixed(3))
+    assert verdict.outcome is outcome
+    assert verdict.p is verdict.evidence[0].p is None
+
+
+@pytest.mark.parametrize("values", [RISING, [1.0] * 10, [0.0] * 5 + [9.0] * 5])
+@pytest.mark.parametrize("n", [6, 9, 10])
+def test_no_condition_is_above_itself(source, n, values) -> None:
+    verdict = judge(source("a", values).score().never_above_itself(), Protocol.fixed(n))
+    assert verdict.outcome is SUPPORTED
+    assert f"of {math.comb(n, n // 2)} splits" in verdict.reason
+
+
+def test_beyond_ten_trials_a_fixed_sample_of_splits_is_judged(source) -> None:
+    measure = source("a", [float(i) for i in range(14)]).score()
+    verdicts = [judge(measure.never_above_itself(), Protocol.fixed(14)) for _ in range(2)]
+    assert verdicts[0] == verdicts[1]
+    assert verdicts[0].outcome is SUPPORTED
+    assert "of 252 splits" in verdicts[0].reason
+
+
+@pytest.mark.parametrize("n", [10, 14])
+def test_the_control_catches_a_judge_that_cries_wolf(source, n, monkeypatch) -> None:
+    from evoclaims.judging.exact import ExactTest
+    from evoclaims.judging.kinds import greater
+
+    real = greater.rank_test
+    monkeypatch.setattr(greater, "rank_test", lambda a, b: ExactTest(real(a, b).p / 5, 0.0))
+    measure = source("a", [float(i) for i in range(n)]).score()
+    assert judge(measure.never_above_itself(), Protocol.fixed(n)).outcome is REFUTED
+
+
+def test_the_control_is_underpowered_where_no_split_could_come_out_supported(source) -> None:
+    verdict = judge(source("a", RISING).score().never_above_itself(), Protocol.fixed(5))
+    assert verdict.outcome is INCONCLUSIVE
+    assert "underpowered: needs n = 6" in verdict.reason
+
+
+OUTCOMES = {SUPPORTED: [1.0] * 10, REFUTED: [0.0] * 10, INCONCLUSIVE: [1.0] * 8 + [0.0] * 2}
+
+
+@pytest.mark.parametrize(("left", "right"), list(product(OUTCOMES, OUTCOMES)))
+def test_and_needs_every_part_and_or_needs_one(source, left, right) -> None:
+    a = source("a", OUTCOMES[left]).solved().in_most_trials(p0=0.6)
+    b = source("b", OUTCOMES[right]).solved().in_most_trials(p0=0.6)
+    both = {left, right}
+    expected_and = REFUTED if REFUTED in both else SUPPORTED if both == {SUPPORTED} else INCONCLUSIVE
+    expected_or = SUPPORTED if SUPPORTED in both else REFUTED if both == {REFUTED} else INCONCLUSIVE
+    assert judge(a & b, FIXED_10).outcome is expected_and
+    assert judge(a | b, FIXED_10).outcome is expected_or
+    assert [entry.outcome for entry in judge(a & b, FIXED_10).evidence] == [left, right]
+
+
+def test_or_pays_holms_correction_and_and_does_not(source) -> None:
+    # 10 of 10 against 0.7 has p = 0.028: enough alone and for "and", not as the better of two.
+    a, b = source("a", [1.0] * 10).solved().stays(), source("b", [1.0] * 10).solved().stays()
+    assert judge(a & b, FIXED_10).outcome is SUPPORTED
+    verdict = judge(a | b, FIXED_10)
+    assert verdict.outcome is INCONCLUSIVE
+    assert verdict.p == pytest.approx(2 * 0.7**10)

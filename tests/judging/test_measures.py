@@ -1,0 +1,162 @@
+"""What is read from trials: failed trials are worst, NaN is an error, and sentences read well."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from evoclaims.core.errors import UserError
+from evoclaims.judging.measure import Event, Measure, Profile
+from evoclaims.judging.sample import UnreadableTrialError
+
+
+def fetched(source, n):  # type: ignore[no-untyped-def]
+    return {source.fingerprint: tuple(source.fetch(range(n)))}
+
+
+def test_a_measure_reads_one_number_a_trial(source) -> None:
+    cma = source("cma_es on n_parity", [1.0, 0.5, 0.25])
+    sample = cma.score().sample(fetched(cma, 3))
+    assert sample.label == "cma_es on n_parity: score"
+    assert (sample.seeds, sample.values, sample.median, sample.failed) == ((0, 1, 2), (1.0, 0.5, 0.25), 0.5, ())
+
+
+@pytest.mark.parametrize(("better", "worst"), [("higher", -math.inf), ("lower", math.inf)])
+@pytest.mark.parametrize("status", ["diverged", "timeout"])
+def test_a_failed_trial_takes_the_worst_value(source, status, better, worst) -> None:
+    ppo = source("ppo", [1.0, status])
+    sample = ppo.score(better).sample(fetched(ppo, 2))
+    assert (sample.values, sample.failed) == ((1.0, worst), (1,))
+
+
+def test_an_event_never_holds_in_a_failed_trial(source) -> None:
+    ppo = source("ppo", [1.0, "diverged", 0.0, "timeout"])
+    always = Event(ppo, "anything at all", lambda trial: True)
+    assert always.sample(fetched(ppo, 4)).values == (1.0, 0.0, 1.0, 0.0)
+
+
+def test_a_failed_trial_is_flat_and_worst_in_a_profile(source) -> None:
+    ppo = source("ppo", [(1.0, 0.5), "diverged"])
+    assert ppo.success(2).rows(fetched(ppo, 2)) == ((1.0, 0.5), (-math.inf, -math.inf))
+
+
+def test_nan_in_a_finished_trial_is_an_error_for_every_kind_of_reading(source) -> None:
+    broken, row = source("ppo", [math.nan]), source("ppo", [(1.0, math.nan)])
+    hidden = Measure(broken, "made nan", lambda trial: math.nan)
+    ignored = Measure(broken, "clipped", lambda trial: max(0.0, trial.metrics["score"]))
+    for read in (broken.score(), broken.solved(), hidden, ignored):
+        with pytest.raises(UnreadableTrialError, match="NaN in the finished trial of seed 0"):
+            read.sample(fetched(broken, 1))
+    with pytest.raises(UnreadableTrialError, match="NaN"):
+        row.success(2).rows(fetched(row, 1))
+    computed = Profile(row, "computed", lambda trial: (0.0, math.nan), 2)
+    with pytest.raises(UnreadableTrialError, match="NaN"):
+        computed.rows(fetched(row, 1))
+
+
+def test_a_profile_of_another_length_is_an_error(source) -> None:
+    ppo = source("ppo", [(1.0, 0.5, 0.2)])
+    with pytest.raises(UnreadableTrialError, match="3 levels instead of 2"):
+        ppo.success(2).rows(fetched(ppo, 1))
+
+
+def test_a_level_of_a_profile_is_a_measure(source) -> None:
+    ppo = source("ppo", [(1.0, 0.5)])
+    at = ppo.success(2).at(1)
+    assert at.describe() == "ppo: success at level 1"
+    assert at.sample(fetched(ppo, 1)).values == (0.5,)
+    with pytest.raises(UserError, match="levels 0 to 1, not 2"):
+        ppo.success(2).at(2)
+
+
+def test_a_profile_of_one_level_is_rejected(source) -> None:
+    with pytest.raises(UserError, match="at least 2 levels"):
+        source("ppo", []).success(1)
+
+
+def test_assertions_read_as_sentences(source) -> None:
+    cma, ppo = source("cma_es", []), source("ppo", [])
+    sentences = {
+        (cma.score() > ppo.score()): "cma_es: score > ppo: score",
+        (ppo.score() < cma.score()): "cma_es: score > ppo: score",
+        cma.score().between(4, 6): "the median of cma_es: score lies in [4, 6]",
+        cma.score().equivalent_to(ppo.score(), margin=0.1): "cma_es: score is within 0.1 of ppo: score",
+        cma.solved().in_most_trials(): "cma_es: solved in most trials",
+        cma.solved().stays(): "cma_es: solved in most trials",
+        cma.solved().in_every_trial(): "cma_es: solved in every trial",
+        cma.success(3).falls(): "cma_es: success falls with the level",
+        cma.success(3).rises(): "cma_es: success rises with the level",
+        cma.score().never_above_itself(): "cma_es: score is never judged above itself",
+        (cma.solved().stays() & cma.success(3).falls()): "(cma_es: solved in most trials) and (cma_es: success falls "
+        "with the level)",
+        (
+            cma.solved().stays() | ppo.solved().stays()
+        ): "(cma_es: solved in most trials) or (ppo: solved in most trials)",
+    }
+    assert {assertion.describe() for assertion in sentences} == set(sentences.values())
+    assert all(assertion.describe() == sentence for assertion, sentence in sentences.items())
+
+
+def test_no_assertion_is_true_or_false_without_a_judge(source) -> None:
+    cma, ppo = source("cma_es", []), source("ppo", [])
+    greater = cma.score() > ppo.score()
+    for assertion in (greater, cma.solved().stays(), greater & greater, greater | greater, cma.success(2).falls()):
+        with pytest.raises(TypeError, match=r"Write verdict\(a > b\)"):
+            assert assertion
+    with pytest.raises(TypeError, match="bare assert"):
+        assert cma.score() > ppo.score() > cma.score()
+
+
+def test_a_measure_is_not_compared_with_a_number(source) -> None:
+    with pytest.raises(UserError, match="between"):
+        _ = source("cma_es", []).score() > 0.5
+
+
+def test_measures_of_opposite_directions_are_not_compared(source) -> None:
+    with pytest.raises(UserError, match="one direction"):
+        _ = source("cma_es", []).score() > source("ppo", []).score("lower")
+
+
+def test_two_readings_of_the_same_trials_are_not_compared_by_rank(source) -> None:
+    success = source("cma_es", []).success(2)
+    with pytest.raises(UserError, match="same trials"):
+        _ = success.at(0) > success.at(1)
+    with pytest.raises(UserError, match="same trials"):
+        success.at(0).equivalent_to(success.at(1), margin=0.1)
+
+
+def test_an_unknown_direction_lists_the_known_ones(source) -> None:
+    with pytest.raises(UserError, match="higher, lower"):
+        source("cma_es", []).score("larger")
+
+
+@pytest.mark.parametrize("margin", [0.0, -1.0, math.inf, math.nan])
+def test_an_equivalence_needs_a_real_margin(source, margin) -> None:
+    with pytest.raises(UserError, match="margin"):
+        source("cma_es", []).score().equivalent_to(source("ppo", []).score(), margin=margin)
+
+
+@pytest.mark.parametrize("ends", [(2, 1), (-math.inf, 1), (0, math.inf), (math.nan, 1)])
+def test_a_band_needs_two_finite_ends_in_order(source, ends) -> None:
+    with pytest.raises(UserError, match="band"):
+        source("cma_es", []).score().between(*ends)
+
+
+@pytest.mark.parametrize("p0", [0.0, 1.0])
+def test_an_overriding_p0_lies_between_0_and_1(source, p0) -> None:
+    with pytest.raises(UserError, match="p0"):
+        source("cma_es", []).solved().in_most_trials(p0)
+
+
+def test_only_assertions_are_joined(source) -> None:
+    with pytest.raises(UserError, match="parentheses"):
+        _ = source("cma_es", []).solved().stays() & 3
+
+
+def test_compounds_are_flat_and_name_each_condition_once(source) -> None:
+    a, b, c = (source(name, []).solved().stays() for name in "abc")
+    assert (a | b | c).parts == (a | (b | c)).parts == (a, b, c)
+    assert (a & b & c).parts == (a & (b & c)).parts == (a, b, c)
+    assert len((a & b | c).parts) == 2
+    assert [s.label for s in (a & b & a).sources()] == ["a", "b"]

@@ -1,0 +1,85 @@
+"""Trial results made by hand, for the tests of the store."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from evoclaims.core.canonical import content_hash
+from evoclaims.trials.result import Status, TrialResult, digest
+from evoclaims.trials.store import Store
+
+
+def _make_result(
+    seed: int = 0,
+    status: Status = "done",
+    metrics: Mapping[str, float] | None = None,
+    levels: Mapping[str, tuple[float, ...]] | None = None,
+    curves: Mapping[str, tuple[float, ...]] | None = None,
+    method: str = "an_algorithm",
+) -> TrialResult:
+    """Return a sound result whose id, condition and digest follow from its parts."""
+    condition = {"engine": 1, "method": {"name": method, "revision": 1, "parameters": {"rate": 0.1}}}
+    spec = {**condition, "seed": seed}
+    metrics = {"mean_success": 0.75} if metrics is None else metrics
+    levels = {"success": (1.0, 0.5)} if levels is None else levels
+    curves = {"best": (0.25, 0.75)} if curves is None else curves
+    return TrialResult(
+        id=content_hash(spec),
+        condition=content_hash(condition),
+        spec=spec,
+        seed=seed,
+        status=status,
+        metrics=metrics,
+        levels=levels,
+        curves=curves,
+        digest=digest(status, metrics, levels, curves, b"parameters"),
+        timing={"run": 1.5, "compile": 0.5, "batch": 3, "started": "2025-01-01T00:00:00+00:00"},
+        provenance={"git": None, "versions": {"numpy": "2.0"}},
+    )
+
+
+def _edit_record(path: Path, reseal: bool = True, **fields: Any) -> None:
+    """Change fields of a record file by hand; with `reseal` as one who knows how the seal is made."""
+    plain = json.loads(path.read_text())
+    plain.update(fields)
+    if reseal:
+        plain["seal"] = content_hash({key: value for key, value in plain.items() if key != "seal"})
+    path.write_text(json.dumps(plain))
+
+
+@pytest.fixture(scope="session")
+def make_result() -> Callable[..., TrialResult]:
+    """A function that makes a sound result; see `_make_result`."""
+    return _make_result
+
+
+@pytest.fixture(scope="session")
+def edit_record() -> Callable[..., None]:
+    """A function that edits a record file by hand; see `_edit_record`."""
+    return _edit_record
+
+
+@pytest.fixture(scope="session")
+def parameters() -> dict[str, Any]:
+    """A champion's parameters: a matrix [2, 3] and a scalar."""
+    return {"layer_0/kernel": np.arange(6, dtype=np.float32).reshape(2, 3), "bias": np.asarray(0.5, np.float32)}
+
+
+@pytest.fixture
+def store(tmp_path: Path) -> Store:
+    """An empty store that no folder exists for yet."""
+    return Store(tmp_path / "store")
+
+
+@pytest.fixture
+def trial(store: Store, parameters: dict[str, Any]) -> TrialResult:
+    """A trial that `store` holds."""
+    result = _make_result()
+    store.put(result, parameters)
+    return result

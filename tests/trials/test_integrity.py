@@ -1,0 +1,222 @@
+"""`verify` reads a whole store back, lists what is wrong, and moves bad files aside without deleting any."""
+
+from __future__ import annotations
+
+import json
+import os
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from evoclaims.core.errors import UserError
+from evoclaims.trials import integrity
+from evoclaims.trials.integrity import Problem, verify
+from evoclaims.trials.notice import Notice
+from evoclaims.trials.result import TrialResult
+from evoclaims.trials.store import Store
+
+Make = Callable[..., TrialResult]
+Edit = Callable[..., None]
+
+
+def cut_the_record(store: Store, trial: TrialResult) -> None:
+    path = store.record_path(trial.id)
+    path.write_bytes(path.read_bytes()[:-20])
+
+
+def edit_the_record(store: Store, trial: TrialResult) -> None:
+    path = store.record_path(trial.id)
+    path.write_text(path.read_text().replace("0.75", "0.76"))
+
+
+def cut_the_champion(store: Store, trial: TrialResult) -> None:
+    path = store.champion_path(trial.id)
+    path.write_bytes(path.read_bytes()[:-20])
+
+
+def lose_the_champion(store: Store, trial: TrialResult) -> None:
+    store.champion_path(trial.id).unlink()
+
+
+def age(path: Path, seconds: float = 3600.0) -> None:
+    """Make a file look as if it was last written `seconds` ago."""
+    then = time.time() - seconds
+    os.utime(path, (then, then))
+
+
+def kinds(problems: list[Problem]) -> list[tuple[str, str]]:
+    return [(problem.kind, problem.path.suffix) for problem in problems]
+
+
+def test_a_sound_store_has_no_problems(store: Store, trial: TrialResult) -> None:
+    assert verify(store, repair=True) == []
+
+
+def test_a_store_that_does_not_exist_yet_has_no_problems(store: Store) -> None:
+    assert verify(store, repair=True) == []
+    assert not store.root.exists()
+
+
+def test_a_root_that_is_a_file_is_a_user_error(tmp_path: Path) -> None:
+    (tmp_path / "store").write_text("not a folder")
+    with pytest.raises(UserError, match="is a file, not a folder"):
+        verify(Store(tmp_path / "store"), repair=False)
+
+
+@pytest.mark.parametrize("damage", [cut_the_record, edit_the_record, cut_the_champion])
+def test_damage_lists_record_and_champion(
+    store: Store, trial: TrialResult, damage: Callable[[Store, TrialResult], None]
+) -> None:
+    damage(store, trial)
+    problems = verify(store, repair=False)
+    assert [problem.path for problem in problems] == [store.record_path(trial.id), store.champion_path(trial.id)]
+    assert kinds(problems) == [("record", ".json"), ("champion", ".npz")]
+    assert all(problem.moved_to is None for problem in problems)
+
+
+def test_a_lost_champion_lists_its_record(store: Store, trial: TrialResult) -> None:
+    lose_the_champion(store, trial)
+    assert [problem.path for problem in verify(store, repair=False)] == [store.record_path(trial.id)]
+
+
+def test_looking_alone_moves_nothing(store: Store, trial: TrialResult) -> None:
+    cut_the_record(store, trial)
+    before = sorted(store.root.rglob("*"))
+    verify(store, repair=False)
+    assert sorted(store.root.rglob("*")) == before
+
+
+@pytest.mark.parametrize("damage", [cut_the_record, edit_the_record, cut_the_champion, lose_the_champion])
+def test_a_repair_lets_the_trial_be_run_again_and_deletes_nothing(
+    store: Store,
+    trial: TrialResult,
+    make_result: Make,
+    parameters: dict[str, Any],
+    damage: Callable[[Store, TrialResult], None],
+) -> None:
+    sound = make_result(1)
+    store.put(sound, parameters)
+    damage(store, trial)
+    contents = {path.read_bytes() for path in store.root.rglob("*") if path.is_file()}
+    for problem in verify(store, repair=True):
+        assert problem.moved_to is not None
+        assert problem.moved_to.parent == store.root / "quarantine"
+        assert not problem.path.exists()
+    assert {path.read_bytes() for path in store.root.rglob("*") if path.is_file()} == contents
+    assert verify(store, repair=False) == []
+    assert store.ids() == (sound.id,)
+    assert store.get(trial.id) is None
+    assert store.put(make_result(), parameters) == "stored"
+
+
+def test_a_file_damaged_twice_is_kept_twice(store: Store, trial: TrialResult, make_result: Make) -> None:
+    for text in (b"first", b"second"):
+        store.record_path(trial.id).write_bytes(text)
+        verify(store, repair=True)
+    kept = (store.root / "quarantine").glob(f"{trial.id}.json*")
+    assert {path.read_bytes() for path in kept} == {b"first", b"second"}
+
+
+def test_foreign_files_are_listed_wherever_they_lie(store: Store, trial: TrialResult) -> None:
+    record, champion = store.record_path(trial.id), store.champion_path(trial.id)
+    strays = [
+        store.root / "trials" / "notes.txt",
+        store.root / "champions" / "notes.txt",
+        record.with_name("copy of a record.json"),
+        record.with_suffix(".txt"),
+        champion.with_suffix(".pickle"),
+    ]
+    for path in strays:
+        path.write_text("mine")
+    misplaced = store.root / "trials" / "zz" / record.name
+    misplaced.parent.mkdir()
+    misplaced.write_bytes(record.read_bytes())
+    problems = verify(store, repair=True)
+    assert {problem.path for problem in problems} == {*strays, misplaced.parent}
+    assert verify(store, repair=False) == []
+    assert store.ids() == (trial.id,)
+
+
+def test_a_record_in_the_wrong_folder_is_listed(store: Store, trial: TrialResult) -> None:
+    record = store.record_path(trial.id)
+    wrong = record.parent.with_name("00" if record.parent.name != "00" else "01") / record.name
+    wrong.parent.mkdir()
+    wrong.write_bytes(record.read_bytes())
+    assert [problem.path for problem in verify(store, repair=False)] == [wrong]
+
+
+def test_half_written_files_of_a_kill_are_listed_once_nobody_can_be_writing_them(
+    store: Store, trial: TrialResult
+) -> None:
+    path = store.record_path(trial.id)
+    aside = path.with_name(f".{path.name}.123.abcd.tmp")
+    aside.write_bytes(b'{"sch')
+    assert verify(store, repair=True) == []
+    age(aside)
+    assert kinds(verify(store, repair=True)) == [("leftover", ".tmp")]
+    assert verify(store, repair=False) == []
+
+
+def test_a_champion_whose_record_was_never_written_is_a_leftover_once_settled(store: Store, trial: TrialResult) -> None:
+    store.record_path(trial.id).unlink()
+    assert verify(store, repair=True) == []
+    age(store.champion_path(trial.id))
+    assert kinds(verify(store, repair=True)) == [("leftover", ".npz")]
+
+
+def test_the_notice_of_a_process_that_is_gone_is_a_leftover_and_that_of_a_live_one_is_not(
+    store: Store, trial: TrialResult
+) -> None:
+    with Notice(store.root, trial.condition) as notice:
+        assert verify(store, repair=True) == []
+        plain = json.loads(notice.path.read_text())
+        notice.path.write_text(json.dumps({**plain, "pid": 2**22 + 1}))
+        assert [problem.path for problem in verify(store, repair=False)] == [notice.path]
+
+
+def test_a_checkpoint_is_judged_by_whoever_knows_its_schema(store: Store) -> None:
+    store.checkpoints.mkdir(parents=True)
+    good, bad = store.checkpoints / "good.ckpt", store.checkpoints / "bad.ckpt"
+    for path in (good, bad):
+        path.write_bytes(b"state")
+    problems = verify(store, True, lambda path: "its schema is 9" if path == bad else None)
+    assert [(problem.kind, problem.path, problem.reason) for problem in problems] == [
+        ("checkpoint", bad, "its schema is 9")
+    ]
+    assert good.exists()
+
+
+def test_a_file_that_cannot_be_moved_is_a_user_error(store: Store, trial: TrialResult) -> None:
+    cut_the_record(store, trial)
+    (store.root / "quarantine").write_text("in the way")
+    with pytest.raises(UserError, match="move it by hand"):
+        verify(store, repair=True)
+
+
+def test_a_file_that_another_process_moved_first_is_no_error(
+    store: Store, trial: TrialResult, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    cut_the_record(store, trial)
+    settle = integrity._set_aside
+    monkeypatch.setattr(integrity, "_set_aside", lambda store, path: (settle(store, path), settle(store, path))[1])
+    assert [problem.moved_to for problem in verify(store, repair=True)] == [None, None]
+
+
+def test_a_problem_reads_as_one_printable_line(store: Store) -> None:
+    problem = Problem(Path("a\x1b[31m\nb"), "record", "it is torn", Path("quarantine/a"))
+    assert str(problem).isprintable()
+    assert "quarantine" in str(problem)
+
+
+def test_every_trial_of_a_larger_store_is_read_back(store: Store, make_result: Make) -> None:
+    results = [make_result(seed) for seed in range(20)]
+    for result in results:
+        store.put(result, {"w": np.ones(3)})
+    bad = {results[3].id, results[11].id}
+    for trial_id in bad:
+        store.champion_path(trial_id).write_bytes(b"")
+    assert {problem.path.stem for problem in verify(store, repair=False)} == bad

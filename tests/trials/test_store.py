@@ -1,0 +1,222 @@
+"""The store gives back what was put into it, under any sharing, and reports what it cannot use."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import os
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from evoclaims.core.errors import UserError
+from evoclaims.trials.result import TrialResult
+from evoclaims.trials.store import DamagedFileError, Store
+
+Make = Callable[..., TrialResult]
+
+numbers = st.floats(allow_nan=True, allow_infinity=True) | st.integers(-(2**60), 2**60)
+names = st.text(max_size=8)
+vectors = st.dictionaries(names, st.lists(numbers, max_size=4).map(tuple), max_size=3)
+equal_vectors = st.integers(0, 4).flatmap(
+    lambda length: st.dictionaries(names, st.tuples(*[numbers] * length), max_size=3)
+)
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    st.integers(0, 2**63),
+    st.sampled_from(["done", "diverged", "timeout", "crashed"]),
+    st.dictionaries(names, numbers, max_size=4),
+    vectors,
+    equal_vectors,
+)
+def test_what_is_put_is_got(make_result: Make, seed: int, status: str, metrics: Any, levels: Any, curves: Any) -> None:
+    result = make_result(seed, status, metrics, levels, curves)
+    with tempfile.TemporaryDirectory() as folder:
+        store = Store(Path(folder))
+        assert store.put(result, {}) == "stored"
+        back = store.get(result.id)
+    assert back is not None
+    assert back.to_json() == result.to_json()
+
+
+@pytest.mark.parametrize("value", [math.inf, -math.inf, math.nan])
+def test_numbers_that_json_lacks_come_back_as_floats(store: Store, make_result: Make, value: float) -> None:
+    result = make_result(metrics={"m": value}, levels={"l": (value,)}, curves={"c": (value,)})
+    store.put(result, {})
+    back = store.get(result.id)
+    assert back is not None
+    for number in (back.metrics["m"], *back.levels["l"], *back.curves["c"]):
+        assert isinstance(number, float)
+        assert repr(number) == repr(value)
+
+
+def test_a_text_that_is_no_number_word_stays_out_of_metrics(store: Store, make_result: Make) -> None:
+    with pytest.raises(ValueError, match="'NaN' in its metrics is not a number"):
+        store.put(make_result(metrics={"m": "NaN"}), {})
+    assert store.ids() == ()
+
+
+def test_a_result_whose_id_does_not_follow_from_its_specification_is_refused(store: Store, make_result: Make) -> None:
+    with pytest.raises(ValueError, match="id is not the hash"):
+        store.put(dataclasses.replace(make_result(), id="0" * 64), {})
+
+
+def test_a_champion_comes_back_with_shapes_and_types(
+    store: Store, trial: TrialResult, parameters: dict[str, Any]
+) -> None:
+    back = store.champion(trial.id)
+    assert back.keys() == parameters.keys()
+    for name, array in parameters.items():
+        assert back[name].dtype == array.dtype
+        np.testing.assert_array_equal(back[name], array, strict=True)
+
+
+def test_the_same_champion_gives_the_same_bytes_whenever_it_is_stored(
+    tmp_path: Path, make_result: Make, parameters: dict[str, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    result = make_result()
+    for name, now in (("one", 1.0e9), ("two", 1.5e9)):
+        monkeypatch.setattr("time.time", lambda now=now: now)
+        Store(tmp_path / name).put(result, dict(reversed(parameters.items())) if name == "two" else parameters)
+    one, two = (Store(tmp_path / name).champion_path(result.id).read_bytes() for name in ("one", "two"))
+    assert one == two
+
+
+@pytest.mark.parametrize("array", [np.array([object()]), np.zeros(2, np.dtype("V2"))], ids=["objects", "void"])
+def test_an_array_that_would_need_pickle_is_refused(store: Store, make_result: Make, array: Any) -> None:
+    with pytest.raises(ValueError, match="without pickle"):
+        store.put(make_result(), {"w": array})
+    assert store.ids() == ()
+
+
+def test_a_trial_without_a_champion_gives_no_arrays(store: Store, make_result: Make) -> None:
+    result = make_result(status="crashed")
+    store.put(result, {})
+    assert store.champion(result.id) == {}
+    assert not store.champion_path(result.id).exists()
+
+
+def test_the_files_lie_where_the_layout_says(store: Store, trial: TrialResult) -> None:
+    files = sorted(path.relative_to(store.root).as_posix() for path in store.root.rglob("*") if path.is_file())
+    prefix = trial.id[:2]
+    assert files == [f"champions/{prefix}/{trial.id}.npz", f"trials/{prefix}/{trial.id}.json"]
+
+
+def test_a_trial_that_is_absent_is_none(store: Store, make_result: Make) -> None:
+    assert store.get(make_result().id) is None
+    assert store.ids() == ()
+    assert list(store.results([])) == []
+
+
+def test_the_champion_of_an_absent_trial_is_an_error_that_names_it(store: Store, make_result: Make) -> None:
+    with pytest.raises(UserError, match=make_result().id):
+        store.champion(make_result().id)
+
+
+@pytest.mark.parametrize("text", ["../../etc/passwd", "0" * 63, "G" * 64, "A" * 64, "0" * 64 + "\n", ""])
+def test_a_text_that_is_no_id_reaches_no_file(store: Store, text: str) -> None:
+    for look_up in (store.get, store.champion, store.record_path, store.champion_path):
+        with pytest.raises(UserError, match="64 lower-case hexadecimal digits"):
+            look_up(text)
+
+
+def test_an_equal_trial_put_again_changes_nothing(
+    store: Store, trial: TrialResult, make_result: Make, parameters: dict[str, Any]
+) -> None:
+    before = store.record_path(trial.id).read_bytes()
+    again = dataclasses.replace(make_result(), timing={"run": 99.0})
+    assert store.put(again, parameters) == "present"
+    assert store.record_path(trial.id).read_bytes() == before
+
+
+def test_another_digest_keeps_the_first_trial_and_its_champion_and_says_so(
+    store: Store, trial: TrialResult, make_result: Make, parameters: dict[str, Any]
+) -> None:
+    other = make_result(metrics={"mean_success": 0.0})
+    assert store.put(other, {"bias": np.zeros(1)}) == "differs"
+    kept = store.get(trial.id)
+    assert kept is not None
+    assert kept.metrics == trial.metrics
+    assert store.champion(trial.id).keys() == parameters.keys()
+
+
+def test_a_trial_run_again_after_a_crash_takes_its_place(
+    store: Store, make_result: Make, parameters: dict[str, Any]
+) -> None:
+    store.put(make_result(status="crashed"), {})
+    assert store.put(make_result(), parameters) == "stored"
+    kept = store.get(make_result().id)
+    assert kept is not None
+    assert kept.status == "done"
+
+
+@pytest.mark.parametrize("status", ["diverged", "timeout"])
+def test_a_trial_that_diverged_or_timed_out_keeps_its_place(store: Store, make_result: Make, status: str) -> None:
+    store.put(make_result(status=status), {})
+    assert store.put(make_result(), {}) == "differs"
+
+
+def test_a_champion_is_written_before_its_record(
+    store: Store, make_result: Make, parameters: dict[str, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    renamed = []
+    replace = os.replace
+    monkeypatch.setattr(os, "replace", lambda a, b: (renamed.append(Path(b).suffix), replace(a, b)))
+    store.put(make_result(), parameters)
+    assert renamed == [".npz", ".json"]
+
+
+def test_a_run_killed_between_champion_and_record_is_simply_run_again(
+    store: Store, make_result: Make, parameters: dict[str, Any]
+) -> None:
+    result = make_result()
+    store.put(result, {"bias": np.ones(3)})
+    store.record_path(result.id).unlink()
+    assert store.get(result.id) is None
+    assert store.put(result, parameters) == "stored"
+    assert store.champion(result.id).keys() == parameters.keys()
+
+
+def test_one_bad_file_costs_no_other_trial(store: Store, make_result: Make) -> None:
+    results = [make_result(seed) for seed in range(4)]
+    for result in results:
+        store.put(result, {})
+    bad = store.record_path(results[2].id)
+    bad.write_bytes(b"{")
+    stray = store.root / "trials" / "notes.txt"
+    stray.write_text("mine")
+    errors: list[DamagedFileError] = []
+    read = {result.id for result in store.results(errors)}
+    assert read == {results[i].id for i in (0, 1, 3)}
+    assert {error.path for error in errors} == {bad, stray}
+    assert set(store.ids()) == {result.id for result in results}
+
+
+def test_results_come_in_the_order_of_ids(store: Store, make_result: Make) -> None:
+    for seed in range(6):
+        store.put(make_result(seed), {})
+    assert tuple(result.id for result in store.results([])) == store.ids() == tuple(sorted(store.ids()))
+
+
+def test_a_half_written_file_left_by_a_kill_is_not_a_trial(store: Store, trial: TrialResult) -> None:
+    path = store.record_path(trial.id)
+    path.with_name(f".{path.name}.123.abcd.tmp").write_bytes(b'{"sch')
+    errors: list[DamagedFileError] = []
+    assert [result.id for result in store.results(errors)] == [trial.id]
+    assert errors == []
+
+
+def test_a_store_can_be_read_without_jax() -> None:
+    script = "import sys, evoclaims.trials.integrity, evoclaims.trials.notice; sys.exit('jax' in sys.modules)"
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
+    assert subprocess.run([sys.executable, "-c", script], env=environment, check=False).returncode == 0

@@ -1,0 +1,225 @@
+"""A record or champion that is torn, edited, swapped or foreign is an error that names the file and the way out."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from evoclaims.trials.records import RecordError, dump, parse
+from evoclaims.trials.result import TrialResult
+from evoclaims.trials.store import DamagedFileError, Store
+
+Make = Callable[..., TrialResult]
+Edit = Callable[..., None]
+
+
+def complaint(store: Store, trial_id: str) -> str:
+    """Return what `get` says, after checking that it names the file and the way out."""
+    with pytest.raises(DamagedFileError) as caught:
+        store.get(trial_id)
+    text = str(caught.value)
+    assert str(store.record_path(trial_id)) in text
+    assert "evoclaims verify" in text
+    assert "\n" not in text
+    return text
+
+
+@given(st.data())
+def test_a_record_cut_short_anywhere_is_refused(make_result: Make, data: st.DataObject) -> None:
+    record = dump(make_result())
+    length = data.draw(st.integers(0, len(record) - 2))
+    with pytest.raises(RecordError):
+        parse(record[:length])
+
+
+@given(st.data())
+def test_no_flipped_byte_changes_what_a_record_says(make_result: Make, data: st.DataObject) -> None:
+    result = make_result(metrics={"a": 0.1, "b": float("nan")})
+    record = bytearray(dump(result))
+    record[data.draw(st.integers(0, len(record) - 1))] ^= data.draw(st.integers(1, 255))
+    try:
+        back = parse(bytes(record))
+    except RecordError:
+        return
+    assert back.to_json() == result.to_json()
+
+
+@given(st.recursive(st.none() | st.booleans() | st.floats() | st.text(max_size=5), st.lists, max_leaves=5) | st.text())
+def test_any_other_json_is_refused_and_crashes_nothing(value: Any) -> None:
+    with pytest.raises(RecordError):
+        parse(json.dumps(value))
+
+
+@given(st.binary(max_size=60))
+def test_any_other_bytes_are_refused_and_crash_nothing(data: bytes) -> None:
+    with pytest.raises(RecordError):
+        parse(data)
+
+
+@pytest.mark.parametrize("depth", [900, 100_000])  # too deep for the hash, and for the JSON reader too
+def test_a_deeply_nested_text_is_refused_and_crashes_nothing(make_result: Make, depth: int) -> None:
+    nested = "[" * depth + "]" * depth
+    for text in (nested, dump(make_result()).decode().replace('"git":null', f'"git":{nested}')):
+        with pytest.raises(RecordError):
+            parse(text)
+
+
+def test_a_truncated_file_is_named_with_the_way_out(store: Store, trial: TrialResult) -> None:
+    path = store.record_path(trial.id)
+    path.write_bytes(path.read_bytes()[:100])
+    assert "not one whole JSON text" in complaint(store, trial.id)
+
+
+def test_an_empty_file_is_named_with_the_way_out(store: Store, trial: TrialResult) -> None:
+    store.record_path(trial.id).write_bytes(b"")
+    assert "not one whole JSON text" in complaint(store, trial.id)
+
+
+def test_a_metric_edited_by_hand_breaks_the_seal(store: Store, trial: TrialResult, edit_record: Edit) -> None:
+    edit_record(store.record_path(trial.id), reseal=False, metrics={"mean_success": 1.0})
+    assert "seal" in complaint(store, trial.id)
+
+
+def test_an_infinity_written_as_a_huge_number_does_not_pass_under_the_seal(store: Store, make_result: Make) -> None:
+    result = make_result(metrics={"m": float("inf")})
+    store.put(result, {})
+    path = store.record_path(result.id)
+    path.write_text(path.read_text().replace('"m":"inf"', '"m":1e999'))
+    complaint(store, result.id)
+
+
+def test_a_key_named_twice_is_refused(store: Store, trial: TrialResult) -> None:
+    path = store.record_path(trial.id)
+    path.write_text(path.read_text().replace('"status":', '"status":"crashed","status":'))
+    assert "not one whole JSON text" in complaint(store, trial.id)
+
+
+@pytest.mark.parametrize("schema", [0, 2, "1", True, None])
+def test_another_schema_is_named(store: Store, trial: TrialResult, edit_record: Edit, schema: Any) -> None:
+    edit_record(store.record_path(trial.id), schema=schema)
+    assert f"its schema is {schema!r}" in complaint(store, trial.id)
+
+
+@pytest.mark.parametrize(
+    ("fields", "reason"),
+    [
+        ({"status": "fine"}, "known: done, diverged, timeout, crashed"),
+        ({"status": ["done"]}, "known: done"),
+        ({"seed": 1}, "seed"),
+        ({"seed": -1}, "seed"),
+        ({"seed": False}, "seed"),
+        ({"seed": "0"}, "seed"),
+        ({"spec": []}, "spec field is not a JSON object"),
+        ({"spec": {"seed": 0}}, "hash of its specification"),
+        ({"condition": "0" * 64}, "condition"),
+        ({"condition": 7}, "condition"),
+        ({"digest": "abc"}, "digest"),
+        ({"digest": 7}, "digest"),
+        ({"champion": "../champion"}, "champion"),
+        ({"champion": None}, "champion"),
+        ({"metrics": None}, "metrics"),
+        ({"metrics": {"m": True}}, "metrics"),
+        ({"metrics": {"m": "Infinity"}}, "metrics"),
+        ({"metrics": {"m": [1.0]}}, "metrics"),
+        ({"levels": {"success": 1.0}}, "levels"),
+        ({"levels": {"success": "nan"}}, "levels"),
+        ({"curves": {"best": [None]}}, "curves"),
+        ({"curves": {"best": [1.0], "mean": []}}, "equally long"),
+        ({"timing": "1 s"}, "timing"),
+        ({"provenance": 3}, "provenance"),
+        ({"surprise": 1}, "missing or unknown: surprise"),
+    ],
+)
+def test_a_field_of_the_wrong_kind_is_refused_even_under_a_right_seal(
+    store: Store, trial: TrialResult, edit_record: Edit, fields: dict[str, Any], reason: str
+) -> None:
+    edit_record(store.record_path(trial.id), **fields)
+    assert reason in complaint(store, trial.id)
+
+
+def test_a_missing_field_is_named(store: Store, trial: TrialResult, edit_record: Edit) -> None:
+    path = store.record_path(trial.id)
+    path.write_text(json.dumps({k: v for k, v in json.loads(path.read_text()).items() if k != "timing"}))
+    assert "missing or unknown: timing" in complaint(store, trial.id)
+
+
+def test_a_record_under_another_trials_name_is_foreign(store: Store, trial: TrialResult, make_result: Make) -> None:
+    other = make_result(7)
+    store.record_path(other.id).parent.mkdir(parents=True, exist_ok=True)
+    store.record_path(trial.id).rename(store.record_path(other.id))
+    assert f"it holds another trial, {trial.id}" in complaint(store, other.id)
+
+
+def test_an_unreadable_file_is_named_with_the_way_out(
+    store: Store, trial: TrialResult, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(path: Path) -> bytes:
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr(Path, "read_bytes", refuse)
+    assert "Permission denied" in complaint(store, trial.id)
+
+
+def test_a_folder_in_place_of_a_record_is_named_with_the_way_out(store: Store, trial: TrialResult) -> None:
+    store.record_path(trial.id).unlink()
+    store.record_path(trial.id).mkdir()
+    assert "cannot be read" in complaint(store, trial.id)
+
+
+def test_control_characters_of_a_record_never_reach_the_terminal(
+    store: Store, trial: TrialResult, edit_record: Edit
+) -> None:
+    edit_record(store.record_path(trial.id), **{"\x1b]0;owned\x07\n": 1})
+    text = complaint(store, trial.id)
+    assert text.isprintable()
+
+
+def test_a_swapped_champion_is_refused(store: Store, trial: TrialResult, make_result: Make) -> None:
+    other = make_result(1)
+    store.put(other, {"bias": np.ones(2)})
+    store.champion_path(trial.id).write_bytes(store.champion_path(other.id).read_bytes())
+    with pytest.raises(DamagedFileError, match="not the champion that the trial's record names") as caught:
+        store.champion(trial.id)
+    assert caught.value.path == store.champion_path(trial.id)
+
+
+def test_a_champion_with_one_flipped_byte_is_refused(store: Store, trial: TrialResult) -> None:
+    path = store.champion_path(trial.id)
+    data = bytearray(path.read_bytes())
+    data[len(data) // 2] ^= 1
+    path.write_bytes(data)
+    with pytest.raises(DamagedFileError, match="not the champion"):
+        store.champion(trial.id)
+
+
+def test_a_missing_champion_is_refused(store: Store, trial: TrialResult) -> None:
+    store.champion_path(trial.id).unlink()
+    with pytest.raises(DamagedFileError, match="cannot be read"):
+        store.champion(trial.id)
+
+
+@pytest.mark.parametrize("data", [b"", b"PK\x03\x04 and more", b"\x80\x04N.", b"\x93NUMPY"])
+def test_a_champion_that_is_no_npz_is_refused_though_its_hash_is_right(
+    store: Store, trial: TrialResult, edit_record: Edit, data: bytes
+) -> None:
+    store.champion_path(trial.id).write_bytes(data)
+    edit_record(store.record_path(trial.id), champion=hashlib.sha256(data).hexdigest())
+    with pytest.raises(DamagedFileError, match="not a readable npz file"):
+        store.champion(trial.id)
+
+
+def test_a_pickle_inside_a_champion_is_never_opened(store: Store, trial: TrialResult, edit_record: Edit) -> None:
+    path = store.champion_path(trial.id)
+    with open(path, "wb") as file:
+        np.savez(file, allow_pickle=True, w=np.array([{"a": 1}], dtype=object))
+    edit_record(store.record_path(trial.id), champion=hashlib.sha256(path.read_bytes()).hexdigest())
+    with pytest.raises(DamagedFileError, match="not a readable npz file"):
+        store.champion(trial.id)
