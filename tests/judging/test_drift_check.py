@@ -52,6 +52,7 @@ def test_the_suite_pays_holms_correction(case) -> None:
     few, many = check_drift([drifting] + [steady] * 4), check_drift([drifting] + [steady] * 15)
     assert few.rows[0].p_holm == pytest.approx(5 * 2 / math.comb(15, 5))
     assert [row.drifted for row in few.rows] == [True, False, False, False, False]
+    assert few.drifted
     assert not many.drifted
     assert {row.status for row in many.rows} == {"underpowered"}
 
@@ -59,7 +60,7 @@ def test_the_suite_pays_holms_correction(case) -> None:
 def test_fewer_than_ten_references_are_said_and_no_pass(case) -> None:
     report = check_drift([case([0.5] * 5, BEFORE[:9])])
     (row,) = report.rows
-    assert (row.status, row.p) == ("no reference", None)
+    assert (row.status, row.p, row.p_holm) == ("no reference", None, None)
     assert "9 reference trials of this condition, 10 needed" in row.detail
     assert report.unchecked == report.rows
 

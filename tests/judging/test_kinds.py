@@ -98,6 +98,12 @@ def test_band(source, values, outcome) -> None:
     assert judge(source("a", values).score().between(4, 6), FIXED_10).outcome is outcome
 
 
+@pytest.mark.parametrize(("n", "outcome"), [(5, INCONCLUSIVE), (6, REFUTED)])
+def test_a_band_is_refuted_at_half_of_alpha(source, n, outcome) -> None:
+    # All five beyond one end have p = 0.031, all six 0.016; alpha / 2 is 0.025.
+    assert judge(source("a", [9.0] * n).score().between(4, 6), Protocol.fixed(n)).outcome is outcome
+
+
 @pytest.mark.parametrize(
     ("rows", "outcome"),
     [

@@ -7,12 +7,12 @@ from typing import Any
 
 import jax
 import jax.numpy as jnp
-from brax.training.types import Transition
 from jaxtyping import Array, Int, PRNGKeyArray
 
 from evoclaims.core.keys import streams
 from evoclaims.core.pytree import pytree, select
 from evoclaims.envs.base import Task, TaskState
+from evoclaims.methods.brax_blocks import Transition
 
 Act = Callable[[Array, Array], tuple[Array, Any]]
 """A stochastic policy, as Brax's `make_inference_fn` gives it: (observations, key) -> (actions, extras)."""

@@ -13,8 +13,6 @@ from typing import Any, ClassVar
 import jax
 import jax.numpy as jnp
 import optax
-from brax.training.acme import running_statistics, specs
-from brax.training.agents.ppo import losses, networks
 from jaxtyping import Array, Float, Int, PRNGKeyArray
 
 from evoclaims.core.errors import UserError
@@ -22,6 +20,7 @@ from evoclaims.core.keys import stream, streams
 from evoclaims.core.pytree import pytree, select, strong
 from evoclaims.envs.base import Episode, Task
 from evoclaims.methods.base import Policy, Progress
+from evoclaims.methods.brax_blocks import losses, networks, running_statistics, specs
 from evoclaims.methods.collect import Interaction, collect
 
 

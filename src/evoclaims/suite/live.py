@@ -43,14 +43,15 @@ class LiveLine:
         step = (progress.condition, progress.phase)
         finished = progress.trials > 0 and progress.ended == progress.trials
         if step != self._shown or finished or self._clock() - self._at >= LOG_SECONDS:
-            self._terminal.write(f"\n  {describe(progress)}", flush=True)
+            self._terminal.write(("" if self._open else "\n") + f"  {describe(progress)}\n", flush=True)
             self._shown, self._at, self._open = step, self._clock(), True
 
     def close(self) -> None:
         """Leave the line, so that other output starts on a fresh one."""
         if self._open:
             width = max(self._terminal.fullwidth - 1, 20)
-            self._terminal.write("\r" + " " * width + "\r" if self._terminal.hasmarkup else "\n", flush=True)
+            if self._terminal.hasmarkup:
+                self._terminal.write("\r" + " " * width + "\r", flush=True)
             self._open = False
 
 

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import io
+import os
 from collections import Counter
 from collections.abc import Sequence
+from pathlib import Path
 
 from rich.console import Console
 from rich.markup import escape
@@ -33,7 +35,7 @@ def verdict_table(reports: Sequence[ClaimReport], width: int, colour: bool) -> s
         "n": {"justify": "right"},
         "A12": {"justify": "right"},
         "p (attainable)": {"no_wrap": True},
-        "evidence": {"ratio": 2, "overflow": "fold", "style": "dim"},
+        "evidence": {"no_wrap": True, "style": "dim"},
     }.items():
         table.add_column(heading, **options)  # type: ignore[arg-type]
     for report in sorted(reports, key=lambda r: (r.tier, r.claim[:1], len(r.claim), r.claim, r.case)):
@@ -46,9 +48,11 @@ def verdict_table(reports: Sequence[ClaimReport], width: int, colour: bool) -> s
             str(report.n) if report.n else "–",
             _effect(report),
             _p_values(report),
-            escape(report.evidence),
+            escape(Path(report.evidence).name),
         )
-    return _rendered(table, width, colour)
+    folders = sorted({os.path.relpath(Path(report.evidence).parent) for report in reports if report.evidence})
+    caption = f"\nevidence: {', '.join(folders)}" if folders else ""
+    return _rendered(table, width, colour) + caption
 
 
 def explanations(reports: Sequence[ClaimReport], width: int, colour: bool) -> str:

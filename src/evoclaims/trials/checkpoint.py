@@ -104,3 +104,12 @@ def restore(folder: Path, header: Header, like: Any) -> TrialState:
 def remove(folder: Path, header: Header) -> None:
     """Delete the checkpoint of a batch whose trials are all stored."""
     path_of(folder, header.condition, header.batch, header.platform).unlink(missing_ok=True)
+
+
+def fault(path: Path) -> str | None:
+    """Return why a checkpoint cannot be gone on from, or None when it can."""
+    try:
+        header, _ = read(path)
+    except DamagedFileError as error:
+        return error.reason
+    return None if header.schema == SCHEMA else f"it has schema {header.schema}, not {SCHEMA}"

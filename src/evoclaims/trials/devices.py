@@ -46,9 +46,10 @@ def choose(name: str) -> list[jax.Device]:
     try:
         return list(jax.devices(None if name == "auto" else name))
     except RuntimeError as error:
-        asked = f"JAX_PLATFORMS={os.environ['JAX_PLATFORMS']}" if "JAX_PLATFORMS" in os.environ else f"device {name!r}"
+        platforms = os.environ.get("JAX_PLATFORMS")
+        wish = f"the device {name!r}" + (f" with JAX_PLATFORMS={platforms}" if platforms else "")
         raise UserError(
-            f"There is no device for {asked}: jax {jax.__version__} sees none of that kind. Install jax for CUDA "
+            f"jax {jax.__version__} finds no hardware for {wish}. Install jax for CUDA "
             '(pip install "jax[cuda13]", Python 3.12) on a machine with a GPU, or ask for the device "cpu".'
         ) from error
 

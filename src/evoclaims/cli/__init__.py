@@ -1,0 +1,5 @@
+"""The command line: `evoclaims plan | run | status | verify | reference`."""
+
+from evoclaims.cli.main import main
+
+__all__ = ["main"]

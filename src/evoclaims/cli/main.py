@@ -1,0 +1,73 @@
+"""Reading the command line, and ending every mistake of a user's in one sentence."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Callable, Sequence
+
+from evoclaims.core.errors import UserError
+
+USER_ERROR, INTERRUPTED = 2, 130
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one command and return its exit status: 0, what the command says, 2 for a user's mistake."""
+    options = _parser().parse_args(arguments)
+    try:
+        status: int = _command(options.command)(options)
+    except UserError as error:
+        print(f"evoclaims: {error}", file=sys.stderr)
+        return USER_ERROR
+    except KeyboardInterrupt:
+        print("\nevoclaims: interrupted; the same command goes on from the last checkpoint.", file=sys.stderr)
+        return INTERRUPTED
+    return status
+
+
+def _command(name: str) -> Callable[[argparse.Namespace], int]:
+    """Return a command's function; imported only now, so that --help does not wait for jax."""
+    import importlib
+
+    function: Callable[[argparse.Namespace], int] = importlib.import_module(f"evoclaims.cli.{name}").main
+    return function
+
+
+def _parser() -> argparse.ArgumentParser:
+    """Build the parser."""
+    parser = argparse.ArgumentParser(prog="evoclaims", description="Claims of a paper, judged by real trials.")
+    commands = parser.add_subparsers(dest="command", required=True, metavar="command")
+
+    def add(name: str, text: str) -> argparse.ArgumentParser:
+        command = commands.add_parser(name, help=text, description=text)
+        command.add_argument("--storage", metavar="DIR", default=".evoclaims", help="folder of trials (.evoclaims)")
+        return command
+
+    def tier(command: argparse.ArgumentParser) -> None:
+        command.add_argument("--tier", default="smoke", help="smoke (default) or full")
+
+    def device(command: argparse.ArgumentParser) -> None:
+        command.add_argument("--device", default="auto", help="auto (default), cpu or gpu")
+
+    plan = add("plan", "say what a tier would run, what it costs here, and what its verdicts can show")
+    tier(plan)
+    device(plan)
+    plan.add_argument("--measure", action="store_true", help="time a few steps of conditions never run here")
+
+    run = add("run", "run conditions without judging them")
+    run.add_argument("method", nargs="?", help="only this method")
+    run.add_argument("--on", metavar="TASK", help="only this task")
+    tier(run)
+    device(run)
+    run.add_argument("--trials", type=int, metavar="N", help="trials per condition (default: the tier's)")
+    run.add_argument("--first-seed", type=int, default=0, metavar="SEED", help="seed of the first trial (0)")
+
+    status = add("status", "show the verdicts that the stored trials give; run nothing")
+    tier(status)
+
+    verify = add("verify", "read every stored file back, and move bad ones aside so that their trials run again")
+    verify.add_argument("--dry-run", action="store_true", help="list bad files and leave them where they are")
+
+    reference = add("reference", "write the stored trials of a tier as the committed reference trials")
+    tier(reference)
+    return parser

@@ -1,0 +1,87 @@
+"""`evoclaims plan`: what a tier would run, what it costs here, and what its verdicts can show."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+
+from rich.console import Console
+from rich.table import Table
+
+from evoclaims.cli.project import judge_stored, open_project, open_store
+from evoclaims.suite.cost import Pace, known_pace, measured_pace
+from evoclaims.suite.live import duration
+from evoclaims.suite.report import ClaimReport
+from evoclaims.suite.reproduction import Tier
+from evoclaims.trials import devices
+from evoclaims.trials.spec import Condition, TrialSpec
+from evoclaims.trials.store import Store
+
+
+def main(options: argparse.Namespace) -> int:
+    """Print conditions with their cost, then claims with their attainable p."""
+    config, reproduction = open_project()
+    tier, store = reproduction.tier(options.tier), open_store(options.storage)
+    chosen = devices.choose(options.device)
+    reports = judge_stored(config, options.storage, options.tier)
+    used = sorted({(source["method"], source["task"]) for report in reports for source in report.sources})
+
+    def pace(condition: Condition, method: str, task: str) -> Pace | None:
+        known = known_pace(condition, store, reproduction.references, options.tier, method, task, chosen)
+        return measured_pace(condition, chosen) if known is None and options.measure else known
+
+    paces = {names: pace(tier.condition(*names), *names) for names in used}
+    console = Console()
+    console.print(f"Conditions of the {options.tier} tier, on {len(chosen)} × {chosen[0].device_kind}")
+    console.print(_conditions(tier, store, used, paces))
+    console.print(f"\nClaims: the smallest p that the protocol allows (n trials a side, α {tier.protocol.alpha:g})")
+    console.print(_claims(reports))
+    if any(pace is None for pace in paces.values()):
+        console.print("\nTimes are unknown where no trial has run on such a device; --measure times a few steps.")
+    return 0
+
+
+def _conditions(
+    tier: Tier, store: Store, used: Sequence[tuple[str, str]], paces: dict[tuple[str, str], Pace | None]
+) -> Table:
+    """Build the table of conditions; steps and times are upper bounds, since a trial that has solved all stops."""
+    table = Table(box=None, pad_edge=False)
+    for heading in ("condition", "cached", "missing", "environment steps", "time, at most"):
+        table.add_column(heading, justify="left" if heading == "condition" else "right")
+    seeds = tier.protocol.seeds(tier.protocol.last.n)
+    steps, seconds, unknown = 0, 0.0, False
+    for names in used:
+        condition = tier.condition(*names)
+        missing = sum(store.get(TrialSpec(condition, seed).id) is None for seed in seeds)
+        owed = missing * condition.environment_steps
+        pace = paces[names]
+        time = 0.0 if not missing else None if pace is None else pace.seconds(condition, missing)
+        table.add_row(
+            f"{names[0]} on {names[1]}",
+            str(len(seeds) - missing),
+            str(missing),
+            f"{owed:,}",
+            "unknown" if time is None else duration(time),
+        )
+        steps, seconds, unknown = steps + owed, seconds + (time or 0.0), unknown or time is None
+    table.add_row("total", "", "", f"{steps:,}", duration(seconds) + (" and more" if unknown else ""), style="bold")
+    return table
+
+
+def _claims(reports: Sequence[ClaimReport]) -> Table:
+    """Build the table of claims."""
+    table = Table(box=None, pad_edge=False)
+    for heading in ("claim", "n", "α", "p for", "p against", "can be decided"):
+        table.add_column(heading, justify="left" if heading == "claim" else "right")
+    for report in reports:
+        for look in report.attainable:
+            reach = [word for word in ("supported", "refuted") if look[word] <= look["alpha"]]
+            table.add_row(
+                report.name,
+                str(look["n"]),
+                f"{look['alpha']:g}",
+                f"{look['supported']:.2g}",
+                f"{look['refuted']:.2g}",
+                " or ".join(reach) or "no",
+            )
+    return table

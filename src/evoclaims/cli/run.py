@@ -1,0 +1,55 @@
+"""`evoclaims run`: conditions without pytest."""
+
+from __future__ import annotations
+
+import argparse
+
+from evoclaims.cli.project import open_project, open_store
+from evoclaims.cli.terminal import StdoutTerminal
+from evoclaims.core.errors import UnknownNameError, UserError
+from evoclaims.suite.live import LiveLine, duration
+from evoclaims.suite.modes import RunMissing
+from evoclaims.suite.reproduction import Tier
+from evoclaims.trials.result import TrialResult
+
+
+def main(options: argparse.Namespace) -> int:
+    """Run what is missing and list the trials."""
+    _, reproduction = open_project()
+    tier = reproduction.tier(options.tier)
+    chosen = choose(tier, options.method, options.on)
+    n = options.trials if options.trials is not None else tier.protocol.last.n
+    if n < 1:
+        raise UserError(f"--trials takes a number of trials from 1, not {n}.")
+    line = LiveLine(StdoutTerminal())
+    fetch = RunMissing(open_store(options.storage), options.device, line)
+    fetch.check()
+    for method, task in chosen:
+        try:
+            results = fetch(tier.condition(method, task), range(options.first_seed, options.first_seed + n))
+        finally:
+            line.close()
+        print(f"{method} on {task} ({options.tier})")
+        for result in results:
+            print(f"  {describe(result)}")
+    return 0
+
+
+def choose(tier: Tier, method: str | None, task: str | None) -> list[tuple[str, str]]:
+    """Return the conditions that a method and a task leave; an unknown name raises with the known ones."""
+    if method is not None and task is not None:
+        tier.condition(method, task)
+    known = list(tier.conditions)
+    for name, position, kind in ((method, 0, "method"), (task, 1, "task")):
+        if name is not None and name not in {names[position] for names in known}:
+            raise UnknownNameError(kind, name, {names[position] for names in known})
+    return [names for names in known if method in (None, names[0]) and task in (None, names[1])]
+
+
+def describe(result: TrialResult) -> str:
+    """Return a trial in one line."""
+    success = " ".join(f"{value:.3f}" for value in result.levels["success"])
+    return (
+        f"seed {result.seed}: {result.status} after {int(result.metrics['environment_steps']):,} environment steps, "
+        f"success by level {success} ({duration(result.timing['run'])} for the batch of {result.timing['batch']})"
+    )

@@ -1,0 +1,26 @@
+"""`evoclaims status`: the verdict table from the store."""
+
+from __future__ import annotations
+
+import argparse
+
+from rich.console import Console
+
+from evoclaims.cli.project import judge_stored, open_project
+from evoclaims.suite import table
+
+
+def main(options: argparse.Namespace) -> int:
+    """Print the table; 1 when something is refuted or broken without being accepted."""
+    config, reproduction = open_project()
+    reproduction.tier(options.tier)
+    reports = judge_stored(config, options.storage, options.tier)
+    console = Console()
+    for part in (
+        table.verdict_table(reports, console.width, console.is_terminal),
+        table.explanations(reports, console.width, console.is_terminal),
+        f"claims ({options.tier}): {table.totals(reports)}",
+    ):
+        if part:
+            print(part)
+    return int(any(report.failed for report in reports))

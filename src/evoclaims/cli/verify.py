@@ -1,0 +1,19 @@
+"""`evoclaims verify`: every file of the store read back."""
+
+from __future__ import annotations
+
+import argparse
+
+from evoclaims.cli.project import open_store
+from evoclaims.trials.checkpoint import fault
+from evoclaims.trials.integrity import verify
+
+
+def main(options: argparse.Namespace) -> int:
+    """List problems and move bad files aside; 1 when there were any."""
+    store = open_store(options.storage)
+    problems = verify(store, repair=not options.dry_run, checkpoint_fault=fault)
+    for problem in problems:
+        print(problem)
+    print(f"{len(store.ids())} trials in {store.root}, {len(problems)} problems")
+    return int(bool(problems))
