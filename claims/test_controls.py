@@ -11,7 +11,7 @@ TASKS = ["n_parity", "simple_alu"]
     "C1",
     says="Random search, with the encoding and the evaluations of CMA-ES, does not solve 6-parity",
     where="control",
-    smoke="Random search, with the encoding and the evaluations of CMA-ES, does not solve 3-parity",
+    smoke="Random search, with the encoding and the evaluations of CMA-ES, does not solve 4-parity",
 )
 def test_random_search_does_not_solve_parity(trials, verdict):
     random_search = trials("random_search", on="n_parity_direct")
@@ -22,7 +22,7 @@ def test_random_search_does_not_solve_parity(trials, verdict):
     "C2",
     says="A network built by hand is right on every row of every level, and its negation on none",
     where="control",
-    smoke="The same on 3-parity and the first three levels of Simple ALU",
+    smoke="The same on 4-parity and the first three levels of Simple ALU",
 )
 @pytest.mark.parametrize("task", TASKS)
 def test_a_right_circuit_scores_one_and_a_wrong_one_zero(trials, verdict, task):

@@ -1,6 +1,6 @@
 """§5.1: what the paper says about the stepping gates (Figs. 3 and 4).
 
-Smoke judges each sentence on a smaller instance: 3-parity and the first three operations of the ALU.
+Smoke judges each sentence on a smaller instance: 4-parity and the first three operations of the ALU.
 """
 
 import pytest
@@ -14,7 +14,7 @@ TASKS = ["n_parity", "simple_alu"]
     "G1",
     says="CMA-ES successfully solves all levels for both tasks",
     where="§5.1, Fig. 3",
-    smoke="CMA-ES solves both levels of 3-parity, and the first three levels of Simple ALU",
+    smoke="CMA-ES solves all three levels of 4-parity, and the first three levels of Simple ALU",
 )
 @pytest.mark.parametrize("task", TASKS)
 def test_cma_es_solves_every_level(trials, verdict, task):
@@ -26,7 +26,7 @@ def test_cma_es_solves_every_level(trials, verdict, task):
     "G5",
     says="PPO only reached the first level of both tasks",
     where="§5.1, Fig. 3",
-    smoke="PPO solves no level but the first of 3-parity, and of the first three levels of Simple ALU",
+    smoke="PPO solves no level but the first of 4-parity, and of the first three levels of Simple ALU",
 )
 @pytest.mark.parametrize("task", TASKS)
 def test_ppo_stays_at_the_first_level(trials, verdict, task):
@@ -38,7 +38,7 @@ def test_ppo_stays_at_the_first_level(trials, verdict, task):
     "G7",
     says="When directly solving 6-parity (without going through the intermediate levels) PPO solves the task",
     where="§5.1, Fig. 4",
-    smoke="When directly solving 3-parity, PPO solves it",
+    smoke="When directly solving 4-parity, PPO solves it",
 )
 def test_ppo_solves_parity_without_the_curriculum(trials, verdict):
     ppo = trials("ppo", on="n_parity_direct")
@@ -50,7 +50,7 @@ def test_ppo_solves_parity_without_the_curriculum(trials, verdict):
     says="The issue does not lie in the capacity of PPO but in its inability to progress through the levels of our "
     "curriculum",
     where="§5.1, Fig. 4",
-    smoke="PPO does better on 3-parity without the curriculum than with it",
+    smoke="PPO does better on 4-parity without the curriculum than with it",
 )
 def test_ppo_is_better_without_the_curriculum(trials, verdict):
     direct = trials("ppo", on="n_parity_direct")

@@ -62,15 +62,15 @@ def _full() -> Conditions:
 
 
 def _smoke() -> Conditions:
-    """Return the scaled-down instances: 3-parity and the first three operations of the ALU.
+    """Return the scaled-down instances: 4-parity and the first three operations of the ALU.
 
     A whole budget takes seconds on one core; PPO takes larger steps on smaller batches, since it gets a few hundred
     updates where the paper gives hundreds of thousands.
     """
-    parity, alu = NParity(bits=3), SimpleAlu(level_count=3)
+    parity, alu = NParity(bits=4), SimpleAlu(level_count=3)
     network = AllSkips(hidden=16)
     ppo = Ppo(environments=256, batch_size=256, minibatches=8, learning_rate=3e-3)
-    generations, steps = Budget(generations=200), Budget(environment_steps=600_000)
+    generations, steps = Budget(generations=300), Budget(environment_steps=800_000)
     return {
         **_on_every_task(parity, alu, CmaEs(population=256, network=network), generations, generations),
         **_on_every_task(parity, alu, RandomSearch(population=256, network=network), generations, generations),

@@ -6,6 +6,7 @@ import argparse
 from collections.abc import Sequence
 
 from rich.console import Console
+from rich.markup import escape
 from rich.table import Table
 
 from evoclaims.cli.project import judge_stored, open_project, open_store
@@ -57,7 +58,7 @@ def _conditions(
         pace = paces[names]
         time = 0.0 if not missing else None if pace is None else pace.seconds(condition, missing)
         table.add_row(
-            f"{names[0]} on {names[1]}",
+            escape(f"{names[0]} on {names[1]}"),
             str(len(seeds) - missing),
             str(missing),
             f"{owed:,}",
@@ -77,7 +78,7 @@ def _claims(reports: Sequence[ClaimReport]) -> Table:
         for look in report.attainable:
             reach = [word for word in ("supported", "refuted") if look[word] <= look["alpha"]]
             table.add_row(
-                report.name,
+                escape(report.name),
                 str(look["n"]),
                 f"{look['alpha']:g}",
                 f"{look['supported']:.2g}",
