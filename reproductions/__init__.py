@@ -1,0 +1,1 @@
+"""Papers under test: what is run, and the committed reference trials."""

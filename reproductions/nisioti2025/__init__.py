@@ -1,5 +1,4 @@
-"""Nisioti, Pedersen, Plantec, Montero, Risi: When Does Neuroevolution Outcompete Reinforcement Learning in Transfer
-Learning Tasks? GECCO 2025."""
+"""Nisioti et al., GECCO 2025: When Does Neuroevolution Outcompete Reinforcement Learning in Transfer Learning Tasks?"""
 
 from __future__ import annotations
 

@@ -77,9 +77,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     claims = {item: item.get_closest_marker("claim").args[0] for item in items if item.get_closest_marker("claim")}  # type: ignore[union-attr]
     wanted = _wanted_claims(config, {claim.id for claim in claims.values()})
     tiers = _wanted_tiers(config)
-    dropped = [
-        item for item, claim in claims.items() if claim.id not in wanted or tiers.isdisjoint(_tiers_of(item))
-    ]
+    dropped = [item for item, claim in claims.items() if claim.id not in wanted or tiers.isdisjoint(_tiers_of(item))]
     if dropped:
         config.hook.pytest_deselected(items=dropped)
         items[:] = [item for item in items if item not in set(dropped)]

@@ -83,3 +83,11 @@ def trial(store: Store, parameters: dict[str, Any]) -> TrialResult:
     result = _make_result()
     store.put(result, parameters)
     return result
+
+
+@pytest.fixture(scope="session")
+def cpus() -> list[Any]:
+    """Two CPU devices (tests/conftest.py asks for them)."""
+    import jax
+
+    return list(jax.devices("cpu")[:2])

@@ -1,0 +1,1 @@
+"""Keys, trees, canonical JSON, files, errors and provenance: what every floor above needs."""

@@ -17,16 +17,19 @@ def _stable_int(name: str) -> int:
 
 
 def stream(key: jax.Array, name: str) -> jax.Array:
-    """Return the key of the stream called `name` under `key` (a typed key, shape [])."""
+    """Derive one key (typed, shape []) per use, told apart by `name`."""
     return jax.random.fold_in(key, _stable_int(name))
 
 
 def streams(key: jax.Array, *names: str) -> tuple[jax.Array, ...]:
-    """Return one key per name: `mutate_key, eval_key = streams(key, "mutate", "eval")`."""
+    """Return one key per name.
+
+    `mutate_key, eval_key = streams(key, "mutate", "eval")`
+    """
     return tuple(stream(key, name) for name in names)
 
 
-def trial_key(seed: int, purpose: str) -> jax.Array:
+def trial_key(seed: int | jax.Array, purpose: str) -> jax.Array:
     """Return the root key of a trial for one purpose.
 
     Training's and evaluation's keys come from different streams of the same seed, so that no evaluation can

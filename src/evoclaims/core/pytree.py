@@ -31,9 +31,11 @@ def pytree(cls: type[T]) -> type[T]:
 
 def strong(tree: T) -> T:
     """Give every leaf a strong dtype, so that a loop carries what it was given and nothing compiles twice."""
-    return jax.tree.map(lambda leaf: jnp.asarray(leaf, dtype=jnp.result_type(leaf)), tree)
+    made: T = jax.tree.map(lambda leaf: jnp.asarray(leaf, dtype=jnp.result_type(leaf)), tree)
+    return made
 
 
 def select(condition: jax.Array, on_true: T, on_false: T) -> T:
     """Choose between two trees of the same structure by a scalar condition (shape [])."""
-    return jax.tree.map(lambda a, b: jnp.where(condition, a, b), on_true, on_false)
+    chosen: T = jax.tree.map(lambda a, b: jnp.where(condition, a, b), on_true, on_false)
+    return chosen

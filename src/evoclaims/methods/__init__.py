@@ -1,0 +1,1 @@
+"""Algorithms: pure functions of an explicit state, one a file."""

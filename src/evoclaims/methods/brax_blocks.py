@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import io
 
-# MJX, which Brax imports, prints two lines to standard output when NVIDIA's warp is not installed; nothing here uses it.
+# MJX, which Brax imports, prints two lines when NVIDIA's warp is not installed; nothing here uses warp.
 with contextlib.redirect_stdout(io.StringIO()):
     from brax.training.acme import running_statistics, specs
     from brax.training.agents.ppo import losses, networks

@@ -32,8 +32,8 @@ def ordinal_weights(
 ) -> Float[Array, " n"]:
     """Give the i-th best individual the i-th recombination weight, ties in order of index.
 
-    evosax's default averages the ranks of ties; on a thresholded fitness most of a population ties, the averaged weights
-    cancel, and the step size collapses. Individuals are drawn independently, so breaking ties by index is
+    evosax's default averages the ranks of ties; on a thresholded fitness most of a population ties, the averaged
+    weights cancel, and the step size collapses. Individuals are drawn independently, so breaking ties by index is
     breaking them at random.
     """
     return params.weights[jnp.argsort(jnp.argsort(fitness, stable=True), stable=True)]

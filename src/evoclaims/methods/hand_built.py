@@ -1,7 +1,7 @@
 """A network written down by hand, one neuron per row of the truth table: the positive control of the gates.
 
-It learns nothing; it goes through the same engine and the same judging as every method, so that a harness in which a right
-circuit fails, or a wrong one passes, gives itself away (controls C2).
+It learns nothing; it goes through the same engine and the same judging as every method, so that a harness in which a
+right circuit fails, or a wrong one passes, gives itself away (control C2).
 """
 
 from __future__ import annotations
@@ -47,9 +47,7 @@ class HandBuilt:
     ) -> tuple[Int[Array, ""], Progress]:
         """Examine the network and change nothing."""
         episode = task.examine(self.best(task, state), key, level)
-        progress = Progress(
-            fitness=episode.fitness, success=episode.success, healthy=jnp.ones((), bool), metrics={}
-        )
+        progress = Progress(fitness=episode.fitness, success=episode.success, healthy=jnp.ones((), bool), metrics={})
         return state + 1, progress
 
     def best(self, task: Task, state: Int[Array, ""]) -> Policy:

@@ -111,9 +111,7 @@ class Ppo:
             )
         )
 
-    def step(
-        self, key: PRNGKeyArray, task: Task, level: Int[Array, ""], state: PpoState
-    ) -> tuple[PpoState, Progress]:
+    def step(self, key: PRNGKeyArray, task: Task, level: Int[Array, ""], state: PpoState) -> tuple[PpoState, Progress]:
         """Collect batch_size × minibatches trajectories, then pass over them updates_per_batch times."""
         reset_key, act_key, train_key, test_key = streams(key, "reset", "act", "train", "test")
         interaction = state.interaction.at_level(task, reset_key, level)
@@ -214,7 +212,7 @@ class Ppo:
             keys = jax.random.split(stream(key, "sampled test"), self.level_test.sampled_episodes)
 
             def rewarded(key: Array) -> Array:
-                reset_key, act_key, episode_key = streams(key, "reset", "act", "episode")
+                reset_key, act_key = streams(key, "reset", "act")
                 start = task.reset(reset_key, level)
                 return task.step(start, act(start.observation, act_key)[0]).reward
 

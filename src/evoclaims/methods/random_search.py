@@ -38,9 +38,7 @@ class RandomSearch:
         """Start without a champion."""
         return first_champion(jnp.zeros(self.network.size(task.observation_size, task.action_size)))
 
-    def step(
-        self, key: PRNGKeyArray, task: Task, level: Int[Array, ""], state: Champion
-    ) -> tuple[Champion, Progress]:
+    def step(self, key: PRNGKeyArray, task: Task, level: Int[Array, ""], state: Champion) -> tuple[Champion, Progress]:
         """Draw and evaluate one population."""
         draw_key, episode_key = streams(key, "draw", "episode")
         population = self.std * jax.random.normal(draw_key, (self.population, state.parameters.shape[0]))

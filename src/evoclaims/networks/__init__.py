@@ -1,0 +1,1 @@
+"""Networks: what a policy is made of."""

@@ -11,8 +11,7 @@ from jaxtyping import Array, Float
 
 @dataclass(frozen=True)
 class AllSkips:
-    """`hidden` tanh neurons in a fixed order, each fed by the inputs, a bias and every earlier neuron; tanh outputs fed
-    by all of them.
+    """Tanh neurons in a fixed order, each fed by the inputs, a bias and every earlier neuron; tanh outputs fed by all.
 
     Parameters, in order: weights from inputs and bias to hidden and outputs, [hidden + outputs, inputs + 1]; weights
     from hidden neurons to outputs, [outputs, hidden]; weights between hidden neurons, the strict lower triangle

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 import jax.numpy as jnp
 from jaxtyping import Array, Float
@@ -27,7 +28,7 @@ class Mlp:
     def size(self, inputs: int, outputs: int) -> int:
         """Return the number of parameters."""
         widths = (inputs, *self.layers, outputs)
-        dense = sum((fan_in + 1) * fan_out for fan_in, fan_out in zip(widths, widths[1:], strict=False))
+        dense = sum((fan_in + 1) * fan_out for fan_in, fan_out in pairwise(widths))
         return dense + inputs * outputs * self.skip
 
     def apply(

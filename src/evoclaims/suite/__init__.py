@@ -1,0 +1,1 @@
+"""A paper under test: its conditions, its claims, and what became of them."""

@@ -54,12 +54,12 @@ class Expectation:
 
 
 def claim(
-    id: str, *, says: str, where: str, smoke: str, expect: Outcome | None = None, because: str = ""
+    claim_id: str, /, *, says: str, where: str, smoke: str, expect: Outcome | None = None, because: str = ""
 ) -> Callable[[F], F]:
     """Mark a test as the check of a claim; the test runs once per tier.
 
     Args:
-        id: the claim's id.
+        claim_id: a short name, such as "G1".
         says: the paper's own words.
         where: section and figure.
         smoke: the scaled-down statement of the smoke tier.
@@ -69,10 +69,10 @@ def claim(
     Raises:
         UserError: when a text is missing.
     """
-    for word, text in {"id": id, "says": says, "where": where, "smoke": smoke}.items():
+    for word, text in {"id": claim_id, "says": says, "where": where, "smoke": smoke}.items():
         if not text.strip():
-            raise UserError(f"The claim {id or '(without id)'} lacks its {word}.")
-    marks = [pytest.mark.claim(Claim(id, says, where, smoke))]
+            raise UserError(f"The claim {claim_id or '(without id)'} lacks its {word}.")
+    marks = [pytest.mark.claim(Claim(claim_id, says, where, smoke))]
     if expect is not None:
         marks.append(expected(expect, because=because))
 

@@ -51,7 +51,7 @@ def load_config(root: Path) -> SuiteConfig:
     table = _tool_tables(root / "pyproject.toml").get("evoclaims")
     if not isinstance(table, dict) or "reproduction" not in table or not set(table) <= {"reproduction", "claims"}:
         raise UserError(
-            f"{root / 'pyproject.toml'} needs a [tool.evoclaims] table with reproduction = \"package.module\" and, if "
+            f'{root / "pyproject.toml"} needs a [tool.evoclaims] table with reproduction = "package.module" and, if '
             'it is not "claims", claims = "folder"; no other keys.'
         )
     return SuiteConfig(root=root, **table)

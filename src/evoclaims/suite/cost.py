@@ -52,7 +52,8 @@ def known_pace(
     """Return the pace of stored or reference trials of this condition on this kind of device; None without any."""
     stored = (store.get(TrialSpec(condition, seed).id) for seed in range(SEEDS_LOOKED_AT))
     trials = [trial for trial in stored if trial is not None]
-    trials += [t for t in references.load(references.path_of(folder, tier, method, task)) if t.condition == condition.id]
+    committed = references.load(references.path_of(folder, tier, method, task))
+    trials += [trial for trial in committed if trial.condition == condition.id]
     kind = devices[0].device_kind
     batches: dict[str, list[TrialResult]] = defaultdict(list)
     for trial in trials:
@@ -80,4 +81,4 @@ def measured_pace(condition: Condition, devices: Sequence[jax.Device]) -> Pace:
     took = time.perf_counter() - began
     steps = max(int(np.max(report.steps)) - 1, 1)
     share = width if lanes.layout == "loop" else 1
-    return Pace(took / steps / share, lanes.programs(width).seconds, lanes.layout)
+    return Pace(took / steps / share, lanes.seconds, lanes.layout)

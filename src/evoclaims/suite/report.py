@@ -80,9 +80,7 @@ class ClaimReport:
     @staticmethod
     def from_json(plain: dict[str, Any]) -> ClaimReport:
         """Return the report that `to_json` gave."""
-        return ClaimReport(
-            **{**plain, "sources": tuple(plain["sources"]), "attainable": tuple(plain["attainable"])}
-        )
+        return ClaimReport(**{**plain, "sources": tuple(plain["sources"]), "attainable": tuple(plain["attainable"])})
 
 
 def judged(

@@ -7,6 +7,7 @@ import os
 from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Literal
 
 from rich.console import Console
 from rich.markup import escape
@@ -26,7 +27,7 @@ _COLOURS = {
 
 
 def verdict_table(reports: Sequence[ClaimReport], width: int, colour: bool) -> str:
-    """Return the table: claim, sentence, verdict, n, effect, p against the attainable p, and where the evidence lies."""
+    """Return the table: claim, sentence, verdict, n, effect, p against the attainable p, evidence."""
     table = Table(expand=True, show_lines=False, pad_edge=False, box=None)
     for heading, options in {
         "claim": {"no_wrap": True},
@@ -103,6 +104,7 @@ def _p_values(report: ClaimReport) -> str:
 def _rendered(content: Table | str, width: int, colour: bool) -> str:
     """Return rich content as text."""
     file = io.StringIO()
-    console = Console(file=file, width=max(width, 60), force_terminal=colour, color_system="standard" if colour else None)
+    system: Literal["standard"] | None = "standard" if colour else None
+    console = Console(file=file, width=max(width, 60), force_terminal=colour, color_system=system)
     console.print(content, highlight=False)
     return file.getvalue().rstrip("\n")

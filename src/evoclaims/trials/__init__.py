@@ -1,0 +1,1 @@
+"""Running trials: specification, the one loop, records and store."""

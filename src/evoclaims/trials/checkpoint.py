@@ -33,7 +33,8 @@ class Header:
         lanes: for each lane, the seed whose record is still owed, or None.
         chunks: chunks of the budget done.
         curves: for each seed (as text), the points of its training curve so far, by name.
-        run_seconds, compile_seconds: spent so far.
+        run_seconds: spent on running so far.
+        compile_seconds: spent on compiling by the processes that had the batch before.
         started: when the batch began (UTC, ISO 8601).
         schema: version of this format.
     """

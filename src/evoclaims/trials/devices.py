@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any, Final
 
 import jax
+from threadpoolctl import threadpool_limits
 
 from evoclaims.core.errors import UnknownNameError, UserError
 
@@ -29,10 +32,25 @@ def configure() -> None:
         # jax would otherwise evict nothing and warn about nothing; a broken cache must not break a run.
         config.update("jax_raise_persistent_cache_errors", False)
     if "xla_force_host_platform_device_count" not in os.environ.get("XLA_FLAGS", ""):
-        try:
-            config.update("jax_num_cpu_devices", len(os.sched_getaffinity(0)))
-        except RuntimeError:
-            pass  # jax has started: its devices stay as they are
+        with contextlib.suppress(RuntimeError):  # jax has started: its devices stay as they are
+            config.update("jax_num_cpu_devices", usable_cores())
+
+
+def usable_cores() -> int:
+    """Return how many cores this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def single_threaded_linear_algebra() -> AbstractContextManager[object]:
+    """Keep LAPACK, which jax calls for eigenvalues on a CPU, on the thread of the trial that calls it.
+
+    Trials already fill the cores. With threads of its own, OpenBLAS waits in busy loops for cores that other trials
+    hold: measured, 50 times slower; and its bits would depend on the number of cores.
+    """
+    import scipy.linalg  # noqa: F401  (loads the library that is limited)
+
+    limited: AbstractContextManager[object] = threadpool_limits(limits=1, user_api="blas")
+    return limited
 
 
 def choose(name: str) -> list[jax.Device]:

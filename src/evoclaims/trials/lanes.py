@@ -5,6 +5,8 @@ from __future__ import annotations
 import dataclasses
 import time
 from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,7 +14,6 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jax.sharding import Mesh, NamedSharding, PartitionSpec
-from numpy.typing import NDArray
 
 from evoclaims.trials.devices import MATMUL_PRECISION, layout_for
 from evoclaims.trials.program import Program, Report, Score, TrialState, over_trials
@@ -39,26 +40,32 @@ class Compiled:
     """The programs of a condition for one number of lanes.
 
     Attributes:
-        start, advance, score: compiled; all arguments and results have a leading axis [lanes].
+        advance, score: compiled; all arguments and results have a leading axis [lanes].
         shapes: shapes and dtypes of the stacked state.
-        seconds: what compiling took.
     """
 
-    start: Callable[..., TrialState]
     advance: Callable[..., tuple[TrialState, Report]]
     score: Callable[..., Score]
     shapes: Any
-    seconds: float
 
 
 class Lanes:
-    """Compiles a condition's programs for given devices, each width at most once."""
+    """Compiles a condition's programs for given devices, each width at most once.
+
+    Attributes:
+        condition: what is compiled.
+        devices: where it runs.
+        layout: see `program.over_trials`.
+        seconds: spent on compiling so far.
+    """
 
     def __init__(self, condition: Condition, devices: Sequence[jax.Device]) -> None:
         """Remember the condition and the devices; nothing is compiled yet."""
         self.condition = condition
         self.devices = list(devices)
         self.layout = layout_for(self.devices)
+        self.seconds = 0.0
+        self._program = Program(condition)
         self._compiled: dict[int, Compiled] = {}
 
     def width(self, active: int, full: int) -> int:
@@ -72,18 +79,25 @@ class Lanes:
     def programs(self, width: int) -> Compiled:
         """Return the programs for `width` lanes, compiling them the first time."""
         if width not in self._compiled:
+            began = time.perf_counter()
             self._compiled[width] = self._compile(width)
+            self.seconds += time.perf_counter() - began
         return self._compiled[width]
 
     def place(self, tree: Any, width: int) -> Any:
         """Move a tree of host arrays with leading axis [width] onto the devices, lanes spread evenly."""
-        return jax.device_put(tree, NamedSharding(self._mesh(width), PartitionSpec(AXIS)))
+        return jax.device_put(tree, self._sharding(width))
 
     def start(self, seeds: Sequence[int | None], width: int) -> TrialState:
         """Start one trial per lane; None makes an idle lane."""
         known = np.array([0 if seed is None else seed for seed in seeds], np.int32)
         idle = np.array([seed is None for seed in seeds])
-        return self.programs(width).start(*self.place((known, idle), width))
+        began = time.perf_counter()
+        with self._settings():
+            compiled = self._spread(self._program.start, width).lower(*self.place((known, idle), width)).compile()
+        self.seconds += time.perf_counter() - began
+        state: TrialState = compiled(*self.place((known, idle), width))
+        return state
 
     def advance(self, state: TrialState, until: int, width: int) -> tuple[TrialState, Report]:
         """Take every trial to its end or to `until` steps; `state` is donated. The report is on the host."""
@@ -122,28 +136,39 @@ class Lanes:
         count = max(n for n in range(1, len(self.devices) + 1) if width % n == 0)
         return Mesh(np.array(self.devices[:count]), (AXIS,))
 
+    def _sharding(self, width: int) -> NamedSharding:
+        """Return the even spread of the leading axis over the mesh."""
+        return NamedSharding(self._mesh(width), PartitionSpec(AXIS))
+
+    @staticmethod
+    def _settings() -> AbstractContextManager[Any]:
+        """Return the settings that the programs are traced under."""
+        settings: AbstractContextManager[Any] = jax.default_matmul_precision(MATMUL_PRECISION)
+        return settings
+
+    def _spread(self, function: Callable[..., Any], width: int, donate: bool = False) -> Any:
+        """Lay a single-trial function out over lanes and devices, ready to be lowered."""
+        laid_out = over_trials(function, self.layout)
+        axis = PartitionSpec(AXIS)
+        spread = jax.shard_map(laid_out, mesh=self._mesh(width), in_specs=axis, out_specs=axis, check_vma=False)
+        return jax.jit(spread, donate_argnums=(0,) if donate else ())
+
     def _compile(self, width: int) -> Compiled:
-        """Compile the three programs, ahead of time, so that compile time and run time are told apart."""
-        program, began = Program(self.condition), time.perf_counter()
-        mesh = self._mesh(width)
-        lanes = jax.ShapeDtypeStruct((width,), jnp.int32, sharding=NamedSharding(mesh, PartitionSpec(AXIS)))
-        flags = jax.ShapeDtypeStruct((width,), jnp.bool_, sharding=lanes.sharding)
+        """Compile what runs again and again, ahead of time, so that compile time and run time are told apart."""
+        sharding = self._sharding(width)
 
-        def compiled(function: Callable[..., Any], *arguments: Any, donate: bool = False) -> Any:
-            spread = jax.shard_map(
-                over_trials(function, self.layout),
-                mesh=mesh,
-                in_specs=PartitionSpec(AXIS),
-                out_specs=PartitionSpec(AXIS),
-                check_vma=False,
+        def shape(leaf: Any) -> jax.ShapeDtypeStruct:
+            return jax.ShapeDtypeStruct(leaf.shape, leaf.dtype, sharding=sharding)
+
+        seeds, idle = jax.ShapeDtypeStruct((width,), jnp.int32), jax.ShapeDtypeStruct((width,), jnp.bool_)
+        with self._settings():
+            shapes = jax.eval_shape(self._spread(self._program.start, width), seeds, idle)
+            state = jax.tree.map(shape, shapes)
+            lowered = (
+                self._spread(self._program.advance, width, donate=True).lower(state, shape(seeds)),
+                self._spread(self._program.score, width).lower(state),
             )
-            jitted = jax.jit(spread, donate_argnums=(0,) if donate else ())
-            with jax.default_matmul_precision(MATMUL_PRECISION):
-                return jitted.lower(*arguments).compile(), jax.eval_shape(jitted, *arguments)
-
-        start, shapes = compiled(program.start, lanes, flags)
-        state = jax.tree.map(lambda x: jax.ShapeDtypeStruct(x.shape, x.dtype, sharding=lanes.sharding), shapes)
-        advance, _ = compiled(program.advance, state, lanes, donate=True)
-        score, _ = compiled(program.score, state)
-        seconds = time.perf_counter() - began
-        return Compiled(start=start, advance=advance, score=score, shapes=shapes, seconds=seconds)
+            # XLA compiles without holding the interpreter, so that two programs take the time of one.
+            with ThreadPoolExecutor() as pool:
+                advance, score = pool.map(lambda program: program.compile(), lowered)
+        return Compiled(advance=advance, score=score, shapes=shapes)

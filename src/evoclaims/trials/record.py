@@ -15,7 +15,7 @@ from evoclaims.trials.arrays import pack
 from evoclaims.trials.curriculum import NEVER
 from evoclaims.trials.devices import MATMUL_PRECISION
 from evoclaims.trials.program import Report, Score
-from evoclaims.trials.result import TrialResult, digest
+from evoclaims.trials.result import Status, TrialResult, digest
 from evoclaims.trials.spec import TrialSpec
 
 
@@ -70,7 +70,7 @@ def make_result(
         "solved_at": tuple(float(x * cost) if x != NEVER else float(NEVER) for x in solved_at),
     }
     champion = named_leaves(jax.tree.map(lambda leaf: np.asarray(leaf)[lane], score.parameters))
-    status = "diverged" if bool(report.diverged[lane]) else "done"
+    status: Status = "diverged" if bool(report.diverged[lane]) else "done"
     plain_curves = {name: tuple(map(float, values)) for name, values in curves.items()}
     result = TrialResult(
         id=spec.id,

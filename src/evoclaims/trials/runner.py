@@ -15,6 +15,7 @@ from evoclaims.core.canonical import content_hash
 from evoclaims.core.provenance import collect
 from evoclaims.trials import checkpoint
 from evoclaims.trials.checkpoint import Header
+from evoclaims.trials.devices import single_threaded_linear_algebra
 from evoclaims.trials.lanes import Lanes
 from evoclaims.trials.notice import Notice, wait_while_others_run
 from evoclaims.trials.program import Report, TrialState
@@ -75,14 +76,17 @@ def run(
     specs = {seed: TrialSpec(condition, seed) for seed in seeds}
     while any(store.get(spec.id) is None for spec in specs.values()):
         store.check_writable()
-        wait_while_others_run(store.root, condition.id, lambda text: watch(RunProgress(condition.label, text)))
+        wait_while_others_run(
+            store.root, condition.id, lambda text: watch(RunProgress(condition.label, text, len(seeds)))
+        )
         with Notice(store.root, condition.id) as notice:
             if notice.other is not None:
                 continue  # another process was faster: wait for it, then look again
             missing = [seed for seed, spec in specs.items() if store.get(spec.id) is None]
             one = Run(Lanes(condition, devices), store, watch, checkpoint_seconds)
-            for batch in _batches(one, missing):
-                _finish(one, batch, notice)
+            with single_threaded_linear_algebra():
+                for batch in _batches(one, missing):
+                    _finish(one, batch, notice)
     results = [store.get(spec.id) for spec in specs.values()]
     return [result for result in results if result is not None]
 
@@ -102,15 +106,13 @@ def _batches(run: Run, missing: Sequence[int]) -> Iterator[Batch]:
         # A lane whose trial is stored goes idle; the others keep their places, and so their bits.
         state = replace(state, idle=state.idle | np.array(stored))
         remaining = [seed for seed in remaining if seed not in header.lanes]
-        yield Batch(
-            replace(header, compile_seconds=header.compile_seconds + programs.seconds),
-            lanes.place(state, len(stored)),
-        )
+        yield Batch(header, lanes.place(state, len(stored)))
     if remaining:
         run.watch(RunProgress(run.condition.label, "compiling", len(remaining)))
         width = lanes.width(len(remaining), len(remaining))
         order = lanes.arrangement(range(len(remaining)), width)
         owed = [None if lane is None else remaining[lane] for lane in order]
+        lanes.programs(width)
         state = lanes.start(owed, width)
         header = Header(
             condition=run.condition.id,
@@ -120,7 +122,7 @@ def _batches(run: Run, missing: Sequence[int]) -> Iterator[Batch]:
             chunks=0,
             curves={str(seed): {} for seed in remaining},
             run_seconds=0.0,
-            compile_seconds=lanes.programs(width).seconds,
+            compile_seconds=0.0,
             started=datetime.now(UTC).isoformat(timespec="seconds"),
         )
         yield Batch(header, state)
@@ -138,7 +140,8 @@ def _finish(run: Run, batch: Batch, notice: Notice) -> None:
             batch = _rearranged(run, batch)
         now = time.monotonic()
         if batch.owed and now - saved >= run.checkpoint_seconds:
-            checkpoint.save(folder, batch.header, jax.device_get(batch.state))
+            spent = batch.header.compile_seconds + run.lanes.seconds
+            checkpoint.save(folder, replace(batch.header, compile_seconds=spent), jax.device_get(batch.state))
             notice.refresh()
             saved = now
         pace = (now - began) / (batch.header.chunks - first_chunk)
@@ -167,7 +170,7 @@ def _store_ended(run: Run, batch: Batch, report: Report, ended: Sequence[int]) -
     score = run.lanes.score(batch.state, len(header.lanes))
     timing = {
         "run": header.run_seconds,
-        "compile": header.compile_seconds,
+        "compile": header.compile_seconds + run.lanes.seconds,
         "batch": len(header.batch),
         "started": header.started,
     }
@@ -189,9 +192,7 @@ def _rearranged(run: Run, batch: Batch) -> Batch:
         return batch
     state = run.lanes.rearrange(batch.state, order, width)
     owed = [None if lane is None else batch.header.lanes[lane] for lane in order]
-    compiled = run.lanes.programs(width).seconds if width != len(batch.header.lanes) else 0.0
-    spent = batch.header.compile_seconds + compiled
-    return Batch(replace(batch.header, lanes=owed, compile_seconds=spent), state)
+    return Batch(replace(batch.header, lanes=owed), state)
 
 
 def _progress(run: Run, batch: Batch, report: Report, seconds_per_chunk: float) -> RunProgress:

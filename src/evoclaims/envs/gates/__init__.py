@@ -1,0 +1,1 @@
+"""Stepping gates: truth tables with levels (§3.1 of the paper)."""

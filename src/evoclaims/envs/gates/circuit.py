@@ -29,9 +29,9 @@ class Circuit(ABC):
     """A gate task; a subclass gives `name`, `revision`, `table` and a field `sampling`.
 
     Attributes:
-        sampling: "exhaustive": an episode asks every row of the level in order, and its fitness is minus the mean error;
-            "sampled": an episode is one step on a row drawn uniformly from the level. The error of a row is the share
-            of its active outputs that are wrong; an output x is read as the bit x > 0.
+        sampling: "exhaustive": an episode asks every row of the level in order, and its fitness is minus the mean
+            error; "sampled": an episode is one step on a row drawn uniformly from the level. The error of a row is the
+            share of its active outputs that are wrong; an output x is read as the bit x > 0.
     """
 
     sampling: Sampling

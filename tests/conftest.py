@@ -1,0 +1,29 @@
+"""Settings of every test: two CPU devices wherever it runs, and one compilation cache for the processes of a run."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import tempfile
+from typing import Final
+
+import pytest
+
+pytest_plugins = ["pytester"]
+
+_CACHE: Final = "JAX_COMPILATION_CACHE_DIR"
+_made = ""
+
+# Before anything imports jax; environment variables, so that xdist workers and subprocesses see the same.
+os.environ.setdefault("JAX_PLATFORMS", "cpu")
+os.environ.setdefault("JAX_NUM_CPU_DEVICES", "2")
+if _CACHE not in os.environ:
+    _made = os.environ[_CACHE] = tempfile.mkdtemp(prefix="evoclaims-tests-")
+    os.environ["JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS"] = "0.1"
+
+
+def pytest_unconfigure(config: pytest.Config) -> None:
+    """Remove the compilation cache that this process made."""
+    if _made:
+        shutil.rmtree(_made, ignore_errors=True)
+        os.environ.pop(_CACHE, None)

@@ -1,0 +1,198 @@
+"""Lanes: how many there are, where each lies, and what is compiled for them."""
+
+from __future__ import annotations
+
+import logging
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+import jax
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from trial_toys import walk
+
+from evoclaims.trials.lanes import Compiled, Lanes, width_for
+from evoclaims.trials.runner import run
+from evoclaims.trials.store import Store
+
+
+class _Mesh:
+    """Stands for the mesh of `Lanes`, of which only the number of devices matters here."""
+
+    def __init__(self, size: int) -> None:
+        self.size = size
+
+
+def _lanes(devices: int, layout: str = "vector") -> Lanes:
+    """Return lanes over devices that need not exist."""
+    lanes = object.__new__(Lanes)
+    lanes.devices = [None] * devices  # type: ignore[list-item]
+    lanes.layout = layout
+    lanes._mesh = lambda width: _Mesh(max(n for n in range(1, devices + 1) if width % n == 0))  # type: ignore
+    return lanes
+
+
+counts = st.integers(1, 40)
+
+
+@given(st.data(), counts, st.integers(1, 8))
+def test_there_are_never_fewer_lanes_than_active_trials(data: st.DataObject, full: int, devices: int) -> None:
+    active = data.draw(st.integers(0, full))
+    width = width_for(active, devices, full)
+    assert width >= max(active, 1)
+    assert width % devices == 0
+    assert width <= -(-full // devices) * devices
+
+
+@given(st.data(), counts, st.integers(1, 8))
+def test_fewer_active_trials_never_need_more_lanes(data: st.DataObject, full: int, devices: int) -> None:
+    active = data.draw(st.integers(1, full))
+    assert width_for(active - 1, devices, full) <= width_for(active, devices, full)
+
+
+@given(counts)
+def test_lanes_halve_so_that_few_widths_are_compiled(full: int) -> None:
+    widths = {width_for(active, 1, full) for active in range(1, full + 1)}
+    assert len(widths) <= full.bit_length() + 1
+    assert width_for(full, 1, full) == full
+    assert width_for(1, 1, full) <= 2
+
+
+@given(st.data(), counts, st.integers(1, 8))
+def test_a_batch_uses_no_more_devices_than_it_has_trials(data: st.DataObject, full: int, devices: int) -> None:
+    active = data.draw(st.integers(1, full))
+    lanes = _lanes(devices)
+    width = lanes.width(active, full)
+    assert width % min(devices, full) == 0
+    assert active <= width <= full + min(devices, full) - 1
+    assert _lanes(devices, "loop").width(active, full) == lanes.width(full, full)
+
+
+@given(st.data(), counts, st.integers(1, 8))
+def test_an_arrangement_places_every_active_lane_once_and_loads_devices_evenly(
+    data: st.DataObject, full: int, devices: int
+) -> None:
+    lanes = _lanes(devices)
+    active = sorted(data.draw(st.sets(st.integers(0, full - 1), min_size=1)))
+    width = lanes.width(len(active), full)
+    order = lanes.arrangement(active, width)
+    assert len(order) == width
+    assert sorted(lane for lane in order if lane is not None) == active
+    assert order == lanes.arrangement(active, width)
+    used = lanes._mesh(width).size
+    loads = [sum(lane is not None for lane in share) for share in np.array(order, dtype=object).reshape(used, -1)]
+    assert max(loads) - min(loads) <= 1
+
+
+@given(st.data(), counts, st.integers(1, 8), st.sampled_from(["loop", "vector"]))
+def test_lanes_that_have_just_been_arranged_are_not_worth_moving_again(
+    data: st.DataObject, full: int, devices: int, layout: str
+) -> None:
+    lanes = _lanes(devices, layout)
+    active = sorted(data.draw(st.sets(st.integers(0, full - 1), min_size=1)))
+    width = lanes.width(len(active), full)
+    order = lanes.arrangement(active, width)
+    placed = [lane for lane, was in enumerate(order) if was is not None]
+    assert not lanes.worth_moving(placed, width, width)
+
+
+def test_lanes_move_into_fewer_lanes_or_off_a_device_that_has_more_to_do() -> None:
+    assert _lanes(1).worth_moving([0, 5], 8, 2)
+    assert not _lanes(1).worth_moving([0, 5], 8, 8)
+    assert _lanes(2, "loop").worth_moving([0, 1], 8, 8)
+    assert not _lanes(2, "loop").worth_moving([0, 7], 8, 8)
+    assert not _lanes(2, "loop").worth_moving([0], 8, 8)
+    assert not _lanes(2, "vector").worth_moving([0, 1], 8, 8)
+
+
+@settings(max_examples=20, deadline=None)
+@given(st.lists(st.integers(0, 3) | st.none(), min_size=2, max_size=6).filter(lambda order: set(order) != {None}))
+def test_rearranged_lanes_keep_their_state_and_the_others_go_idle(order: list[int | None]) -> None:
+    lanes = Lanes(walk(), jax.devices("cpu")[:1])
+    program_state = _started()
+    moved = jax.device_get(lanes.rearrange(program_state, order, len(order)))
+    for place, lane in enumerate(order):
+        assert moved.idle[place] == (lane is None)
+        if lane is not None:
+            assert moved.seed[place] == program_state.seed[lane]
+            np.testing.assert_array_equal(moved.method[place], program_state.method[lane])
+
+
+_cached: list[Any] = []
+
+
+def _started() -> Any:
+    """Return the state of four trials on the host, started once."""
+    if not _cached:
+        _cached.append(jax.device_get(Lanes(walk(), jax.devices("cpu")[:1]).start([3, 1, 4, 2], 4)))
+    return _cached[0]
+
+
+@pytest.mark.parametrize("layout", ["loop", "vector"])
+def test_each_width_is_compiled_once_in_a_run(
+    layout: str,
+    tmp_path: Path,
+    cpus: list[Any],
+    monkeypatch: pytest.MonkeyPatch,
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    monkeypatch.setattr("evoclaims.trials.lanes.layout_for", lambda devices: layout)
+    widths: Counter[int] = Counter()
+    compile_width = Lanes._compile
+
+    def spy(self: Lanes, width: int) -> Compiled:
+        widths[width] += 1
+        return compile_width(self, width)
+
+    monkeypatch.setattr(Lanes, "_compile", spy)
+    with jax.log_compiles(), caplog.at_level(logging.WARNING, "jax"):
+        results = run(walk(chance=0.3, hazard=0.03), range(5), Store(tmp_path), cpus)
+    assert widths == ({6: 1} if layout == "loop" else {6: 1, 4: 1, 2: 1})
+    compiled = [r for r in caplog.records if r.getMessage().startswith("Compiling ")]
+    assert len(compiled) == 3 * len(widths), [r.getMessage() for r in compiled]
+    assert len({result.metrics["steps"] for result in results}) > 1
+
+
+def test_a_chunk_moves_nothing_between_host_and_device(cpus: list[Any]) -> None:
+    lanes = Lanes(walk(), cpus)
+    state, bound = lanes.start([0, 1], 2), lanes.place(np.full(2, 5, np.int32), 2)
+    advance = lanes.programs(2).advance
+    with jax.transfer_guard("disallow"):
+        state, report = advance(state, bound)
+    assert np.asarray(report.steps).tolist() == [5, 5]
+    text = advance.as_text()  # type: ignore[attr-defined]
+    assert not [word for word in ("callback", "infeed", "outfeed", "send(", "recv(") if word in text]
+
+
+def test_the_state_given_to_a_chunk_is_donated(cpus: list[Any]) -> None:
+    lanes = Lanes(walk(), cpus)
+    before = lanes.start([0, 1], 2)
+    lanes.advance(before, 1, 2)
+    assert before.method.is_deleted()
+
+
+def test_a_torn_entry_of_the_compilation_cache_costs_time_and_nothing_else(tmp_path: Path, cpus: list[Any]) -> None:
+    """A kill can tear one, since jax writes them in place; a warning about it would be an error under pytest."""
+    from jax.experimental.compilation_cache import compilation_cache
+
+    options = ("jax_compilation_cache_dir", "jax_persistent_cache_min_compile_time_secs")
+    was = {name: getattr(jax.config, name) for name in options}
+    condition = walk(steps=7)
+    try:
+        for name, value in zip(options, (str(tmp_path / "xla"), 0.0), strict=True):
+            jax.config.update(name, value)
+        compilation_cache.reset_cache()
+        wanted = run(condition, [0], Store(tmp_path / "one"), cpus)
+        entries = list((tmp_path / "xla").glob("*-cache"))
+        assert len(entries) >= 3
+        for entry in entries:
+            entry.write_bytes(entry.read_bytes()[:100])
+        jax.clear_caches()
+        assert run(condition, [0], Store(tmp_path / "two"), cpus)[0].digest == wanted[0].digest
+    finally:
+        for name, value in was.items():
+            jax.config.update(name, value)
+        compilation_cache.reset_cache()
