@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import dataclasses
 import time
-from collections.abc import Callable, Sequence
+import warnings
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import AbstractContextManager
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
@@ -141,10 +142,13 @@ class Lanes:
         return NamedSharding(self._mesh(width), PartitionSpec(AXIS))
 
     @staticmethod
-    def _settings() -> AbstractContextManager[Any]:
-        """Return the settings that the programs are traced under."""
-        settings: AbstractContextManager[Any] = jax.default_matmul_precision(MATMUL_PRECISION)
-        return settings
+    @contextmanager
+    def _settings() -> Iterator[None]:
+        """Set what the programs are traced and compiled under."""
+        with jax.default_matmul_precision(MATMUL_PRECISION), warnings.catch_warnings():
+            # A kill can tear an entry of jax's cache: it is compiled anew, which must not become an error in pytest.
+            warnings.filterwarnings("ignore", "Error (reading|writing) persistent compilation cache")
+            yield
 
     def _spread(self, function: Callable[..., Any], width: int, donate: bool = False) -> Any:
         """Lay a single-trial function out over lanes and devices, ready to be lowered."""

@@ -79,15 +79,15 @@ class Condition:
 
 @dataclass(frozen=True)
 class TrialSpec:
-    """One trial: a condition and a seed (0 or above)."""
+    """One trial: a condition and a seed (from 0 to 2³¹ − 1, as the device holds it)."""
 
     condition: Condition
     seed: int
 
     def __post_init__(self) -> None:
-        """Reject negative seeds."""
-        if self.seed < 0:
-            raise UserError(f"A seed is 0 or above, not {self.seed}.")
+        """Reject seeds that the device's 32-bit integers cannot hold."""
+        if not 0 <= self.seed < 2**31:
+            raise UserError(f"A seed is 0 or above and below 2147483648, not {self.seed}.")
 
     @cached_property
     def plain(self) -> dict[str, Any]:
