@@ -22,7 +22,8 @@ def test_random_search_does_not_solve_parity(trials, verdict):
     "C2",
     says="A network built by hand is right on every row of every level, and its negation on none",
     where="control",
-    smoke="The same on 4-parity and the first three levels of Simple ALU",
+    smoke="A network built by hand is right on every row of every level of 4-parity and of the first three of Simple "
+    "ALU, and its negation on none",
 )
 @pytest.mark.parametrize("task", TASKS)
 def test_a_right_circuit_scores_one_and_a_wrong_one_zero(trials, verdict, task):
@@ -35,7 +36,8 @@ def test_a_right_circuit_scores_one_and_a_wrong_one_zero(trials, verdict, task):
     "C5",
     says="Trials of one method, split into halves at random, are found different no more often than chance allows",
     where="control",
-    smoke="The same with the smoke tier's trials",
+    smoke="Trials of one method on 4-parity, split into halves at random, are found different no more often than chance "
+    "allows",
 )
 @pytest.mark.parametrize("method", ["cma_es", "ppo", "random_search"])
 def test_a_method_is_not_better_than_itself(trials, verdict, method):

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Generator
+from contextlib import nullcontext
 from typing import TYPE_CHECKING, Any
 
 import pytest
@@ -133,7 +134,7 @@ def make_session(config: pytest.Config) -> Session:
 
     devices.configure()
     store = Store(config.invocation_params.dir / config.getoption("claims_storage"))
-    line = LiveLine(config.get_terminal_writer()) if config.pluginmanager.has_plugin("terminalreporter") else None
+    line = LiveLine(Uncaptured(config)) if config.pluginmanager.has_plugin("terminalreporter") else None
     mode: Any = RunMissing(store, config.getoption("claims_device"), line or ignore)
     if config.getoption("claims_stored"):
         mode = StoredOnly(store)
@@ -144,6 +145,22 @@ def make_session(config: pytest.Config) -> Session:
     if line is not None:
         config.stash[_line] = line
     return made
+
+
+class Uncaptured:
+    """The terminal behind pytest's capture, for a progress line that is seen while a claim's trials run."""
+
+    def __init__(self, config: pytest.Config) -> None:
+        """Look at what the terminal is."""
+        self._capture: Any = config.pluginmanager.get_plugin("capturemanager")
+        self._writer = config.get_terminal_writer()
+        self.fullwidth = self._writer.fullwidth
+        self.hasmarkup = self._writer.hasmarkup
+
+    def write(self, msg: str, *, flush: bool = False) -> None:
+        """Write text as it is."""
+        with self._capture.global_and_fixture_disabled() if self._capture else nullcontext():
+            self._writer.write(msg, flush=flush)
 
 
 @pytest.fixture
@@ -209,7 +226,7 @@ def pytest_runtest_makereport(
     expected_failure = call.excinfo is None or call.excinfo.errisinstance(UserError)
     if expected_failure:
         report.longrepr = f"{claimed.name} ({claimed.tier}) is {claimed.outcome}: {claimed.reason}" if failed else None
-    report.user_properties += [
+    properties: list[tuple[str, object]] = [
         ("claim", claimed.claim),
         ("tier", claimed.tier),
         ("verdict", claimed.outcome),
@@ -218,6 +235,8 @@ def pytest_runtest_makereport(
         ("p", (claimed.verdict or {}).get("p")),
         ("evidence", claimed.evidence),
     ]
+    item.user_properties += properties  # JUnit's file takes them from the report of the teardown
+    report.user_properties += properties
     return report
 
 

@@ -46,10 +46,11 @@ def load_config(root: Path) -> SuiteConfig:
     """Read the settings of the project in `root`.
 
     Raises:
-        UserError: when the table is missing or has other keys.
+        UserError: when the table is missing, has other keys, or a value that is no text.
     """
     table = _tool_tables(root / "pyproject.toml").get("evoclaims")
-    if not isinstance(table, dict) or "reproduction" not in table or not set(table) <= {"reproduction", "claims"}:
+    known = isinstance(table, dict) and {"reproduction"} <= set(table) <= {"reproduction", "claims"}
+    if not isinstance(table, dict) or not known or not all(isinstance(value, str) for value in table.values()):
         raise UserError(
             f'{root / "pyproject.toml"} needs a [tool.evoclaims] table with reproduction = "package.module" and, if '
             'it is not "claims", claims = "folder"; no other keys.'

@@ -37,7 +37,8 @@ class LiveLine:
         """Show the newest state."""
         if self._terminal.hasmarkup:
             width = max(self._terminal.fullwidth - 1, 20)
-            self._terminal.write("\r" + describe(progress)[:width].ljust(width), flush=True)
+            start = "\r" if self._open else "\n"
+            self._terminal.write(start + describe(progress)[:width].ljust(width), flush=True)
             self._open = True
             return
         step = (progress.condition, progress.phase)

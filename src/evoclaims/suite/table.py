@@ -16,6 +16,7 @@ from rich.table import Table
 from evoclaims.judging.baseline import DriftReport
 from evoclaims.judging.verdict import Outcome
 from evoclaims.suite.report import ClaimReport
+from evoclaims.trials.records import printable
 
 _COLOURS = {
     Outcome.SUPPORTED: "green",
@@ -43,16 +44,16 @@ def verdict_table(reports: Sequence[ClaimReport], width: int, colour: bool) -> s
         outcome = Outcome(report.outcome)
         mark = f"{outcome.symbol} {outcome}" + (" (expected)" if report.as_expected else "")
         table.add_row(
-            escape(report.name),
-            escape(f"{report.statement} ({report.where})"),
+            _literal(report.name),
+            _literal(f"{report.statement} ({report.where})"),
             f"[{_COLOURS[outcome]}]{mark}[/]",
             str(report.n) if report.n else "–",
             _effect(report),
             _p_values(report),
-            escape(Path(report.evidence).name),
+            _literal(Path(report.evidence).name),
         )
     folders = sorted({os.path.relpath(Path(report.evidence).parent) for report in reports if report.evidence})
-    caption = f"\nevidence: {', '.join(folders)}" if folders else ""
+    caption = f"\nevidence: {printable(', '.join(folders))}" if folders else ""
     return _rendered(table, width, colour) + caption
 
 
@@ -67,7 +68,7 @@ def explanations(reports: Sequence[ClaimReport], width: int, colour: bool) -> st
             kept = "accepted" if report.as_expected else f"no longer {report.expected}, which was accepted"
             note = f" [{kept}: {report.because}]"
         lines.append(f"{Outcome(report.outcome).symbol} {report.name}: {report.reason}{note}")
-    return _rendered("\n".join(escape(line) for line in lines), width, colour) if lines else ""
+    return _rendered("\n".join(_literal(line) for line in lines), width, colour) if lines else ""
 
 
 def totals(reports: Sequence[ClaimReport]) -> str:
@@ -84,6 +85,11 @@ def drift_lines(drift: DriftReport, changed: int, compared: int) -> str:
     head = f"reference trials: {tested} comparisons, {len(found)} drifted (exact rank tests, Holm, α = {drift.alpha:g})"
     bits = f"to the bit: {compared} trials compared with the same machine and versions, {changed} changed"
     return "\n".join([head, *found, *unchecked, bits])
+
+
+def _literal(text: str) -> str:
+    """Return text as markup that shows it as it is, on one line, without what would steer the terminal."""
+    return escape(printable(" ".join(text.split())))
 
 
 def _effect(report: ClaimReport) -> str:
@@ -105,6 +111,6 @@ def _rendered(content: Table | str, width: int, colour: bool) -> str:
     """Return rich content as text."""
     file = io.StringIO()
     system: Literal["standard"] | None = "standard" if colour else None
-    console = Console(file=file, width=max(width, 60), force_terminal=colour, color_system=system)
+    console = Console(file=file, width=max(width, 60), force_terminal=colour, color_system=system, emoji=False)
     console.print(content, highlight=False)
     return file.getvalue().rstrip("\n")
