@@ -9,7 +9,7 @@ from typing import Final
 
 import pytest
 
-pytest_plugins = ["pytester"]
+pytest_plugins = ["pytester", "tiny_project"]
 
 _CACHE: Final = "JAX_COMPILATION_CACHE_DIR"
 _made = ""

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from evoclaims.core.errors import UnknownNameError, UserError
-from evoclaims.pytest_summary import ATTRIBUTE, Summary
+from evoclaims.pytest_summary import ATTRIBUTE, TROUBLE, Summary
 
 if TYPE_CHECKING:
     from evoclaims.suite.group import TrialGroup
@@ -76,7 +76,11 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Leave out other tiers and claims; the full tier is only kept when it was asked for by name."""
     claims = {item: item.get_closest_marker("claim").args[0] for item in items if item.get_closest_marker("claim")}  # type: ignore[union-attr]
-    wanted = _wanted_claims(config, {claim.id for claim in claims.values()})
+    try:
+        wanted = _wanted_claims(config, {claim.id for claim in claims.values()})
+    except UserError as error:
+        _refuse(config, items, error)
+        return
     tiers = _wanted_tiers(config)
     dropped = [item for item, claim in claims.items() if claim.id not in wanted or tiers.isdisjoint(_tiers_of(item))]
     if dropped:
@@ -105,10 +109,20 @@ def _wanted_claims(config: pytest.Config, known: set[str]) -> set[str]:
         return known
     wanted = {name.strip() for name in option.split(",") if name.strip()}
     for name in sorted(wanted - known):
-        raise pytest.UsageError(str(UnknownNameError("claim", name, known or {"(none collected)"})))
+        raise UnknownNameError("claim", name, known or {"(none collected)"})
     return wanted
 
 
+def _refuse(config: pytest.Config, items: list[pytest.Item], error: UserError) -> None:
+    """End the run with a sentence; a worker of xdist can only pass it on to its controller, and run nothing."""
+    output: dict[str, Any] | None = getattr(config, "workeroutput", None)
+    if output is None:
+        raise pytest.UsageError(str(error)) from error
+    output[TROUBLE] = str(error)
+    items.clear()
+
+
+@pytest.hookimpl(tryfirst=True)
 def pytest_collection_finish(session: pytest.Session) -> None:
     """Find out before the first trial whether anything is in the way."""
     config = session.config
@@ -117,7 +131,7 @@ def pytest_collection_finish(session: pytest.Session) -> None:
     try:
         make_session(config)
     except UserError as error:
-        raise pytest.UsageError(str(error)) from error
+        _refuse(config, session.items, error)
 
 
 def make_session(config: pytest.Config) -> Session:

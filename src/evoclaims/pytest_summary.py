@@ -20,6 +20,9 @@ if TYPE_CHECKING:
 ATTRIBUTE: Final = "claim_report"
 """Name under which a test's report carries the claim's, also from an xdist worker to its controller."""
 
+TROUBLE: Final = "claims_trouble"
+"""Name under which an xdist worker tells its controller why it runs nothing."""
+
 
 class Summary:
     """Gathers the claims' reports of a run, in the process that talks to the user, and ends the run with them."""
@@ -40,14 +43,24 @@ class Summary:
         if plain is not None:
             self.reports.append(ClaimReport.from_json(plain))
 
+    @pytest.hookimpl(optionalhook=True)
+    def pytest_testnodedown(self, node: Any, error: object) -> None:
+        """Note why an xdist worker ran nothing; they all give the same reason."""
+        trouble = getattr(node, "workeroutput", {}).get(TROUBLE)
+        if trouble is not None and trouble not in self._troubles:
+            self._troubles.append(trouble)
+
     @pytest.hookimpl(tryfirst=True)
     def pytest_sessionfinish(self, session: pytest.Session) -> None:
         """Compare with the reference trials, write the JSON report and settle the exit status.
 
         0: nothing refuted, nothing drifted. 1: something was refuted without being accepted, broke, or drifted.
-        5 (pytest's "no tests"): no trial was looked at, so that nothing was measured.
+        4: xdist's workers refused to begin. 5 (pytest's "no tests"): no trial was looked at, so that nothing was
+        measured.
         """
         if not self.reports:
+            if self._troubles:
+                session.exitstatus = pytest.ExitCode.USAGE_ERROR
             return
         try:
             self._drift = self._make_session(self._config).drift(self.reports)
@@ -64,6 +77,8 @@ class Summary:
     def pytest_terminal_summary(self, terminalreporter: Any) -> None:
         """Print the verdict table and what lies behind it."""
         if not self.reports:
+            for trouble in self._troubles:
+                terminalreporter.write_line(f"ERROR: {trouble}", red=True)
             return
         from evoclaims.suite import table
 

@@ -13,6 +13,7 @@ from trial_toys import StoppedError, stopping, walk
 from evoclaims.envs.gates.parity import NParity
 from evoclaims.methods.cma_es import CmaEs
 from evoclaims.networks.all_skips import AllSkips
+from evoclaims.trials import checkpoint
 from evoclaims.trials.budget import Budget
 from evoclaims.trials.progress import RunProgress, ignore
 from evoclaims.trials.result import TrialResult
@@ -169,7 +170,9 @@ def test_a_batch_that_has_narrowed_goes_on_to_the_same_bits(
     monkeypatch.setattr("evoclaims.trials.lanes.layout_for", lambda devices: "vector")
     wanted = _run(Store(tmp_path / "whole"), cpus)
     with pytest.raises(StoppedError):
-        _run(store, cpus, stopping(4))
+        _run(store, cpus, stopping(5))
+    (header,) = (checkpoint.read(path)[0] for path in store.checkpoints.iterdir())
+    assert len(header.lanes) == 2 < len(SEEDS)
     assert _digests(_run(store, cpus)) == _digests(wanted)
 
 

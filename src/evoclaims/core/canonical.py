@@ -16,7 +16,7 @@ def as_plain(value: Any) -> Any:
     infinities become the strings "nan", "inf", "-inf", since JSON has no word for them.
 
     Raises:
-        TypeError: for a value that has no canonical form (an array, a function, a set).
+        TypeError: for a value that has no canonical form (an array, a function, a set, a key that is no text).
     """
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
         return {
@@ -25,7 +25,10 @@ def as_plain(value: Any) -> Any:
             if field.metadata.get("canonical", True)
         }
     if isinstance(value, dict):
-        return {str(key): as_plain(item) for key, item in value.items()}
+        for key in value:
+            if not isinstance(key, str):  # JSON would make one text of 1 and "1"
+                raise TypeError(f"a key of type {type(key).__name__} has no canonical JSON form: {key!r}")
+        return {key: as_plain(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
         return [as_plain(item) for item in value]
     if isinstance(value, float) and not math.isfinite(value):

@@ -10,12 +10,17 @@ class UserError(Exception):
     """Something a user can cause and mend; shown as its message alone, without a traceback."""
 
 
-class UnknownNameError(UserError):
-    """A name that nothing is registered under; the message lists the known names."""
+class UnknownNameError(UserError, KeyError):
+    """A name that nothing is registered under; the message lists the known names.
 
-    def __init__(self, kind: str, name: str, known: Iterable[str]) -> None:
+    It is a `KeyError` too, so that a registry keeps what a mapping promises (`get` with a default).
+    """
+
+    __str__ = Exception.__str__  # a KeyError would show the sentence in quotation marks
+
+    def __init__(self, kind: str, name: object, known: Iterable[str]) -> None:
         """Build the sentence for `kind` (such as "method"), the wrong `name` and the `known` ones."""
         names = sorted(known)
-        near = difflib.get_close_matches(name, names, n=1)
+        near = difflib.get_close_matches(str(name), names, n=1)
         guess = f" Did you mean {near[0]!r}?" if near else ""
         super().__init__(f"There is no {kind} named {name!r}.{guess} Known: {', '.join(names)}.")

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, Protocol
 
+import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int, PRNGKeyArray
 
 from evoclaims.core.pytree import pytree
@@ -43,6 +44,15 @@ class Episode:
 
     fitness: Float[Array, ""]
     success: Float[Array, ""]
+
+
+def share(part: Int[Array, ""], whole: Int[Array, ""]) -> Float[Array, ""]:
+    """Return part / whole of two counts: exactly 1 when they are equal, and only then.
+
+    XLA turns a division by what it knows to be constant into a product with the rounded reciprocal, by which 41 of 41
+    would be 0.99999994: a solved level that nobody ever leaves.
+    """
+    return jnp.where(part == whole, 1.0, part.astype(jnp.float32) / whole.astype(jnp.float32))
 
 
 class Task(Protocol):

@@ -41,7 +41,8 @@ def evaluate(
 def first_champion(parameters: Float[Array, " parameters"]) -> Champion:
     """Return a champion that any evaluated individual beats."""
     return Champion(
-        parameters=parameters, episode=Episode(fitness=jnp.array(-jnp.inf), success=jnp.zeros((), jnp.float32))
+        parameters=parameters,
+        episode=Episode(fitness=jnp.full((), -jnp.inf, jnp.float32), success=jnp.zeros((), jnp.float32)),
     )
 
 
@@ -58,13 +59,13 @@ def evaluate_with_champion(
     The old champion is evaluated anew, because the level may have moved since. A tie goes to the newcomer.
 
     Returns:
-        The population's episodes (leaves [n]), the new champion, and whether all fitnesses are finite.
+        The population's episodes (leaves [n]), the new champion, and whether all fitnesses and parameters are finite.
     """
     everyone = jnp.concatenate([population, champion.parameters[None]])
     episodes = evaluate(network, task, key, level, everyone)
     winner = jnp.argmax(episodes.fitness)
     best = Champion(parameters=everyone[winner], episode=jax.tree.map(lambda x: x[winner], episodes))
-    healthy = jnp.all(jnp.isfinite(episodes.fitness)) & jnp.all(jnp.isfinite(population))
+    healthy = jnp.all(jnp.isfinite(episodes.fitness)) & jnp.all(jnp.isfinite(everyone))
     kept = select(healthy, best, champion)
     return jax.tree.map(lambda x: x[:-1], episodes), kept, healthy
 

@@ -10,11 +10,13 @@ import jax.numpy as jnp
 from evosax.algorithms.distribution_based.cma_es import CMA_ES
 from jaxtyping import Array, Float, Int, PRNGKeyArray
 
+from evoclaims.core.errors import UserError
 from evoclaims.core.keys import streams
 from evoclaims.core.pytree import pytree, strong
 from evoclaims.envs.base import Task
 from evoclaims.methods.base import Policy, Progress
 from evoclaims.methods.champion import Champion, champion_policy, evaluate_with_champion, first_champion
+from evoclaims.methods.foreign import implicit_promotions
 from evoclaims.networks.all_skips import AllSkips
 from evoclaims.networks.base import Network
 
@@ -54,11 +56,18 @@ class CmaEs:
     population: int = 256
     network: Network = AllSkips()
 
+    def __post_init__(self) -> None:
+        """Check the size: half of a population recombines, weighted by how much better it is than the other."""
+        if self.population < 4:
+            raise UserError(f"CMA-ES needs a population of at least 4, not {self.population}.")
+
     def init(self, key: PRNGKeyArray, task: Task) -> CmaEsState:
         """Start from N(0, 1), evosax's default; the key is not used."""
         search, params = self._search(task)
         mean = jnp.zeros(self.network.size(task.observation_size, task.action_size))
-        return CmaEsState(distribution=strong(search.init(key, mean, params)), champion=first_champion(mean))
+        with implicit_promotions():
+            distribution = search.init(key, mean, params)
+        return CmaEsState(distribution=strong(distribution), champion=first_champion(mean))
 
     def step(
         self, key: PRNGKeyArray, task: Task, level: Int[Array, ""], state: CmaEsState
@@ -66,12 +75,14 @@ class CmaEs:
         """Sample, evaluate and update for one generation."""
         ask_key, episode_key, tell_key = streams(key, "ask", "episode", "tell")
         search, params = self._search(task)
-        population, distribution = search.ask(ask_key, state.distribution, params)
+        with implicit_promotions():
+            population, distribution = search.ask(ask_key, state.distribution, params)
         episodes, champion, healthy = evaluate_with_champion(
             self.network, task, episode_key, level, population, state.champion
         )
         # evosax minimizes.
-        distribution, _ = search.tell(tell_key, population, -episodes.fitness, distribution, params)
+        with implicit_promotions():
+            distribution, _ = search.tell(tell_key, population, -episodes.fitness, distribution, params)
         progress = Progress(
             fitness=champion.episode.fitness,
             success=champion.episode.success,
@@ -92,7 +103,8 @@ class CmaEs:
         """Build evosax's algorithm and its default parameters for the task's encoding."""
         size = self.network.size(task.observation_size, task.action_size)
         search = CMA_ES(self.population, jnp.zeros(size), fitness_shaping_fn=ordinal_weights, metrics_fn=_no_metrics)
-        return search, search.default_params
+        with implicit_promotions():
+            return search, search.default_params
 
 
 def _no_metrics(*_: Any) -> dict[str, jax.Array]:

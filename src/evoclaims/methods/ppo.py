@@ -18,10 +18,11 @@ from jaxtyping import Array, Float, Int, PRNGKeyArray
 from evoclaims.core.errors import UserError
 from evoclaims.core.keys import stream, streams
 from evoclaims.core.pytree import pytree, select, strong
-from evoclaims.envs.base import Episode, Task
+from evoclaims.envs.base import Episode, Task, share
 from evoclaims.methods.base import Policy, Progress
 from evoclaims.methods.brax_blocks import losses, networks, running_statistics, specs
-from evoclaims.methods.collect import Interaction, collect
+from evoclaims.methods.collect import Act, Interaction, collect
+from evoclaims.methods.foreign import implicit_promotions
 
 
 @pytree
@@ -47,6 +48,14 @@ class LevelTest:
 
     every: int = 1
     sampled_episodes: int = 0
+
+    def __post_init__(self) -> None:
+        """Check the counts."""
+        if self.every < 1 or self.sampled_episodes < 0:
+            raise UserError(
+                "PPO's level test is held every 1 or more training steps over 0 or more sampled episodes, not every "
+                f"{self.every} over {self.sampled_episodes}."
+            )
 
 
 @dataclass(frozen=True)
@@ -86,7 +95,16 @@ class Ppo:
     level_test: LevelTest = LevelTest()
 
     def __post_init__(self) -> None:
-        """Check that the collected data fill the minibatches."""
+        """Check the sizes, and that the collected data fill the minibatches."""
+        sizes = ("environments", "unroll_length", "batch_size", "minibatches", "updates_per_batch")
+        for name in sizes:
+            if getattr(self, name) < 1:
+                raise UserError(f"PPO's {name} must be at least 1, not {getattr(self, name)}.")
+        if any(width < 1 for width in (*self.policy_layers, *self.value_layers)):
+            raise UserError(
+                "Every layer of PPO's networks has at least 1 neuron; these are "
+                f"{self.policy_layers} and {self.value_layers}."
+            )
         if self.batch_size * self.minibatches % self.environments:
             raise UserError(
                 f"PPO's batch_size × minibatches ({self.batch_size} × {self.minibatches}) must be a multiple of "
@@ -115,12 +133,13 @@ class Ppo:
         """Collect batch_size × minibatches trajectories, then pass over them updates_per_batch times."""
         reset_key, act_key, train_key, test_key = streams(key, "reset", "act", "train", "test")
         interaction = state.interaction.at_level(task, reset_key, level)
-        act = networks.make_inference_fn(self._networks(task))((state.statistics, state.networks.policy))
+        act = self._act(task, state)
         rounds = self.batch_size * self.minibatches // self.environments
         interaction, data = collect(task, act, act_key, interaction, rounds, self.unroll_length)
         statistics = state.statistics
         if self.normalize_observations:
-            statistics = running_statistics.update(statistics, data.observation)
+            with implicit_promotions():
+                statistics = running_statistics.update(statistics, data.observation)
         parameters, optimizer = self._train(train_key, task, data, statistics, state.networks, state.optimizer)
         after = strong(
             PpoState(
@@ -146,7 +165,8 @@ class Ppo:
         make = networks.make_inference_fn(self._networks(task))
 
         def function(parameters: Any, observation: Float[Array, " observation"]) -> Float[Array, " action"]:
-            action, _ = make(parameters, deterministic=True)(observation, jax.random.key(0))
+            with implicit_promotions():
+                action, _ = make(parameters, deterministic=True)(observation, jax.random.key(0))
             return action
 
         return Policy(parameters=(state.statistics, state.networks.policy), function=function)
@@ -164,6 +184,17 @@ class Ppo:
             policy_hidden_layer_sizes=self.policy_layers,
             value_hidden_layer_sizes=self.value_layers,
         )
+
+    def _act(self, task: Task, state: PpoState) -> Act:
+        """Return the stochastic policy."""
+        act = networks.make_inference_fn(self._networks(task))((state.statistics, state.networks.policy))
+
+        def function(observation: Array, key: Array) -> tuple[Array, Any]:
+            with implicit_promotions():
+                acted: tuple[Array, Any] = act(observation, key)
+            return acted
+
+        return function
 
     def _optimizer(self) -> optax.GradientTransformation:
         """Adam, as in Brax."""
@@ -189,8 +220,9 @@ class Ppo:
             chosen, loss_key = minibatch
             # Gathering rows here, minibatch by minibatch, moves each row once; the order is drawn once for all leaves.
             rows = jax.tree.map(lambda leaf: jnp.take(leaf, chosen, axis=0), data)
-            gradient, _ = jax.grad(loss, has_aux=True)(parameters, statistics, rows, loss_key)
-            update, optimizer = adam.update(gradient, optimizer)
+            with implicit_promotions():
+                gradient, _ = jax.grad(loss, has_aux=True)(parameters, statistics, rows, loss_key)
+                update, optimizer = adam.update(gradient, optimizer)
             return (optax.apply_updates(parameters, update), optimizer), None
 
         def one_pass(carry: tuple[Any, Any], pass_key: Array) -> tuple[tuple[Any, Any], None]:
@@ -205,10 +237,10 @@ class Ppo:
 
     def _test(self, key: PRNGKeyArray, task: Task, level: Int[Array, ""], state: PpoState) -> Episode:
         """Test the policy on the current level; between tests success is 0, so that the level stays."""
-        examined = task.examine(self.best(task, state), key, level)
+        examined = task.examine(self.best(task, state), stream(key, "examination"), level)
         success = examined.success
         if self.level_test.sampled_episodes:
-            act = networks.make_inference_fn(self._networks(task))((state.statistics, state.networks.policy))
+            act = self._act(task, state)
             keys = jax.random.split(stream(key, "sampled test"), self.level_test.sampled_episodes)
 
             def rewarded(key: Array) -> Array:
@@ -216,7 +248,8 @@ class Ppo:
                 start = task.reset(reset_key, level)
                 return task.step(start, act(start.observation, act_key)[0]).reward
 
-            success = jnp.mean(jax.vmap(rewarded)(keys) >= 0)
+            faultless = jax.vmap(rewarded)(keys) >= 0
+            success = share(jnp.sum(faultless), jnp.asarray(faultless.size))
         due = state.steps % self.level_test.every == 0
         return select(
             due,

@@ -9,6 +9,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Int, PRNGKeyArray
 
+from evoclaims.core.errors import UserError
 from evoclaims.core.keys import streams
 from evoclaims.envs.base import Task
 from evoclaims.methods.base import Policy, Progress
@@ -33,6 +34,14 @@ class RandomSearch:
     population: int = 256
     std: float = 1.0
     network: Network = AllSkips()
+
+    def __post_init__(self) -> None:
+        """Check the size and the spread."""
+        if self.population < 1 or self.std <= 0:
+            raise UserError(
+                "Random search needs a population of at least 1 and a standard deviation above 0, not "
+                f"{self.population} and {self.std}."
+            )
 
     def init(self, key: PRNGKeyArray, task: Task) -> Champion:
         """Start without a champion."""

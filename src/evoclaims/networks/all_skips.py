@@ -8,6 +8,8 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from evoclaims.core.errors import UserError
+
 
 @dataclass(frozen=True)
 class AllSkips:
@@ -20,6 +22,11 @@ class AllSkips:
 
     name: str = field(default="all_skips", init=False)
     hidden: int = 24
+
+    def __post_init__(self) -> None:
+        """Check the size."""
+        if self.hidden < 0:
+            raise UserError(f"A network has 0 or more hidden neurons, not {self.hidden}.")
 
     def size(self, inputs: int, outputs: int) -> int:
         """Return the number of parameters."""

@@ -8,6 +8,8 @@ from itertools import pairwise
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from evoclaims.core.errors import UserError
+
 
 @dataclass(frozen=True)
 class Mlp:
@@ -24,6 +26,11 @@ class Mlp:
     name: str = field(default="mlp", init=False)
     layers: tuple[int, ...] = (32, 32, 32, 32)
     skip: bool = False
+
+    def __post_init__(self) -> None:
+        """Check the widths."""
+        if any(width < 1 for width in self.layers):
+            raise UserError(f"Every hidden layer of a perceptron has at least 1 neuron; these are {self.layers}.")
 
     def size(self, inputs: int, outputs: int) -> int:
         """Return the number of parameters."""

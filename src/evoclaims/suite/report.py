@@ -73,8 +73,8 @@ class ClaimReport:
         return int(self.verdict["n"]) if self.verdict else 0
 
     def to_json(self) -> dict[str, Any]:
-        """Return the report as plain JSON."""
-        plain: dict[str, Any] = as_plain(self)
+        """Return the report as plain JSON, with no enumerations left in it: xdist passes on built-in types alone."""
+        plain: dict[str, Any] = json.loads(json.dumps(as_plain(self)))
         return plain
 
     @staticmethod

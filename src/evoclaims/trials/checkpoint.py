@@ -12,9 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evoclaims.core.canonical import content_hash
+from evoclaims.core.errors import UserError
 from evoclaims.core.files import write_atomically
 from evoclaims.trials.arrays import pack, unpack
 from evoclaims.trials.program import TrialState
+from evoclaims.trials.records import is_hash, printable
 from evoclaims.trials.store import DamagedFileError
 
 SCHEMA: Final = 1
@@ -77,27 +79,52 @@ def read(path: Path) -> tuple[Header, list[NDArray[Any]]]:
     """Return a checkpoint's header and the leaves of its state.
 
     Raises:
-        DamagedFileError: when the file is torn, edited or not a checkpoint.
+        DamagedFileError: when the file is torn, edited, misplaced or not a checkpoint.
     """
     try:
         arrays = unpack(path.read_bytes())
         header = Header(**json.loads(arrays.pop(_HEADER).tobytes()))
-    except (OSError, ValueError, KeyError, TypeError) as error:
+        sound = header.schema != SCHEMA or _is_sound(header)
+    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         raise DamagedFileError(path, "it is not a readable checkpoint") from error
+    if not sound:
+        raise DamagedFileError(path, "its header does not describe a batch of trials")
+    home = path if header.schema != SCHEMA else path_of(path.parent, header.condition, header.batch, header.platform)
+    if path.name != home.name:
+        raise DamagedFileError(path, "its name is not that of the batch it holds")
     return header, [arrays[name] for name in sorted(arrays)]
+
+
+def _is_sound(header: Header) -> bool:
+    """Whether the fields of a header have the types and the sizes that the runner relies on."""
+    points = [point for curve in header.curves.values() for values in curve.values() for point in values]
+    return (
+        is_hash(header.condition)
+        and all(type(seed) is int for seed in header.batch)
+        and all(seed is None or seed in header.batch for seed in header.lanes)
+        and header.curves.keys() == {str(seed) for seed in header.batch}
+        and type(header.chunks) is int
+        and all(isinstance(number, int | float) for number in (*points, header.run_seconds, header.compile_seconds))
+        and isinstance(header.platform, str)
+        and isinstance(header.started, str)
+    )
 
 
 def restore(folder: Path, header: Header, like: Any) -> TrialState:
     """Return the state of a checkpoint on the host, in the structure of `like` (leaves with shape and dtype).
 
     Raises:
-        DamagedFileError: when its arrays are not those of such a state.
+        DamagedFileError: when the file is torn or edited.
+        UserError: when its arrays are not those of such a state, which nothing but the condition's program can tell.
     """
     path = path_of(folder, header.condition, header.batch, header.platform)
     _, leaves = read(path)
     expected, structure = jax.tree.flatten(like)
     if [(x.shape, x.dtype) for x in leaves] != [(x.shape, x.dtype) for x in expected]:
-        raise DamagedFileError(path, "its arrays are not those of this condition's state")
+        raise UserError(
+            f"Cannot go on from {printable(path)}: its arrays are not those of this condition's state, so it was made "
+            "by another version of the code; delete it, and its trials begin anew."
+        )
     state: TrialState = jax.tree.unflatten(structure, leaves)
     return state
 

@@ -21,8 +21,11 @@ MATMUL_PRECISION: Final = "highest"
 def configure() -> None:
     """Prepare jax before its first use: one CPU device per core, and a compilation cache that outlives the process.
 
-    Does nothing that a user has already decided (JAX_COMPILATION_CACHE_DIR, a device count in XLA_FLAGS, a jax that
-    has already started).
+    Does nothing that a user has already decided (JAX_COMPILATION_CACHE_DIR, JAX_NUM_CPU_DEVICES, a device count in
+    XLA_FLAGS, a jax that has already started).
+
+    Raises:
+        UserError: when JAX_PLATFORMS names hardware that is not there.
     """
     config: Any = jax.config
     if config.jax_compilation_cache_dir is None:
@@ -31,9 +34,11 @@ def configure() -> None:
         config.update("jax_persistent_cache_min_compile_time_secs", 0.2)
         # jax would otherwise evict nothing and warn about nothing; a broken cache must not break a run.
         config.update("jax_raise_persistent_cache_errors", False)
-    if "xla_force_host_platform_device_count" not in os.environ.get("XLA_FLAGS", ""):
+    forced = "xla_force_host_platform_device_count" in os.environ.get("XLA_FLAGS", "")
+    if not forced and config.jax_num_cpu_devices == -1:
         with contextlib.suppress(RuntimeError):  # jax has started: its devices stay as they are
             config.update("jax_num_cpu_devices", usable_cores())
+    choose("auto")  # now, before an import that computes something fails with a traceback
 
 
 def usable_cores() -> int:
@@ -63,7 +68,7 @@ def choose(name: str) -> list[jax.Device]:
         raise UnknownNameError("device", name, DEVICE_NAMES)
     try:
         return list(jax.devices(None if name == "auto" else name))
-    except RuntimeError as error:
+    except (RuntimeError, AssertionError) as error:  # jax asserts that a platform in JAX_PLATFORMS has a plugin
         platforms = os.environ.get("JAX_PLATFORMS")
         wish = f"the device {name!r}" + (f" with JAX_PLATFORMS={platforms}" if platforms else "")
         raise UserError(

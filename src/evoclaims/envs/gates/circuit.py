@@ -11,7 +11,7 @@ from jaxtyping import Array, Bool, Float, Int, PRNGKeyArray
 
 from evoclaims.core.errors import UnknownNameError
 from evoclaims.core.pytree import pytree
-from evoclaims.envs.base import Episode, PolicyFn, TaskState
+from evoclaims.envs.base import Episode, PolicyFn, TaskState, share
 from evoclaims.envs.gates.truth_table import TruthTable
 
 Sampling = Literal["exhaustive", "sampled"]
@@ -99,10 +99,9 @@ class Circuit(ABC):
         wrong, right = self._errors(jax.vmap(policy)(jnp.asarray(self.table.inputs)), jnp.arange(self.table.rows))
         rows = self._rows(level)
         asked = jnp.arange(self.table.rows) < rows
-        # Counts are exact in float32, so that a solved level gives exactly 1.
         return Episode(
-            fitness=-jnp.sum(jnp.where(asked, wrong, 0.0)) / rows,
-            success=jnp.sum(asked & right).astype(jnp.float32) / rows,
+            fitness=-jnp.sum(jnp.where(asked, wrong, 0.0)) / rows.astype(jnp.float32),
+            success=share(jnp.sum(asked & right), rows),
         )
 
     def _rows(self, level: Int[Array, ""]) -> Int[Array, ""]:

@@ -1,0 +1,207 @@
+"""The command line in the tiny project: what each command does, prints and returns."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from evoclaims.cli import main
+from evoclaims.suite import references
+from evoclaims.trials.store import Store
+
+Evoclaims = Callable[..., tuple[int, str, str]]
+
+
+@pytest.fixture
+def evoclaims(project: Any, capsys: pytest.CaptureFixture[str]) -> Evoclaims:
+    """A function that runs a command in the tiny project; returns status, output and errors."""
+    project.write(a="supported", b="refuted")
+
+    def run(*arguments: str) -> tuple[int, str, str]:
+        capsys.readouterr()
+        status = main(arguments)
+        out, err = capsys.readouterr()
+        assert "Traceback" not in out + err
+        return status, out, err
+
+    return run
+
+
+@pytest.fixture
+def stored(evoclaims: Evoclaims) -> Store:
+    """The store of the project after both conditions of its claims were run."""
+    for method in ("right", "wrong"):
+        assert evoclaims("run", method)[0] == 0
+    return Store(Path(".evoclaims"))
+
+
+def test_run_runs_what_is_missing_and_lists_the_trials(evoclaims: Evoclaims) -> None:
+    status, out, err = evoclaims("run", "right", "--trials", "2", "--first-seed", "7", "--device", "cpu")
+    assert (status, err) == (0, "")
+    lines = [line for line in out.splitlines() if "seed" in line or line.startswith("right")]
+    assert lines[0] == "right on parity (smoke)"
+    assert [re.sub(r" \(.*", "", line) for line in lines[1:]] == [
+        f"  seed {seed}: done after 4 environment steps, success by level 1.000" for seed in (7, 8)
+    ]
+    assert len(Store(Path(".evoclaims")).ids()) == 2
+
+
+def test_a_second_run_runs_nothing(evoclaims: Evoclaims, monkeypatch: pytest.MonkeyPatch) -> None:
+    first = evoclaims("run", "wrong", "--trials", "3")
+    monkeypatch.setattr("evoclaims.trials.runner.Lanes", None)
+    second = evoclaims("run", "wrong", "--trials", "3")
+    trials = [[line for line in out.splitlines() if "seed" in line] for _, out, _ in (first, second)]
+    assert trials[0] == trials[1]
+    assert len(trials[0]) == 3
+    assert second[0] == 0
+
+
+def test_run_can_be_held_to_a_task_and_a_tier(evoclaims: Evoclaims, monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[tuple[str, int]] = []
+
+    def fetch(self: object, condition: Any, seeds: range) -> list[Any]:
+        asked.append((condition.label, condition.steps))
+        return []
+
+    monkeypatch.setattr("evoclaims.suite.modes.RunMissing.__call__", fetch)
+    assert evoclaims("run", "--on", "parity", "--tier", "full")[0] == 0
+    assert asked == [(f"{n} on n_parity", 2) for n in ("hand_built", "hand_built_negated", "coin", "broken")]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "text"),
+    [
+        (
+            ("run", "rihgt"),
+            "There is no method named 'rihgt'. Did you mean 'right'? Known: broken, coin, right, wrong.",
+        ),
+        (("run", "--on", "partiy"), "There is no task named 'partiy'. Did you mean 'parity'? Known: parity."),
+        (("run", "right", "--on", "x"), "There is no task for right named 'x'. Known: parity."),
+        (("run", "right", "--trials", "0"), "--trials takes a number of trials from 1, not 0."),
+        (("run", "right", "--first-seed", "-1"), "A seed is 0 or above and below 2147483648, not -1."),
+        (("run", "right", "--first-seed", "2147483647"), "A seed is 0 or above and below 2147483648, not 2147483648."),
+        (("run", "right", "--device", "tpu"), "There is no device named 'tpu'. Did you mean 'gpu'?"),
+        (("run", "right", "--storage", "pyproject.toml"), "is a file, not a folder"),
+        (("run", "--tier", "ful"), "There is no tier named 'ful'. Did you mean 'full'? Known: full, smoke."),
+        (("plan", "--tier", "ful"), "There is no tier named 'ful'."),
+        (("plan", "--device", "tpu"), "There is no device named 'tpu'."),
+        (("status", "--tier", "ful"), "There is no tier named 'ful'."),
+        (("status", "--storage", "pyproject.toml"), "is a file, not a folder"),
+        (("reference", "--tier", "ful"), "There is no tier named 'ful'."),
+        (("reference",), "No condition of the smoke tier has 10 stored trials; run them first"),
+        (("verify", "--storage", "pyproject.toml"), "is a file, not a folder"),
+    ],
+)
+def test_a_users_mistake_is_one_sentence_and_status_2(
+    evoclaims: Evoclaims, arguments: tuple[str, ...], text: str
+) -> None:
+    status, _, err = evoclaims(*arguments)
+    assert status == 2
+    assert err.startswith("evoclaims: ")
+    assert text in err
+
+
+@pytest.mark.parametrize("command", ["plan", "run", "status", "reference"])
+def test_outside_of_a_project_a_command_says_what_is_missing(
+    evoclaims: Evoclaims, tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch, command: str
+) -> None:
+    monkeypatch.chdir(tmp_path_factory.mktemp("elsewhere"))
+    status, _, err = evoclaims(command)
+    assert (status, err.count("\n")) == (2, 1)
+    assert "has a [tool.evoclaims] table" in err
+
+
+def test_an_interrupted_command_says_that_it_goes_on(evoclaims: Evoclaims, monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupt(*arguments: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("evoclaims.suite.modes.RunMissing.__call__", interrupt)
+    status, _, err = evoclaims("run", "right")
+    assert status == 130
+    assert "the same command goes on from the last checkpoint" in err
+
+
+def test_status_shows_the_verdicts_that_the_store_gives(evoclaims: Evoclaims) -> None:
+    status, out, _ = evoclaims("status")
+    assert status == 0
+    assert "claims (smoke): 2 not run" in out
+    assert not Path(".evoclaims").exists()
+    evoclaims("run", "right")
+    status, out, _ = evoclaims("status")
+    assert (status, out.splitlines()[-1]) == (0, "claims (smoke): 1 supported, 1 not run")
+    evoclaims("run", "wrong")
+    status, out, _ = evoclaims("status")
+    assert (status, out.splitlines()[-1]) == (1, "claims (smoke): 1 supported, 1 refuted")
+    assert re.search(r"^b +b in small \(§1\) +✗ refuted +10 ", out, re.MULTILINE)
+    assert evoclaims("status", "--tier", "full")[1].splitlines()[-1] == "claims (full): 2 not run"
+
+
+def test_claims_that_cannot_be_collected_are_named_with_the_reason(
+    evoclaims: Evoclaims, capsys: pytest.CaptureFixture[str]
+) -> None:
+    Path("claims/test_more.py").write_text("import a_package_that_is_not_installed\n")
+    assert main(["status"]) == 2
+    err = capsys.readouterr().err
+    assert "cannot be collected" in err
+    assert "claims/test_more.py" in err
+    assert "No module named 'a_package_that_is_not_installed'" in err
+
+
+def test_plan_counts_what_is_stored_and_what_is_missing(evoclaims: Evoclaims) -> None:
+    status, out, _ = evoclaims("plan")
+    assert status == 0
+    assert re.search(r"^right on parity +0 +10 +40 +unknown$", out, re.MULTILINE)
+    assert re.search(r"^total +80 +0 s and more$", out, re.MULTILINE)
+    assert re.search(r"^a +10 +0.05 +0.028 +\S+ +supported or refuted$", out, re.MULTILINE)
+    assert "--measure times a few steps" in out
+    assert "coin" not in out  # no claim asks for it
+    evoclaims("run", "right", "--trials", "4")
+    status, out, _ = evoclaims("plan")
+    assert re.search(r"^right on parity +4 +6 +24 +\d+ s$", out, re.MULTILINE)
+    assert re.search(r"^wrong on parity +0 +10 +40 +unknown$", out, re.MULTILINE)
+
+
+def test_plan_times_a_few_steps_where_it_is_asked_to_and_stores_none(evoclaims: Evoclaims) -> None:
+    status, out, _ = evoclaims("plan", "--measure", "--tier", "full")
+    assert status == 0
+    assert re.search(r"^right on parity +0 +10 +80 +\d+ s$", out, re.MULTILINE)
+    assert "unknown" not in out
+    assert not Path(".evoclaims/trials").exists()
+
+
+def test_verify_moves_bad_files_aside_and_the_trials_run_again(evoclaims: Evoclaims, stored: Store) -> None:
+    assert evoclaims("verify")[:2] == (0, "20 trials in .evoclaims, 0 problems\n")
+    record = stored.record_path(stored.ids()[3])
+    record.write_bytes(record.read_bytes()[:50])
+    stored.checkpoints.mkdir()
+    (stored.checkpoints / "torn.npz").write_bytes(b"PK")
+    status, out, _ = evoclaims("verify", "--dry-run")
+    assert (status, out.splitlines()[-1]) == (1, "20 trials in .evoclaims, 3 problems")
+    assert record.exists()
+    status, out, _ = evoclaims("status")
+    assert (status, out.splitlines()[-1].count("1 error")) == (1, 1)
+    assert "run `evoclaims verify`" in out
+    status, out, _ = evoclaims("verify")
+    assert (status, out.splitlines()[-1]) == (1, "19 trials in .evoclaims, 3 problems")
+    assert str(record) in out
+    assert not record.exists()
+    assert evoclaims("verify")[0] == 0
+    for method in ("right", "wrong"):
+        evoclaims("run", method)
+    assert len(stored.ids()) == 20
+
+
+def test_reference_commits_the_trials_of_every_condition_that_has_enough(evoclaims: Evoclaims) -> None:
+    evoclaims("run", "right")
+    evoclaims("run", "wrong", "--trials", "9")
+    status, out, _ = evoclaims("reference")
+    path = references.path_of(Path.cwd() / "reference", "smoke", "right", "parity")
+    assert status == 0
+    assert f"wrote {path}: 10 trials" in out
+    assert "left alone: wrong on parity: 9 of 10 trials are stored" in out
+    assert [trial.seed for trial in references.load(path)] == list(range(10))
+    assert not references.path_of(Path.cwd() / "reference", "smoke", "wrong", "parity").exists()

@@ -1,0 +1,107 @@
+"""A file is the old one or the new one, whatever goes wrong in between."""
+
+from __future__ import annotations
+
+import errno
+import os
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from evoclaims.core.errors import UserError
+from evoclaims.core.files import write_atomically
+
+FAULTS = {"the disk is full": errno.ENOSPC, "the disk is read-only": errno.EROFS, "the disk fails": errno.EIO}
+
+
+@pytest.fixture(params=FAULTS.values(), ids=list(FAULTS))
+def fault(request: pytest.FixtureRequest) -> OSError:
+    return OSError(request.param, os.strerror(request.param))
+
+
+def _raising(error: OSError) -> Any:
+    def function(*_: Any, **__: Any) -> None:
+        raise error
+
+    return function
+
+
+@given(data=st.binary(max_size=200))
+def test_what_is_written_is_read_back(data: bytes, tmp_path_factory: pytest.TempPathFactory) -> None:
+    path = tmp_path_factory.mktemp("files") / "file"
+    write_atomically(path, data)
+    assert path.read_bytes() == data
+
+
+def test_missing_folders_are_made_and_nothing_else_is_left(tmp_path: Path) -> None:
+    path = tmp_path / "a" / "b" / "file.json"
+    write_atomically(path, b"one")
+    write_atomically(path, b"two")
+    assert path.read_bytes() == b"two"
+    assert list(path.parent.iterdir()) == [path]
+
+
+@pytest.mark.parametrize("call", ["fsync", "replace"])
+def test_a_failing_disk_leaves_the_old_file_and_no_leftovers(
+    call: str, fault: OSError, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "file"
+    write_atomically(path, b"old")
+    monkeypatch.setattr(os, call, _raising(fault))
+    with pytest.raises(UserError, match=rf"^Cannot write .*file: {fault.strerror}\. Free some space or .*--storage"):
+        write_atomically(path, b"new")
+    monkeypatch.undo()
+    assert path.read_bytes() == b"old"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_disk_that_cannot_even_be_opened_for_writing_leaves_the_old_file(
+    fault: OSError, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "file"
+    write_atomically(path, b"old")
+    monkeypatch.setattr("builtins.open", _raising(fault))
+    with pytest.raises(UserError, match=str(fault.strerror)):
+        write_atomically(path, b"new")
+    monkeypatch.undo()
+    assert path.read_bytes() == b"old"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_read_only_disk_that_refuses_even_the_clean_up_is_still_one_sentence(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    error = OSError(errno.EROFS, os.strerror(errno.EROFS))
+    monkeypatch.setattr(os, "replace", _raising(error))
+    monkeypatch.setattr(Path, "unlink", _raising(error))
+    with pytest.raises(UserError, match="Read-only file system"):
+        write_atomically(tmp_path / "file", b"new")
+
+
+def test_a_file_where_a_folder_is_needed_is_one_sentence(tmp_path: Path) -> None:
+    (tmp_path / "taken").write_text("a file")
+    with pytest.raises(UserError, match="Cannot write"):
+        write_atomically(tmp_path / "taken" / "file", b"new")
+
+
+def test_a_folder_in_the_place_of_the_file_stays_and_nothing_is_left(tmp_path: Path) -> None:
+    (tmp_path / "file").mkdir()
+    with pytest.raises(UserError, match="Cannot write"):
+        write_atomically(tmp_path / "file", b"new")
+    assert list(tmp_path.iterdir()) == [tmp_path / "file"]
+
+
+def test_the_new_file_is_whole_before_it_has_the_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path, seen = tmp_path / "file", []
+    rename = os.replace
+
+    def watched(source: Path, target: Path) -> None:
+        seen.append((Path(source).read_bytes(), path.exists(), Path(source).parent == path.parent))
+        rename(source, target)
+
+    monkeypatch.setattr(os, "replace", watched)
+    write_atomically(path, b"whole")
+    assert seen == [(b"whole", False, True)]

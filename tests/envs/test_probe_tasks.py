@@ -1,0 +1,156 @@
+"""The probes' answers are known, so they are written out here."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from evoclaims.core.errors import UserError
+from evoclaims.envs.base import Episode, PolicyFn
+from evoclaims.envs.probes import CONSTANT, COPY, CURRICULUM, DELAYED, PROBES, SURVIVAL, Probe
+
+YES: PolicyFn = lambda observation: jnp.ones(1)  # noqa: E731
+REPEAT: PolicyFn = lambda observation: 2.0 * observation[:1] - 1.0  # noqa: E731
+EXCLUSIVE_OR: PolicyFn = lambda observation: jnp.sum(observation, keepdims=True) % 2.0 - 0.5  # noqa: E731
+SECOND_BIT: PolicyFn = lambda observation: 2.0 * observation[1:] - 1.0  # noqa: E731
+RIGHT = {
+    "probe_constant": YES,
+    "probe_copy": REPEAT,
+    "probe_delayed": REPEAT,
+    "probe_survival": REPEAT,
+    "probe_curriculum": EXCLUSIVE_OR,
+}
+BEST = {
+    "probe_constant": 1.0,
+    "probe_copy": 1.0,
+    "probe_delayed": 1.0,
+    "probe_survival": 2.0,
+    "probe_curriculum": 1.0,
+}
+
+
+def _examine(probe: Probe, policy: PolicyFn, level: int = 0) -> Episode:
+    return jax.jit(lambda level: probe.examine(policy, jax.random.key(0), level))(jnp.asarray(level, jnp.int32))
+
+
+def _play(probe: Probe, observation: tuple[float, ...], actions: list[float]) -> list[tuple[Any, ...]]:
+    """Start where `observation` is shown; return observation, reward, terminated and truncated after each action."""
+    level = jnp.asarray(probe.levels - 1, jnp.int32)
+    starts = (probe.reset(key, level) for key in jax.random.split(jax.random.key(0), 64))
+    state = next(state for state in starts if tuple(map(float, state.observation)) == observation)
+    seen = []
+    for action in actions:
+        state = probe.step(state, jnp.array([action]))
+        flags = bool(state.terminated), bool(state.truncated)
+        seen.append((tuple(map(float, state.observation)), float(state.reward), *flags))
+    return seen
+
+
+def test_the_probes_are_the_five_with_known_answers() -> None:
+    assert list(PROBES) == list(RIGHT) == list(BEST)
+    for name, probe in PROBES.items():
+        assert probe.name == name
+        assert probe.best_fitness == BEST[name]
+
+
+@pytest.mark.parametrize("name", RIGHT)
+def test_the_right_policy_succeeds_exactly_with_the_best_fitness_at_every_level(name: str) -> None:
+    for level in range(PROBES[name].levels):
+        episode = _examine(PROBES[name], RIGHT[name], level)
+        assert float(episode.success) == 1.0
+        assert float(episode.fitness) == BEST[name]
+
+
+@pytest.mark.parametrize("name", RIGHT)
+def test_the_wrong_policy_fails_exactly(name: str) -> None:
+    for level in range(PROBES[name].levels):
+        episode = _examine(PROBES[name], lambda observation: -RIGHT[name](observation), level)
+        assert float(episode.success) == 0.0
+        assert float(episode.fitness) == -1.0
+
+
+def test_the_constant_asks_for_yes_whatever_is_shown() -> None:
+    assert float(_examine(CONSTANT, REPEAT).success) == 0.5
+    assert float(_examine(CONSTANT, REPEAT).fitness) == 0.0
+    assert _play(CONSTANT, (0.0,), [1.0]) == [((0.0,), 1.0, True, False)]
+    assert _play(CONSTANT, (1.0,), [-1.0]) == [((1.0,), -1.0, True, False)]
+
+
+def test_an_answer_of_0_is_the_bit_0() -> None:
+    assert _play(COPY, (0.0,), [0.0]) == [((0.0,), 1.0, True, False)]
+    assert _play(COPY, (1.0,), [0.0]) == [((1.0,), -1.0, True, False)]
+
+
+@pytest.mark.parametrize("bit", [0.0, 1.0])
+@pytest.mark.parametrize("second", [-1.0, 1.0])
+def test_the_delayed_reward_is_paid_by_the_second_step_for_the_first_answer(bit: float, second: float) -> None:
+    answer = 2 * bit - 1
+    waiting = (0.0, 1.0)
+    assert _play(DELAYED, (bit, 0.0), [answer, second]) == [
+        (waiting, 0.0, False, False),
+        (waiting, 1.0, True, False),
+    ]
+    assert _play(DELAYED, (bit, 0.0), [-answer, second])[1] == (waiting, -1.0, True, False)
+
+
+@pytest.mark.parametrize("bit", [0.0, 1.0])
+def test_survival_terminates_on_an_error_and_truncates_at_the_horizon(bit: float) -> None:
+    answer = 2 * bit - 1
+    assert _play(SURVIVAL, (bit,), [answer, -answer]) == [
+        ((1 - bit,), 1.0, False, False),
+        ((1 - bit,), 1.0, False, True),
+    ]
+    assert _play(SURVIVAL, (bit,), [-answer])[0] == ((1 - bit,), -1.0, True, False)
+    assert _play(SURVIVAL, (bit,), [answer, answer])[1] == ((1 - bit,), -1.0, True, False)
+
+
+def test_survival_forfeits_what_an_ended_episode_does_not_reach() -> None:
+    episode = _examine(SURVIVAL, YES)  # right, then wrong; or wrong at once
+    assert float(episode.success) == 0.25
+    assert float(episode.fitness) == (0.0 - 1.0) / 2
+
+
+def test_the_curriculums_first_level_is_solved_by_what_its_second_is_not() -> None:
+    assert float(_examine(CURRICULUM, SECOND_BIT, 0).success) == 1.0
+    assert float(_examine(CURRICULUM, SECOND_BIT, 1).success) == 0.5
+
+
+@pytest.mark.parametrize("name", RIGHT)
+def test_episodes_start_on_every_case_of_the_level_alike_and_on_no_other(name: str) -> None:
+    probe = PROBES[name]
+    for level, cases in enumerate(probe.cases_at_level):
+        keys = jax.random.split(jax.random.key(level), 400)
+        states = jax.vmap(probe.reset, in_axes=(0, None))(keys, jnp.asarray(level, jnp.int32))
+        counts = np.bincount(np.asarray(states.inner.case))
+        assert len(counts) == cases
+        assert counts.min() > 0.7 * 400 / cases
+
+
+@pytest.mark.parametrize("name", RIGHT)
+@pytest.mark.parametrize("policy", [YES, REPEAT, lambda observation: -jnp.ones(1)], ids=["yes", "repeat", "no"])
+def test_the_examination_is_what_episodes_pay_on_average(name: str, policy: PolicyFn) -> None:
+    probe = PROBES[name]
+    level = jnp.asarray(probe.levels - 1, jnp.int32)
+    returns: dict[int, float] = {}
+    for key in jax.random.split(jax.random.key(0), 64):
+        state = probe.reset(key, level)
+        case, total = int(state.inner.case), 0.0
+        if case in returns:
+            continue
+        while not (state.terminated or state.truncated):
+            state = probe.step(state, policy(state.observation))
+            total += float(state.reward)
+        returns[case] = total
+    assert len(returns) == probe.cases_at_level[-1]
+    assert float(_examine(probe, policy, probe.levels - 1).fitness) == pytest.approx(np.mean(list(returns.values())))
+    trained = probe.episode(policy, jax.random.key(1), level)
+    assert float(trained.fitness) == float(_examine(probe, policy, probe.levels - 1).fitness)
+
+
+def test_an_unknown_probe_lists_the_known_ones() -> None:
+    with pytest.raises(UserError, match=r"no probe named 'probe_copi'\. Did you mean 'probe_copy'\? Known: probe_con"):
+        PROBES["probe_copi"]

@@ -1,0 +1,128 @@
+"""The methods that every conformance test runs over; a new method is one entry here."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import jax
+import pytest
+from workbench import Workbench
+
+from evoclaims.envs.gates.parity import NParity
+from evoclaims.methods.cma_es import CmaEs
+from evoclaims.methods.ppo import Ppo
+from evoclaims.methods.random_search import RandomSearch
+from evoclaims.networks.all_skips import AllSkips
+from evoclaims.trials.budget import Budget
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A method small enough to compile and run in no time.
+
+    Attributes:
+        method: the method.
+        task: what the conformance tests train it on.
+        cost: environment steps of one of its steps on `task`, worked out by hand.
+        keeps_the_best: whether its best policy never gets worse on a deterministic task.
+        prober: the method at a size that solves every probe.
+        probing: how long that may take.
+    """
+
+    method: Any
+    task: Any
+    cost: int
+    keeps_the_best: bool
+    prober: Any
+    probing: Budget
+
+
+METHODS = {
+    "random_search": Entry(
+        method=RandomSearch(12, network=AllSkips(3)),
+        task=NParity(3),
+        cost=12 * 8,
+        keeps_the_best=True,
+        prober=RandomSearch(256, network=AllSkips(8)),
+        probing=Budget(generations=200, reports=1),
+    ),
+    "cma_es": Entry(
+        method=CmaEs(12, network=AllSkips(3)),
+        task=NParity(3),
+        cost=12 * 8,
+        keeps_the_best=True,
+        prober=CmaEs(256, network=AllSkips(8)),
+        probing=Budget(generations=200, reports=1),
+    ),
+    "ppo": Entry(
+        method=Ppo(
+            policy_layers=(4,),
+            value_layers=(4,),
+            environments=8,
+            unroll_length=2,
+            batch_size=8,
+            minibatches=2,
+            updates_per_batch=2,
+            normalize_observations=True,
+        ),
+        task=NParity(3, "sampled"),
+        cost=8 * 2 * 2,
+        keeps_the_best=False,
+        prober=Ppo(
+            policy_layers=(8, 8),
+            value_layers=(8, 8),
+            environments=32,
+            unroll_length=2,
+            batch_size=16,
+            minibatches=4,
+            learning_rate=1e-2,
+        ),
+        probing=Budget(generations=1500, reports=1),
+    ),
+}
+_BENCHES = {name: Workbench(entry.method, entry.task) for name, entry in METHODS.items()}
+
+
+@pytest.fixture(autouse=True)
+def _strictly() -> Iterator[None]:
+    """Run every test without implicit promotions and with every key used once."""
+    with jax.numpy_dtype_promotion("strict"), jax.numpy_rank_promotion("raise"), jax.debug_key_reuse(True):
+        yield
+
+
+@pytest.fixture(params=METHODS)
+def name(request: pytest.FixtureRequest) -> str:
+    """Each method's name in turn."""
+    return str(request.param)
+
+
+@pytest.fixture
+def entry(name: str) -> Entry:
+    """The method's entry in the table."""
+    return METHODS[name]
+
+
+@pytest.fixture
+def bench(name: str) -> Workbench:
+    """The method with its compiled step, which the tests share."""
+    return _BENCHES[name]
+
+
+@pytest.fixture
+def cpus() -> list[Any]:
+    """The CPU devices that the engine spreads trials over."""
+    return list(jax.devices("cpu")[:2])
+
+
+@pytest.fixture
+def probers() -> dict[str, Any]:
+    """Every method at the size that solves probes."""
+    return {name: entry.prober for name, entry in METHODS.items()}
+
+
+@pytest.fixture
+def benches() -> dict[str, Workbench]:
+    """Every method with its compiled step."""
+    return _BENCHES

@@ -1,0 +1,54 @@
+"""The positive control: right about every row of every gate, and its negation wrong about every row."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import jax
+import numpy as np
+import pytest
+
+from evoclaims.core.errors import UserError
+from evoclaims.envs.gates.alu import SimpleAlu
+from evoclaims.envs.gates.parity import NParity
+from evoclaims.envs.probes import COPY
+from evoclaims.methods.hand_built import HandBuilt
+from evoclaims.trials.rollout import score_every_level
+
+GATES = [
+    *(NParity(bits) for bits in range(2, 9)),
+    NParity(4, "sampled"),
+    *(
+        SimpleAlu(operations=operations, multiplexer=multiplexer)
+        for operations in ("paper", "published_code")
+        for multiplexer in ("paper", "published_code")
+    ),
+]
+
+
+@pytest.mark.parametrize("task", GATES, ids=str)
+@pytest.mark.parametrize(("negated", "success", "fitness"), [(False, 1.0, 0.0), (True, 0.0, -1.0)])
+def test_it_is_exactly_right_at_every_level_and_its_negation_exactly_wrong(
+    task: Any, negated: bool, success: float, fitness: float
+) -> None:
+    method = HandBuilt(negated)
+    policy = method.best(task, method.init(jax.random.key(0), task))
+    final = jax.jit(lambda key: score_every_level(task, policy, key))(jax.random.key(0))
+    np.testing.assert_array_equal(final.success, np.full(task.levels, success, np.float32))
+    np.testing.assert_array_equal(final.fitness, np.full(task.levels, fitness, np.float32))
+
+
+def test_a_step_tells_the_examination_and_counts() -> None:
+    task, method = NParity(3), HandBuilt()
+    state, progress = method.step(jax.random.key(1), task, jax.numpy.int32(1), method.init(jax.random.key(0), task))
+    assert (float(progress.success), bool(progress.healthy), int(state)) == (1.0, True, 1)
+    assert method.cost(task) == 8
+
+
+def test_the_network_and_its_negation_have_different_names() -> None:
+    assert (HandBuilt().name, HandBuilt(negated=True).name) == ("hand_built", "hand_built_negated")
+
+
+def test_a_task_without_a_truth_table_is_one_sentence() -> None:
+    with pytest.raises(UserError, match="from a truth table, which the task 'probe_copy' does not have"):
+        HandBuilt().best(COPY, jax.numpy.int32(0))

@@ -1,0 +1,127 @@
+"""What every method keeps to, so that one engine can run them all."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from workbench import Workbench, close, same_bits
+
+from evoclaims.core.canonical import canonical_json
+
+LEVEL = jnp.zeros((), jnp.int32)
+
+
+def _shapes(tree: Any) -> list[tuple[Any, ...]]:
+    return [(leaf.shape, leaf.dtype) for leaf in jax.tree.leaves(tree)]
+
+
+def test_the_state_keeps_its_structure_shapes_and_strong_dtypes(bench: Workbench) -> None:
+    before = jax.eval_shape(bench.init)
+    after, _ = jax.eval_shape(bench.plain_step, jax.random.key(0), LEVEL, before)
+    assert jax.tree.structure(before) == jax.tree.structure(after)
+    assert _shapes(before) == _shapes(after)
+    assert not [leaf for leaf in jax.tree.leaves((before, after)) if leaf.weak_type]
+
+
+def test_progress_is_scalars_of_the_same_names_at_every_step(bench: Workbench) -> None:
+    _, (first, *_, last) = bench.run(3)
+    assert jax.tree.structure(first) == jax.tree.structure(last)
+    for progress in (first, last):
+        assert {leaf.shape for leaf in jax.tree.leaves(progress)} == {()}
+        assert progress.fitness.dtype == progress.success.dtype == jnp.float32
+        assert progress.healthy.dtype == jnp.bool_
+        assert bool(progress.healthy)
+        assert np.isfinite(float(progress.fitness))
+        assert 0.0 <= float(progress.success) <= 1.0
+
+
+def test_stepping_compiles_once(bench: Workbench) -> None:
+    for level in range(bench.task.levels):
+        bench.run(2, level=level)
+    assert bench.traces == 1
+
+
+def test_the_same_key_gives_the_same_state(bench: Workbench) -> None:
+    one, other = bench.run(2, seed=4), bench.run(2, seed=4)
+    assert same_bits(one, other)
+
+
+def test_another_key_gives_another_state(bench: Workbench) -> None:
+    state = bench.init()
+    one, _ = bench.run(1, seed=4, state=state)
+    other, _ = bench.run(1, seed=5, state=state)
+    assert not same_bits(one, other)
+
+
+def test_a_compiled_step_is_the_plain_step(bench: Workbench) -> None:
+    state, _ = bench.run(1)
+    close(
+        bench.plain_step(jax.random.key(9), LEVEL, state),
+        bench.step(jax.random.key(9), LEVEL, state),
+        tolerance=1e-4,  # XLA fuses multiplications and additions
+    )
+
+
+def test_trials_side_by_side_are_the_trials_one_by_one(bench: Workbench) -> None:
+    seeds = (3, 8)
+    alone = [bench.run(1, seed=seed)[0] for seed in seeds]
+    keys = jnp.stack([jax.random.fold_in(jax.random.key(seed + 1), 0) for seed in seeds])
+    starts = jax.tree.map(lambda *leaf: jnp.stack(leaf), *[bench.init(seed) for seed in seeds])
+    with jax.debug_key_reuse(False):  # jax takes the keys of any scan under vmap for used
+        together, _ = jax.jit(jax.vmap(bench.plain_step, in_axes=(0, None, 0)))(keys, LEVEL, starts)
+    for i, one in enumerate(alone):
+        close(one, jax.tree.map(lambda leaf, i=i: leaf[i], together), tolerance=1e-4)
+
+
+def test_progress_is_what_an_examination_of_the_best_policy_says(bench: Workbench) -> None:
+    for level in range(bench.task.levels):
+        state, reports = bench.run(2, level=level)
+        examined = bench.examine(state, level)
+        np.testing.assert_allclose(float(reports[-1].fitness), float(examined.fitness), atol=1e-6)
+        np.testing.assert_allclose(float(reports[-1].success), float(examined.success), atol=1e-6)
+
+
+def test_the_best_policy_answers_alike_each_time_and_only_by_its_parameters(bench: Workbench) -> None:
+    one, other = (bench.method.best(bench.task, bench.run(2, seed=6)[0]) for _ in range(2))
+    observation = jnp.ones(bench.task.observation_size)
+    answer = one(observation)
+    assert answer.shape == (bench.task.action_size,)
+    assert same_bits(answer, other(observation))
+    assert same_bits(one(observation), answer)
+    assert same_bits(one.parameters, other.parameters)
+
+
+def test_numbers_that_are_not_finite_are_told_as_unhealthy(bench: Workbench) -> None:
+    state, _ = bench.run(1)
+    poisoned = jax.tree.map(lambda x: x * jnp.nan if jnp.issubdtype(x.dtype, jnp.floating) else x, state)
+    _, (progress,) = bench.run(1, state=poisoned)
+    assert not bool(progress.healthy)
+
+
+def test_the_best_never_worsens_where_evaluation_is_deterministic(entry: Any, bench: Workbench) -> None:
+    if entry.keeps_the_best:
+        gains = []
+        for level, seed in ((0, 0), (1, 1), (1, 2)):
+            _, reports = bench.run(25, seed=seed, level=level)
+            fitness = [float(progress.fitness) for progress in reports]
+            assert fitness == sorted(fitness)
+            gains.append(fitness[-1] - fitness[0])
+        assert max(gains) > 0
+
+
+def test_the_cost_is_the_environment_steps_of_one_step(entry: Any) -> None:
+    assert entry.method.cost(entry.task) == entry.cost
+
+
+def test_a_method_is_hashable_and_has_a_canonical_form(entry: Any, name: str) -> None:
+    assert hash(entry.method) == hash(type(entry.method)(**_parameters(entry.method)))
+    assert canonical_json(entry.method) != canonical_json(entry.prober)
+    assert entry.method.name == name
+    assert entry.method.revision >= 1
+
+
+def _parameters(method: Any) -> dict[str, Any]:
+    return {field: getattr(method, field) for field in method.__dataclass_fields__ if field in vars(method)}

@@ -1,0 +1,121 @@
+"""PPO's training step, and the test that moves it up a level."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from workbench import Workbench, leaves
+
+from evoclaims.core.errors import UserError
+from evoclaims.envs.probes import CONSTANT, Probe
+from evoclaims.methods.ppo import LevelTest, Ppo
+
+SMALL = Ppo(policy_layers=(3,), value_layers=(3,), environments=4, batch_size=4, minibatches=1, updates_per_batch=1)
+ALWAYS_RIGHT = Probe("always_right", cases=((((0.0,), None),),), cases_at_level=(1,))
+
+
+def test_one_step_changes_every_layer_of_both_networks(benches: dict[str, Workbench]) -> None:
+    bench = benches["ppo"]
+    before = bench.init()
+    after, _ = bench.run(1, state=before)
+    for network in ("policy", "value"):
+        pairs = zip(leaves(getattr(before.networks, network)), leaves(getattr(after.networks, network)), strict=True)
+        assert all(np.abs(one - other).max() > 0 for one, other in pairs)
+    assert int(after.steps) == 1
+
+
+def test_without_a_learning_rate_nothing_changes() -> None:
+    bench = Workbench(replace(SMALL, learning_rate=0.0), CONSTANT)
+    before = bench.init()
+    after, _ = bench.run(1, state=before)
+    for one, other in zip(leaves(before.networks), leaves(after.networks), strict=True):
+        np.testing.assert_array_equal(one, other)
+
+
+def test_the_observations_statistics_are_those_of_what_was_collected(benches: dict[str, Workbench]) -> None:
+    bench = benches["ppo"]
+    state, _ = bench.run(3, level=1)
+    count = float(state.statistics.count.lo) if hasattr(state.statistics.count, "lo") else float(state.statistics.count)
+    assert count == 3 * bench.method.cost(bench.task)
+    assert np.all(np.asarray(state.statistics.mean) > 0.2)
+    assert np.all(np.asarray(state.statistics.mean) < 0.8)
+
+
+def test_a_step_at_another_level_trains_on_episodes_of_that_level(benches: dict[str, Workbench]) -> None:
+    bench = benches["ppo"]
+    low, _ = bench.run(4, level=0)
+    assert set(np.asarray(low.interaction.states.observation)[:, 0].tolist()) == {0.0}
+    high, _ = bench.run(1, level=1, state=low)
+    assert int(high.interaction.level) == 1
+    assert set(np.asarray(high.interaction.states.inner.level).tolist()) == {1}
+    assert set(np.asarray(high.interaction.states.observation)[:, 0].tolist()) == {0.0, 1.0}
+
+
+@pytest.mark.parametrize("sampled_episodes", [0, 128], ids=["the whole table", "as published"])
+def test_success_is_told_only_by_the_steps_that_test_for_it(sampled_episodes: int) -> None:
+    bench = Workbench(replace(SMALL, level_test=LevelTest(every=3, sampled_episodes=sampled_episodes)), ALWAYS_RIGHT)
+    _, reports = bench.run(7)
+    assert [float(progress.success) for progress in reports] == [0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 0.0]
+
+
+def test_the_published_test_asks_the_stochastic_policy_and_forgives_no_error() -> None:
+    sampled = Workbench(replace(SMALL, level_test=LevelTest(sampled_episodes=128)), CONSTANT)
+    told = [float(progress.success) for progress in sampled.run(5)[1]]
+    assert all(success * 128 == int(success * 128) for success in told)
+    assert all(0.0 < success < 1.0 for success in told)  # an untrained policy errs now and then
+    certain = [float(progress.success) for progress in Workbench(SMALL, CONSTANT).run(5)[1]]
+    assert set(certain) <= {0.0, 0.5, 1.0}
+
+
+def test_faultless_episodes_are_a_success_of_exactly_1_whatever_their_number() -> None:
+    """41 · float32(1 / 41) is 0.99999994: a test that nobody passes."""
+    bench = Workbench(replace(SMALL, level_test=LevelTest(sampled_episodes=41)), ALWAYS_RIGHT)
+    assert float(bench.run(1)[1][0].success) == 1.0
+
+
+@pytest.mark.parametrize(
+    ("wrong", "sentence"),
+    [
+        ({"environments": 0}, "PPO's environments must be at least 1, not 0"),
+        ({"unroll_length": 0}, "PPO's unroll_length must be at least 1"),
+        ({"batch_size": 0}, "PPO's batch_size must be at least 1"),
+        ({"minibatches": -1}, "PPO's minibatches must be at least 1, not -1"),
+        ({"updates_per_batch": 0}, "PPO's updates_per_batch must be at least 1"),
+        ({"environments": 3}, r"batch_size × minibatches \(4 × 1\) must be a multiple of environments \(3\)"),
+        ({"environments": 8}, "must be a multiple of environments"),
+        ({"policy_layers": (4, 0)}, "Every layer of PPO's networks has at least 1 neuron"),
+        ({"value_layers": (-1,)}, "Every layer of PPO's networks has at least 1 neuron"),
+    ],
+)
+def test_impossible_sizes_are_one_sentence(wrong: dict[str, Any], sentence: str) -> None:
+    with pytest.raises(UserError, match=sentence):
+        replace(SMALL, **wrong)
+
+
+@pytest.mark.parametrize("wrong", [{"every": 0}, {"sampled_episodes": -1}])
+def test_an_impossible_level_test_is_one_sentence(wrong: dict[str, Any]) -> None:
+    with pytest.raises(UserError, match="held every 1 or more training steps over 0 or more sampled episodes"):
+        LevelTest(**wrong)
+
+
+def test_a_policy_of_rewards_in_the_other_direction_learns_the_other_answer() -> None:
+    """The gradient's sign: yes is learnt where yes is paid, and no where no is."""
+    no = Probe("constant_no", cases=((((0.0,), 0),), (((1.0,), 0),)), cases_at_level=(2,))
+    learner = replace(SMALL, environments=32, batch_size=32, updates_per_batch=8, learning_rate=3e-2)
+    for task, sign in ((CONSTANT, 1.0), (no, -1.0)):
+        bench = Workbench(learner, task)
+        policy = bench.method.best(task, bench.run(10)[0])
+        for bit in (0.0, 1.0):
+            assert sign * float(policy(jnp.array([bit]))[0]) > 0
+
+
+def test_the_key_of_the_deterministic_policy_is_no_randomness(benches: dict[str, Workbench]) -> None:
+    bench = benches["ppo"]
+    policy = bench.method.best(bench.task, bench.init())
+    answers = {float(jax.jit(policy)(jnp.ones(3))[0]) for _ in range(3)}
+    assert len(answers) == 1

@@ -1,0 +1,65 @@
+"""Random search is the best of all that it has drawn."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import jax
+import numpy as np
+import pytest
+
+from evoclaims.core.errors import UserError
+from evoclaims.core.keys import stream
+from evoclaims.methods.random_search import RandomSearch
+
+STEPS, SEED = 6, 2
+
+
+def test_its_champion_is_the_best_of_everyone_drawn(benches: dict[str, Any]) -> None:
+    bench = benches["random_search"]
+    state, reports = bench.run(STEPS, seed=SEED, level=1)
+    rows = bench.task.table.inputs
+    wanted = [sum(map(int, row)) % 2 == 1 for row in rows]
+    best, individuals, when = -np.inf, [], []
+    for step in range(STEPS):
+        key = stream(jax.random.fold_in(jax.random.key(SEED + 1), step), "draw")
+        population = np.asarray(jax.random.normal(key, (bench.method.population, len(state.parameters))))
+        for individual in population:
+            answers = [_fire(individual.astype(np.float64), row, bench.method.network.hidden) > 0 for row in rows]
+            fitness = -np.mean([answer != bit for answer, bit in zip(answers, wanted, strict=True)])
+            if fitness > best:
+                individuals = []
+            if fitness >= best:
+                individuals.append(individual)
+            best = max(best, fitness)
+        when.append(best)
+    assert [float(progress.fitness) for progress in reports] == when
+    assert any(np.array_equal(individual, state.parameters) for individual in individuals)
+
+
+def _fire(parameters: Any, bits: Any, hidden: int) -> float:
+    """Return the one output of an all-skips network, neuron by neuron."""
+    inputs, neurons = len(bits), hidden + 1
+    feed = parameters[: neurons * (inputs + 1)].reshape(neurons, inputs + 1)
+    readout = parameters[neurons * (inputs + 1) :][:hidden]
+    between = list(parameters[neurons * (inputs + 1) + hidden :])
+    fired: list[float] = []
+    for neuron in range(hidden):
+        weights = [between.pop(0) for _ in range(neuron)]
+        fired.append(np.tanh(feed[neuron] @ [*bits, 1.0] + np.dot(weights, fired)))
+    return float(feed[hidden] @ [*bits, 1.0] + np.dot(readout, fired))
+
+
+def test_the_standard_deviation_scales_what_is_drawn(benches: dict[str, Any]) -> None:
+    task = benches["random_search"].task
+    size = RandomSearch().network.size(task.observation_size, task.action_size)
+    for std in (0.1, 3.0):
+        method = RandomSearch(2, std=std)
+        state, _ = method.step(jax.random.key(0), task, jax.numpy.int32(0), method.init(jax.random.key(1), task))
+        assert float(np.std(state.parameters)) == pytest.approx(std, rel=5 / np.sqrt(size))
+
+
+@pytest.mark.parametrize("wrong", [{"population": 0}, {"std": 0.0}, {"std": -1.0}])
+def test_impossible_sizes_are_one_sentence(wrong: dict[str, Any]) -> None:
+    with pytest.raises(UserError, match="population of at least 1 and a standard deviation above 0"):
+        RandomSearch(**wrong)

@@ -1,0 +1,84 @@
+"""Perceptrons against loops over neurons in float64."""
+
+from __future__ import annotations
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from evoclaims.core.errors import UserError
+from evoclaims.networks.mlp import Mlp
+
+SHAPES = [(2, (), 1), (3, (4,), 2), (6, (5, 3, 2), 1), (8, (32, 32, 32, 32), 4)]
+shapes = pytest.mark.parametrize(("inputs", "layers", "outputs"), SHAPES)
+skips = pytest.mark.parametrize("skip", [False, True], ids=["dense", "skip"])
+
+
+def _loops(
+    parameters: NDArray[np.float64], observation: NDArray[np.float64], widths: tuple[int, ...], skip: bool
+) -> list[float]:
+    """Fire layer after layer, taking the parameters in the order that the class documents."""
+    left = iter(parameters.tolist())
+    signal = observation.tolist()
+    for depth, width in enumerate(widths):
+        weights = [[next(left) for _ in signal] for _ in range(width)]
+        biases = [next(left) for _ in range(width)]
+        potentials = [
+            bias + sum(weight * x for weight, x in zip(row, signal, strict=True))
+            for row, bias in zip(weights, biases, strict=True)
+        ]
+        if skip and depth == len(widths) - 1:
+            for neuron in range(width):
+                potentials[neuron] += sum(next(left) * x for x in observation)
+        signal = [float(np.tanh(potential)) for potential in potentials]
+    assert list(left) == []
+    return signal
+
+
+@shapes
+@skips
+def test_it_computes_what_loops_over_neurons_compute(
+    inputs: int, layers: tuple[int, ...], outputs: int, skip: bool
+) -> None:
+    network = Mlp(layers, skip)
+    for seed in range(3):
+        draw = np.random.default_rng(seed)
+        parameters, observation = draw.normal(size=network.size(inputs, outputs)), draw.normal(size=inputs)
+        answer = network.apply(jnp.float32(parameters), jnp.float32(observation), outputs)
+        assert answer.shape == (outputs,)
+        assert answer.dtype == jnp.float32
+        np.testing.assert_allclose(answer, _loops(parameters, observation, (*layers, outputs), skip), atol=2e-5)
+
+
+@shapes
+@skips
+def test_every_parameter_matters(inputs: int, layers: tuple[int, ...], outputs: int, skip: bool) -> None:
+    network = Mlp(layers, skip)
+    draw = np.random.default_rng(0)
+    parameters, observation = draw.normal(size=network.size(inputs, outputs)) / 4, draw.normal(size=inputs)
+    slopes = jax.jacobian(network.apply)(jnp.float32(parameters), jnp.float32(observation), outputs)
+    assert (np.abs(slopes).max(axis=0) > 0).all()
+
+
+def test_sizes_are_those_counted_by_hand() -> None:
+    assert Mlp((4,)).size(3, 2) == 4 * 3 + 4 + 2 * 4 + 2
+    assert Mlp((4,), skip=True).size(3, 2) == 4 * 3 + 4 + 2 * 4 + 2 + 3 * 2
+    assert Mlp((32, 32, 32, 32)).size(8, 4) == 9 * 32 + 3 * 33 * 32 + 33 * 4  # the published code's network
+
+
+def test_a_batch_matches_the_loop_plain_and_jitted() -> None:
+    network = Mlp((5,), skip=True)
+    parameters = jax.random.normal(jax.random.key(1), (network.size(4, 2),))
+    observations = jax.random.normal(jax.random.key(0), (7, 4))
+    batch = jax.vmap(lambda x: network.apply(parameters, x, 2))(observations)
+    jitted = jax.jit(lambda x: network.apply(parameters, x, 2))
+    for one, answer in zip(observations, batch, strict=True):
+        np.testing.assert_allclose(answer, network.apply(parameters, one, 2), atol=1e-6)
+        np.testing.assert_allclose(answer, jitted(one), atol=1e-6)
+
+
+def test_an_empty_layer_is_one_sentence() -> None:
+    with pytest.raises(UserError, match=r"at least 1 neuron; these are \(4, 0\)"):
+        Mlp((4, 0))

@@ -1,0 +1,159 @@
+"""The options: each does what it says, and a wrong value is one sentence before the first trial."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+Sentence = Callable[[pytest.RunResult, str], None]
+
+
+def test_too_few_trials_are_underpowered_and_a_run_that_measured_nothing_does_not_end_well(project: Any) -> None:
+    project.write(a="supported")
+    result = project.run("--claims-trials=2", own_store=True)
+    assert result.ret == pytest.ExitCode.NO_TESTS_COLLECTED
+    result.stdout.fnmatch_lines(["[?] a: underpowered: needs n = 9 at alpha = 0.05"])
+    result.stdout.fnmatch_lines(["No trial was looked at: nothing was measured."])
+    assert not (project.path / ".evoclaims" / "trials").exists()
+
+
+def test_a_number_of_trials_takes_the_place_of_the_tiers_own(project: Any) -> None:
+    project.write(a="supported")
+    (report,) = project.json("--claims-trials=12")["claims"]
+    assert (report["outcome"], report["verdict"]["n"]) == ("supported", 12)
+
+
+def test_one_measured_claim_is_enough_for_a_run_to_count(project: Any) -> None:
+    project.write(
+        a="verdict(trials('right', on='parity').success_everywhere_is(1.0).in_every_trial())",
+        b="supported",
+    )
+    result = project.run("--claims-trials=2")
+    assert result.ret == 0
+    result.stdout.fnmatch_lines(["claims: 1 supported, 1 inconclusive"])
+
+
+@pytest.mark.parametrize(("choice", "status"), [("report", 0), ("fail", 1)])
+def test_an_undecided_claim_ends_the_run_as_asked(project: Any, choice: str, status: int) -> None:
+    project.write(a="undecided", b="supported")
+    result = project.run(f"--claims-undecided={choice}")
+    assert result.ret == status
+    result.stdout.fnmatch_lines(["claims: 1 supported, 1 inconclusive"])
+
+
+@pytest.mark.parametrize(
+    ("arguments", "text"),
+    [
+        (("--claims-storage=afile",), "The trial store {path}/afile is a file, not a folder"),
+        (("--claims-storage=afile/store",), "Cannot write {path}/afile/store"),
+        (("--claims-device=gpu",), "finds no hardware for the device 'gpu'"),
+        (("--claims-device=tpu",), "There is no device named 'tpu'. Did you mean 'gpu'? Known: auto, cpu, gpu."),
+        (("--claims-trials=0",), "A look takes 1 to"),
+        (("--claims-trials=many",), "argument --claims-trials: invalid int value: 'many'"),
+    ],
+)
+def test_a_wrong_value_is_one_sentence_before_the_first_trial(
+    project: Any, sentence: Sentence, monkeypatch: pytest.MonkeyPatch, arguments: tuple[str, ...], text: str
+) -> None:
+    monkeypatch.setenv("JAX_PLATFORMS", "cpu")
+    (project.path / "afile").write_text("not a folder")
+    project.write(a="supported")
+    result = project.run(*arguments, own_store=True)
+    assert result.ret == pytest.ExitCode.USAGE_ERROR
+    sentence(result, text.format(path=project.path))
+    result.stdout.no_fnmatch_line("*collected * and nothing else*")
+    assert not (project.path / ".evoclaims" / "trials").exists()
+
+
+@pytest.mark.parametrize(
+    ("pyproject", "text"),
+    [
+        ("[tool.evoclaims]\n", "needs a [tool.evoclaims] table with reproduction"),
+        ('[tool.evoclaims]\nreproduction = "tiny_papr"\n', "There is no module 'tiny_papr' in"),
+        ('[tool.evoclaims]\nreproduction = "json"\n', "The module 'json' has no REPRODUCTION"),
+    ],
+)
+def test_a_project_that_is_not_set_up_is_one_sentence(
+    project: Any, sentence: Sentence, pyproject: str, text: str
+) -> None:
+    project.write(a="supported")
+    (project.path / "pyproject.toml").write_text(pyproject)
+    result = project.run("claims", f"--rootdir={project.path}")
+    assert result.ret == pytest.ExitCode.USAGE_ERROR
+    sentence(result, text)
+
+
+def test_stored_trials_alone_are_judged_without_running_or_writing_any(project: Any) -> None:
+    project.write(a="supported")
+    result = project.run("--claims-stored", own_store=True)
+    assert result.ret == pytest.ExitCode.NO_TESTS_COLLECTED
+    result.stdout.fnmatch_lines(["- a: 10 of 10 trials of hand_built on n_parity are missing"])
+    assert not (project.path / ".evoclaims").exists()
+    assert project.run(own_store=True).ret == 0
+    before = sorted((project.path / ".evoclaims").rglob("*"))
+    result = project.run("--claims-stored", own_store=True)
+    assert result.ret == 0
+    result.stdout.fnmatch_lines(["claims: 1 supported"])
+    assert sorted((project.path / ".evoclaims").rglob("*")) == before
+
+
+def test_a_second_run_runs_no_trial(project: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    project.write(a="supported", b="refuted")
+    first = project.run(own_store=True)
+    monkeypatch.setattr("evoclaims.trials.runner.Lanes", None)
+    second = project.run(own_store=True)
+    assert first.ret == second.ret == 1
+    table = [line for line in first.outlines if line.startswith(("a ", "b "))]
+    assert table == [line for line in second.outlines if line.startswith(("a ", "b "))]
+
+
+def test_a_report_that_cannot_be_written_fails_the_run_and_hides_no_verdict(project: Any, sentence: Sentence) -> None:
+    (project.path / "afile").write_text("not a folder")
+    project.write(a="supported")
+    result = project.run("--claims-json=afile/out.json")
+    assert result.ret == pytest.ExitCode.TESTS_FAILED
+    result.stdout.fnmatch_lines(["a *✓ supported*", "error: Cannot write *afile/out.json*", "claims: 1 supported"])
+    sentence(result, "Cannot write")
+
+
+def test_a_damaged_record_is_an_error_of_the_claims_that_need_it(project: Any, sentence: Sentence) -> None:
+    project.write(a="supported", b="refuted")
+    project.run(own_store=True)
+    trials = json.loads((project.path / ".evoclaims/verdicts/smoke/a.json").read_text())["sources"][0]["trials"]
+    record = project.path / ".evoclaims" / "trials" / trials[3][:2] / f"{trials[3]}.json"
+    record.write_bytes(record.read_bytes()[:99])
+    result = project.run("--claims-only=a", own_store=True)
+    assert result.ret == 1
+    sentence(result, f"Cannot use {record}: it is not one whole JSON text; run `evoclaims verify`")
+    result.stdout.fnmatch_lines(["claims: 1 error"])
+    result = project.run("--claims-only=b", own_store=True)
+    result.stdout.fnmatch_lines(["claims: 1 refuted"])
+
+
+def test_trials_that_drifted_from_the_committed_ones_fail_the_run(project: Any) -> None:
+    """The references of the right network are swapped for what other trials gave."""
+    from dataclasses import replace
+    from pathlib import Path
+
+    from evoclaims.suite import references
+    from evoclaims.trials.result import digest
+    from evoclaims.trials.store import Store
+
+    project.write(a="supported")
+    assert project.run(own_store=True).ret == 0
+    path = references.path_of(project.path / "reference", "smoke", "right", "parity")
+    stored = list(Store(Path(project.path / ".evoclaims")).results([]))
+    references.write(path, stored)
+    result = project.run(own_store=True)
+    assert result.ret == 0
+    result.stdout.fnmatch_lines(["reference trials: 2 comparisons, 0 drifted*", "to the bit: 10 trials *, 0 changed"])
+    worse = {"mean_success": 0.5}
+    made = [replace(t, metrics={**t.metrics, **worse}, digest=digest("done", worse, {}, {}, b"")) for t in stored]
+    references.write(path, made)
+    result = project.run(own_store=True)
+    assert result.ret == 1
+    result.stdout.fnmatch_lines(["*✓ supported*", "DRIFT in right on parity (smoke): mean_success, p = *"])
+    result.stdout.fnmatch_lines(["to the bit: 10 trials compared with the same machine and versions, 10 changed"])

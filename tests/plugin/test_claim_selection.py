@@ -1,0 +1,128 @@
+"""Tiers are markers, and the full tier is only run when it is asked for by name."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+Sentence = Callable[[pytest.RunResult, str], None]
+
+
+@pytest.fixture
+def collected(project: Any) -> Callable[..., list[str]]:
+    """A function that returns what a selection leaves of two claims and a plain test, tier first."""
+    project.write(a="supported", b="refuted")
+    with (project.path / "claims" / "test_claims.py").open("a") as file:
+        file.write("\ndef test_plain():\n    pass\n")
+
+    def run(*arguments: str) -> list[str]:
+        result = project.run("--collect-only", "-q", *arguments)
+        names = [line.partition("::test_")[2] for line in result.outlines if "::" in line]
+        return sorted(name.replace("[", " ").replace("]", "") for name in names)
+
+    return run
+
+
+@pytest.mark.parametrize(
+    ("arguments", "left"),
+    [
+        ((), ["a smoke", "b smoke", "plain"]),
+        (("-m", "smoke"), ["a smoke", "b smoke"]),
+        (("-m", "full"), ["a full", "b full"]),
+        (("-m", "not smoke"), ["plain"]),
+        (("-m", "not full"), ["a smoke", "b smoke", "plain"]),
+        (("-m", "smoke or full"), ["a full", "a smoke", "b full", "b smoke"]),
+        (("-m", "full and not smoke"), ["a full", "b full"]),
+        (("--claims-tier", "full"), ["a full", "b full", "plain"]),
+        (("--claims-tier", "smoke"), ["a smoke", "b smoke", "plain"]),
+        (("--claims-tier", "full", "-m", "smoke"), []),
+        (("--claims-only", "b"), ["b smoke", "plain"]),
+        (("--claims-only", "b, a"), ["a smoke", "b smoke", "plain"]),
+        (("--claims-only", "b", "-m", "full"), ["b full"]),
+        (("-k", "full"), []),
+        (("-m", "claim and not full"), ["a smoke", "b smoke"]),
+    ],
+)
+def test_a_selection_leaves_the_claims_of_the_tiers_it_names(
+    collected: Any, arguments: tuple[str, ...], left: list[str]
+) -> None:
+    assert collected(*arguments) == left
+
+
+def test_naming_the_test_itself_does_not_start_the_full_tier(project: Any) -> None:
+    project.write(a="supported")
+    result = project.run("--collect-only", "-q", "claims/test_claims.py::test_a[full]")
+    assert result.ret == pytest.ExitCode.NO_TESTS_COLLECTED
+
+
+def test_the_full_tier_judges_the_papers_own_sentence(project: Any) -> None:
+    project.write(a="supported")
+    result = project.run("-m", "full")
+    assert result.ret == 0
+    result.stdout.fnmatch_lines(["a *a at full size (§1)*✓ supported*"])
+
+
+@pytest.mark.parametrize(
+    ("arguments", "text"),
+    [
+        (("--claims-tier", "fulll"), "There is no tier named 'fulll'. Did you mean 'full'? Known: full, smoke."),
+        (("--claims-only", "G1"), "There is no claim named 'G1'. Known: first, second."),
+        (("--claims-only", "first,secnd"), "no claim named 'secnd'. Did you mean 'second'? Known: first, second."),
+        (("--claims-undecided", "maybe"), "argument --claims-undecided: invalid choice: 'maybe'"),
+    ],
+)
+def test_an_unknown_name_ends_the_run_with_a_sentence_before_any_trial(
+    project: Any, sentence: Sentence, arguments: tuple[str, ...], text: str
+) -> None:
+    project.write(first="supported", second="supported")
+    result = project.run(*arguments, own_store=True)
+    assert result.ret == pytest.ExitCode.USAGE_ERROR
+    sentence(result, text)
+    assert not (project.path / ".evoclaims" / "trials").exists()
+
+
+def test_parameters_multiply_with_tiers_and_name_the_case(project: Any) -> None:
+    project.write(
+        "@pytest.mark.parametrize('method', ['right', 'wrong'])\n@pytest.mark.parametrize('value', [1.0, 0.0])\n"
+        "@says('a')\ndef test_a(trials, verdict, method, value):\n"
+        "    verdict(trials(method, on='parity').success_everywhere_is(value).in_every_trial())\n"
+    )
+    reports = {f"{r['claim']}[{r['case']}]": r["outcome"] for r in project.json()["claims"]}
+    assert reports == {
+        "a[1.0-right]": "supported",
+        "a[1.0-wrong]": "refuted",
+        "a[0.0-right]": "refuted",
+        "a[0.0-wrong]": "supported",
+    }
+
+
+def test_a_claim_that_takes_no_verdict_is_a_sentence(project: Any, sentence: Sentence) -> None:
+    project.write("@says('a')\ndef test_a():\n    pass\n")
+    result = project.run()
+    assert result.ret == pytest.ExitCode.INTERRUPTED
+    sentence(result, "test_a is a claim but takes neither the fixture `trials` nor `verdict`.")
+
+
+def test_the_fixtures_are_refused_to_tests_that_are_no_claims(project: Any) -> None:
+    project.write("def test_a(trials):\n    pass\n")
+    result = project.run()
+    assert result.ret == pytest.ExitCode.TESTS_FAILED
+    result.stdout.fnmatch_lines(["*UserError: The fixtures `trials` and `verdict` are for tests marked with @claim*"])
+
+
+def test_a_claim_without_a_text_is_a_sentence_at_collection(project: Any) -> None:
+    project.write("@claim('a', says='x', where='', smoke='y')\ndef test_a(trials, verdict):\n    pass\n")
+    result = project.run()
+    assert result.ret == pytest.ExitCode.INTERRUPTED
+    result.stdout.fnmatch_lines(["*UserError: The claim a lacks its where.*"])
+
+
+def test_tests_without_claims_are_left_alone(project: Any) -> None:
+    project.write("def test_a():\n    pass\n")
+    result = project.run(own_store=True)
+    assert result.ret == 0
+    result.assert_outcomes(passed=1)
+    result.stdout.no_fnmatch_line("*claims:*")
+    assert not (project.path / ".evoclaims").exists()

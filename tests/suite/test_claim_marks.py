@@ -1,0 +1,104 @@
+"""Claims and accepted outcomes: what they must say, and which acceptance holds."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from evoclaims import Outcome, claim, expected
+from evoclaims.core.errors import UserError
+from evoclaims.suite.claim import Claim, Expectation, claim_of, expectation_of
+from evoclaims.suite.report import ClaimReport, broken, expecting, save
+
+TEXTS = {"says": "So it is", "where": "§1", "smoke": "So it is, in small"}
+
+
+class Item:
+    """Stands for a pytest item with marks, the closest first."""
+
+    def __init__(self, *marks: Any) -> None:
+        self.marks = [getattr(mark, "mark", mark) for mark in marks]
+
+    def iter_markers(self, name: str) -> list[Any]:
+        return [mark for mark in self.marks if mark.name == name]
+
+    def get_closest_marker(self, name: str) -> Any:
+        return next(iter(self.iter_markers(name)), None)
+
+
+def test_a_claim_is_attached_to_its_test() -> None:
+    @claim("T1", **TEXTS)
+    def test_it() -> None: ...
+
+    found = claim_of(Item(*test_it.pytestmark))  # type: ignore[arg-type,attr-defined]
+    assert found == Claim("T1", **TEXTS)
+    assert claim_of(Item()) is None  # type: ignore[arg-type]
+    assert (found.statement("smoke"), found.statement("full")) == (TEXTS["smoke"], TEXTS["says"])
+
+
+@pytest.mark.parametrize("lacking", ["id", "says", "where", "smoke"])
+def test_a_claim_that_lacks_a_text_says_which(lacking: str) -> None:
+    texts = {"id": "T1", **TEXTS, lacking: "  "}
+    with pytest.raises(UserError, match=f"lacks its {lacking}"):
+        claim(texts.pop("id"), **texts)
+
+
+def test_an_accepted_outcome_must_be_known_and_have_a_reason() -> None:
+    with pytest.raises(UserError, match="There is no outcome 'rejected'; known: supported, refuted"):
+        expected("rejected", because="it is")
+    with pytest.raises(UserError, match="says because="):
+        expected(Outcome.REFUTED, because=" ")
+    with pytest.raises(UserError, match="says because="):
+        claim("T1", **TEXTS, expect=Outcome.REFUTED)
+
+
+def test_the_closest_acceptance_of_the_tier_holds() -> None:
+    item: Any = Item(
+        expected("inconclusive", because="this parameter", tier="full"),
+        expected(Outcome.REFUTED, because="the whole claim"),
+    )
+    assert expectation_of(item, "full") == Expectation(Outcome.INCONCLUSIVE, "this parameter", "full")
+    assert expectation_of(item, "smoke") == Expectation(Outcome.REFUTED, "the whole claim", None)
+    assert expectation_of(Item(expected("error", because="x", tier="full")), "smoke") is None  # type: ignore[arg-type]
+
+
+REPORT = broken(Claim("T1", **TEXTS), "n_parity", "smoke", "it broke")
+
+
+@pytest.mark.parametrize(
+    ("outcome", "accepted", "failed"),
+    [
+        ("supported", None, False),
+        ("inconclusive", None, False),
+        ("not run", None, False),
+        ("refuted", None, True),
+        ("error", None, True),
+        ("refuted", Outcome.REFUTED, False),
+        ("error", Outcome.REFUTED, True),
+        ("supported", Outcome.REFUTED, False),
+    ],
+)
+def test_a_claim_fails_when_it_is_refuted_or_breaks_without_being_accepted(
+    outcome: str, accepted: Outcome | None, failed: bool
+) -> None:
+    expectation = None if accepted is None else Expectation(accepted, "known")
+    report = expecting(replace(REPORT, outcome=outcome), expectation)
+    assert report.failed is failed
+    assert report.as_expected is (accepted == outcome)
+
+
+def test_a_report_crosses_processes_as_json_unchanged() -> None:
+    report = replace(REPORT, sources=({"method": "a", "trials": ["b"]},), attainable=({"n": 3, "alpha": 0.05},))
+    assert ClaimReport.from_json(json.loads(json.dumps(report.to_json()))) == report
+
+
+@pytest.mark.parametrize("case", ["n_parity", "../../etc", "a b/c", "", "é[x]"])
+def test_the_evidence_lies_below_the_store_under_a_plain_name(case: str, tmp_path: Path) -> None:
+    saved = save(replace(REPORT, case=case), tmp_path)
+    path = Path(saved.evidence)
+    assert path.parent == tmp_path / "verdicts" / "smoke"
+    assert ClaimReport.from_json(json.loads(path.read_text())) == saved

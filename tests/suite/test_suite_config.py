@@ -1,0 +1,103 @@
+"""Finding a project: each way of getting it wrong is one sentence."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from evoclaims.core.errors import UserError
+from evoclaims.suite.config import SuiteConfig, find_root, load_config, load_reproduction
+
+TABLE = '[tool.evoclaims]\nreproduction = "a_tiny_paper"\n'
+MODULE = """
+from pathlib import Path
+from evoclaims.judging.protocol import Protocol
+from evoclaims.suite.reproduction import Reproduction, Tier
+REPRODUCTION = Reproduction("tiny", "A Tiny Paper", Path(__file__).parent, {"smoke": Tier({}, Protocol.fixed(3))})
+"""
+
+
+@pytest.fixture
+def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """A folder whose modules are forgotten at the end."""
+    monkeypatch.setattr(sys, "path", list(sys.path))
+    yield tmp_path
+    for name in ("a_tiny_paper", "a_tiny_paper_of_others"):
+        sys.modules.pop(name, None)
+
+
+def _sentence(caught: pytest.ExceptionInfo[UserError]) -> str:
+    text = str(caught.value)
+    assert "\n" not in text
+    assert text.endswith(".")
+    return text
+
+
+def test_the_project_is_found_from_any_folder_within(project: Path) -> None:
+    (project / "pyproject.toml").write_text(TABLE)
+    (project / "a" / "b").mkdir(parents=True)
+    (project / "a" / "pyproject.toml").write_text("[tool.other]\n")
+    assert find_root(project / "a" / "b") == project
+
+
+def test_a_folder_outside_of_any_project_says_what_to_add(project: Path) -> None:
+    with pytest.raises(UserError, match=r"\[tool\.evoclaims\]") as caught:
+        find_root(project)
+    assert str(project) in _sentence(caught)
+
+
+@pytest.mark.parametrize("text", ["", "[tool.evoclaims]\n", TABLE + "claim = 'x'\n", "[tool]\nevoclaims = 3\n"])
+def test_a_table_that_is_missing_or_has_other_keys_says_which_it_takes(project: Path, text: str) -> None:
+    (project / "pyproject.toml").write_text(text)
+    with pytest.raises(UserError, match=r'reproduction = "package\.module".*no other keys') as caught:
+        load_config(project)
+    assert str(project / "pyproject.toml") in _sentence(caught)
+
+
+@pytest.mark.parametrize("text", ["reproduction = 3\n", 'reproduction = "a_tiny_paper"\nclaims = ["a"]\n'])
+def test_a_setting_that_is_no_text_is_a_sentence(project: Path, text: str) -> None:
+    (project / "pyproject.toml").write_text(f"[tool.evoclaims]\n{text}")
+    with pytest.raises(UserError, match="needs a"):
+        load_config(project)
+
+
+def test_a_pyproject_that_is_not_toml_is_named(project: Path) -> None:
+    (project / "pyproject.toml").write_text("[tool\n")
+    with pytest.raises(UserError, match="Cannot read .*pyproject"):
+        find_root(project)
+
+
+def test_claims_lie_in_the_folder_claims_unless_said_otherwise(project: Path) -> None:
+    (project / "pyproject.toml").write_text(TABLE)
+    assert load_config(project) == SuiteConfig(project, "a_tiny_paper", "claims")
+    (project / "pyproject.toml").write_text(TABLE + 'claims = "elsewhere"\n')
+    assert load_config(project).claims == "elsewhere"
+
+
+def test_a_reproduction_is_imported_from_the_project(project: Path) -> None:
+    (project / "a_tiny_paper.py").write_text(MODULE)
+    found = load_reproduction(SuiteConfig(project, "a_tiny_paper"))
+    assert (found.name, found.references) == ("tiny", project / "reference")
+
+
+@pytest.mark.parametrize("name", ["a_tiny_paper_of_others", "a_tiny_paper_of_others.part"])
+def test_a_module_that_is_not_there_is_a_sentence(project: Path, name: str) -> None:
+    with pytest.raises(UserError, match=f"There is no module '{name}'") as caught:
+        load_reproduction(SuiteConfig(project, name))
+    _sentence(caught)
+
+
+def test_a_module_without_a_reproduction_is_a_sentence(project: Path) -> None:
+    (project / "a_tiny_paper.py").write_text("REPRODUCTION = 'later'\n")
+    with pytest.raises(UserError, match="has no REPRODUCTION") as caught:
+        load_reproduction(SuiteConfig(project, "a_tiny_paper"))
+    _sentence(caught)
+
+
+def test_what_a_module_itself_lacks_is_not_taken_for_the_module(project: Path) -> None:
+    (project / "a_tiny_paper.py").write_text("import a_package_that_is_not_installed\n")
+    with pytest.raises(ModuleNotFoundError, match="a_package_that_is_not_installed"):
+        load_reproduction(SuiteConfig(project, "a_tiny_paper"))

@@ -1,0 +1,186 @@
+"""A tiny project with claims of every end, judged by real trials that compile in no time."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+PYPROJECT = """
+[tool.evoclaims]
+reproduction = "tiny_paper"
+
+[tool.pytest.ini_options]
+testpaths = ["claims"]
+addopts = "--strict-markers --strict-config"
+filterwarnings = ["error"]
+"""
+
+REPRODUCTION = '''
+"""Hand-built networks that are right, wrong, or either by the toss of a coin."""
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, ClassVar
+
+import jax
+import jax.numpy as jnp
+
+from evoclaims.envs.gates.parity import NParity
+from evoclaims.judging.protocol import Protocol
+from evoclaims.methods.base import Policy, Progress
+from evoclaims.methods.hand_built import HandBuilt, threshold_network
+from evoclaims.suite.reproduction import Reproduction, Tier
+from evoclaims.trials.budget import Budget
+from evoclaims.trials.spec import Condition
+
+
+@dataclass(frozen=True)
+class Coin:
+    """A network that is right on about half of the seeds."""
+
+    name: ClassVar[str] = "coin"
+    revision: ClassVar[int] = 1
+
+    def init(self, key, task):
+        return jnp.where(jax.random.bernoulli(key), 1.0, -1.0)
+
+    def step(self, key, task, level, state):
+        episode = task.examine(self.best(task, state), key, level)
+        return state, Progress(episode.fitness, episode.success, jnp.ones((), bool), {})
+
+    def best(self, task, state):
+        right = threshold_network(task, 1.0)
+        return Policy(state, lambda sign, bits: sign * right(bits))
+
+    def cost(self, task):
+        return task.horizon
+
+
+class Broken(Coin):
+    name: ClassVar[str] = "broken"
+
+    def init(self, key, task):
+        raise RuntimeError("out of order")
+
+
+METHODS = {"right": HandBuilt(), "wrong": HandBuilt(negated=True), "coin": Coin(), "broken": Broken()}
+
+
+def conditions(generations):
+    budget = Budget(generations=generations, reports=1)
+    return {(name, "parity"): Condition(m, NParity(2), "curriculum", budget) for name, m in METHODS.items()}
+
+
+REPRODUCTION = Reproduction(
+    name="tiny",
+    title="A Tiny Paper",
+    folder=Path(__file__).parent,
+    tiers={"smoke": Tier(conditions(1), Protocol.fixed(10)), "full": Tier(conditions(2), Protocol.fixed(10))},
+)
+'''
+
+HEAD = """
+import pytest
+from evoclaims import Outcome, claim, expected
+
+def says(name, **kwargs):
+    return claim(name, says=f"{name} at full size", where="§1", smoke=f"{name} in small", **kwargs)
+"""
+
+BODIES = {
+    "supported": "verdict(trials('right', on='parity').solves_every_level.in_most_trials())",
+    "refuted": "verdict(trials('wrong', on='parity').solves_every_level.in_most_trials())",
+    "undecided": "verdict(trials('coin', on='parity').solves_every_level.in_most_trials(p0=0.5))",
+    "error": "verdict(trials('broken', on='parity').solves_every_level.in_most_trials())",
+}
+
+
+def claims(**bodies: str) -> str:
+    """Return a module with one claim for each name, whose test has this body (a key of BODIES, or code)."""
+    tests = [
+        f"@says('{name}')\ndef test_{name}(trials, verdict):\n    {BODIES.get(body, body)}\n"
+        for name, body in bodies.items()
+    ]
+    return HEAD + "\n\n" + "\n\n".join(tests)
+
+
+@pytest.fixture(scope="session")
+def warmed() -> None:
+    """Import here what a run imports late: pytester forgets the modules that a run within this process imported."""
+    import tempfile
+
+    import evoclaims.cli.plan
+    import evoclaims.cli.project
+    import evoclaims.cli.run
+    import evoclaims.suite.table  # noqa: F401
+    from evoclaims.envs.gates.parity import NParity
+    from evoclaims.methods.hand_built import HandBuilt
+    from evoclaims.trials import devices
+    from evoclaims.trials.budget import Budget
+    from evoclaims.trials.runner import run
+    from evoclaims.trials.spec import Condition
+    from evoclaims.trials.store import Store
+
+    with tempfile.TemporaryDirectory() as folder:
+        condition = Condition(HandBuilt(), NParity(2), "curriculum", Budget(generations=1, reports=1))
+        run(condition, [0], Store(Path(folder)), devices.choose("cpu"))
+
+
+@pytest.fixture(scope="session")
+def shared_store(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A store that tests share which do not look into it, so that their trials are run once."""
+    return tmp_path_factory.mktemp("shared") / "store"
+
+
+class Project:
+    """The tiny project in pytester's folder."""
+
+    def __init__(self, pytester: pytest.Pytester, store: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.setenv("COLUMNS", "160")  # so that no line of interest is wrapped
+        self.pytester = pytester
+        self.path = pytester.path
+        self.store = store
+        pytester.makepyprojecttoml(PYPROJECT)
+        pytester.makepyfile(tiny_paper=REPRODUCTION)
+        (self.path / "claims").mkdir()
+
+    def write(self, text: str = "", **bodies: str) -> None:
+        """Write the claims; see `claims`."""
+        (self.path / "claims" / "test_claims.py").write_text((text and HEAD + text) or claims(**bodies))
+
+    def run(self, *arguments: str, own_store: bool = False) -> pytest.RunResult:
+        """Run pytest in this process; on the shared store unless told otherwise."""
+        storage = () if own_store else (f"--claims-storage={self.store}",)
+        return self.pytester.runpytest_inprocess(*storage, *arguments)
+
+    def run_apart(self, *arguments: str) -> pytest.RunResult:
+        """Run pytest in a process of its own, on the project's own store."""
+        return self.pytester.runpytest_subprocess(*arguments)
+
+    def json(self, *arguments: str) -> dict[str, Any]:
+        """Run, and return what --claims-json wrote."""
+        self.run("--claims-json=out.json", *arguments)
+        plain: dict[str, Any] = json.loads((self.path / "out.json").read_text())
+        return plain
+
+
+@pytest.fixture
+def project(pytester: pytest.Pytester, shared_store: Path, warmed: None, monkeypatch: pytest.MonkeyPatch) -> Project:
+    """The tiny project, without claims yet."""
+    return Project(pytester, shared_store, monkeypatch)
+
+
+@pytest.fixture(scope="session")
+def sentence() -> Callable[[pytest.RunResult, str], None]:
+    """A function that checks that a run ended with a sentence and no traceback."""
+
+    def check(result: pytest.RunResult, text: str) -> None:
+        shown = "\n".join([*result.outlines, *result.errlines])
+        assert text in " ".join(shown.split())
+        assert "Traceback" not in shown
+        assert "INTERNALERROR" not in shown
+
+    return check

@@ -1,0 +1,62 @@
+"""Choosing the hardware: one sentence where it is not there, and no hand in what a user has decided."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from evoclaims.core.errors import UserError
+from evoclaims.trials import devices
+
+
+def test_an_unknown_device_is_a_sentence_with_the_known_ones() -> None:
+    with pytest.raises(UserError, match="There is no device named 'gpus'.*Known: auto, cpu, gpu"):
+        devices.choose("gpus")
+
+
+def test_a_gpu_that_is_not_there_is_a_sentence_with_the_remedy(monkeypatch: pytest.MonkeyPatch) -> None:
+    def none(platform: str | None = None) -> list[object]:
+        raise RuntimeError("Unknown backend")
+
+    monkeypatch.setattr("jax.devices", none)
+    monkeypatch.setenv("JAX_PLATFORMS", "cuda")
+    with pytest.raises(UserError, match=r"'gpu' with JAX_PLATFORMS=cuda\. Install jax for CUDA .*\"cpu\"") as caught:
+        devices.choose("gpu")
+    assert "\n" not in str(caught.value)
+
+
+def test_the_cpu_can_always_be_asked_for() -> None:
+    assert {device.platform for device in devices.choose("cpu")} == {"cpu"}
+    assert devices.layout_for(devices.choose("cpu")) == "loop"
+
+
+SCRIPT = """
+import json, jax
+from evoclaims.trials import devices
+devices.configure()
+devices.configure()
+print(json.dumps([len(jax.devices()), jax.config.jax_compilation_cache_dir]))
+"""
+
+
+def _configured(**settings: str) -> tuple[int, str]:
+    """Return what a fresh process sees under these environment variables."""
+    ours = {name: value for name, value in os.environ.items() if not name.startswith(("JAX_", "XLA_"))}
+    environment = {**ours, "JAX_PLATFORMS": "cpu", "PYTHONPATH": os.pathsep.join(sys.path), **settings}
+    done = subprocess.run([sys.executable, "-c", SCRIPT], env=environment, capture_output=True, text=True, check=True)
+    count, folder = json.loads(done.stdout)
+    return count, folder
+
+
+def test_there_is_a_cpu_device_for_every_core_and_a_cache_that_lasts(tmp_path: Path) -> None:
+    cores = devices.usable_cores()
+    assert _configured(XDG_CACHE_HOME=str(tmp_path)) == (cores, str(tmp_path / "evoclaims" / "xla"))
+
+
+def test_what_a_user_has_decided_stays(tmp_path: Path) -> None:
+    assert _configured(JAX_NUM_CPU_DEVICES="3", JAX_COMPILATION_CACHE_DIR=str(tmp_path)) == (3, str(tmp_path))

@@ -1,0 +1,117 @@
+"""The record of a run: what it says of a trial that climbed, of one that diverged, and of where it was made."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from trial_toys import walk
+
+from evoclaims.envs.gates.parity import NParity
+from evoclaims.methods.hand_built import HandBuilt
+from evoclaims.trials.budget import Budget
+from evoclaims.trials.result import TrialResult
+from evoclaims.trials.runner import run
+from evoclaims.trials.spec import Condition, TrialSpec
+from evoclaims.trials.store import Store
+
+SEEDS = range(6)
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory: pytest.TempPathFactory, cpus: list[Any]) -> list[TrialResult]:
+    """Some climb to the end, some diverge."""
+    return run(walk(chance=0.35, hazard=0.1), SEEDS, Store(tmp_path_factory.mktemp("store")), cpus)
+
+
+def _of(results: Sequence[TrialResult], status: str) -> list[TrialResult]:
+    found = [result for result in results if result.status == status]
+    assert found
+    return found
+
+
+def test_a_nan_ends_its_own_trial_as_diverged_and_the_others_go_on(results: list[TrialResult]) -> None:
+    for diverged in _of(results, "diverged"):
+        assert np.isnan(diverged.curves["fitness"][-1])
+        assert not np.isnan(diverged.curves["fitness"][:-1]).any()
+        assert len(diverged.curves["fitness"]) == -(-int(diverged.metrics["steps"]) // 2)
+    for done in _of(results, "done"):
+        assert not np.isnan(done.curves["fitness"]).any()
+
+
+def test_a_method_that_calls_itself_unhealthy_diverges_as_one_that_yields_nan(
+    results: list[TrialResult], tmp_path: Path, cpus: list[Any]
+) -> None:
+    unhealthy = run(walk(chance=0.35, hazard=0.1, unhealthy=True), SEEDS, Store(tmp_path), cpus)
+    assert [(r.seed, r.status, r.metrics["steps"]) for r in unhealthy] == [
+        (r.seed, r.status, r.metrics["steps"]) for r in results
+    ]
+    assert not any(np.isnan(result.curves["fitness"]).any() for result in unhealthy)
+
+
+def test_a_level_is_counted_as_solved_only_by_a_healthy_step(results: list[TrialResult]) -> None:
+    """The toy reports success together with its NaN."""
+    for diverged in _of(results, "diverged"):
+        assert diverged.metrics["steps"] * 10 not in diverged.levels["solved_at"]
+
+
+def test_metrics_and_levels_agree_with_each_other(results: list[TrialResult]) -> None:
+    for result in results:
+        solved = [level for level, steps in enumerate(result.levels["solved_at"]) if steps != -1]
+        assert result.metrics["furthest_solved"] == (solved[-1] if solved else -1)
+        assert result.metrics["furthest_reached"] == min(result.metrics["furthest_solved"] + 1, 2)
+        assert result.metrics["environment_steps"] == 10 * result.metrics["steps"]
+        assert result.metrics["mean_success"] == pytest.approx(np.mean(result.levels["success"]))
+        assert result.metrics["last_success"] == result.levels["success"][-1]
+        assert result.metrics["last_fitness"] == result.levels["fitness"][-1]
+
+
+def test_a_curve_has_one_point_a_report_until_the_trial_ends(results: list[TrialResult]) -> None:
+    for result in results:
+        steps = result.curves["steps"]
+        assert list(steps[:-1]) == [2 * (i + 1) for i in range(len(steps) - 1)]
+        assert steps[-1] == result.metrics["steps"]
+        assert set(result.curves) == {"steps", "environment_steps", "level", "fitness", "success", "first"}
+        assert list(result.curves["level"]) == sorted(result.curves["level"])
+
+
+def test_a_finished_trial_spends_no_step_after_its_last_level(results: list[TrialResult]) -> None:
+    finished = [r for r in results if r.metrics["furthest_solved"] == 2]
+    assert finished
+    for result in finished:
+        assert result.levels["solved_at"][-1] == result.metrics["environment_steps"]
+
+
+def test_a_record_says_what_it_is_and_where_it_was_made(results: list[TrialResult]) -> None:
+    for seed, result in zip(SEEDS, results, strict=True):
+        spec = TrialSpec(walk(chance=0.35, hazard=0.1), seed)
+        assert (result.id, result.condition, result.seed) == (spec.id, spec.condition.id, seed)
+        assert result.provenance["device"]["platform"] == "cpu"
+        assert result.provenance["device"]["count"] == 2
+        assert result.provenance["matmul_precision"] == "highest"
+        assert result.timing["batch"] == len(SEEDS)
+        assert datetime.fromisoformat(result.timing["started"]) <= datetime.fromisoformat(result.timing["ended"])
+        assert result.timing["run"] >= 0
+        assert result.timing["compile"] >= 0
+
+
+@pytest.mark.parametrize(("negated", "success", "furthest"), [(False, 1.0, 1), (True, 0.0, -1)])
+def test_a_right_network_goes_through_every_level_and_a_wrong_one_through_none(
+    negated: bool, success: float, furthest: int, tmp_path: Path, cpus: list[Any]
+) -> None:
+    condition = Condition(HandBuilt(negated), NParity(3), "curriculum", Budget(generations=9, reports=3))
+    (result,) = run(condition, [0], Store(tmp_path), cpus[:1])
+    assert result.levels["success"] == (success, success)
+    assert result.metrics["furthest_solved"] == furthest
+    assert result.metrics["steps"] == (9 if negated else 2)
+
+
+def test_a_direct_trial_trains_on_the_last_level_and_is_examined_on_all(tmp_path: Path, cpus: list[Any]) -> None:
+    condition = Condition(HandBuilt(), NParity(3), "direct", Budget(generations=9, reports=3))
+    (result,) = run(condition, [0], Store(tmp_path), cpus[:1])
+    assert result.levels["solved_at"] == (-1.0, 8.0)
+    assert result.levels["success"] == (1.0, 1.0)
