@@ -151,14 +151,15 @@ def test_a_sampled_episode_is_one_step_that_pays_its_rows_error(gate: Gate) -> N
     policy = table_policy(task.table.inputs, answers)
     level = jnp.asarray(task.levels - 1, jnp.int32)
     keys = jax.random.split(jax.random.key(3), 300)
-    starts = jax.vmap(lambda key: task.reset(key, level))(keys)
-    ends = jax.vmap(lambda state: task.step(state, policy(state.observation)))(starts)
+    starts = jax.jit(jax.vmap(lambda key: task.reset(key, level)))(keys)
+    ends = jax.jit(jax.vmap(lambda state: task.step(state, policy(state.observation))))(starts)
     assert np.asarray(ends.terminated).all()
     assert not np.asarray(ends.truncated).any()
     for row, reward in zip(np.asarray(starts.inner.index), np.asarray(ends.reward), strict=True):
         wanted = [(x > 0) != bit for x, bit in zip(answers[row], gate.last[row].wanted, strict=True) if bit is not None]
         assert reward == pytest.approx(-np.mean(wanted), abs=1e-7)
-    episodes = jax.vmap(lambda key: task.episode(policy, key, level))(jax.random.split(jax.random.key(3), 300))
+    again = jax.random.split(jax.random.key(3), 300)
+    episodes = jax.jit(jax.vmap(lambda key: task.episode(policy, key, level)))(again)
     np.testing.assert_array_equal(np.asarray(episodes.fitness), np.asarray(ends.reward))
     np.testing.assert_array_equal(np.asarray(episodes.success) == 1.0, np.asarray(ends.reward) == 0.0)
 

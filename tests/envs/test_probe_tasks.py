@@ -14,9 +14,9 @@ from evoclaims.envs.base import Episode, PolicyFn
 from evoclaims.envs.probes import CONSTANT, COPY, CURRICULUM, DELAYED, PROBES, SURVIVAL, Probe
 
 YES: PolicyFn = lambda observation: jnp.ones(1)  # noqa: E731
-REPEAT: PolicyFn = lambda observation: 2.0 * observation[:1] - 1.0  # noqa: E731
-EXCLUSIVE_OR: PolicyFn = lambda observation: jnp.sum(observation, keepdims=True) % 2.0 - 0.5  # noqa: E731
-SECOND_BIT: PolicyFn = lambda observation: 2.0 * observation[1:] - 1.0  # noqa: E731
+REPEAT: PolicyFn = lambda observation: observation[:1]  # noqa: E731
+EXCLUSIVE_OR: PolicyFn = lambda observation: -jnp.prod(observation, keepdims=True)  # noqa: E731
+SECOND_BIT: PolicyFn = lambda observation: observation[1:]  # noqa: E731
 RIGHT = {
     "probe_constant": YES,
     "probe_copy": REPEAT,
@@ -81,31 +81,29 @@ def test_the_constant_asks_for_yes_whatever_is_shown() -> None:
 
 
 def test_an_answer_of_0_is_the_bit_0() -> None:
-    assert _play(COPY, (0.0,), [0.0]) == [((0.0,), 1.0, True, False)]
+    assert _play(COPY, (-1.0,), [0.0]) == [((-1.0,), 1.0, True, False)]
     assert _play(COPY, (1.0,), [0.0]) == [((1.0,), -1.0, True, False)]
 
 
-@pytest.mark.parametrize("bit", [0.0, 1.0])
+@pytest.mark.parametrize("bit", [-1.0, 1.0])
 @pytest.mark.parametrize("second", [-1.0, 1.0])
 def test_the_delayed_reward_is_paid_by_the_second_step_for_the_first_answer(bit: float, second: float) -> None:
-    answer = 2 * bit - 1
     waiting = (0.0, 1.0)
-    assert _play(DELAYED, (bit, 0.0), [answer, second]) == [
+    assert _play(DELAYED, (bit, 0.0), [bit, second]) == [
         (waiting, 0.0, False, False),
         (waiting, 1.0, True, False),
     ]
-    assert _play(DELAYED, (bit, 0.0), [-answer, second])[1] == (waiting, -1.0, True, False)
+    assert _play(DELAYED, (bit, 0.0), [-bit, second])[1] == (waiting, -1.0, True, False)
 
 
-@pytest.mark.parametrize("bit", [0.0, 1.0])
+@pytest.mark.parametrize("bit", [-1.0, 1.0])
 def test_survival_terminates_on_an_error_and_truncates_at_the_horizon(bit: float) -> None:
-    answer = 2 * bit - 1
-    assert _play(SURVIVAL, (bit,), [answer, -answer]) == [
-        ((1 - bit,), 1.0, False, False),
-        ((1 - bit,), 1.0, False, True),
+    assert _play(SURVIVAL, (bit,), [bit, -bit]) == [
+        ((-bit,), 1.0, False, False),
+        ((-bit,), 1.0, False, True),
     ]
-    assert _play(SURVIVAL, (bit,), [-answer])[0] == ((1 - bit,), -1.0, True, False)
-    assert _play(SURVIVAL, (bit,), [answer, answer])[1] == ((1 - bit,), -1.0, True, False)
+    assert _play(SURVIVAL, (bit,), [-bit])[0] == ((-bit,), -1.0, True, False)
+    assert _play(SURVIVAL, (bit,), [bit, bit])[1] == ((-bit,), -1.0, True, False)
 
 
 def test_survival_forfeits_what_an_ended_episode_does_not_reach() -> None:
@@ -135,6 +133,7 @@ def test_episodes_start_on_every_case_of_the_level_alike_and_on_no_other(name: s
 def test_the_examination_is_what_episodes_pay_on_average(name: str, policy: PolicyFn) -> None:
     probe = PROBES[name]
     level = jnp.asarray(probe.levels - 1, jnp.int32)
+    step = jax.jit(lambda state: probe.step(state, policy(state.observation)))
     returns: dict[int, float] = {}
     for key in jax.random.split(jax.random.key(0), 64):
         state = probe.reset(key, level)
@@ -142,7 +141,7 @@ def test_the_examination_is_what_episodes_pay_on_average(name: str, policy: Poli
         if case in returns:
             continue
         while not (state.terminated or state.truncated):
-            state = probe.step(state, policy(state.observation))
+            state = step(state)
             total += float(state.reward)
         returns[case] = total
     assert len(returns) == probe.cases_at_level[-1]

@@ -71,15 +71,15 @@ METHODS = {
         cost=8 * 2 * 2,
         keeps_the_best=False,
         prober=Ppo(
-            policy_layers=(8, 8),
-            value_layers=(8, 8),
-            environments=32,
+            policy_layers=(16,),
+            value_layers=(16,),
+            environments=64,
             unroll_length=2,
-            batch_size=16,
+            batch_size=32,
             minibatches=4,
             learning_rate=1e-2,
         ),
-        probing=Budget(generations=1500, reports=1),
+        probing=Budget(generations=2000, reports=1),
     ),
 }
 _BENCHES = {name: Workbench(entry.method, entry.task) for name, entry in METHODS.items()}
@@ -112,8 +112,8 @@ def bench(name: str) -> Workbench:
 
 @pytest.fixture
 def cpus() -> list[Any]:
-    """The CPU devices that the engine spreads trials over."""
-    return list(jax.devices("cpu")[:2])
+    """The CPU device that the engine runs trials on: one compiles faster than two."""
+    return list(jax.devices("cpu")[:1])
 
 
 @pytest.fixture

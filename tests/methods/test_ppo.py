@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -29,14 +28,6 @@ def test_one_step_changes_every_layer_of_both_networks(benches: dict[str, Workbe
     assert int(after.steps) == 1
 
 
-def test_without_a_learning_rate_nothing_changes() -> None:
-    bench = Workbench(replace(SMALL, learning_rate=0.0), CONSTANT)
-    before = bench.init()
-    after, _ = bench.run(1, state=before)
-    for one, other in zip(leaves(before.networks), leaves(after.networks), strict=True):
-        np.testing.assert_array_equal(one, other)
-
-
 def test_the_observations_statistics_are_those_of_what_was_collected(benches: dict[str, Workbench]) -> None:
     bench = benches["ppo"]
     state, _ = bench.run(3, level=1)
@@ -56,11 +47,12 @@ def test_a_step_at_another_level_trains_on_episodes_of_that_level(benches: dict[
     assert set(np.asarray(high.interaction.states.observation)[:, 0].tolist()) == {0.0, 1.0}
 
 
-@pytest.mark.parametrize("sampled_episodes", [0, 128], ids=["the whole table", "as published"])
-def test_success_is_told_only_by_the_steps_that_test_for_it(sampled_episodes: int) -> None:
-    bench = Workbench(replace(SMALL, level_test=LevelTest(every=3, sampled_episodes=sampled_episodes)), ALWAYS_RIGHT)
+def test_success_is_told_only_by_the_steps_that_test_for_it_and_is_exactly_1_without_an_error() -> None:
+    """41 · float32(1 / 41), as XLA divides by a constant, would be 0.99999994: a test that nobody passes."""
+    bench = Workbench(replace(SMALL, level_test=LevelTest(every=3, sampled_episodes=41)), ALWAYS_RIGHT)
     _, reports = bench.run(7)
     assert [float(progress.success) for progress in reports] == [0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 0.0]
+    assert {float(progress.fitness) for progress in reports} == {0.0}
 
 
 def test_the_published_test_asks_the_stochastic_policy_and_forgives_no_error() -> None:
@@ -68,14 +60,7 @@ def test_the_published_test_asks_the_stochastic_policy_and_forgives_no_error() -
     told = [float(progress.success) for progress in sampled.run(5)[1]]
     assert all(success * 128 == int(success * 128) for success in told)
     assert all(0.0 < success < 1.0 for success in told)  # an untrained policy errs now and then
-    certain = [float(progress.success) for progress in Workbench(SMALL, CONSTANT).run(5)[1]]
-    assert set(certain) <= {0.0, 0.5, 1.0}
-
-
-def test_faultless_episodes_are_a_success_of_exactly_1_whatever_their_number() -> None:
-    """41 · float32(1 / 41) is 0.99999994: a test that nobody passes."""
-    bench = Workbench(replace(SMALL, level_test=LevelTest(sampled_episodes=41)), ALWAYS_RIGHT)
-    assert float(bench.run(1)[1][0].success) == 1.0
+    assert len(set(told)) > 1
 
 
 @pytest.mark.parametrize(
@@ -103,19 +88,10 @@ def test_an_impossible_level_test_is_one_sentence(wrong: dict[str, Any]) -> None
         LevelTest(**wrong)
 
 
-def test_a_policy_of_rewards_in_the_other_direction_learns_the_other_answer() -> None:
-    """The gradient's sign: yes is learnt where yes is paid, and no where no is."""
+def test_a_no_is_learnt_where_a_no_is_paid() -> None:
+    """The gradient's sign; that a yes is learnt where a yes is paid, a probe shows."""
     no = Probe("constant_no", cases=((((0.0,), 0),), (((1.0,), 0),)), cases_at_level=(2,))
     learner = replace(SMALL, environments=32, batch_size=32, updates_per_batch=8, learning_rate=3e-2)
-    for task, sign in ((CONSTANT, 1.0), (no, -1.0)):
-        bench = Workbench(learner, task)
-        policy = bench.method.best(task, bench.run(10)[0])
-        for bit in (0.0, 1.0):
-            assert sign * float(policy(jnp.array([bit]))[0]) > 0
-
-
-def test_the_key_of_the_deterministic_policy_is_no_randomness(benches: dict[str, Workbench]) -> None:
-    bench = benches["ppo"]
-    policy = bench.method.best(bench.task, bench.init())
-    answers = {float(jax.jit(policy)(jnp.ones(3))[0]) for _ in range(3)}
-    assert len(answers) == 1
+    bench = Workbench(learner, no)
+    policy = bench.method.best(no, bench.run(10)[0])
+    assert [float(policy(jnp.array([bit]))[0]) < 0 for bit in (0.0, 1.0)] == [True, True]

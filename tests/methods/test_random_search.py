@@ -7,10 +7,13 @@ from typing import Any
 import jax
 import numpy as np
 import pytest
+from workbench import Workbench
 
 from evoclaims.core.errors import UserError
 from evoclaims.core.keys import stream
+from evoclaims.envs.probes import Probe
 from evoclaims.methods.random_search import RandomSearch
+from evoclaims.networks.all_skips import AllSkips
 
 STEPS, SEED = 6, 2
 
@@ -50,13 +53,15 @@ def _fire(parameters: Any, bits: Any, hidden: int) -> float:
     return float(feed[hidden] @ [*bits, 1.0] + np.dot(readout, fired))
 
 
-def test_the_standard_deviation_scales_what_is_drawn(benches: dict[str, Any]) -> None:
-    task = benches["random_search"].task
-    size = RandomSearch().network.size(task.observation_size, task.action_size)
-    for std in (0.1, 3.0):
-        method = RandomSearch(2, std=std)
-        state, _ = method.step(jax.random.key(0), task, jax.numpy.int32(0), method.init(jax.random.key(1), task))
-        assert float(np.std(state.parameters)) == pytest.approx(std, rel=5 / np.sqrt(size))
+def test_the_standard_deviation_scales_what_is_drawn() -> None:
+    """Every draw is right where every answer is, so that the newcomer is champion."""
+    task = Probe("always_right", cases=((((0.0,), None),),), cases_at_level=(1,))
+    drawn = {}
+    for std in (1.0, 3.0):
+        method = RandomSearch(1, std, AllSkips(2))
+        drawn[std] = Workbench(method, task).run(1)[0]
+    np.testing.assert_allclose(drawn[3.0].parameters, 3.0 * drawn[1.0].parameters, rtol=1e-6)
+    assert float(np.abs(drawn[1.0].parameters).max()) > 0
 
 
 @pytest.mark.parametrize("wrong", [{"population": 0}, {"std": 0.0}, {"std": -1.0}])

@@ -18,6 +18,8 @@ class Workbench:
     def __init__(self, method: Any, task: Any) -> None:
         self.method, self.task, self.traces = method, task, 0
         self.step: Callable[[Any, Any, Any], tuple[Any, Progress]] = jax.jit(self._traced)
+        self._init = jax.jit(lambda key: method.init(key, task))
+        self._examine = jax.jit(lambda state, level: task.examine(method.best(task, state), jax.random.key(0), level))
 
     def _traced(self, key: Any, level: Any, state: Any) -> tuple[Any, Progress]:
         self.traces += 1
@@ -27,7 +29,7 @@ class Workbench:
         return self.method.step(key, self.task, level, state)
 
     def init(self, seed: int = 0) -> Any:
-        return self.method.init(jax.random.key(seed), self.task)
+        return self._init(jax.random.key(seed))
 
     def run(self, steps: int, seed: int = 0, level: int = 0, state: Any = None) -> tuple[Any, list[Progress]]:
         """Take `steps` steps; the i-th uses the key `seed + 1` folded with i."""
@@ -41,8 +43,7 @@ class Workbench:
 
     def examine(self, state: Any, level: int = 0) -> Any:
         """Return the examination of the method's best policy."""
-        policy = self.method.best(self.task, state)
-        return self.task.examine(policy, jax.random.key(0), jnp.asarray(level, jnp.int32))
+        return self._examine(state, jnp.asarray(level, jnp.int32))
 
 
 def leaves(tree: Any) -> list[Any]:

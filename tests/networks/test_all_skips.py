@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import functools
+from collections.abc import Callable
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -34,6 +37,11 @@ def _loops(parameters: NDArray[np.float64], observation: NDArray[np.float64], hi
     return fired[hidden:]
 
 
+@functools.cache
+def _apply(hidden: int, outputs: int) -> Callable[[jax.Array, jax.Array], jax.Array]:
+    return jax.jit(lambda parameters, observation: AllSkips(hidden).apply(parameters, observation, outputs))
+
+
 def _drawn(inputs: int, hidden: int, outputs: int, seed: int = 0) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return parameters and an observation."""
     draw = np.random.default_rng(seed)
@@ -44,7 +52,7 @@ def _drawn(inputs: int, hidden: int, outputs: int, seed: int = 0) -> tuple[NDArr
 def test_it_computes_what_loops_over_neurons_compute(inputs: int, hidden: int, outputs: int) -> None:
     for seed in range(3):
         parameters, observation = _drawn(inputs, hidden, outputs, seed)
-        answer = AllSkips(hidden).apply(jnp.float32(parameters), jnp.float32(observation), outputs)
+        answer = _apply(hidden, outputs)(jnp.float32(parameters), jnp.float32(observation))
         assert answer.shape == (outputs,)
         assert answer.dtype == jnp.float32
         np.testing.assert_allclose(answer, _loops(parameters, observation, hidden, outputs), atol=1e-5)
@@ -54,11 +62,8 @@ def test_it_computes_what_loops_over_neurons_compute(inputs: int, hidden: int, o
 @given(seed=st.integers(0, 2**31 - 1))
 def test_any_parameters_give_what_loops_give(seed: int) -> None:
     parameters, observation = _drawn(3, 4, 2, seed)
-    answer = APPLY(jnp.float32(parameters), jnp.float32(observation))
+    answer = _apply(4, 2)(jnp.float32(parameters), jnp.float32(observation))
     np.testing.assert_allclose(answer, _loops(parameters, observation, 4, 2), atol=1e-5)
-
-
-APPLY = jax.jit(lambda parameters, observation: AllSkips(4).apply(parameters, observation, 2))
 
 
 @sizes
@@ -75,7 +80,7 @@ def test_the_papers_network_on_6_parity_has_475_parameters() -> None:
 @sizes
 def test_every_parameter_matters(inputs: int, hidden: int, outputs: int) -> None:
     parameters, observation = _drawn(inputs, hidden, outputs)
-    slopes = jax.jacobian(AllSkips(hidden).apply)(jnp.float32(parameters) / 5, jnp.float32(observation), outputs)
+    slopes = jax.jit(jax.jacobian(_apply(hidden, outputs)))(jnp.float32(parameters) / 5, jnp.float32(observation))
     assert (np.abs(slopes).max(axis=0) > 0).all()
 
 
@@ -85,7 +90,7 @@ def test_a_hidden_neuron_is_influenced_by_every_earlier_one_and_by_no_later_one(
     feed, readout = (2 * hidden) * (inputs + 1), hidden * hidden
     parameters[hidden * (inputs + 1) : feed] = 0.0  # output j hears hidden neuron j alone
     parameters[feed : feed + readout] = np.eye(hidden).ravel()
-    slopes = jax.jacobian(AllSkips(hidden).apply)(jnp.asarray(parameters), jnp.ones(inputs), hidden)
+    slopes = jax.jit(jax.jacobian(_apply(hidden, hidden)))(jnp.asarray(parameters), jnp.ones(inputs))
     biases = np.arange(hidden) * (inputs + 1) + inputs
     heard = np.asarray(slopes)[:, biases] != 0
     np.testing.assert_array_equal(heard, np.tril(np.ones((hidden, hidden), bool)))
@@ -94,7 +99,7 @@ def test_a_hidden_neuron_is_influenced_by_every_earlier_one_and_by_no_later_one(
 def test_every_input_reaches_an_output_past_all_hidden_neurons() -> None:
     parameters = np.zeros(AllSkips(3).size(2, 1), np.float32)
     parameters[3 * 3 : 3 * 3 + 2] = 0.5, -0.25  # the output's own weights from the inputs
-    answer = AllSkips(3).apply(jnp.asarray(parameters), jnp.array([1.0, 1.0]), 1)
+    answer = _apply(3, 1)(jnp.asarray(parameters), jnp.array([1.0, 1.0]))
     np.testing.assert_allclose(answer, np.tanh(0.25), atol=1e-6)
 
 

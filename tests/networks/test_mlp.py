@@ -43,10 +43,11 @@ def test_it_computes_what_loops_over_neurons_compute(
     inputs: int, layers: tuple[int, ...], outputs: int, skip: bool
 ) -> None:
     network = Mlp(layers, skip)
+    apply = jax.jit(lambda parameters, observation: network.apply(parameters, observation, outputs))
     for seed in range(3):
         draw = np.random.default_rng(seed)
         parameters, observation = draw.normal(size=network.size(inputs, outputs)), draw.normal(size=inputs)
-        answer = network.apply(jnp.float32(parameters), jnp.float32(observation), outputs)
+        answer = apply(jnp.float32(parameters), jnp.float32(observation))
         assert answer.shape == (outputs,)
         assert answer.dtype == jnp.float32
         np.testing.assert_allclose(answer, _loops(parameters, observation, (*layers, outputs), skip), atol=2e-5)
@@ -58,7 +59,8 @@ def test_every_parameter_matters(inputs: int, layers: tuple[int, ...], outputs: 
     network = Mlp(layers, skip)
     draw = np.random.default_rng(0)
     parameters, observation = draw.normal(size=network.size(inputs, outputs)) / 4, draw.normal(size=inputs)
-    slopes = jax.jacobian(network.apply)(jnp.float32(parameters), jnp.float32(observation), outputs)
+    slope = jax.jit(jax.jacobian(lambda parameters, observation: network.apply(parameters, observation, outputs)))
+    slopes = slope(jnp.float32(parameters), jnp.float32(observation))
     assert (np.abs(slopes).max(axis=0) > 0).all()
 
 

@@ -121,8 +121,10 @@ def test_a_trial_stored_elsewhere_after_the_checkpoint_is_not_run_again(
     late = next(result for result in uninterrupted if result.metrics["steps"] == 12)
     store.put(late, {})
     puts.clear()
-    assert _digests(_run(store, cpus)) == _digests(uninterrupted)
+    log = Log()
+    assert _digests(_run(store, cpus, log)) == _digests(uninterrupted)
     assert puts[late.seed] == 0
+    assert max(log.steps()) == max(r.metrics["steps"] for r in uninterrupted if r is not late) < 10  # its lane is idle
 
 
 def test_a_checkpoint_whose_trials_are_all_stored_is_removed(

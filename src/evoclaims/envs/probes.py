@@ -168,25 +168,26 @@ class Probe:
 
 CONSTANT: Final = Probe("probe_constant", cases=((((0.0,), 1),), (((1.0,), 1),)), cases_at_level=(2,))
 """Say yes, whatever is shown: does anything that is rewarded get done?"""
-COPY: Final = Probe("probe_copy", cases=((((0.0,), 0),), (((1.0,), 1),)), cases_at_level=(2,))
+# From here on bits are shown as -1 and 1: an untrained network without biases answers 0, a no, to an observation of 0.
+COPY: Final = Probe("probe_copy", cases=((((-1.0,), 0),), (((1.0,), 1),)), cases_at_level=(2,))
 """Repeat the bit: does the policy look at what it is shown?"""
 DELAYED: Final = Probe(
     "probe_delayed",
-    cases=((((0.0, 0.0), 0), ((0.0, 1.0), None)), (((1.0, 0.0), 1), ((0.0, 1.0), None))),
+    cases=((((-1.0, 0.0), 0), ((0.0, 1.0), None)), (((1.0, 0.0), 1), ((0.0, 1.0), None))),
     cases_at_level=(2,),
     paid_late=True,
 )
 """Repeat the bit and be paid one step later, when nothing shown tells which bit it was: is credit carried back?"""
 SURVIVAL: Final = Probe(
     "probe_survival",
-    cases=((((0.0,), 0), ((1.0,), 1)), (((1.0,), 1), ((0.0,), 0))),
+    cases=((((-1.0,), 0), ((1.0,), 1)), (((1.0,), 1), ((-1.0,), 0))),
     cases_at_level=(2,),
     error_ends=True,
 )
 """Repeat two bits, of which a wrong answer to the first forfeits the second: is a policy trained through early ends?"""
 CURRICULUM: Final = Probe(
     "probe_curriculum",
-    cases=((((0.0, 0.0), 0),), (((0.0, 1.0), 1),), (((1.0, 0.0), 1),), (((1.0, 1.0), 0),)),
+    cases=((((-1.0, -1.0), 0),), (((-1.0, 1.0), 1),), (((1.0, -1.0), 1),), (((1.0, 1.0), 0),)),
     cases_at_level=(2, 4),
 )
 """Repeat the second bit (level 0), and negate it where the first is set (level 1): is a level left when solved?"""
