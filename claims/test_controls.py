@@ -36,8 +36,8 @@ def test_a_right_circuit_scores_one_and_a_wrong_one_zero(trials, verdict, task):
     "C5",
     says="Trials of one method, split into halves at random, are found different no more often than chance allows",
     where="control",
-    smoke="Trials of one method on 4-parity, split into halves at random, are found different no more often than chance "
-    "allows",
+    smoke="Trials of one method on 4-parity, split into halves at random, are found different no more often than "
+    "chance allows",
 )
 @pytest.mark.parametrize("method", ["cma_es", "ppo", "random_search"])
 def test_a_method_is_not_better_than_itself(trials, verdict, method):

@@ -5,7 +5,7 @@ Smoke judges each sentence on a smaller instance: 4-parity and the first three o
 
 import pytest
 
-from evoclaims import claim
+from evoclaims import Outcome, claim, expected
 
 TASKS = ["n_parity", "simple_alu"]
 
@@ -15,6 +15,9 @@ TASKS = ["n_parity", "simple_alu"]
     says="CMA-ES successfully solves all levels for both tasks",
     where="§5.1, Fig. 3",
     smoke="CMA-ES solves all three levels of 4-parity, and the first three levels of Simple ALU",
+    expect=Outcome.REFUTED,
+    because="most trials end in a local optimum one row short; full: 2 of 10 solve 6-parity, none of 10 gets past XOR "
+    "in the ALU",
 )
 @pytest.mark.parametrize("task", TASKS)
 def test_cma_es_solves_every_level(trials, verdict, task):
@@ -28,6 +31,12 @@ def test_cma_es_solves_every_level(trials, verdict, task):
     where="§5.1, Fig. 3",
     smoke="PPO solves no level but the first of 4-parity, and of the first three levels of Simple ALU",
 )
+@expected(
+    Outcome.REFUTED,
+    tier="smoke",
+    because="the smaller tasks let more than half of the trials past the first level; full is undecided, with 5 of 10 "
+    "and 4 of 10 trials staying there",
+)
 @pytest.mark.parametrize("task", TASKS)
 def test_ppo_stays_at_the_first_level(trials, verdict, task):
     ppo = trials("ppo", on=task)
@@ -39,6 +48,12 @@ def test_ppo_stays_at_the_first_level(trials, verdict, task):
     says="When directly solving 6-parity (without going through the intermediate levels) PPO solves the task",
     where="§5.1, Fig. 4",
     smoke="When directly solving 4-parity, PPO solves it",
+)
+@expected(
+    Outcome.REFUTED,
+    tier="full",
+    because="2 of 10 trials answer all 64 rows at once, the others end at 0.73 to 0.98: near the paper's perfect "
+    "success, but never at it",
 )
 def test_ppo_solves_parity_without_the_curriculum(trials, verdict):
     ppo = trials("ppo", on="n_parity_direct")

@@ -76,14 +76,11 @@ def test_unscored_outputs_do_not_matter(gate: Gate, unscored: float) -> None:
     assert (episode.fitness == 0.0).all()
 
 
-def test_an_output_of_0_is_the_bit_0() -> None:
-    task = NParity(2)
-    episode = _examine(task, np.zeros((4, 1)))
-    assert episode.success[0] == 0.5
-
-
-def test_an_output_that_is_not_a_number_is_right_about_nothing_it_should_set() -> None:
-    assert _examine(NParity(2), np.full((4, 1), np.nan)).success[0] == 0.5
+@pytest.mark.parametrize("output", [0.0, -0.0, np.nan])
+def test_an_output_that_is_not_above_0_is_the_bit_0(output: float) -> None:
+    right = right_answers(GATES["parity of 2"].last)
+    assert _examine(NParity(2), np.where(right < 0, output, 1.0)).success[0] == 1.0
+    assert _examine(NParity(2), np.where(right > 0, output, -1.0)).success[0] == 0.5
 
 
 @few
