@@ -257,7 +257,7 @@ def pytest_runtest_makereport(
 def _claim_report(item: pytest.Item, call: pytest.CallInfo[None]) -> ClaimReport:
     """Return what became of a claim test: its verdict, or the error in the way of one."""
     from evoclaims.suite.claim import claim_of, expectation_of
-    from evoclaims.suite.report import broken, expecting, save
+    from evoclaims.suite.report import broken, expecting, located, save
 
     claim, tier = claim_of(item), next(iter(_tiers_of(item)))
     assert claim is not None
@@ -269,8 +269,10 @@ def _claim_report(item: pytest.Item, call: pytest.CallInfo[None]) -> ClaimReport
         report = broken(claim, _case(item), tier, "the test ended without calling verdict(...), so it judged nothing")
     report = expecting(report, expectation_of(item, tier))
     session = item.config.stash.get(_session, None)
-    if session is None or item.config.getoption("claims_stored"):
+    if session is None:
         return report
+    if item.config.getoption("claims_stored"):
+        return located(report, session.store.root)
     try:
         return save(report, session.store.root)
     except UserError:

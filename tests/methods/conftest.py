@@ -15,7 +15,6 @@ from evoclaims.methods.cma_es import CmaEs
 from evoclaims.methods.ppo import Ppo
 from evoclaims.methods.random_search import RandomSearch
 from evoclaims.networks.all_skips import AllSkips
-from evoclaims.trials.budget import Budget
 
 
 @dataclass(frozen=True)
@@ -28,7 +27,7 @@ class Entry:
         cost: environment steps of one of its steps on `task`, worked out by hand.
         keeps_the_best: whether its best policy never gets worse on a deterministic task.
         prober: the method at a size that solves every probe.
-        probing: how long that may take.
+        curriculum: steps that the probe with two levels may take.
     """
 
     method: Any
@@ -36,7 +35,7 @@ class Entry:
     cost: int
     keeps_the_best: bool
     prober: Any
-    probing: Budget
+    curriculum: int
 
 
 METHODS = {
@@ -46,7 +45,7 @@ METHODS = {
         cost=12 * 8,
         keeps_the_best=True,
         prober=RandomSearch(256, network=AllSkips(8)),
-        probing=Budget(generations=200, reports=1),
+        curriculum=200,
     ),
     "cma_es": Entry(
         method=CmaEs(12, network=AllSkips(3)),
@@ -54,7 +53,7 @@ METHODS = {
         cost=12 * 8,
         keeps_the_best=True,
         prober=CmaEs(256, network=AllSkips(8)),
-        probing=Budget(generations=200, reports=1),
+        curriculum=200,
     ),
     "ppo": Entry(
         method=Ppo(
@@ -79,7 +78,7 @@ METHODS = {
             minibatches=4,
             learning_rate=1e-2,
         ),
-        probing=Budget(generations=2000, reports=1),
+        curriculum=2000,
     ),
 }
 _BENCHES = {name: Workbench(entry.method, entry.task) for name, entry in METHODS.items()}

@@ -2,33 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
 from workbench import Workbench, leaves
 
 from evoclaims.core.errors import UserError
-from evoclaims.envs.base import Episode, PolicyFn
 from evoclaims.envs.probes import CONSTANT, Probe
 from evoclaims.methods.ppo import LevelTest, Ppo
 
 SMALL = Ppo(policy_layers=(3,), value_layers=(3,), environments=4, batch_size=4, minibatches=1, updates_per_batch=1)
-
-
-@dataclass(frozen=True)
-class Drawing(Probe):
-    """A probe whose examination uses its key up, as a task with random starts does."""
-
-    def examine(self, policy: PolicyFn, key: jax.Array, level: jax.Array) -> Episode:
-        episode = super().examine(policy, key, level)
-        return replace(episode, fitness=episode.fitness + 0.0 * jax.random.normal(key))
-
-
-ALWAYS_RIGHT = Drawing("always_right", cases=((((0.0,), None),),), cases_at_level=(1,))
+ALWAYS_RIGHT = Probe("always_right", cases=((((0.0,), None),),), cases_at_level=(1,))
 
 
 def test_one_step_changes_every_layer_of_both_networks(benches: dict[str, Workbench]) -> None:

@@ -9,33 +9,28 @@ import jax
 import jax.numpy as jnp
 import pytest
 
-from evoclaims.envs.probes import PROBES
+from evoclaims.envs.probes import PROBES, Probe
 from evoclaims.trials.budget import Budget
-from evoclaims.trials.result import TrialResult
 from evoclaims.trials.runner import run
 from evoclaims.trials.spec import Condition
 from evoclaims.trials.store import Store
 
-SEEDS = range(4)
-"""One trial may be lucky: about every third one is without any learning."""
+SEEDS = range(8)
+"""One trial may be lucky: about every third untrained policy is right."""
+AT_ONCE = 10
+"""Steps for a probe with one level: a method that takes longer has drifted there."""
 
 
-def _trials(method: Any, probe: str, budget: Budget, folder: Path, cpus: list[Any]) -> list[TrialResult]:
-    return run(Condition(method, PROBES[probe], "curriculum", budget), SEEDS, Store(folder), cpus)
-
-
-@pytest.mark.parametrize("probe", PROBES)
-def test_every_method_solves_every_probe(entry: Any, probe: str, tmp_path: Path, cpus: list[Any]) -> None:
-    levels = PROBES[probe].levels
-    for trial in _trials(entry.prober, probe, entry.probing, tmp_path, cpus):
+@pytest.mark.parametrize("probe", PROBES.values(), ids=list(PROBES))
+def test_every_method_solves_every_probe(entry: Any, probe: Probe, tmp_path: Path, cpus: list[Any]) -> None:
+    budget = Budget(generations=entry.curriculum if probe.levels > 1 else AT_ONCE, reports=1)
+    for trial in run(Condition(entry.prober, probe, "curriculum", budget), SEEDS, Store(tmp_path), cpus):
         assert trial.status == "done"
+        assert trial.metrics["furthest_solved"] == probe.levels - 1
         assert trial.metrics["last_success"] == 1.0
-        assert trial.metrics["last_fitness"] == PROBES[probe].best_fitness
-        assert trial.metrics["furthest_solved"] == levels - 1
-        assert trial.metrics["steps"] < entry.probing.generations
+        assert trial.metrics["last_fitness"] == probe.best_fitness
         solved_at = trial.levels["solved_at"]
-        assert sorted(solved_at) == list(solved_at)
-        assert len(set(solved_at)) == levels
+        assert sorted(set(solved_at)) == list(solved_at)
 
 
 @pytest.mark.parametrize("probe", PROBES)

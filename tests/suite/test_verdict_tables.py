@@ -46,7 +46,7 @@ def test_a_row_shows_claim_sentence_verdict_n_effect_p_and_evidence() -> None:
         "0.028 (0.028)",
         "G1.json",
     ]
-    assert caption == "evidence: a/verdicts/smoke"
+    assert caption == "evidence: a/verdicts/smoke/<claim>.json"
 
 
 def test_what_was_not_measured_is_shown_as_a_dash() -> None:
@@ -111,8 +111,8 @@ def test_only_what_is_not_plainly_supported_is_explained() -> None:
 
 
 def test_an_accepted_verdict_is_marked_in_its_row() -> None:
-    assert "✗ refuted (expected)" in verdict_table([_report(outcome="refuted", expected="refuted")], 120, False)
-    assert "(expected)" not in verdict_table([_report(outcome="refuted", expected="error")], 120, False)
+    assert "✗ refuted*" in verdict_table([_report(outcome="refuted", expected="refuted")], 120, False)
+    assert "refuted*" not in verdict_table([_report(outcome="refuted", expected="error")], 120, False)
 
 
 def test_totals_count_each_outcome_in_one_line() -> None:
@@ -134,3 +134,10 @@ def test_the_comparison_with_the_references_says_what_drifted_and_what_it_did_no
         "not checked: c on d: 0 reference trials, 10 needed",
         "to the bit: 4 trials compared with the same machine and versions, 1 changed",
     ]
+
+
+def test_eighty_columns_leave_out_the_files_and_nothing_else() -> None:
+    lines = verdict_table([_report(case="n_parity", evidence="a/verdicts/smoke/G1.json")], 80, False).splitlines()
+    assert " ".join(lines[0].split()) == "claim what is claimed verdict n A12 p (attainable)"
+    assert all(len(line) <= 80 for line in lines)
+    assert lines[-1] == "evidence: a/verdicts/smoke/<claim>.json"

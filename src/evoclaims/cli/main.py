@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 from collections.abc import Callable, Sequence
 
 from evoclaims.core.errors import UserError
 
-USER_ERROR, INTERRUPTED = 2, 130
+USER_ERROR, INTERRUPTED, CLOSED_PIPE = 2, 130, 141
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -16,12 +17,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = _parser().parse_args(arguments)
     try:
         status: int = _command(options.command)(options)
+        sys.stdout.flush()
     except UserError as error:
         print(f"evoclaims: {error}", file=sys.stderr)
         return USER_ERROR
     except KeyboardInterrupt:
         print("\nevoclaims: interrupted; the same command goes on from the last checkpoint.", file=sys.stderr)
         return INTERRUPTED
+    except BrokenPipeError:  # `evoclaims status | head`: the reader has seen enough
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return CLOSED_PIPE
     return status
 
 

@@ -128,11 +128,21 @@ def expecting(report: ClaimReport, expectation: Expectation | None) -> ClaimRepo
 
 def save(report: ClaimReport, root: Path) -> ClaimReport:
     """Write the report under `root`/verdicts and return it with the path filled in."""
-    name = re.sub(r"[^A-Za-z0-9_.-]+", "-", report.name).strip("-")
-    path = root / "verdicts" / report.tier / f"{name}.json"
-    saved = replace(report, evidence=str(path))
-    write_atomically(path, (json.dumps(saved.to_json(), indent=1, sort_keys=True) + "\n").encode())
+    saved = replace(report, evidence=str(_path(report, root)))
+    write_atomically(_path(report, root), (json.dumps(saved.to_json(), indent=1, sort_keys=True) + "\n").encode())
     return saved
+
+
+def located(report: ClaimReport, root: Path) -> ClaimReport:
+    """Return the report with the path of the file that an earlier run has written, if there is one."""
+    path = _path(report, root)
+    return replace(report, evidence=str(path)) if path.is_file() else report
+
+
+def _path(report: ClaimReport, root: Path) -> Path:
+    """Return where a report's file lies."""
+    name = re.sub(r"[^A-Za-z0-9_.-]+", "-", report.name).strip("-")
+    return root / "verdicts" / report.tier / f"{name}.json"
 
 
 def _source(group: TrialGroup, seeds: Sequence[int]) -> dict[str, Any]:

@@ -18,6 +18,9 @@ from evoclaims.judging.verdict import Outcome
 from evoclaims.suite.report import ClaimReport
 from evoclaims.trials.records import printable
 
+WIDE = 100
+"""Columns from which there is room to name each claim's file of evidence."""
+
 _COLOURS = {
     Outcome.SUPPORTED: "green",
     Outcome.REFUTED: "red",
@@ -30,20 +33,17 @@ _COLOURS = {
 def verdict_table(reports: Sequence[ClaimReport], width: int, colour: bool) -> str:
     """Return the table: claim, sentence, verdict, n, effect, p against the attainable p, evidence."""
     table = Table(expand=True, show_lines=False, pad_edge=False, box=None)
-    for heading, options in {
-        "claim": {"no_wrap": True},
-        "what is claimed": {"ratio": 3},
-        "verdict": {"no_wrap": True},
-        "n": {"justify": "right"},
-        "A12": {"justify": "right"},
-        "p (attainable)": {"no_wrap": True},
-        "evidence": {"no_wrap": True, "style": "dim"},
-    }.items():
-        table.add_column(heading, **options)  # type: ignore[arg-type]
+    table.add_column("claim", no_wrap=True)
+    table.add_column("what is claimed", ratio=1, min_width=16)
+    for heading in ("verdict", "n", "A12", "p (attainable)"):
+        table.add_column(heading, no_wrap=True, justify="right" if heading in ("n", "A12") else "left")
+    wide = width >= WIDE
+    if wide:
+        table.add_column("evidence", no_wrap=True, style="dim")
     for report in sorted(reports, key=lambda r: (r.tier, r.claim[:1], len(r.claim), r.claim, r.case)):
         outcome = Outcome(report.outcome)
-        mark = f"{outcome.symbol} {outcome}" + (" (expected)" if report.as_expected else "")
-        table.add_row(
+        mark = f"{outcome.symbol} {outcome}" + ("*" if report.as_expected else "")
+        cells = (
             _literal(report.name),
             _literal(f"{report.statement} ({report.where})"),
             f"[{_COLOURS[outcome]}]{mark}[/]",
@@ -52,9 +52,12 @@ def verdict_table(reports: Sequence[ClaimReport], width: int, colour: bool) -> s
             _p_values(report),
             _literal(Path(report.evidence).name),
         )
+        table.add_row(*(cells if wide else cells[:-1]))
     folders = sorted({os.path.relpath(Path(report.evidence).parent) for report in reports if report.evidence})
-    caption = f"\nevidence: {printable(', '.join(folders))}" if folders else ""
-    return _rendered(table, width, colour) + caption
+    captions = [f"evidence: {printable(folder)}/<claim>.json" for folder in folders]
+    if any(report.as_expected for report in reports):
+        captions.append("* looked into and accepted, see below")
+    return "\n".join([_rendered(table, width, colour), *captions])
 
 
 def explanations(reports: Sequence[ClaimReport], width: int, colour: bool) -> str:
