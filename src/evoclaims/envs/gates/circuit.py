@@ -84,12 +84,12 @@ class Circuit(ABC):
         return self._asking(following, -wrong[0], ended)
 
     def episode(self, policy: PolicyFn, key: PRNGKeyArray, level: Int[Array, ""]) -> Episode:
-        """Return the fitness under this task's sampling; success is that of the rows asked."""
+        """Return the fitness under this task's sampling; success is the whole level's, so that no luck moves it up."""
         if self.sampling == "exhaustive":
             return self.examine(policy, key, level)
         index = jax.random.randint(key, (1,), 0, self._rows(level), jnp.int32)
-        wrong, right = self._errors(policy(jnp.asarray(self.table.inputs)[index[0]])[None], index)
-        return Episode(fitness=-wrong[0], success=right[0].astype(jnp.float32))
+        wrong, _ = self._errors(policy(jnp.asarray(self.table.inputs)[index[0]])[None], index)
+        return Episode(fitness=-wrong[0], success=self.examine(policy, key, level).success)
 
     def examine(self, policy: PolicyFn, key: PRNGKeyArray, level: Int[Array, ""]) -> Episode:
         """Ask every row of `level`: fitness is minus the mean error, success the share of rows wholly right.
