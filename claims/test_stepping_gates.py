@@ -52,8 +52,8 @@ def test_ppo_stays_at_the_first_level(trials, verdict, task):
 @expected(
     Outcome.REFUTED,
     tier="full",
-    because="2 of 10 trials answer all 64 rows, the others end at 0.73 to 0.98: near the paper's perfect success, not at "
-    "it; Brax's own training loop ends likewise, 2 of 10 (docs/performance.md)",
+    because="2 of 10 trials answer all 64 rows, the others end at 0.73 to 0.98: near the paper's perfect success, not "
+    "at it; Brax's own training loop ends likewise, 2 of 10 (docs/performance.md)",
 )
 def test_ppo_solves_parity_without_the_curriculum(trials, verdict):
     ppo = trials("ppo", on="n_parity_direct")

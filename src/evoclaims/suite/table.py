@@ -18,7 +18,7 @@ from evoclaims.judging.verdict import Outcome
 from evoclaims.suite.report import ClaimReport
 from evoclaims.trials.records import printable
 
-WIDE = 100
+WIDE = 120
 """Columns from which there is room to name each claim's file of evidence."""
 
 _COLOURS = {
