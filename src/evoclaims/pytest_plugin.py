@@ -235,7 +235,7 @@ def pytest_runtest_makereport(
     claimed = _claim_report(item, call)
     setattr(report, ATTRIBUTE, claimed.to_json())
     undecided = claimed.outcome == "inconclusive" and item.config.getoption("claims_undecided") == "fail"
-    failed = claimed.failed or undecided
+    failed = claimed.failed or (undecided and not claimed.as_expected)
     report.outcome = "failed" if failed else "passed"
     expected_failure = call.excinfo is None or call.excinfo.errisinstance(UserError)
     if expected_failure:
