@@ -16,8 +16,8 @@ TASKS = ["n_parity", "simple_alu"]
     where="§5.1, Fig. 3",
     smoke="CMA-ES solves all three levels of 4-parity, and the first three levels of Simple ALU",
     expect=Outcome.REFUTED,
-    because="most trials end in a local optimum one row short; full: 2 of 10 solve 6-parity, none of 10 gets past XOR "
-    "in the ALU",
+    because="most trials end in a local optimum, why is not known; full: 2 of 10 solve 6-parity, none of 10 gets past "
+    "XOR in the ALU",
 )
 @pytest.mark.parametrize("task", TASKS)
 def test_cma_es_solves_every_level(trials, verdict, task):

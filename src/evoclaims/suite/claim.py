@@ -63,7 +63,7 @@ def claim(
         says: the paper's own words.
         where: section and figure.
         smoke: the scaled-down statement of the smoke tier.
-        expect: an accepted outcome, for every tier and parameter (see `expect` for finer ones).
+        expect: an accepted outcome, for every tier and parameter (see `expected` for finer ones).
         because: why it is accepted; required with `expect`.
 
     Raises:
