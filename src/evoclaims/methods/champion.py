@@ -38,12 +38,14 @@ def evaluate(
     return jax.vmap(lambda p, k: task.episode(policy_of(network, task, p), k, level))(population, keys)
 
 
+def no_episode() -> Episode:
+    """Return an episode that any other is better than."""
+    return Episode(fitness=jnp.full((), -jnp.inf, jnp.float32), success=jnp.zeros((), jnp.float32))
+
+
 def first_champion(parameters: Float[Array, " parameters"]) -> Champion:
     """Return a champion that any evaluated individual beats."""
-    return Champion(
-        parameters=parameters,
-        episode=Episode(fitness=jnp.full((), -jnp.inf, jnp.float32), success=jnp.zeros((), jnp.float32)),
-    )
+    return Champion(parameters=parameters, episode=no_episode())
 
 
 def evaluate_with_champion(

@@ -1,0 +1,32 @@
+"""Control flow that stays control flow when it is batched."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+from jax.custom_batching import custom_vmap
+from jaxtyping import Array, Int
+
+
+def switch_together(index: Int[Array, ""], branches: Sequence[Callable[..., Any]], *operands: Any) -> Any:
+    """Run `branches[index]` on the operands; a batch runs, as one, the branch of its largest index.
+
+    An ordinary switch under vmap runs every branch. This one is for branches that differ in what they can hold and not
+    in what they compute, in growing order; they must not close over traced values.
+    """
+
+    @custom_vmap
+    def choose(index: Array, *operands: Any) -> Any:
+        return jax.lax.switch(index, branches, *operands)
+
+    @choose.def_vmap
+    def together(size: int, batched: Any, index: Array, *operands: Any) -> tuple[Any, Any]:
+        axes = tuple(jax.tree.map(lambda leaf: 0 if leaf else None, batched[1:]))
+        batches = [jax.vmap(branch, in_axes=axes, axis_size=size) for branch in branches]
+        result = jax.lax.switch(jnp.max(index), batches, *operands)
+        return result, jax.tree.map(lambda _: True, result)
+
+    return choose(index, *operands)

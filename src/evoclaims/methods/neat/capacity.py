@@ -1,0 +1,37 @@
+"""Programs for small genomes: arrays as large as the genomes are, instead of as large as they may become."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from typing import Any, Final
+
+import jax.numpy as jnp
+from jaxtyping import Array, Int
+
+from evoclaims.core.batching import switch_together
+from evoclaims.methods.neat.settings import Settings
+from evoclaims.networks.genome import Genome
+
+SMALLER: Final = ((32, 96), (100, 200))
+"""Capacities (nodes, connections) to have programs for, besides the largest: each costs compiling, and is several times
+as fast as the next. Populations that have grown have about as many connections as nodes."""
+
+
+def capacities(settings: Settings) -> list[tuple[int, int]]:
+    """Return the capacities (nodes, connections) that generations are compiled for, the largest last."""
+    most = settings.nodes, settings.connections
+    return [*(size for size in SMALLER if size[0] <= most[0] and size[1] < most[1]), most]
+
+
+def in_capacity(settings: Settings, genomes: tuple[Genome, ...], function: Callable[..., Any], *operands: Any) -> Any:
+    """Call `function(nodes, connections, *operands)` with the least capacity that holds the genomes' children.
+
+    A child may have one node and two connections more than its parent. The result must not depend on the capacity.
+    """
+    nodes = jnp.stack([jnp.max(each.node_count) for each in genomes]).max() + 1
+    connections = jnp.stack([jnp.max(each.connection_count) for each in genomes]).max() + 2
+    sizes = capacities(settings)
+    too_small = [(nodes > n) | (connections > c) for n, c in sizes[:-1]]
+    index: Int[Array, ""] = jnp.sum(jnp.array(too_small, bool), dtype=jnp.int32)
+    return switch_together(index, [partial(function, *size) for size in sizes], *operands)

@@ -1,0 +1,122 @@
+"""One generation: express, evaluate, reproduce; the same for every encoding of networks in genomes."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import Any, Protocol
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float, Int, PRNGKeyArray
+
+from evoclaims.core.keys import streams
+from evoclaims.core.pytree import pytree, select
+from evoclaims.envs.base import Episode, Task
+from evoclaims.methods.base import Policy, Progress
+from evoclaims.methods.champion import no_episode
+from evoclaims.methods.neat.capacity import in_capacity
+from evoclaims.methods.neat.population import Population, first_population, forget_records, next_population
+from evoclaims.methods.neat.settings import Settings
+from evoclaims.networks.genome import Genome, resized
+
+
+class Encoding(Protocol):
+    """How a genome stands for a policy; frozen and hashable.
+
+    Attributes:
+        inputs, outputs: of the network that the genome itself describes.
+    """
+
+    @property
+    def inputs(self) -> int:
+        """Inputs of the genome's network."""
+
+    @property
+    def outputs(self) -> int:
+        """Outputs of the genome's network."""
+
+    def express(self, genome: Genome) -> Any:
+        """Turn a genome into what acts: a tree of arrays."""
+
+    def apply(self, phenotype: Any, observation: Float[Array, " observation"]) -> Float[Array, " action"]:
+        """Act on one observation."""
+
+
+@pytree
+class Evolution:
+    """The state of NEAT between two generations.
+
+    Attributes:
+        population: not yet evaluated.
+        level: the level of the last evaluation.
+        champion: the best genome of the last evaluation; leaves [nodes] and [connections].
+        episode: how the champion did.
+    """
+
+    population: Population
+    level: Int[Array, ""]
+    champion: Genome
+    episode: Episode
+
+
+def begin(key: PRNGKeyArray, settings: Settings, encoding: Encoding) -> Evolution:
+    """Draw the first population; its first genome is the champion until one has been evaluated."""
+    population = first_population(key, settings, encoding.inputs, encoding.outputs)
+    return Evolution(
+        population=population,
+        level=jnp.zeros((), jnp.int32),
+        champion=jax.tree.map(lambda leaf: leaf[0], population.genomes),
+        episode=no_episode(),
+    )
+
+
+def evolve(
+    key: PRNGKeyArray, settings: Settings, encoding: Encoding, task: Task, level: Int[Array, ""], state: Evolution
+) -> tuple[Evolution, Progress]:
+    """Evaluate the population on `level` and replace it by the next."""
+    population = state.population
+    if settings.species.on_level_up == "reset":
+        population = select(level == state.level, population, forget_records(population))
+    episode_key, reproduction_key = streams(key, "episode", "reproduction")
+    run = partial(_evaluate, encoding, task)
+    episodes = in_capacity(settings, (population.genomes,), run, episode_key, level, population.genomes)
+    fitness = jnp.where(jnp.isnan(episodes.fitness), -jnp.inf, episodes.fitness)
+    # Of equals the newest, as everywhere in NEAT.
+    best = settings.population - 1 - jnp.argmax(fitness[::-1])
+    champion, episode = jax.tree.map(lambda leaf: leaf[best], (population.genomes, episodes))
+    following = next_population(reproduction_key, settings, population, fitness, encoding.inputs, encoding.outputs)
+    genomes = population.genomes
+    metrics = {
+        "nodes": jnp.mean(genomes.node_count.astype(jnp.float32)),
+        "connections": jnp.mean(genomes.connection_count.astype(jnp.float32)),
+        "champion_nodes": champion.node_count.astype(jnp.float32),
+        "champion_connections": champion.connection_count.astype(jnp.float32),
+        "species": population.species.count.astype(jnp.float32),
+    }
+    progress = Progress(
+        fitness=episode.fitness, success=episode.success, healthy=jnp.isfinite(episode.fitness), metrics=metrics
+    )
+    return Evolution(population=following, level=level, champion=champion, episode=episode), progress
+
+
+def policy(encoding: Encoding, state: Evolution) -> Policy:
+    """Return the champion as a policy; its parameters are the genome."""
+    return Policy(parameters=state.champion, function=lambda genome, x: encoding.apply(encoding.express(genome), x))
+
+
+def _evaluate(
+    encoding: Encoding,
+    task: Task,
+    nodes: int,
+    connections: int,
+    key: PRNGKeyArray,
+    level: Int[Array, ""],
+    genomes: Genome,
+) -> Episode:
+    """Run an episode per genome, in arrays of the given capacity; leaves of the result are [population]."""
+
+    def evaluate(key: PRNGKeyArray, genome: Genome) -> Episode:
+        return task.episode(partial(encoding.apply, encoding.express(genome)), key, level)
+
+    small = resized(genomes, nodes, connections)
+    return jax.vmap(evaluate)(jax.random.split(key, small.node_count.shape[0]), small)

@@ -1,0 +1,166 @@
+"""A population of genomes, and how the next one comes about."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import partial
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float, Int, PRNGKeyArray
+
+from evoclaims.core.keys import streams
+from evoclaims.core.pytree import pytree, select
+from evoclaims.methods.neat.capacity import in_capacity
+from evoclaims.methods.neat.crossover import crossover
+from evoclaims.methods.neat.reproduction import Parents, choose_parents, survive
+from evoclaims.methods.neat.settings import Settings
+from evoclaims.methods.neat.species import SpeciesState, one_species, speciate
+from evoclaims.methods.neat.structure import mutate_structure
+from evoclaims.methods.neat.values import draw, mutate_values
+from evoclaims.networks.genome import EMPTY, Connections, Genome, Nodes, resized
+
+
+@pytree
+class Population:
+    """The genomes of one generation.
+
+    Attributes:
+        genomes: leaves [population, …].
+        species: how they are grouped.
+        generation: how many populations came before.
+        next_key: the historical marking of the next new node; as 32-bit integers, exact for 2³¹ / population
+            generations.
+    """
+
+    genomes: Genome
+    species: SpeciesState
+    generation: Int[Array, ""]
+    next_key: Int[Array, ""]
+
+
+def first_population(key: PRNGKeyArray, settings: Settings, inputs: int, outputs: int) -> Population:
+    """Draw genomes in which every input feeds every output, and put them into one species.
+
+    Raises:
+        UserError: when the smallest network does not fit.
+    """
+    settings.check_fits(inputs, outputs)
+    keys = jax.random.split(key, settings.population)
+    genomes = jax.vmap(lambda k: _first_genome(k, settings, inputs, outputs))(keys)
+    return Population(
+        genomes=genomes,
+        species=one_species(settings.species, genomes),
+        generation=jnp.zeros((), jnp.int32),
+        next_key=jnp.full((), inputs + outputs, jnp.int32),
+    )
+
+
+def next_population(
+    key: PRNGKeyArray,
+    settings: Settings,
+    population: Population,
+    fitness: Float[Array, " population"],
+    inputs: int,
+    outputs: int,
+) -> Population:
+    """Replace all genomes by the offspring of the best of each species, but for its elites.
+
+    A fitness of NaN counts as -inf.
+    """
+    parents_key, breeding_key = streams(key, "parents", "breeding")
+    fitness = jnp.where(jnp.isnan(fitness), -jnp.inf, fitness)
+    species = survive(settings.species, population.species, fitness, population.generation + 1)
+    parents = choose_parents(parents_key, settings.species, species, fitness)
+    survivors = replace(population, species=species)
+    breed = partial(_breed, settings, inputs, outputs)
+    following: Population = in_capacity(
+        settings, (population.genomes, species.centres), breed, breeding_key, survivors, parents
+    )
+    return following
+
+
+def forget_records(population: Population) -> Population:
+    """Let every species count as improved in the next generation: fitness has become another quantity."""
+    best = jnp.full_like(population.species.best, -jnp.inf)
+    return replace(population, species=replace(population.species, best=best))
+
+
+def _breed(
+    settings: Settings,
+    inputs: int,
+    outputs: int,
+    nodes: int,
+    connections: int,
+    key: PRNGKeyArray,
+    population: Population,
+    parents: Parents,
+) -> Population:
+    """Replace the genomes by the parents' children, in arrays of the given capacity."""
+    crossover_key, mutation_key = streams(key, "crossover", "mutation")
+    small = _resized(population, nodes, connections)
+    children = _crossed(crossover_key, small.genomes, parents)
+
+    def mutated(key: PRNGKeyArray, genome: Genome, new_key: Array) -> Genome:
+        structure_key, values_key = streams(key, "structure", "values")
+        changed = mutate_structure(structure_key, settings.mutation, genome, new_key, inputs, outputs)
+        return mutate_values(values_key, settings.mutation, len(settings.activations), changed)
+
+    size = parents.elite.shape[0]
+    new_keys = population.next_key + jnp.arange(size, dtype=jnp.int32)
+    mutants = jax.vmap(mutated)(jax.random.split(mutation_key, size), children, new_keys)
+    genomes = jax.vmap(select)(parents.elite, children, mutants)
+    generation = population.generation + 1
+    following = Population(
+        genomes=genomes,
+        species=speciate(settings.species, small.species, genomes, generation),
+        generation=generation,
+        next_key=population.next_key + size,
+    )
+    return _resized(following, settings.nodes, settings.connections)
+
+
+def _resized(population: Population, nodes: int, connections: int) -> Population:
+    """Give all genomes another capacity."""
+    return replace(
+        population,
+        genomes=resized(population.genomes, nodes, connections),
+        species=replace(population.species, centres=resized(population.species.centres, nodes, connections)),
+    )
+
+
+def _crossed(key: PRNGKeyArray, genomes: Genome, parents: Parents) -> Genome:
+    """Return the children before mutation."""
+    keys = jax.random.split(key, parents.fitter.shape[0])
+    fitter = jax.tree.map(lambda leaf: leaf[parents.fitter], genomes)
+    # With the paper's survival threshold most species have one parent, whose children inherit all of it.
+    return jax.lax.cond(
+        jnp.any(parents.fitter != parents.other),
+        lambda: jax.vmap(crossover)(keys, fitter, jax.tree.map(lambda leaf: leaf[parents.other], genomes)),
+        lambda: fitter,
+    )
+
+
+def _first_genome(key: PRNGKeyArray, settings: Settings, inputs: int, outputs: int) -> Genome:
+    """Draw one genome without hidden nodes."""
+    bias_key, response_key, activation_key, weight_key = streams(key, "bias", "response", "activation", "weight")
+    nodes, connections = inputs + outputs, inputs * outputs
+    slots, places = jnp.arange(settings.nodes), jnp.arange(settings.connections)
+    has_node, has_connection = slots < nodes, places < connections
+    activation = jax.random.randint(activation_key, slots.shape, 0, len(settings.activations), jnp.int32)
+    mutation = settings.mutation
+    return Genome(
+        nodes=Nodes(
+            key=jnp.where(has_node, slots, EMPTY),
+            bias=jnp.where(has_node, draw(bias_key, mutation.bias, settings.nodes), 0),
+            response=jnp.where(has_node, draw(response_key, mutation.response, settings.nodes), 0),
+            activation=jnp.where(has_node, activation, 0),
+        ),
+        connections=Connections(
+            source=jnp.where(has_connection, places // outputs, 0),
+            target=jnp.where(has_connection, inputs + places % outputs, 0),
+            weight=jnp.where(has_connection, draw(weight_key, mutation.weight, settings.connections), 0),
+        ),
+        node_count=jnp.full((), nodes, jnp.int32),
+        connection_count=jnp.full((), connections, jnp.int32),
+    )

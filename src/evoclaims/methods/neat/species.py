@@ -1,0 +1,156 @@
+"""Species: groups of similar genomes that compete among themselves (Stanley and Miikkulainen 2002, §3.3).
+
+TensorNEAT's variant: a species is known by a centre; a genome joins the nearest centre within the threshold.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Bool, Float, Int
+
+from evoclaims.core.pytree import pytree
+from evoclaims.methods.neat.distance import distance
+from evoclaims.methods.neat.homology import index
+from evoclaims.methods.neat.settings import Species
+from evoclaims.networks.genome import Genome
+
+NONE = -1
+
+
+@pytree
+class SpeciesState:
+    """The species alive, packed into the first places.
+
+    Attributes:
+        centres: the genome that stands for each species; leaves [species, …].
+        count: how many are alive.
+        best: the best fitness a species has had; -inf for a new one.
+        improved_at: the generation in which it had it.
+        size: members in the current population; 0 for no species.
+        member_of: the species of each genome of the population.
+    """
+
+    centres: Genome
+    count: Int[Array, ""]
+    best: Float[Array, " species"]
+    improved_at: Int[Array, " species"]
+    size: Int[Array, " species"]
+    member_of: Int[Array, " population"]
+
+
+def one_species(settings: Species, population: Genome) -> SpeciesState:
+    """Put a whole first population into one species around its first genome."""
+    size = population.node_count.shape[0]
+    return SpeciesState(
+        centres=jax.tree.map(lambda leaf: jnp.broadcast_to(leaf[0], (settings.most, *leaf.shape[1:])), population),
+        count=jnp.ones((), jnp.int32),
+        best=jnp.full((settings.most,), -jnp.inf),
+        improved_at=jnp.zeros((settings.most,), jnp.int32),
+        size=jnp.zeros((settings.most,), jnp.int32).at[0].set(size),
+        member_of=jnp.zeros((size,), jnp.int32),
+    )
+
+
+@pytree
+class _Grouping:
+    """A population being divided.
+
+    Attributes:
+        centre_of: the genome that is each species' centre.
+        member_of: each genome's species so far, or `NONE`.
+        nearest: each genome's distance to that species' centre.
+    """
+
+    count: Int[Array, ""]
+    centre_of: Int[Array, " species"]
+    member_of: Int[Array, " population"]
+    nearest: Float[Array, " population"]
+
+
+def speciate(settings: Species, species: SpeciesState, population: Genome, generation: Int[Array, ""]) -> SpeciesState:
+    """Divide a population among the species that are alive, and found new ones where there is room.
+
+    First the genome nearest to each old centre becomes the new centre; then every genome joins the nearest centre
+    within the threshold; then, one by one, the first genome that has joined none founds a species, as long as there
+    is room. What is left joins the last species.
+    """
+    everyone = jnp.arange(population.node_count.shape[0], dtype=jnp.int32)
+
+    def to_all(centre: Genome) -> Array:
+        prepared = index(centre)
+        one = jax.vmap(lambda g: distance(settings, g, prepared, centre.node_count, centre.connection_count))
+        result: Array = one(population)
+        return result
+
+    def recentre(place: Array, grouping: _Grouping) -> _Grouping:
+        distances = to_all(_at(species.centres, place))
+        chosen = jnp.argmin(jnp.where(grouping.member_of == NONE, distances, jnp.inf)).astype(jnp.int32)
+        return _join(grouping, place, chosen)
+
+    def gather(place: Array, grouping: _Grouping) -> _Grouping:
+        distances = to_all(_at(population, grouping.centre_of[place]))
+        return _attract(settings, grouping, place, distances)
+
+    def found(grouping: _Grouping) -> _Grouping:
+        founder = jnp.argmax(grouping.member_of == NONE).astype(jnp.int32)
+        founded = _join(grouping, grouping.count, founder)
+        distances = to_all(_at(population, founder))
+        founded = _attract(settings, founded, grouping.count, distances)
+        return _Grouping(grouping.count + 1, founded.centre_of, founded.member_of, founded.nearest)
+
+    def unfinished(grouping: _Grouping) -> Bool[Array, ""]:
+        return jnp.any(grouping.member_of == NONE) & (grouping.count < settings.most)
+
+    grouping = _Grouping(
+        count=species.count,
+        centre_of=jnp.zeros((settings.most,), jnp.int32),
+        member_of=jnp.full(everyone.shape, NONE, jnp.int32),
+        nearest=jnp.full(everyone.shape, jnp.inf),
+    )
+    grouping = jax.lax.fori_loop(0, species.count, recentre, grouping)
+    grouping = jax.lax.fori_loop(0, species.count, gather, grouping)
+    grouping = jax.lax.while_loop(unfinished, found, grouping)
+    member_of = jnp.where(grouping.member_of == NONE, settings.most - 1, grouping.member_of)
+    places = jnp.arange(settings.most)
+    alive, new = places < grouping.count, places >= species.count
+    return SpeciesState(
+        centres=_at(population, grouping.centre_of),
+        count=grouping.count,
+        best=jnp.where(new, -jnp.inf, species.best),
+        improved_at=jnp.where(new, generation, species.improved_at),
+        size=jnp.where(alive, jnp.sum(member_of[None, :] == places[:, None], axis=1, dtype=jnp.int32), 0),
+        member_of=member_of,
+    )
+
+
+def _at(genomes: Genome, place: Any) -> Genome:
+    """Return the genome or genomes at `place`."""
+    chosen: Genome = jax.tree.map(lambda leaf: leaf[place], genomes)
+    return chosen
+
+
+def _join(grouping: _Grouping, place: Int[Array, ""], chosen: Int[Array, ""]) -> _Grouping:
+    """Make the genome `chosen` the centre of the species at `place`."""
+    return _Grouping(
+        count=grouping.count,
+        centre_of=grouping.centre_of.at[place].set(chosen),
+        member_of=grouping.member_of.at[chosen].set(place),
+        nearest=grouping.nearest.at[chosen].set(0.0),
+    )
+
+
+def _attract(
+    settings: Species, grouping: _Grouping, place: Int[Array, ""], distances: Float[Array, " population"]
+) -> _Grouping:
+    """Let all genomes join the species at `place` that are within the threshold and in no nearer one."""
+    free = grouping.member_of == NONE
+    joins = (distances < settings.threshold) & (free | (distances < grouping.nearest))
+    return _Grouping(
+        count=grouping.count,
+        centre_of=grouping.centre_of,
+        member_of=jnp.where(joins, place, grouping.member_of),
+        nearest=jnp.where(joins, distances, grouping.nearest),
+    )

@@ -1,0 +1,209 @@
+"""Structural mutation (Stanley and Miikkulainen 2002, §3.1; TensorNEAT's set of four).
+
+Every function maps one genome to one genome and keeps the slots in topological order.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Bool, Float, Int, PRNGKeyArray
+
+from evoclaims.core.pytree import select
+from evoclaims.methods.neat.settings import Mutation
+from evoclaims.networks.genome import EMPTY, Connections, Genome, Nodes
+
+
+def mutate_structure(
+    key: PRNGKeyArray, settings: Mutation, genome: Genome, new_key: Int[Array, ""], inputs: int, outputs: int
+) -> Genome:
+    """Add a node, delete a node, add a connection, delete a connection, each with its own probability.
+
+    `new_key` is the historical marking of a node that is added; nobody else's.
+    """
+    # All draws in one go: they are few, and each call of a generator costs compiling.
+    happens, which = jnp.split(jax.random.uniform(key, (9,)), [4])
+    grown = add_node(which[0], genome, new_key)
+    genome = select(happens[0] < settings.node_add, grown, genome)
+    shrunk = delete_node(which[1], genome, inputs, outputs)
+    genome = select(happens[1] < settings.node_delete, shrunk, genome)
+    linked = add_connection(which[2], which[3], genome, inputs)
+    genome = select(happens[2] < settings.connection_add, linked, genome)
+    cut = delete_connection(which[4], genome)
+    return select(happens[3] < settings.connection_delete, cut, genome)
+
+
+def add_node(u: Float[Array, ""], genome: Genome, new_key: Int[Array, ""]) -> Genome:
+    """Split the connection that `u` in [0, 1) picks: in-weight 1, out-weight the old one.
+
+    The new node has bias 0, response 1 and the first function. Nothing happens without a connection, or without room
+    for a node and two connections.
+    """
+    nodes, genes = genome.nodes, genome.connections
+    slots, places = jnp.arange(nodes.key.shape[0]), jnp.arange(genes.weight.shape[0])
+    split = places == _pick(u, genome.connection_count)
+    room = (genome.node_count < slots.size) & (genome.connection_count + 2 <= places.size)
+    # The new node takes its target's slot; the target and all after it move up by one.
+    slot = jnp.sum(jnp.where(split, genes.target, 0))
+    weight = jnp.sum(jnp.where(split, genes.weight, 0))
+
+    def insert(leaf: Array, value: Array | float) -> Array:
+        return jnp.where(slots < slot, leaf, jnp.where(slots == slot, value, jnp.roll(leaf, 1)))
+
+    new = places == genome.connection_count
+    source, target = genes.source + _one_if(genes.source >= slot), genes.target + _one_if(genes.target >= slot)
+    grown = Genome(
+        nodes=Nodes(
+            key=insert(nodes.key, new_key),
+            bias=insert(nodes.bias, 0.0),
+            response=insert(nodes.response, 1.0),
+            activation=insert(nodes.activation, 0),
+        ),
+        connections=Connections(
+            source=jnp.where(new, slot, source),
+            target=jnp.where(new, slot + 1, jnp.where(split, slot, target)),
+            weight=jnp.where(new, weight, jnp.where(split, 1.0, genes.weight)),
+        ),
+        node_count=genome.node_count + 1,
+        connection_count=genome.connection_count + 1,
+    )
+    return select((genome.connection_count > 0) & room, grown, genome)
+
+
+def delete_node(u: Float[Array, ""], genome: Genome, inputs: int, outputs: int) -> Genome:
+    """Delete the hidden node that `u` in [0, 1) picks, with its connections; nothing happens without one."""
+    nodes, genes = genome.nodes, genome.connections
+    slots = jnp.arange(nodes.key.shape[0])
+    hidden = nodes.key >= inputs + outputs
+    chosen = _pick(u, genome.node_count - inputs - outputs)
+    slot = jnp.argmax(hidden & (jnp.cumsum(hidden, dtype=jnp.int32) == chosen + 1)).astype(jnp.int32)
+
+    def remove(leaf: Array, empty: int) -> Array:
+        moved = jnp.where(slots < slot, leaf, jnp.roll(leaf, -1))
+        return jnp.where(slots < genome.node_count - 1, moved, empty)
+
+    kept = genome.has_connection & (genes.source != slot) & (genes.target != slot)
+    moved = Connections(
+        source=genes.source - _one_if(genes.source > slot),
+        target=genes.target - _one_if(genes.target > slot),
+        weight=genes.weight,
+    )
+    shrunk = Genome(
+        nodes=Nodes(
+            key=remove(nodes.key, EMPTY),
+            bias=remove(nodes.bias, 0),
+            response=remove(nodes.response, 0),
+            activation=remove(nodes.activation, 0),
+        ),
+        connections=packed(moved, kept),
+        node_count=genome.node_count - 1,
+        connection_count=jnp.sum(kept, dtype=jnp.int32),
+    )
+    return select(jnp.any(hidden), shrunk, genome)
+
+
+def packed(genes: Connections, kept: Bool[Array, " connections"]) -> Connections:
+    """Move the connections that are kept to the front, in their order."""
+    size = kept.shape[0]
+    place = jnp.where(kept, jnp.cumsum(kept, dtype=jnp.int32) - 1, size)
+    return jax.tree.map(lambda leaf: jnp.zeros_like(leaf).at[place].set(leaf, mode="drop"), genes)
+
+
+def add_connection(u: Float[Array, ""], v: Float[Array, ""], genome: Genome, inputs: int) -> Genome:
+    """Connect two nodes with weight 0; one try.
+
+    `u` and `v` in [0, 1) pick the source from all nodes, and the target from those that are not inputs. Nothing happens
+    when the connection exists, would close a cycle, or has no room.
+    """
+    source, target = _pick(u, genome.node_count), inputs + _pick(v, genome.node_count - inputs)
+    genes = genome.connections
+    exists = jnp.any((genes.source == source) & (genes.target == target) & genome.has_connection)
+    room = genome.connection_count < genes.weight.shape[0]
+    # Against the order of slots, only if the target does not lead to the source.
+    downstream = descendants(genome, target)
+    place = position_after(downstream, target, source)
+    ordered = reordered(genome, place)
+    new = jnp.arange(genes.weight.shape[0]) == genome.connection_count
+    linked = replace(
+        ordered,
+        connections=Connections(
+            source=jnp.where(new, place[source], ordered.connections.source),
+            target=jnp.where(new, place[target], ordered.connections.target),
+            weight=jnp.where(new, 0.0, ordered.connections.weight),
+        ),
+        connection_count=genome.connection_count + 1,
+    )
+    return select(~exists & room & ~downstream[source], linked, genome)
+
+
+def descendants(genome: Genome, start: Int[Array, ""]) -> Bool[Array, " nodes"]:
+    """Return which nodes `start` leads to, itself among them."""
+    size = genome.nodes.key.shape[0]
+    genes = genome.connections
+    target = jnp.where(genome.has_connection, genes.target, size)
+    linked = jnp.zeros((size, size), bool).at[target, genes.source].set(True, mode="drop")
+
+    def visit(slot: Array, reached: Array) -> Array:
+        return reached.at[slot].set(reached[slot] | jnp.any(linked[slot] & reached))
+
+    return jax.lax.fori_loop(0, size, visit, jnp.arange(size) == start)
+
+
+def position_after(
+    downstream: Bool[Array, " nodes"], target: Int[Array, ""], source: Int[Array, ""]
+) -> Int[Array, " nodes"]:
+    """Return each slot's place in an order that has `source` before `target` (Pearce and Kelly 2006, §3).
+
+    Between the two, whatever `target` does not lead to moves to the front, in its order; the rest follows. Without a
+    slot between them (target after source) nothing moves. `downstream` is what `target` leads to, without `source`.
+    """
+    slots = jnp.arange(downstream.shape[0], dtype=jnp.int32)
+    between = (slots >= target) & (slots <= source)
+    ahead = between & ~downstream
+    before = jnp.cumsum(ahead, dtype=jnp.int32) - _one_if(ahead)
+    moved = jnp.where(downstream, slots + jnp.sum(ahead, dtype=jnp.int32) - before, target + before)
+    return jnp.where(between, moved, slots)
+
+
+def reordered(genome: Genome, place: Int[Array, " nodes"]) -> Genome:
+    """Move the node in each slot to its new place."""
+    genes = genome.connections
+    return replace(
+        genome,
+        nodes=jax.tree.map(lambda leaf: jnp.zeros_like(leaf).at[place].set(leaf), genome.nodes),
+        connections=replace(
+            genes,
+            source=jnp.where(genome.has_connection, place[genes.source], 0),
+            target=jnp.where(genome.has_connection, place[genes.target], 0),
+        ),
+    )
+
+
+def delete_connection(u: Float[Array, ""], genome: Genome) -> Genome:
+    """Delete the connection that `u` in [0, 1) picks; the last one takes its place."""
+    genes = genome.connections
+    places = jnp.arange(genes.weight.shape[0])
+    chosen = places == _pick(u, genome.connection_count)
+    last = places == genome.connection_count - 1
+
+    def move(leaf: Array) -> Array:
+        moved = jnp.sum(jnp.where(last, leaf, 0))
+        return jnp.where(last, jnp.zeros((), leaf.dtype), jnp.where(chosen, moved, leaf))
+
+    cut = replace(genome, connections=jax.tree.map(move, genes), connection_count=genome.connection_count - 1)
+    return select(genome.connection_count > 0, cut, genome)
+
+
+def _one_if(condition: Bool[Array, "*shape"]) -> Int[Array, "*shape"]:
+    """Return 1 where the condition holds, else 0."""
+    return condition.astype(jnp.int32)
+
+
+def _pick(u: Float[Array, ""], count: Int[Array, ""]) -> Int[Array, ""]:
+    """Return one of 0 … count - 1 for a uniform `u` in [0, 1); 0 when there is none.
+
+    A count is a few hundred at most, against the 2²³ steps of u.
+    """
+    return jnp.floor(u * jnp.maximum(count, 1).astype(jnp.float32)).astype(jnp.int32)
