@@ -123,27 +123,30 @@ class GraphNetwork:
     def _in_blocks(self, graph: Graph, state: tuple[Array, Array]) -> tuple[Array, Array]:
         """Do the same in blocks of nodes: what comes from earlier blocks is one matrix product."""
         size = graph.bias.shape[0]
+        values, emits = state
+        done = values[: self.inputs]
         for start in range(self.inputs, size, BLOCK):
             end = min(start + BLOCK, size)
-            values, emits = state
-            earlier = graph.weights[start:end, :start] @ values[:start]
-            within = graph.weights[start:end, start:end]
+            earlier = graph.weights[start:end, :start] @ done
+            block, emits = self._block(graph, start, earlier, emits)
+            done = jnp.concatenate([done, block])
+        return done, emits
 
-            def fire(
-                place: Array,
-                state: tuple[Array, Array],
-                start: int = start,
-                earlier: Array = earlier,
-                within: Array = within,
-            ) -> tuple[Array, Array]:
-                block, emits = state
-                received = earlier[place] + jnp.sum(within[place][:, None] * block, axis=0)
-                value, fed = self._fire(graph, start + place, received, emits)
-                return block.at[place].set(value), emits.at[start + place].set(fed)
+    def _block(
+        self, graph: Graph, start: int, earlier: Float[Array, "block rows"], emits: Bool[Array, "nodes rows_or_1"]
+    ) -> tuple[Array, Array]:
+        """Return the values of the block of nodes from `start`, given what they receive from earlier blocks."""
+        end = start + earlier.shape[0]
+        within = graph.weights[start:end, start:end]
 
-            block, emits = jax.lax.fori_loop(0, end - start, fire, (jnp.zeros_like(values[start:end]), emits))
-            state = values.at[start:end].set(block), emits
-        return state
+        def fire(place: Array, state: tuple[Array, Array]) -> tuple[Array, Array]:
+            block, emits = state
+            received = earlier[place] + jnp.sum(within[place][:, None] * block, axis=0)
+            value, fed = self._fire(graph, start + place, received, emits)
+            return block.at[place].set(value), emits.at[start + place].set(fed)
+
+        made: tuple[Array, Array] = jax.lax.fori_loop(0, end - start, fire, (jnp.zeros_like(earlier), emits))
+        return made
 
     def _fire(
         self, graph: Graph, slot: Int[Array, ""], received: Float[Array, " rows"], emits: Bool[Array, "nodes rows_or_1"]

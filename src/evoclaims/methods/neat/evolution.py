@@ -93,9 +93,9 @@ def evolve(
         "champion_connections": champion.connection_count.astype(jnp.float32),
         "species": population.species.count.astype(jnp.float32),
     }
-    progress = Progress(
-        fitness=episode.fitness, success=episode.success, healthy=jnp.isfinite(episode.fitness), metrics=metrics
-    )
+    genes = champion.nodes.bias, champion.nodes.response, champion.connections.weight
+    healthy = jnp.all(jnp.isfinite(jnp.concatenate([*genes, episode.fitness[None]])))
+    progress = Progress(fitness=episode.fitness, success=episode.success, healthy=healthy, metrics=metrics)
     return Evolution(population=following, level=level, champion=champion, episode=episode), progress
 
 

@@ -47,7 +47,7 @@ def one_species(settings: Species, population: Genome) -> SpeciesState:
     return SpeciesState(
         centres=jax.tree.map(lambda leaf: jnp.broadcast_to(leaf[0], (settings.most, *leaf.shape[1:])), population),
         count=jnp.ones((), jnp.int32),
-        best=jnp.full((settings.most,), -jnp.inf),
+        best=jnp.full((settings.most,), -jnp.inf, jnp.float32),
         improved_at=jnp.zeros((settings.most,), jnp.int32),
         size=jnp.zeros((settings.most,), jnp.int32).at[0].set(size),
         member_of=jnp.zeros((size,), jnp.int32),
