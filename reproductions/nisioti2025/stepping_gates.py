@@ -11,9 +11,11 @@ from typing import Any
 from evoclaims.envs.gates.alu import SimpleAlu
 from evoclaims.envs.gates.circuit import Circuit
 from evoclaims.envs.gates.parity import NParity
+from evoclaims.methods import hyperneat
 from evoclaims.methods.base import Method
 from evoclaims.methods.cma_es import CmaEs
 from evoclaims.methods.hand_built import HandBuilt
+from evoclaims.methods.hyperneat import HyperNeat
 from evoclaims.methods.neat.neat import Neat
 from evoclaims.methods.neat.settings import PAPER, Settings, Species
 from evoclaims.methods.ppo import Ppo
@@ -59,6 +61,7 @@ def _full() -> Conditions:
         **_on_every_task(parity, alu, CmaEs(population=256, network=network), *evolution),
         **_on_every_task(parity, alu, RandomSearch(population=256, network=network), *evolution),
         **_on_every_task(parity, alu, Neat(PAPER), *evolution),
+        **_on_every_task(parity, alu, HyperNeat(hyperneat.PAPER), *evolution),
         **_on_every_task(_sampled(parity), _sampled(alu), Ppo(), *learning),
         **_hand_built(parity, alu),
     }
@@ -74,11 +77,13 @@ def _smoke() -> Conditions:
     network = AllSkips(hidden=16)
     ppo = Ppo(environments=256, batch_size=256, minibatches=8, learning_rate=3e-3)
     small = Settings(population=256, nodes=32, connections=96, species=Species(most=10))
+    cppn = replace(small, activations=hyperneat.CPPN_FUNCTIONS)
     generations, steps = Budget(generations=300), Budget(environment_steps=800_000)
     return {
         **_on_every_task(parity, alu, CmaEs(population=256, network=network), generations, generations),
         **_on_every_task(parity, alu, RandomSearch(population=256, network=network), generations, generations),
         **_on_every_task(parity, alu, Neat(small), generations, generations),
+        **_on_every_task(parity, alu, HyperNeat(cppn), generations, generations),
         **_on_every_task(_sampled(parity), _sampled(alu), ppo, steps, steps),
         **_hand_built(parity, alu),
     }

@@ -26,7 +26,7 @@ def switch_together(index: Int[Array, ""], branches: Sequence[Callable[..., Any]
     def together(size: int, batched: Any, index: Array, *operands: Any) -> tuple[Any, Any]:
         axes = tuple(jax.tree.map(lambda leaf: 0 if leaf else None, batched[1:]))
         batches = [jax.vmap(branch, in_axes=axes, axis_size=size) for branch in branches]
-        result = jax.lax.switch(jnp.max(index), batches, *operands)
+        result = switch_together(jnp.max(index), batches, *operands)
         return result, jax.tree.map(lambda _: True, result)
 
     return choose(index, *operands)

@@ -67,7 +67,7 @@ def make_result(
     levels = {
         "success": tuple(map(float, success)),
         "fitness": tuple(map(float, fitness)),
-        "solved_at": tuple(float(x * cost) if x != NEVER else float(NEVER) for x in solved_at),
+        "solved_at": tuple(float(int(x) * cost) if x != NEVER else float(NEVER) for x in solved_at),
     }
     champion = named_leaves(jax.tree.map(lambda leaf: np.asarray(leaf)[lane], score.parameters))
     status: Status = "diverged" if bool(report.diverged[lane]) else "done"

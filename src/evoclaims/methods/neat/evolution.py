@@ -101,7 +101,12 @@ def evolve(
 
 def policy(encoding: Encoding, state: Evolution) -> Policy:
     """Return the champion as a policy; its parameters are the genome."""
-    return Policy(parameters=state.champion, function=lambda genome, x: encoding.apply(encoding.express(genome), x))
+
+    def act(genome: Genome, observation: Array) -> Array:
+        # A genome read from a file has NumPy's arrays.
+        return encoding.apply(encoding.express(jax.tree.map(jnp.asarray, genome)), observation)
+
+    return Policy(parameters=state.champion, function=act)
 
 
 def _evaluate(

@@ -25,22 +25,22 @@ class Neat:
 
     def init(self, key: PRNGKeyArray, task: Task) -> Evolution:
         """Draw the first population; a `UserError` says when the smallest network does not fit."""
-        return begin(key, self.settings, self._encoding(task))
+        return begin(key, self.settings, self.encoding(task))
 
     def step(
         self, key: PRNGKeyArray, task: Task, level: Int[Array, ""], state: Evolution
     ) -> tuple[Evolution, Progress]:
         """Run one generation."""
-        return evolve(key, self.settings, self._encoding(task), task, level, state)
+        return evolve(key, self.settings, self.encoding(task), task, level, state)
 
     def best(self, task: Task, state: Evolution) -> Policy:
         """Return the best genome of the last population that was evaluated, on the level it was evaluated on."""
-        return policy(self._encoding(task), state)
+        return policy(self.encoding(task), state)
 
     def cost(self, task: Task) -> int:
         """Return the environment steps of one generation, at the longest episode."""
         return self.settings.population * task.horizon
 
-    def _encoding(self, task: Task) -> GraphNetwork:
-        """Describe networks of the task's size."""
+    def encoding(self, task: Task) -> GraphNetwork:
+        """Return how a genome stands for a policy of the task's size."""
         return GraphNetwork(task.observation_size, task.action_size, self.settings.activations, self.settings.output)

@@ -1,0 +1,129 @@
+"""HyperNEAT (Stanley, D'Ambrosio and Gauci 2009): NEAT evolves a network that draws another network's weights."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import ClassVar
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float, Int, PRNGKeyArray
+
+from evoclaims.core.errors import UserError
+from evoclaims.envs.base import Task
+from evoclaims.methods.base import Policy, Progress
+from evoclaims.methods.neat import settings as neat
+from evoclaims.methods.neat.evolution import Evolution, begin, evolve, policy
+from evoclaims.methods.neat.settings import Settings
+from evoclaims.networks.genome import Genome
+from evoclaims.networks.graph import GraphNetwork
+from evoclaims.networks.substrate import Extent, Substrate, layered
+
+CPPN_FUNCTIONS = ("tanh", "gauss", "sin", "abs", "identity")
+"""The usual set of a CPPN (Stanley 2007): symmetry by the Gaussian and |x|, repetition by the sine."""
+
+PAPER = replace(neat.PAPER, activations=CPPN_FUNCTIONS)
+"""The paper's values: NEAT's, for a network whose activation functions evolve too (§4)."""
+
+CODE = replace(neat.CODE, nodes=50, connections=100, activations=("sigmoid",))
+"""What the published code runs on the stepping gates."""
+
+
+@dataclass(frozen=True)
+class SubstrateNetwork:
+    """Policies whose weights a genome's network (the CPPN) draws from the places of the neurons.
+
+    The CPPN maps the coordinates of a connection's ends to q; the connection's weight is 0 for |q| < threshold, and
+    else sign(q) (|q| - threshold) / (1 - threshold) · max_weight (Stanley et al. 2009, §3.2). All neurons are tanh.
+    """
+
+    substrate: Substrate
+    activations: tuple[str, ...]
+    output: str
+    threshold: float
+    max_weight: float
+    inputs: int = 4
+    outputs: int = 1
+
+    def express(self, genome: Genome) -> list[Float[Array, "to from"]]:
+        """Return the weights into each layer but the first."""
+        cppn = GraphNetwork(self.inputs, self.outputs, self.activations, self.output)
+        q = cppn.apply_rows(cppn.express(genome), jnp.asarray(self.substrate.queries))[:, 0]
+        size = jnp.maximum(jnp.abs(q) - self.threshold, 0.0) / (1 - self.threshold) * self.max_weight
+        weights = jnp.sign(q) * size
+        shapes = self.substrate.shapes
+        ends = np.cumsum([to * fro for to, fro in shapes])[:-1].tolist()
+        return [part.reshape(shape) for part, shape in zip(jnp.split(weights, ends), shapes, strict=True)]
+
+    def apply(
+        self, phenotype: list[Float[Array, "to from"]], observation: Float[Array, " observation"]
+    ) -> Float[Array, " action"]:
+        """Map one observation to one action in (-1, 1)."""
+        signal = jnp.append(observation, jnp.ones((), observation.dtype))
+        for weights in phenotype:
+            signal = jnp.tanh(weights @ signal)
+        return signal
+
+
+@dataclass(frozen=True)
+class HyperNeat:
+    """HyperNEAT on a layered substrate, or on one whose neurons are placed by hand.
+
+    Attributes:
+        settings: NEAT's, for the CPPN.
+        hidden: neurons in each hidden layer of a layered substrate.
+        extent: see `layered`.
+        substrate: neurons placed by hand; then `hidden` and `extent` are not used.
+        threshold: a connection is drawn where the CPPN's |q| exceeds it.
+        max_weight: weight at |q| = 1.
+    """
+
+    name: ClassVar[str] = "hyperneat"
+    revision: ClassVar[int] = 1
+
+    settings: Settings = PAPER
+    hidden: tuple[int, ...] = (16,)
+    extent: Extent = "largest_layer"
+    substrate: Substrate | None = None
+    threshold: float = 0.3
+    max_weight: float = 5.0
+
+    def __post_init__(self) -> None:
+        """Check the numbers."""
+        if not 0 <= self.threshold < 1 or self.max_weight <= 0:
+            raise UserError(
+                f"HyperNEAT's threshold lies in [0, 1) and its largest weight above 0; {self.threshold} and "
+                f"{self.max_weight} do not."
+            )
+
+    def init(self, key: PRNGKeyArray, task: Task) -> Evolution:
+        """Draw the first population of CPPNs; a `UserError` says when substrate and task do not fit."""
+        return begin(key, self.settings, self.encoding(task))
+
+    def step(
+        self, key: PRNGKeyArray, task: Task, level: Int[Array, ""], state: Evolution
+    ) -> tuple[Evolution, Progress]:
+        """Run one generation."""
+        return evolve(key, self.settings, self.encoding(task), task, level, state)
+
+    def best(self, task: Task, state: Evolution) -> Policy:
+        """Return the best CPPN of the last population that was evaluated, on the level it was evaluated on."""
+        return policy(self.encoding(task), state)
+
+    def cost(self, task: Task) -> int:
+        """Return the environment steps of one generation, at the longest episode."""
+        return self.settings.population * task.horizon
+
+    def encoding(self, task: Task) -> SubstrateNetwork:
+        """Return how a genome stands for a policy of the task's size."""
+        inputs, outputs = task.observation_size + 1, task.action_size
+        substrate = self.substrate or layered((inputs, *self.hidden, outputs), self.extent)
+        ends = len(substrate.layers[0]), len(substrate.layers[-1])
+        if ends != (inputs, outputs):
+            raise UserError(
+                f"{task.name} needs a substrate with {inputs} inputs (one of them the bias) and {outputs} outputs; "
+                f"this one has {ends[0]} and {ends[1]}."
+            )
+        return SubstrateNetwork(
+            substrate, self.settings.activations, self.settings.output, self.threshold, self.max_weight
+        )

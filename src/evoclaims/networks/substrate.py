@@ -1,0 +1,79 @@
+"""Where the neurons of a HyperNEAT network lie in the plane (Stanley, D'Ambrosio and Gauci 2009, §3)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Literal, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from evoclaims.core.errors import UnknownNameError, UserError
+
+Point = tuple[float, float]
+Extent = Literal["largest_layer", "unit"]
+
+
+@dataclass(frozen=True)
+class Substrate:
+    """Layers of neurons in the plane, each fed by the whole layer before.
+
+    Attributes:
+        layers: the (x, y) of every neuron: inputs and, last among them, the bias; hidden layers; outputs.
+    """
+
+    layers: tuple[tuple[Point, ...], ...]
+
+    def __post_init__(self) -> None:
+        """Check that there are inputs and outputs, and neurons in every layer."""
+        if len(self.layers) < 2 or not all(self.layers):
+            raise UserError("A substrate has a layer of inputs, one of outputs, and at least one neuron in each layer.")
+
+    @property
+    def shapes(self) -> list[tuple[int, int]]:
+        """The shapes [to, from] of the weights into each layer but the first."""
+        return [(len(after), len(before)) for before, after in pairwise(self.layers)]
+
+    @property
+    def queries(self) -> NDArray[np.float32]:
+        """The coordinates (x₁, y₁, x₂, y₂) of both ends of every connection, shape [connections, 4].
+
+        Layer by layer; within a layer in the order of its weights, row by row.
+        """
+        ends = [(*source, *target) for before, after in pairwise(self.layers) for target in after for source in before]
+        return np.array(ends, np.float32)
+
+
+def layered(widths: Sequence[int], extent: Extent = "largest_layer") -> Substrate:
+    """Spread each layer evenly along x, and the layers evenly along y; a lone neuron lies in the middle.
+
+    Args:
+        widths: neurons per layer, the bias among the inputs.
+        extent: both coordinates run from -1 to 1 ("unit"), or to ± the width of the largest layer ("largest_layer", the
+            published code's, by which most weights of a first population are near their largest).
+
+    Raises:
+        UserError: for fewer than two layers, or an empty one.
+    """
+    if extent not in get_args(Extent):
+        raise UnknownNameError("extent of a substrate", extent, get_args(Extent))
+    if len(widths) < 2 or min(widths) < 1:
+        raise UserError(f"A substrate has at least two layers of at least one neuron each, not {tuple(widths)}.")
+    size = float(max(widths)) if extent == "largest_layer" else 1.0
+    heights = _spread(len(widths), size)
+    return Substrate(
+        tuple(tuple((x, y) for x in _spread(width, size)) for width, y in zip(widths, heights, strict=True))
+    )
+
+
+def on_circle(angles: Sequence[float], radius: float = 1.0) -> tuple[Point, ...]:
+    """Place neurons at these angles (radians, from the x-axis): where a robot's sensors or actuators point."""
+    return tuple((radius * math.cos(angle), radius * math.sin(angle)) for angle in angles)
+
+
+def _spread(count: int, size: float) -> list[float]:
+    """Return `count` coordinates evenly from -size to size; 0 for a single one."""
+    return [0.0] if count == 1 else [float(x) for x in np.linspace(-size, size, count)]
