@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Generator
-from contextlib import nullcontext
 from typing import TYPE_CHECKING, Any
 
 import pytest
@@ -35,12 +34,12 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     group.addoption("--claims-trials", metavar="N", type=int, help="judge by one look at N trials a condition")
     group.addoption("--claims-only", metavar="IDS", help="judge only these claims, such as G1,G7")
     group.addoption("--claims-device", metavar="DEVICE", default="auto", help="auto (default), cpu or gpu")
-    group.addoption("--claims-json", metavar="FILE", help="write all verdicts to FILE")
+    group.addoption("--claims-json", metavar="FILE", help="write all verdicts to FILE, also when there are none")
     group.addoption(
         "--claims-undecided",
         choices=("report", "fail"),
         default="report",
-        help="whether inconclusive claims end the run with status 1 (default: report)",
+        help="fail: inconclusive claims, or a run that has judged none of its claims, end with status 1 (report)",
     )
     group.addoption("--claims-stored", action="store_true", help="judge from stored trials alone; run nothing")
 
@@ -142,6 +141,7 @@ def make_session(config: pytest.Config) -> Session:
     from evoclaims.suite.live import LiveLine
     from evoclaims.suite.modes import RunMissing, StoredOnly
     from evoclaims.suite.session import Session
+    from evoclaims.suite.uncaptured import Uncaptured
     from evoclaims.trials import devices
     from evoclaims.trials.progress import ignore
     from evoclaims.trials.store import Store
@@ -159,22 +159,6 @@ def make_session(config: pytest.Config) -> Session:
     if line is not None:
         config.stash[_line] = line
     return made
-
-
-class Uncaptured:
-    """The terminal behind pytest's capture, for a progress line that is seen while a claim's trials run."""
-
-    def __init__(self, config: pytest.Config) -> None:
-        """Look at what the terminal is."""
-        self._capture: Any = config.pluginmanager.get_plugin("capturemanager")
-        self._writer = config.get_terminal_writer()
-        self.fullwidth = self._writer.fullwidth
-        self.hasmarkup = self._writer.hasmarkup
-
-    def write(self, msg: str, *, flush: bool = False) -> None:
-        """Write text as it is."""
-        with self._capture.global_and_fixture_disabled() if self._capture else nullcontext():
-            self._writer.write(msg, flush=flush)
 
 
 @pytest.fixture
@@ -228,9 +212,14 @@ def pytest_runtest_makereport(
 ) -> Generator[None, pytest.TestReport, pytest.TestReport]:
     """Turn what became of a claim into the test's outcome, without a traceback."""
     report = yield
-    if item.get_closest_marker("claim") is None or (report.when != "call" and not report.failed):
+    if item.get_closest_marker("claim") is None or (report.when != "call" and report.passed):
         return report
-    if report.skipped or (call.excinfo and call.excinfo.errisinstance(KeyboardInterrupt)):
+    if call.excinfo and call.excinfo.errisinstance(KeyboardInterrupt):
+        return report
+    if report.skipped:
+        if report.when == "teardown":  # the claim has been reported
+            return report
+        setattr(report, ATTRIBUTE, _skipped_report(item, report).to_json())
         return report
     claimed = _claim_report(item, call)
     setattr(report, ATTRIBUTE, claimed.to_json())
@@ -279,6 +268,17 @@ def _claim_report(item: pytest.Item, call: pytest.CallInfo[None]) -> ClaimReport
         return report  # a full disk must not hide the verdict
 
 
+def _skipped_report(item: pytest.Item, report: pytest.TestReport) -> ClaimReport:
+    """Return what the summary says of a claim whose test was skipped, or failed as an xfail mark expects."""
+    from evoclaims.suite.claim import claim_of
+    from evoclaims.suite.report import skipped
+
+    claim = claim_of(item)
+    assert claim is not None
+    words = report.longrepr[2] if isinstance(report.longrepr, tuple) else f"xfail: {getattr(report, 'wasxfail', '')}"
+    return skipped(claim, _case(item), next(iter(_tiers_of(item))), words.removeprefix("Skipped: "))
+
+
 def _sentence(excinfo: pytest.ExceptionInfo[BaseException]) -> str:
     """Return an exception as one line."""
     text = str(excinfo.value).strip().splitlines()
@@ -290,7 +290,7 @@ def pytest_report_teststatus(
 ) -> tuple[str, str, str | tuple[str, dict[str, bool]]] | None:
     """Show a claim's verdict in place of passed and failed."""
     plain = getattr(report, ATTRIBUTE, None)
-    if plain is None:
+    if plain is None or report.skipped:
         return None
     from evoclaims.judging.verdict import Outcome
     from evoclaims.suite.report import ClaimReport

@@ -54,25 +54,40 @@ class Summary:
     def pytest_sessionfinish(self, session: pytest.Session) -> None:
         """Compare with the reference trials, write the JSON report and settle the exit status.
 
-        0: nothing refuted, nothing drifted. 1: something was refuted without being accepted, broke, or drifted.
-        4: xdist's workers refused to begin. 5 (pytest's "no tests"): no trial was looked at, so that nothing was
-        measured.
+        0: nothing refuted, nothing drifted. 1: something was refuted without being accepted, broke, or drifted; or,
+        with --claims-undecided=fail, no claim was judged. 4: xdist's workers refused to begin. 5 (pytest's "no
+        tests"): claims were selected, but no trial was looked at (all are skipped, say), so that nothing was measured.
         """
-        if not self.reports:
-            if self._troubles:
-                session.exitstatus = pytest.ExitCode.USAGE_ERROR
-            return
-        try:
+        refused = bool(self._troubles)
+        for finish in (self._compare, self._write_json):
+            try:
+                finish()
+            except UserError as error:
+                self._troubles.append(str(error))
+        if refused and not self.reports:
+            session.exitstatus = pytest.ExitCode.USAGE_ERROR
+        elif session.exitstatus == pytest.ExitCode.OK:
+            session.exitstatus = self._status()
+
+    def _compare(self) -> None:
+        """Compare the trials behind the claims with the reference trials."""
+        if self.reports:
             self._drift = self._make_session(self._config).drift(self.reports)
-            self._write_json()
-        except UserError as error:
-            self._troubles.append(str(error))
-        failed = self._troubles or (self._drift is not None and self._drift[0].drifted)
-        if session.exitstatus == pytest.ExitCode.OK:
-            if failed:
-                session.exitstatus = pytest.ExitCode.TESTS_FAILED
-            elif not any(report.n for report in self.reports):
-                session.exitstatus = pytest.ExitCode.NO_TESTS_COLLECTED
+
+    def _status(self) -> pytest.ExitCode:
+        """Return the exit status of a run in which no test failed."""
+        if self._troubles or (self._drift is not None and self._drift[0].drifted):
+            return pytest.ExitCode.TESTS_FAILED
+        if self.reports and not self._judged and self._config.getoption("claims_undecided") == "fail":
+            return pytest.ExitCode.TESTS_FAILED
+        if self.reports and not any(report.n for report in self.reports):
+            return pytest.ExitCode.NO_TESTS_COLLECTED
+        return pytest.ExitCode.OK
+
+    @property
+    def _judged(self) -> bool:
+        """Whether any claim has a verdict, be it that it is undecided or broken."""
+        return any(report.outcome != "not run" for report in self.reports)
 
     def pytest_terminal_summary(self, terminalreporter: Any) -> None:
         """Print the verdict table and what lies behind it."""
@@ -98,16 +113,23 @@ class Summary:
             terminalreporter.write_line(f"error: {trouble}", red=True)
         terminalreporter.write_line(f"claims: {table.totals(self.reports)}", bold=True)
         if not any(report.n for report in self.reports):
-            terminalreporter.write_line("No trial was looked at: nothing was measured.", red=True)
+            what = "No trial was looked at" if self._judged else "No claim was judged"
+            terminalreporter.write_line(f"{what}: nothing was measured.", red=True)
 
     def _write_json(self) -> None:
-        """Write all verdicts to the file that --claims-json names."""
+        """Write all verdicts to the file that --claims-json names; none, too, are said, and no old file is left."""
         from evoclaims.core.files import write_atomically
 
         name = self._config.getoption("claims_json")
-        if name is None:
+        if name is None or self._config.option.collectonly:
             return
         drift = self._drift[0].to_json() if self._drift else None
         plain = {"schema": 1, "claims": [report.to_json() for report in self.reports], "drift": drift}
         path = Path(self._config.invocation_params.dir) / name
-        write_atomically(path, (json.dumps(plain, indent=1, sort_keys=True) + "\n").encode())
+        try:
+            write_atomically(path, (json.dumps(plain, indent=1, sort_keys=True) + "\n").encode())
+        except UserError as error:  # its advice is about the store
+            reason = getattr(error.__cause__, "strerror", None) or error.__cause__
+            raise UserError(
+                f"Cannot write the verdicts to {path}: {reason}. Name a file that can be written with --claims-json."
+            ) from error

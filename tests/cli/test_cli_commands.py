@@ -81,7 +81,12 @@ def test_run_can_be_held_to_a_task_and_a_tier(evoclaims: Evoclaims, monkeypatch:
         ),
         (("run", "--on", "partiy"), "There is no task named 'partiy'. Did you mean 'parity'? Known: parity."),
         (("run", "right", "--on", "x"), "There is no task for right named 'x'. Known: parity."),
-        (("run", "right", "--trials", "0"), "--trials takes a number of trials from 1, not 0."),
+        (
+            ("run", "right", "--trials", "0"),
+            "--trials takes 1 to 100 trials a condition (no verdict looks at more), not 0.",
+        ),
+        (("run", "right", "--trials", "101"), "not 101. Further seeds are run by another call, with --first-seed."),
+        (("run", "right", "--trials", "1000000000000"), "--trials takes 1 to 100 trials a condition"),
         (("run", "right", "--first-seed", "-1"), "A seed is 0 or above and below 2147483648, not -1."),
         (("run", "right", "--first-seed", "2147483647"), "A seed is 0 or above and below 2147483648, not 2147483648."),
         (("run", "right", "--device", "tpu"), "There is no device named 'tpu'. Did you mean 'gpu'?"),
@@ -193,6 +198,36 @@ def test_verify_moves_bad_files_aside_and_the_trials_run_again(evoclaims: Evocla
     for method in ("right", "wrong"):
         evoclaims("run", method)
     assert len(stored.ids()) == 20
+
+
+def test_verify_reads_no_verdicts_and_says_so(evoclaims: Evoclaims, stored: Store) -> None:
+    verdict = stored.root / "verdicts" / "smoke" / "a.json"
+    verdict.parent.mkdir(parents=True)
+    verdict.write_text("torn")
+    assert evoclaims("verify")[:2] == (0, "20 trials in .evoclaims, 0 problems\n")
+    assert evoclaims("status")[1].splitlines()[-1] == "claims (smoke): 1 supported, 1 refuted"
+
+
+def test_the_help_of_verify_says_what_is_read(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        main(["verify", "--help"])
+    text = " ".join(capsys.readouterr().out.split())
+    assert "read every stored trial, champion and checkpoint back" in text
+    assert "verdicts are not read: `evoclaims status` judges the trials anew" in text
+
+
+def test_a_device_without_enough_memory_is_one_sentence(evoclaims: Evoclaims, monkeypatch: pytest.MonkeyPatch) -> None:
+    import jax
+
+    from evoclaims.trials.lanes import Lanes
+
+    def advance(*arguments: object) -> None:
+        raise jax.errors.JaxRuntimeError("RESOURCE_EXHAUSTED: Out of memory allocating 17179869184 bytes.")
+
+    monkeypatch.setattr(Lanes, "advance", advance)
+    status, _, err = evoclaims("run", "right", "--trials", "50")
+    assert (status, err.count("\n")) == (2, 1)
+    assert "does not hold 50 trials of hand_built on n_parity at once. Run fewer at a time: `evoclaims run`" in err
 
 
 def test_reference_commits_the_trials_of_every_condition_that_has_enough(evoclaims: Evoclaims) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -35,7 +36,17 @@ def commit(folder: Path, text: str) -> None:
 def test_provenance_is_plain_json_with_every_part() -> None:
     found = provenance.collect()
     assert json.loads(json.dumps(found)) == found
-    assert set(found) == {"git", "versions", "device", "machine", "xla_flags", "matmul_precision", "x64"}
+    assert set(found) == {
+        "git",
+        "versions",
+        "device",
+        "machine",
+        "xla_flags",
+        "matmul_precision",
+        "x64",
+        "cuda",
+        "prng",
+    }
 
 
 def test_versions_name_every_package_and_say_null_for_an_absent_one(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -44,6 +55,55 @@ def test_versions_name_every_package_and_say_null_for_an_absent_one(monkeypatch:
     assert versions["numpy"] == numpy.__version__
     assert versions["evoclaims-no-such-package"] is None
     assert versions["python"] is not None
+
+
+def test_the_versions_of_whatever_brings_cuda_are_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    installed = {
+        "jax-cuda13-plugin": "0.11.2",
+        "jax_cuda12_pjrt": "0.10.2",
+        "nvidia-cudnn-cu13": "9.1",
+        "nvidia-cublas": "13.0",
+        "jaxtyping": "0.3",
+        "my-nvidia-tool": "1",
+    }
+    for name, version in installed.items():
+        folder = tmp_path / f"{name.replace('-', '_')}-{version}.dist-info"
+        folder.mkdir()
+        (folder / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {name}\nVersion: {version}\n")
+    monkeypatch.setattr("sys.path", [str(tmp_path)])
+    assert provenance.cuda_versions() == {
+        "jax-cuda12-pjrt": "0.10.2",
+        "jax-cuda13-plugin": "0.11.2",
+        "nvidia-cublas": "13.0",
+        "nvidia-cudnn-cu13": "9.1",
+    }
+
+
+def test_the_generator_of_random_bits_is_named() -> None:
+    script = "from evoclaims.core import provenance; print(provenance.collect()['prng'])"
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path), "JAX_DEFAULT_PRNG_IMPL": "rbg"}
+    done = subprocess.run([sys.executable, "-c", script], env=environment, capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "{'implementation': 'rbg', 'partitionable': True}"
+    assert provenance.collect()["prng"]["implementation"] == "threefry2x32"
+
+
+@pytest.mark.parametrize("part", ["machine", "versions", "xla_flags", "matmul_precision", "x64", "prng"])
+def test_bits_hang_on_every_part_that_can_change_them(part: str) -> None:
+    known = provenance.collect()
+    assert provenance.what_fixes_bits({**known, part: "another"}) != provenance.what_fixes_bits(known)
+
+
+def test_bits_hang_on_the_kind_of_device_and_on_cuda_where_a_gpu_is_used() -> None:
+    cpu = {
+        "device": {"platform": "cpu", "kind": "cpu", "count": 2},
+        "git": {"sha": "a"},
+        "cuda": {"nvidia-cublas": "1"},
+    }
+    gpu = {**cpu, "device": {"platform": "gpu", "kind": "H200", "count": 1}}
+    changed = {"git": {"sha": "b"}, "cuda": {"nvidia-cublas": "2"}}
+    assert provenance.what_fixes_bits({**cpu, **changed}) == provenance.what_fixes_bits(cpu) == {"kind": "cpu"}
+    assert provenance.what_fixes_bits({**gpu, **changed}) != provenance.what_fixes_bits(gpu)
+    assert provenance.what_fixes_bits(gpu)["kind"] == "H200"
 
 
 def test_the_device_is_the_one_jax_uses() -> None:

@@ -5,12 +5,14 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
 from workbench import Workbench, leaves
 
 from evoclaims.core.errors import UserError
+from evoclaims.envs.gates.parity import NParity
 from evoclaims.envs.probes import CONSTANT, Probe
 from evoclaims.methods.ppo import LevelTest, Ppo
 
@@ -86,6 +88,15 @@ def test_impossible_sizes_are_one_sentence(wrong: dict[str, Any], sentence: str)
 def test_an_impossible_level_test_is_one_sentence(wrong: dict[str, Any]) -> None:
     with pytest.raises(UserError, match="held every 1 or more training steps over 0 or more sampled episodes"):
         LevelTest(**wrong)
+
+
+def test_sampled_episodes_of_more_than_one_step_are_one_sentence() -> None:
+    """On a whole table every one of them would ask the first row."""
+    sampled = replace(SMALL, level_test=LevelTest(sampled_episodes=8))
+    with pytest.raises(UserError, match=r"plays one step in each, and an episode of n_parity has up to 8.*sampling="):
+        sampled.init(jax.random.key(0), NParity(3, sampling="exhaustive"))
+    sampled.init(jax.random.key(0), NParity(3, sampling="sampled"))
+    SMALL.init(jax.random.key(0), NParity(3, sampling="exhaustive"))
 
 
 def test_a_no_is_learnt_where_a_no_is_paid() -> None:

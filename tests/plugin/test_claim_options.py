@@ -91,6 +91,7 @@ def test_stored_trials_alone_are_judged_without_running_or_writing_any(project: 
     result = project.run("--claims-stored", own_store=True)
     assert result.ret == pytest.ExitCode.NO_TESTS_COLLECTED
     result.stdout.fnmatch_lines(["- a: 10 of 10 trials of hand_built on n_parity are missing"])
+    result.stdout.fnmatch_lines(["No claim was judged: nothing was measured."])
     assert not (project.path / ".evoclaims").exists()
     assert project.run(own_store=True).ret == 0
     before = sorted((project.path / ".evoclaims").rglob("*"))
@@ -116,7 +117,21 @@ def test_a_report_that_cannot_be_written_fails_the_run_and_hides_no_verdict(proj
     result = project.run("--claims-json=afile/out.json")
     assert result.ret == pytest.ExitCode.TESTS_FAILED
     result.stdout.fnmatch_lines(["a *✓ supported*", "error: Cannot write *afile/out.json*", "claims: 1 supported"])
-    sentence(result, "Cannot write")
+    sentence(result, "Name a file that can be written with --claims-json.")
+    assert "--claims-storage" not in result.stdout.str()
+
+
+def test_a_torn_reference_fails_the_run_and_does_not_keep_the_verdicts_from_being_written(project: Any) -> None:
+    project.write(a="supported")
+    torn = project.path / "reference" / "smoke" / "right-parity.jsonl"
+    torn.parent.mkdir(parents=True)
+    torn.write_text("torn\n")
+    result = project.run("--claims-json=out.json")
+    assert result.ret == pytest.ExitCode.TESTS_FAILED
+    result.stdout.fnmatch_lines(["error: Line 1 of *right-parity.jsonl is no reference trial*", "claims: 1 supported"])
+    plain = json.loads((project.path / "out.json").read_text())
+    assert [report["outcome"] for report in plain["claims"]] == ["supported"]
+    assert plain["drift"] is None
 
 
 def test_a_damaged_record_is_an_error_of_the_claims_that_need_it(project: Any, sentence: Sentence) -> None:
@@ -131,6 +146,21 @@ def test_a_damaged_record_is_an_error_of_the_claims_that_need_it(project: Any, s
     result.stdout.fnmatch_lines(["claims: 1 error"])
     result = project.run("--claims-only=b", own_store=True)
     result.stdout.fnmatch_lines(["claims: 1 refuted"])
+
+
+def test_a_device_without_enough_memory_is_a_sentence_of_the_claim(
+    project: Any, sentence: Sentence, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    import jax
+
+    def advance(*arguments: object) -> None:
+        raise jax.errors.JaxRuntimeError("RESOURCE_EXHAUSTED: Out of memory allocating 17179869184 bytes.")
+
+    monkeypatch.setattr("evoclaims.trials.lanes.Lanes.advance", advance)
+    project.write(a="supported")
+    result = project.run(own_store=True)
+    assert result.ret == 1
+    sentence(result, "The device's memory does not hold 10 trials of hand_built on n_parity at once. Run fewer at a")
 
 
 def test_trials_that_drifted_from_the_committed_ones_fail_the_run(project: Any) -> None:

@@ -23,11 +23,8 @@ class Item:
     def __init__(self, *marks: Any) -> None:
         self.marks = [getattr(mark, "mark", mark) for mark in marks]
 
-    def iter_markers(self, name: str) -> list[Any]:
-        return [mark for mark in self.marks if mark.name == name]
-
     def get_closest_marker(self, name: str) -> Any:
-        return next(iter(self.iter_markers(name)), None)
+        return next((mark for mark in self.marks if mark.name == name), None)
 
 
 def test_a_claim_is_attached_to_its_test() -> None:
@@ -56,14 +53,74 @@ def test_an_accepted_outcome_must_be_known_and_have_a_reason() -> None:
         claim("T1", **TEXTS, expect=Outcome.REFUTED)
 
 
-def test_the_closest_acceptance_of_the_tier_holds() -> None:
-    item: Any = Item(
-        expected("inconclusive", because="this parameter", tier="full"),
-        expected(Outcome.REFUTED, because="the whole claim"),
+CLAIMS = """
+    import pytest
+    from evoclaims import claim, expected
+
+    TEXTS = {"says": "So it is", "where": "§1", "smoke": "So it is, in small"}
+    pytestmark = expected("error", because="module")
+
+    @pytest.mark.parametrize("task", ["plain", pytest.param("marked", marks=expected("refuted", because="case"))])
+    @claim("wide", **TEXTS, expect="inconclusive", because="claim")
+    def test_wide(task, claim_tier): ...
+
+    @pytest.mark.parametrize("task", ["plain", pytest.param("marked", marks=expected("refuted", because="case"))])
+    @expected("inconclusive", because="claim, full", tier="full")
+    @claim("fine", **TEXTS)
+    def test_fine(task, claim_tier): ...
+
+    @pytest.mark.parametrize(
+        "task",
+        [
+            pytest.param(
+                "both",
+                marks=[expected("refuted", because="every tier"), expected("error", because="full", tier="full")],
+            ),
+            pytest.param("other", marks=expected("refuted", because="full alone", tier="full")),
+        ],
     )
-    assert expectation_of(item, "full") == Expectation(Outcome.INCONCLUSIVE, "this parameter", "full")
-    assert expectation_of(item, "smoke") == Expectation(Outcome.REFUTED, "the whole claim", None)
-    assert expectation_of(Item(expected("error", because="x", tier="full")), "smoke") is None  # type: ignore[arg-type]
+    @expected("supported", because="claim")
+    @claim("tiers", **TEXTS)
+    def test_tiers(task, claim_tier): ...
+
+    @expected("error", because="every tier")
+    @expected("refuted", because="full", tier="full")
+    @claim("above", **TEXTS)
+    def test_above(claim_tier): ...
+
+    @expected("refuted", because="full", tier="full")
+    @expected("error", because="every tier")
+    @claim("below", **TEXTS)
+    def test_below(claim_tier): ...
+"""
+
+CLOSEST = {
+    "wide plain": ("claim", "claim"),
+    "wide marked": ("case", "case"),
+    "fine plain": ("module", "claim, full"),
+    "fine marked": ("case", "case"),
+    "tiers both": ("every tier", "full"),
+    "tiers other": ("claim", "full alone"),
+    "above": ("every tier", "full"),
+    "below": ("every tier", "full"),
+}
+
+
+def test_the_closest_acceptance_holds_and_beside_it_the_one_for_the_tier_alone(pytester: pytest.Pytester) -> None:
+    items, _ = pytester.inline_genitems(pytester.makepyfile(CLAIMS), "-pno:cacheprovider")
+    found = {}
+    for item in (item for item in items if item.callspec.params["claim_tier"] == "full"):  # type: ignore[attr-defined]
+        name = " ".join([item.originalname.removeprefix("test_"), *filter(None, [item.callspec.params.get("task")])])  # type: ignore[attr-defined]
+        found[name] = tuple(getattr(expectation_of(item, tier), "because", None) for tier in ("smoke", "full"))
+    assert found == CLOSEST
+
+
+def test_without_an_acceptance_for_its_tier_a_test_has_none(pytester: pytest.Pytester) -> None:
+    text = CLAIMS.replace('pytestmark = expected("error", because="module")', "")
+    items, _ = pytester.inline_genitems(pytester.makepyfile(text), "-pno:cacheprovider")
+    (item,) = (item for item in items if item.name == "test_fine[full-plain]")
+    assert expectation_of(item, "smoke") is None
+    assert expectation_of(item, "full") == Expectation(Outcome.INCONCLUSIVE, "claim, full", "full")
 
 
 REPORT = broken(Claim("T1", **TEXTS), "n_parity", "smoke", "it broke")

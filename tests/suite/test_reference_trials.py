@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -72,3 +73,38 @@ def test_a_bad_line_is_named_by_file_and_number(
         references.load(path)
     assert str(path) in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+SAYS = {
+    "device": {"platform": "cpu", "kind": "cpu"},
+    "machine": "Linux",
+    "versions": {"jax": "1"},
+    "xla_flags": None,
+    "x64": False,
+    "prng": "threefry2x32",
+}
+
+
+@pytest.mark.parametrize(
+    ("then", "compared"),
+    [
+        (SAYS, 1),
+        ({name: SAYS[name] for name in ("device", "machine", "versions")}, 1),  # made before the others were noted
+        ({**SAYS, "xla_flags": "--xla_cpu_enable_fast_math=true"}, 0),
+        ({**SAYS, "prng": "rbg"}, 0),
+        ({**SAYS, "x64": True}, 0),
+        ({**SAYS, "machine": "Darwin"}, 0),
+        ({**SAYS, "git": {"sha": "0" * 40, "dirty": True}}, 1),
+    ],
+)
+def test_trials_are_compared_to_the_bit_where_all_that_fixes_bits_is_the_same(
+    reproduction: Reproduction, made: Made, then: dict[str, Any], compared: int
+) -> None:
+    condition = reproduction.tier("smoke").condition("better", "small")
+    path = references.path_of(reproduction.references, "smoke", "better", "small")
+    references.write(path, [made(condition, 3, 0.5, **then)])
+    case = references.drift_case(
+        reproduction.references, "smoke", "better", "small", [made(condition, 3, 1.0, **SAYS), made(condition, 4, 1.0)]
+    )
+    _, check = references.compare([case])
+    assert (check.compared, [change.seed for change in check.changed]) == (compared, [3] * compared)

@@ -108,6 +108,8 @@ def test_only_what_is_not_plainly_supported_is_explained() -> None:
     assert explanations([surprising], 100, False) == (
         "✓ G1: for a reason [no longer refuted, which was accepted: known]"
     )
+    not_run = replace(surprising, outcome="not run")  # which says nothing against what was accepted
+    assert explanations([not_run], 100, False) == "- G1: for a reason"
 
 
 def test_an_accepted_verdict_is_marked_in_its_row() -> None:

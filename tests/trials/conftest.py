@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections import Counter
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -91,3 +92,27 @@ def cpus() -> list[Any]:
     import jax
 
     return list(jax.devices("cpu")[:2])
+
+
+@pytest.fixture(scope="session")
+def uninterrupted(tmp_path_factory: pytest.TempPathFactory, cpus: list[Any]) -> list[TrialResult]:
+    """The climbers' trials from a run that nothing has stopped."""
+    from climbers import CLIMBING, SEEDS
+
+    from evoclaims.trials.runner import run
+
+    return run(CLIMBING, SEEDS, Store(tmp_path_factory.mktemp("uninterrupted")), cpus)
+
+
+@pytest.fixture
+def puts(monkeypatch: pytest.MonkeyPatch) -> Counter[int]:
+    """How often each seed was put into any store."""
+    counts: Counter[int] = Counter()
+    put = Store.put
+
+    def counting(self: Store, result: TrialResult, champion: Any) -> Any:
+        counts[result.seed] += 1
+        return put(self, result, champion)
+
+    monkeypatch.setattr(Store, "put", counting)
+    return counts

@@ -8,6 +8,7 @@ import signal
 import socket
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -157,6 +158,32 @@ def test_a_refresh_makes_the_notice_young_again(tmp_path: Path) -> None:
         os.utime(notice.path, (1.0, 1.0))
         notice.refresh()
         assert notice.path.stat().st_mtime > 1e9
+
+
+def test_a_notice_stays_young_through_a_chunk_of_any_length(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nobody calls `refresh` here: while XLA computes, the process does nothing else."""
+    monkeypatch.setattr(notices, "REFRESH_SECONDS", 0.001)
+    refreshed = threading.Event()
+    utime = os.utime
+
+    def telling(path: Path, *times: Any) -> None:
+        utime(path, *times)
+        if not times:
+            refreshed.set()
+
+    with Notice(tmp_path, CONDITION) as notice:
+        monkeypatch.setattr(os, "utime", telling)
+        os.utime(notice.path, (1.0, 1.0))
+        refreshed.clear()
+        assert refreshed.wait(60)
+        assert notice.path.stat().st_mtime > 1e9
+    assert "evoclaims heartbeat" not in [thread.name for thread in threading.enumerate()]
+
+
+def test_who_does_not_hold_the_notice_refreshes_nothing(tmp_path: Path, runner: subprocess.Popen[str]) -> None:
+    with Notice(tmp_path, CONDITION) as notice:
+        assert not notice.held
+        assert "evoclaims heartbeat" not in [thread.name for thread in threading.enumerate()]
 
 
 def test_a_refresh_never_keeps_anothers_notice_alive(tmp_path: Path) -> None:

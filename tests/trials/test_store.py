@@ -169,11 +169,11 @@ def test_a_trial_that_diverged_or_timed_out_keeps_its_place(store: Store, make_r
 def test_a_champion_is_written_before_its_record(
     store: Store, make_result: Make, parameters: dict[str, Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    renamed = []
-    replace = os.replace
-    monkeypatch.setattr(os, "replace", lambda a, b: (renamed.append(Path(b).suffix), replace(a, b)))
+    placed = []
+    link = os.link
+    monkeypatch.setattr(os, "link", lambda a, b: (placed.append(Path(b).suffix), link(a, b)))
     store.put(make_result(), parameters)
-    assert renamed == [".npz", ".json"]
+    assert placed == [".npz", ".json"]
 
 
 def test_a_run_killed_between_champion_and_record_is_simply_run_again(

@@ -70,7 +70,11 @@ def _parser() -> argparse.ArgumentParser:
     status = add("status", "show the verdicts that the stored trials give; run nothing")
     tier(status)
 
-    verify = add("verify", "read every stored file back, and move bad ones aside so that their trials run again")
+    verify = add(
+        "verify",
+        "read every stored trial, champion and checkpoint back, and move bad ones aside so that their trials run again "
+        "(verdicts are not read: `evoclaims status` judges the trials anew)",
+    )
     verify.add_argument("--dry-run", action="store_true", help="list bad files and leave them where they are")
 
     reference = add("reference", "write the stored trials of a tier as the committed reference trials")

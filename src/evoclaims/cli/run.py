@@ -7,6 +7,7 @@ import argparse
 from evoclaims.cli.project import open_project, open_store
 from evoclaims.cli.terminal import StdoutTerminal
 from evoclaims.core.errors import UnknownNameError, UserError
+from evoclaims.judging.counting import MAX_TRIALS
 from evoclaims.suite.live import LiveLine, duration
 from evoclaims.suite.modes import RunMissing
 from evoclaims.suite.reproduction import Tier
@@ -19,8 +20,11 @@ def main(options: argparse.Namespace) -> int:
     tier = reproduction.tier(options.tier)
     chosen = choose(tier, options.method, options.on)
     n = options.trials if options.trials is not None else tier.protocol.last.n
-    if n < 1:
-        raise UserError(f"--trials takes a number of trials from 1, not {n}.")
+    if not 1 <= n <= MAX_TRIALS:
+        raise UserError(
+            f"--trials takes 1 to {MAX_TRIALS} trials a condition (no verdict looks at more), not {n}. Further seeds "
+            "are run by another call, with --first-seed."
+        )
     line = LiveLine(StdoutTerminal())
     fetch = RunMissing(open_store(options.storage), options.device, line)
     fetch.check()

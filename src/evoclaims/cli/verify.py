@@ -1,4 +1,7 @@
-"""`evoclaims verify`: every file of the store read back."""
+"""`evoclaims verify`: every trial, champion and checkpoint of the store read back.
+
+Files of verdicts are not: nothing is ever judged from them, and each run with the same claims writes them anew.
+"""
 
 from __future__ import annotations
 

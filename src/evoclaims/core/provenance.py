@@ -9,6 +9,7 @@ import os
 import platform
 import re
 import subprocess
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final
 
@@ -28,6 +29,12 @@ PACKAGES: Final = (
     "statsmodels",
     "pandas",
 )
+CUDA: Final = re.compile(r"jax-cuda\d+-(plugin|pjrt)|nvidia-.+")
+"""Names of the packages that bring CUDA and its libraries; none of them is there on a machine without a GPU."""
+
+FIXES_BITS: Final = ("machine", "versions", "xla_flags", "matmul_precision", "x64", "prng")
+"""Parts of a provenance that a computation's bits depend on, besides the device."""
+
 GIT_SECONDS: Final = 5.0
 """How long git may take; on a slow network folder a missing revision is better than a stalled run."""
 
@@ -37,9 +44,10 @@ def collect() -> dict[str, Any]:
 
     Returns:
         "git" ({"sha", "dirty"} of the repository around the current folder, or None), "versions" (by package
-        name, None where absent, and "python"), "device" ({"platform", "kind", "count"}), "machine" (a string
-        such as "Linux x86_64 AMD EPYC 7B13"), "xla_flags" (string or None), "matmul_precision" (string or None)
-        and "x64" (bool).
+        name, None where absent, and "python"), "cuda" (versions of the packages that bring CUDA, by name; empty
+        without any), "device" ({"platform", "kind", "count"}), "machine" (a string
+        such as "Linux x86_64 AMD EPYC 7B13"), "xla_flags" (string or None), "matmul_precision" (string or None),
+        "x64" (bool) and "prng" ({"implementation", "partitionable"}: jax's generator of random bits).
     """
     return copy.deepcopy(_collected())
 
@@ -54,12 +62,28 @@ def _collected() -> dict[str, Any]:
     return {
         "git": git_state(),
         "versions": versions(),
+        "cuda": cuda_versions(),
         "device": _device(),
         "machine": machine_class(),
         "xla_flags": os.environ.get("XLA_FLAGS"),
         "matmul_precision": None if precision is None else str(precision),
         "x64": bool(config.jax_enable_x64),
+        "prng": {
+            "implementation": str(config.jax_default_prng_impl),
+            "partitionable": bool(config.jax_threefry_partitionable),
+        },
     }
+
+
+def what_fixes_bits(provenance: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the parts of a provenance that fix a computation's bits, as far as it has them.
+
+    Two computations of the same program, whose provenances agree in these, should agree to the bit. CUDA's versions
+    count on a GPU alone.
+    """
+    device = provenance.get("device") or {}
+    names = (*FIXES_BITS, "cuda") if device.get("platform") == "gpu" else FIXES_BITS
+    return {"kind": device.get("kind"), **{name: provenance[name] for name in names if name in provenance}}
 
 
 def git_state() -> dict[str, Any] | None:
@@ -97,6 +121,14 @@ def _git(*arguments: str) -> str | None:
 def versions() -> dict[str, str | None]:
     """Return the installed version of every package that can change a result (None where absent), and Python's."""
     return {"python": platform.python_version(), **{name: _version(name) for name in PACKAGES}}
+
+
+def cuda_versions() -> dict[str, str]:
+    """Return the version of every installed package that brings CUDA, cuDNN and the like, by name."""
+    found = [
+        (one.name.lower().replace("_", "-"), one.version) for one in importlib.metadata.distributions() if one.name
+    ]
+    return dict(sorted((name, version) for name, version in found if CUDA.fullmatch(name)))
 
 
 def _version(package: str) -> str | None:

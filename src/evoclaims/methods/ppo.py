@@ -44,6 +44,7 @@ class LevelTest:
         every: training steps between tests.
         sampled_episodes: 0 for the deterministic policy under the task's own examination; otherwise how many training
             episodes of the *stochastic* policy must all be without error, as in the authors' published code (128).
+            Such an episode is one step, on a row drawn from the level.
     """
 
     every: int = 1
@@ -112,7 +113,17 @@ class Ppo:
             )
 
     def init(self, key: PRNGKeyArray, task: Task) -> PpoState:
-        """Draw the networks' parameters and start the environments at level 0."""
+        """Draw the networks' parameters and start the environments at level 0.
+
+        Raises:
+            UserError: when the level test samples episodes and those of `task` are longer than the one step it plays.
+        """
+        if self.level_test.sampled_episodes and task.horizon > 1:
+            raise UserError(
+                f"PPO's level test by sampled episodes plays one step in each, and an episode of {task.name} has up to "
+                f"{task.horizon}: the first would decide alone. Let the task draw one row an episode "
+                '(sampling="sampled"), or test the deterministic policy on the whole table (sampled_episodes=0).'
+            )
         policy_key, value_key, reset_key = streams(key, "policy", "value", "reset")
         net = self._networks(task)
         parameters = losses.PPONetworkParams(

@@ -108,15 +108,12 @@ def judged(
 
 def broken(claim: Claim, case: str, tier: str, reason: str) -> ClaimReport:
     """Build the report of a claim whose test broke before it was judged."""
-    return ClaimReport(
-        claim=claim.id,
-        case=case,
-        tier=tier,
-        statement=claim.statement(tier),
-        where=claim.where,
-        outcome=str(Outcome.ERROR),
-        reason=reason,
-    )
+    return _unjudged(claim, case, tier, Outcome.ERROR, reason)
+
+
+def skipped(claim: Claim, case: str, tier: str, reason: str) -> ClaimReport:
+    """Build the report of a claim whose test was skipped, with pytest's words for why."""
+    return _unjudged(claim, case, tier, Outcome.NOT_RUN, f"its test was skipped ({reason or 'no reason given'})")
 
 
 def expecting(report: ClaimReport, expectation: Expectation | None) -> ClaimReport:
@@ -137,6 +134,19 @@ def located(report: ClaimReport, root: Path) -> ClaimReport:
     """Return the report with the path of the file that an earlier run has written, if there is one."""
     path = _path(report, root)
     return replace(report, evidence=str(path)) if path.is_file() else report
+
+
+def _unjudged(claim: Claim, case: str, tier: str, outcome: Outcome, reason: str) -> ClaimReport:
+    """Build the report of a claim without a verdict of the judge."""
+    return ClaimReport(
+        claim=claim.id,
+        case=case,
+        tier=tier,
+        statement=claim.statement(tier),
+        where=claim.where,
+        outcome=str(outcome),
+        reason=reason,
+    )
 
 
 def _path(report: ClaimReport, root: Path) -> Path:

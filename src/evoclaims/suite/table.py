@@ -67,7 +67,7 @@ def explanations(reports: Sequence[ClaimReport], width: int, colour: bool) -> st
         if report.outcome == Outcome.SUPPORTED and report.expected in (None, report.outcome):
             continue
         note = ""
-        if report.expected is not None:
+        if report.expected is not None and report.outcome != Outcome.NOT_RUN:
             kept = "accepted" if report.as_expected else f"no longer {report.expected}, which was accepted"
             note = f" [{kept}: {report.because}]"
         lines.append(f"{Outcome(report.outcome).symbol} {report.name}: {report.reason}{note}")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -32,7 +33,7 @@ class Header:
         platform: what it was computed on and with (device kind and versions): other hardware would go on to other
             bits, so that such a checkpoint is passed over.
         batch: seeds that the batch was started with; it fixes the widths the batch goes through.
-        lanes: for each lane, the seed whose record is still owed, or None.
+        lanes: for each lane, the seed of the trial that has not ended in it, or None.
         chunks: chunks of the budget done.
         curves: for each seed (as text), the points of its training curve so far, by name.
         run_seconds: spent on running so far.
@@ -73,6 +74,15 @@ def find(folder: Path, condition: str, platform: str) -> list[Header]:
     """
     headers = [read(path)[0] for path in sorted(folder.glob(f"{condition}-*.npz"))]
     return [h for h in headers if h.condition == condition and h.platform == platform and h.schema == SCHEMA]
+
+
+def sound_ones(folder: Path, condition: str) -> list[Header]:
+    """Return the headers of a condition's checkpoints of every platform, passing over what is torn or edited."""
+    headers = []
+    for path in sorted(folder.glob(f"{condition}-*.npz")):
+        with contextlib.suppress(DamagedFileError):
+            headers.append(read(path)[0])
+    return [header for header in headers if header.condition == condition and header.schema == SCHEMA]
 
 
 def read(path: Path) -> tuple[Header, list[NDArray[Any]]]:
@@ -130,8 +140,9 @@ def restore(folder: Path, header: Header, like: Any) -> TrialState:
 
 
 def remove(folder: Path, header: Header) -> None:
-    """Delete the checkpoint of a batch whose trials are all stored."""
-    path_of(folder, header.condition, header.batch, header.platform).unlink(missing_ok=True)
+    """Delete the checkpoint of a batch whose trials are all stored; on a read-only disk it stays, and harms nobody."""
+    with contextlib.suppress(OSError):
+        path_of(folder, header.condition, header.batch, header.platform).unlink(missing_ok=True)
 
 
 def fault(path: Path) -> str | None:

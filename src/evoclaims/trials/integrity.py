@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import itertools
 import os
+import re
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -14,10 +15,12 @@ from typing import Final, Literal
 from evoclaims.core.errors import UserError
 from evoclaims.trials.notice import fresh
 from evoclaims.trials.records import is_hash, printable
-from evoclaims.trials.store import DamagedFileError, Store
+from evoclaims.trials.store import SPARE_DIGITS, DamagedFileError, Store
 
 SETTLED_SECONDS: Final = 60.0
 """A half-written file younger than this may be another process at work, so it is no leftover yet."""
+
+_CHAMPION: Final = re.compile(rf"[0-9a-f]{{64}}(\.[0-9a-f]{{{SPARE_DIGITS}}})?\.npz")
 
 Kind = Literal["record", "champion", "checkpoint", "leftover"]
 
@@ -82,8 +85,8 @@ def _records(store: Store) -> Iterator[Problem]:
             result = store.read(path)
         except DamagedFileError as error:
             yield Problem(path, "record", error.reason)
-            if _is_record(store, path) and store.champion_path(path.stem).exists():
-                yield Problem(store.champion_path(path.stem), "champion", "its trial's record cannot be used")
+            for champion in store.champion_files(path.stem) if _is_record(store, path) else ():
+                yield Problem(champion, "champion", "its trial's record cannot be used")
             continue
         if result is None:
             continue
@@ -103,10 +106,22 @@ def _is_record(store: Store, path: Path) -> bool:
 def _champions(store: Store) -> Iterator[Problem]:
     """Find champions that belong to no record: foreign ones, and those of a run killed between the two files."""
     for path in store.champion_paths():
-        if not is_hash(path.stem) or path != store.champion_path(path.stem):
+        trial_id = path.name.partition(".")[0]
+        if not _CHAMPION.fullmatch(path.name) or path.parent != store.champion_path(trial_id).parent:
             yield Problem(path, "champion", "its name or place is not that of a champion")
-        elif not os.path.lexists(store.record_path(path.stem)) and _settled(path):
+        elif not os.path.lexists(store.record_path(trial_id)) and _settled(path):
             yield Problem(path, "leftover", "it has no record, so its run was stopped before the trial was stored")
+        elif len(store.champion_files(trial_id)) > 1 and not _is_named(store, path, trial_id) and _settled(path):
+            yield Problem(path, "leftover", "its trial's record names another champion")
+
+
+def _is_named(store: Store, path: Path, trial_id: str) -> bool:
+    """Whether `path` is the champion that the trial's record names; what cannot be read is told of elsewhere."""
+    try:
+        result = store.get(trial_id)
+    except DamagedFileError:
+        return True
+    return result is not None and result.champion != "" and store.champion_file(result) == path
 
 
 def _checkpoints(store: Store, fault: Callable[[Path], str | None]) -> Iterator[Problem]:

@@ -20,10 +20,14 @@ from types import TracebackType
 from typing import Final
 
 from evoclaims.core.errors import UserError
+from evoclaims.trials.heartbeat import beating
 from evoclaims.trials.records import is_hash, printable
 
 FRESH_SECONDS: Final = 60.0
 """A notice from another host counts for this long after its last refresh; here its process can be asked."""
+
+REFRESH_SECONDS: Final = 15.0
+"""Time between two refreshes: some may come late on a slow network folder before the notice looks stale."""
 
 
 @dataclass(frozen=True)
@@ -50,6 +54,8 @@ class Runner:
 class Notice:
     """A notice for as long as a `with` block lasts; a stale one is taken over, a fresh one of another left alone.
 
+    A thread refreshes it for other hosts, since a chunk of training or a compilation may take longer than they wait.
+
     Attributes:
         store_root: the store's folder.
         condition_id: the condition that is being run.
@@ -59,6 +65,7 @@ class Notice:
     store_root: Path
     condition_id: str
     token: str = field(default_factory=lambda: secrets.token_hex(8))
+    _heart: contextlib.ExitStack = field(default_factory=contextlib.ExitStack, repr=False, compare=False)
 
     @property
     def path(self) -> Path:
@@ -77,7 +84,7 @@ class Notice:
         return runner is not None and runner.token == self.token
 
     def refresh(self) -> None:
-        """Say that the process is still at work, for those on other hosts; call it more often than every 60 s."""
+        """Say that the process is still at work, for those on other hosts."""
         if self.held:
             with contextlib.suppress(OSError):
                 os.utime(self.path)
@@ -89,12 +96,15 @@ class Notice:
             if not _place(self.path, self.token) and self.other is None:
                 _clear(self.path)
                 _place(self.path, self.token)
+        if self.held:
+            self._heart.enter_context(beating(self.refresh, REFRESH_SECONDS))
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         """Take the notice away, if it is still this one."""
+        self._heart.close()
         if self.held:
             with contextlib.suppress(OSError):
                 self.path.unlink()

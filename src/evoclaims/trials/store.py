@@ -20,10 +20,14 @@ from numpy.typing import NDArray
 from evoclaims.core.errors import UserError
 from evoclaims.core.files import write_atomically
 from evoclaims.trials.arrays import pack, unpack
+from evoclaims.trials.once import write_once
 from evoclaims.trials.records import RecordError, dump, is_hash, parse, printable
 from evoclaims.trials.result import TrialResult
 
 DEFAULT_ROOT: Final = Path(".evoclaims")
+
+SPARE_DIGITS: Final = 16
+"""Digits of a champion's hash in the name of a file beside the usual one."""
 
 Put = Literal["stored", "present", "differs"]
 """What became of a trial handed to the store: written; there already, equal to the bit; there with another digest."""
@@ -64,6 +68,20 @@ class Store:
     def champion_path(self, trial_id: str) -> Path:
         """Return where the champion of `trial_id` belongs; a `UserError` for a text that is not an id."""
         return self.root / "champions" / _checked(trial_id)[:2] / f"{trial_id}.npz"
+
+    def champion_files(self, trial_id: str) -> tuple[Path, ...]:
+        """Return the files that hold a champion of `trial_id`; more than one where processes have raced (see `put`)."""
+        usual = self.champion_path(trial_id)
+        return tuple(path for path in (usual, *sorted(usual.parent.glob(f"{trial_id}.*.npz"))) if path.exists())
+
+    def champion_file(self, result: TrialResult) -> Path:
+        """Return the file that holds the champion which a record of this store names."""
+        spare = self._spare_champion_path(result.id, result.champion)
+        return spare if spare.exists() else self.champion_path(result.id)
+
+    def _spare_champion_path(self, trial_id: str, champion: str) -> Path:
+        """Return where a champion goes when the usual place holds another one."""
+        return self.champion_path(trial_id).with_suffix(f".{champion[:SPARE_DIGITS]}.npz")
 
     def check_writable(self) -> None:
         """Write and remove a small file, so that a bad folder is found before an hour of training, not after.
@@ -121,7 +139,8 @@ class Store:
 
         The champion is written first, so that a record that exists is complete. A trial that is there already
         stays as it is, whatever its digest, with one exception: a crash is no outcome of the trial, so a trial
-        run again after a crash takes its place.
+        run again after a crash takes its place. Of processes that put the same trial at the same time, the first
+        record stays and keeps its own champion: no champion is ever written over another.
 
         Returns:
             "stored", "present" (there already with an equal digest) or "differs" (there with another digest).
@@ -141,9 +160,28 @@ class Store:
         if present is not None and (present.status != "crashed" or present.digest == result.digest):
             return "present" if present.digest == result.digest else "differs"
         if packed:
-            write_atomically(self.champion_path(result.id), packed)
-        write_atomically(self.record_path(result.id), record)
+            self._write_champion(sealed, packed)
+        path = self.record_path(result.id)
+        if present is None and write_once(path, record):
+            return "stored"
+        first = self.get(result.id)
+        if present is None and first is not None:  # another process was faster
+            self._remove_champion_beside(first, sealed)
+            return self.put(result, champion)
+        write_atomically(path, record)
         return "stored"
+
+    def _write_champion(self, sealed: TrialResult, packed: bytes) -> None:
+        """Write a champion to its usual place, or beside it where another one lies there."""
+        usual = self.champion_path(sealed.id)
+        if not write_once(usual, packed) and _sha256(usual) != sealed.champion:
+            write_atomically(self._spare_champion_path(sealed.id, sealed.champion), packed)
+
+    def _remove_champion_beside(self, first: TrialResult, sealed: TrialResult) -> None:
+        """Remove the champion of a trial that another process has stored first with another champion."""
+        for path in self.champion_files(sealed.id) if first.champion != sealed.champion else ():
+            if _sha256(path) == sealed.champion:
+                path.unlink(missing_ok=True)
 
     def champion(self, trial_id: str) -> dict[str, NDArray[Any]]:
         """Return the champion's parameters by name (empty when the trial has none).
@@ -161,7 +199,7 @@ class Store:
         """Return the champion's parameters of a trial read from this store; raises as `champion` does."""
         if not result.champion:
             return {}
-        path = self.champion_path(result.id)
+        path = self.champion_file(result)
         try:
             data = path.read_bytes()
         except OSError as error:
@@ -196,6 +234,14 @@ class Store:
     def champion_paths(self) -> Iterator[Path]:
         """Iterate over all that lies where champions belong, strange entries included (hidden ones left out)."""
         return _walk(self.root / "champions")
+
+
+def _sha256(path: Path) -> str:
+    """Return the hash of a file; empty when it cannot be read."""
+    try:
+        return hashlib.sha256(path.read_bytes()).hexdigest()
+    except OSError:
+        return ""
 
 
 def _checked(trial_id: str) -> str:

@@ -1,0 +1,98 @@
+"""A skipped claim is not run, and a run that has judged none of its claims says so and does not end well."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import pytest
+
+BODY = "verdict(trials('right', on='parity').solves_every_level.in_most_trials())"
+SKIPS = {
+    "a mark": (f"@pytest.mark.skip(reason='later')\n@says('a')\ndef test_a(trials, verdict):\n    {BODY}\n", "later"),
+    "a condition": (
+        f"@says('a')\n@pytest.mark.skipif(True, reason='no GPU')\ndef test_a(trials, verdict):\n    {BODY}\n",
+        "no GPU",
+    ),
+    "a call": ("@says('a')\ndef test_a(trials, verdict):\n    pytest.skip('in the middle')\n", "in the middle"),
+    "an expected failure": (
+        "@pytest.mark.xfail(reason='known')\n@says('a')\ndef test_a(trials, verdict):\n    assert False\n",
+        "xfail: known",
+    ),
+}
+
+
+def _reports(project: Any) -> list[dict[str, Any]]:
+    plain: list[dict[str, Any]] = json.loads((project.path / "out.json").read_text())["claims"]
+    return plain
+
+
+@pytest.mark.parametrize("how", SKIPS)
+@pytest.mark.parametrize(
+    ("choice", "status"), [("report", pytest.ExitCode.NO_TESTS_COLLECTED), ("fail", pytest.ExitCode.TESTS_FAILED)]
+)
+def test_a_run_whose_every_claim_is_skipped_says_that_nothing_was_measured(
+    project: Any, how: str, choice: str, status: int
+) -> None:
+    text, reason = SKIPS[how]
+    project.write(text)
+    result = project.run("--claims-json=out.json", f"--claims-undecided={choice}")
+    assert result.ret == status
+    result.stdout.fnmatch_lines(
+        [
+            "a *a in small (§1)*- not run*",
+            f"- a: its test was skipped ({reason})",
+            "claims: 1 not run",
+            "No claim was judged: nothing was measured.",
+        ]
+    )
+    (report,) = _reports(project)
+    assert (report["claim"], report["tier"], report["outcome"]) == ("a", "smoke", "not run")
+    assert reason in report["reason"]
+    outcomes = result.parseoutcomes()
+    assert outcomes.get("skipped", 0) + outcomes.get("xfailed", 0) == 1  # pytest's own counts stay what they are
+
+
+@pytest.mark.parametrize("choice", ["report", "fail"])
+def test_a_skipped_claim_beside_a_judged_one_is_listed_and_fails_nothing(project: Any, choice: str) -> None:
+    project.write(a="pytest.skip('later')", b="supported")
+    result = project.run("--claims-json=out.json", f"--claims-undecided={choice}")
+    assert result.ret == 0
+    result.stdout.fnmatch_lines(["claims: 1 supported, 1 not run"])
+    assert [report["outcome"] for report in _reports(project)] == ["not run", "supported"]
+
+
+def test_a_claim_that_was_judged_is_not_listed_again_when_its_fixture_skips_at_the_end(project: Any) -> None:
+    project.write(
+        "@pytest.fixture\ndef late():\n    yield\n    pytest.skip('too late')\n\n"
+        f"@says('a')\ndef test_a(late, trials, verdict):\n    {BODY}\n"
+    )
+    assert project.run("--claims-json=out.json").ret == 0
+    assert [report["outcome"] for report in _reports(project)] == ["supported"]
+
+
+def test_a_skipped_claim_keeps_the_verdict_that_an_earlier_run_has_stored(project: Any) -> None:
+    project.write(a="supported")
+    project.run(own_store=True)
+    stored = project.path / ".evoclaims" / "verdicts" / "smoke" / "a.json"
+    before = stored.read_bytes()
+    project.write(a="pytest.skip('later')")
+    project.run(own_store=True)
+    assert stored.read_bytes() == before
+
+
+def test_a_run_without_claims_leaves_no_old_verdicts_behind(project: Any) -> None:
+    project.write("def test_plain():\n    pass\n")
+    (project.path / "out.json").write_text("of an earlier run")
+    assert project.run("--claims-json=out.json", "--collect-only").ret == 0
+    assert (project.path / "out.json").read_text() == "of an earlier run"
+    assert project.run("--claims-json=out.json").ret == 0
+    assert json.loads((project.path / "out.json").read_text()) == {"schema": 1, "claims": [], "drift": None}
+
+
+def test_claims_skipped_in_workers_are_known_to_the_controller(project: Any) -> None:
+    project.write(a="pytest.skip('later')")
+    result = project.run_apart("-n1", "--claims-json=out.json")
+    assert result.ret == pytest.ExitCode.NO_TESTS_COLLECTED
+    result.stdout.fnmatch_lines(["- a: its test was skipped (later)", "No claim was judged: nothing was measured."])
+    assert [report["outcome"] for report in _reports(project)] == ["not run"]

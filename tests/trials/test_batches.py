@@ -1,0 +1,191 @@
+"""Which trials go on from a checkpoint, in which lanes, and when a checkpoint goes."""
+
+from __future__ import annotations
+
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+import pytest
+from climbers import CLIMBING, SEEDS, Log, digests, run_climbers
+from trial_toys import StoppedError, stopping
+
+from evoclaims.core.provenance import collect
+from evoclaims.trials import checkpoint
+from evoclaims.trials.lanes import Lanes
+from evoclaims.trials.result import TrialResult
+from evoclaims.trials.store import Store
+
+
+def test_a_checkpoint_of_another_platform_is_passed_over(
+    store: Store,
+    cpus: list[Any],
+    uninterrupted: list[TrialResult],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    with monkeypatch.context() as patch:
+        patch.setattr("evoclaims.trials.outcome.collect", lambda: {**collect(), "machine": "another"})
+        with pytest.raises(StoppedError):
+            run_climbers(store, cpus, stopping(2))
+    log = Log()
+    assert digests(run_climbers(store, cpus, log)) == digests(uninterrupted)
+    assert "resuming" not in log.phases()
+    assert not list(store.checkpoints.iterdir())  # it owed nothing any more
+
+
+def test_a_checkpoint_of_another_platform_stays_while_it_owes_a_trial(
+    store: Store, cpus: list[Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with monkeypatch.context() as patch:
+        patch.setattr("evoclaims.trials.outcome.collect", lambda: {**collect(), "prng": "another"})
+        with pytest.raises(StoppedError):
+            run_climbers(store, cpus, stopping(1))
+    (path,) = store.checkpoints.iterdir()
+    owed = [seed for seed in checkpoint.read(path)[0].lanes if seed is not None]
+    run_climbers(store, cpus, seeds=owed[1:])
+    assert list(store.checkpoints.iterdir()) == [path]
+    run_climbers(store, cpus, seeds=owed[:1])
+    assert list(store.checkpoints.iterdir()) == []
+
+
+def test_an_interrupted_batch_waits_until_one_of_its_trials_is_asked_for(
+    store: Store, cpus: list[Any], uninterrupted: list[TrialResult], puts: Counter[int]
+) -> None:
+    with pytest.raises(StoppedError):
+        run_climbers(store, cpus, stopping(1), seeds=[1, 5])
+    (path,) = store.checkpoints.iterdir()
+    log = Log()
+    assert digests(run_climbers(store, cpus, log, seeds=[3])) == [uninterrupted[2].digest]
+    assert "resuming" not in log.phases()
+    assert list(store.checkpoints.iterdir()) == [path]
+    assert puts.keys() == {3}
+    assert digests(run_climbers(store, cpus, log, seeds=[5])) == [uninterrupted[4].digest]
+    assert "resuming" in log.phases()
+    assert puts == Counter([3, 1, 5])
+
+
+def test_a_checkpoint_whose_trials_are_all_stored_is_removed(
+    store: Store, cpus: list[Any], uninterrupted: list[TrialResult]
+) -> None:
+    with pytest.raises(StoppedError):
+        run_climbers(store, cpus, stopping(1))
+    for result in uninterrupted:
+        store.put(result, {})
+    log = Log()
+    assert digests(run_climbers(store, cpus, log, seeds=[*SEEDS, 0]))[:-1] == digests(uninterrupted)
+    assert log.phases() == ["compiling", "training"]
+    assert not list(store.checkpoints.iterdir())
+
+
+def test_a_checkpoint_that_a_kill_left_behind_goes_though_nothing_is_missing(
+    store: Store, cpus: list[Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with monkeypatch.context() as patch:
+        patch.setattr(checkpoint, "remove", lambda folder, header: None)
+        run_climbers(store, cpus)
+    (path,) = store.checkpoints.iterdir()
+    torn = path.with_name(f"{CLIMBING.id}-torn.npz")
+    torn.write_bytes(b"PK")
+    monkeypatch.setattr("evoclaims.trials.runner.Lanes", None)
+    run_climbers(store, cpus)
+    assert list(store.checkpoints.iterdir()) == [torn]  # left for `evoclaims verify`
+
+
+def test_more_trials_may_be_asked_for_than_the_stopped_run_had(
+    store: Store, cpus: list[Any], uninterrupted: list[TrialResult], puts: Counter[int]
+) -> None:
+    with pytest.raises(StoppedError):
+        run_climbers(store, cpus, stopping(2), seeds=[1, 5])
+    log = Log()
+    assert digests(run_climbers(store, cpus, log)) == digests(uninterrupted)
+    assert log.phases() == ["resuming", "training", "compiling"]
+    assert puts == Counter(SEEDS)
+
+
+@pytest.fixture
+def side_by_side(monkeypatch: pytest.MonkeyPatch) -> list[tuple[int, int]]:
+    """Lay trials out as on a GPU; gives the steps and the number of lanes of every chunk that is run."""
+    monkeypatch.setattr("evoclaims.trials.lanes.layout_for", lambda devices: "vector")
+    chunks: list[tuple[int, int]] = []
+    advance = Lanes.advance
+
+    def telling(self: Lanes, state: Any, until: int, width: int) -> Any:
+        chunks.append((until, width))
+        return advance(self, state, until, width)
+
+    monkeypatch.setattr(Lanes, "advance", telling)
+    return chunks
+
+
+def _stop_with_an_old_checkpoint(store: Store, cpus: list[Any], report: int) -> None:
+    """Stop at a report, with no checkpoint but that of the first chunk."""
+    save = checkpoint.save
+    saved: list[Any] = []
+
+    def once(*arguments: Any) -> None:
+        if not saved:
+            saved.append(save(*arguments))
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(checkpoint, "save", once)
+        with pytest.raises(StoppedError):
+            run_climbers(store, cpus, stopping(report))
+
+
+def test_side_by_side_trials_that_ended_after_the_checkpoint_run_along_so_that_the_widths_stay_the_same(
+    store: Store,
+    tmp_path: Path,
+    cpus: list[Any],
+    side_by_side: list[tuple[int, int]],
+    puts: Counter[int],
+) -> None:
+    """The bits of a trial depend on the width there, so that it must not depend on when a kill came."""
+    wanted = run_climbers(Store(tmp_path / "whole"), cpus)
+    whole = side_by_side.copy()
+    assert whole[0][1] > whole[-1][1]
+    puts.clear()
+    _stop_with_an_old_checkpoint(store, cpus, 5)
+    stored = set(puts)
+    assert len(stored) >= 3  # enough to narrow the batch
+    side_by_side.clear()
+    log = Log()
+    assert digests(run_climbers(store, cpus, log)) == digests(wanted)
+    assert side_by_side == whole[1:]
+    assert puts == Counter(SEEDS)
+    assert (log[0].phase, log[0].trials) == ("resuming", len(SEEDS) - len(stored))
+    assert [progress.ended for progress in log[1:-1]] == [len(stored)] * len(log[1:-1])
+    assert not list(store.checkpoints.iterdir())
+
+
+def test_side_by_side_a_batch_ends_when_nothing_is_owed_though_a_stored_trial_runs_along(
+    store: Store, cpus: list[Any], uninterrupted: list[TrialResult], side_by_side: list[tuple[int, int]]
+) -> None:
+    with pytest.raises(StoppedError):
+        run_climbers(store, cpus, stopping(1))
+    late = max(uninterrupted, key=lambda result: result.metrics["steps"])
+    store.put(late, {})
+    side_by_side.clear()
+    run_climbers(store, cpus)
+    others = [result.metrics["steps"] for result in uninterrupted if result is not late]
+    assert max(others) <= max(steps for steps, _ in side_by_side) < late.metrics["steps"]
+
+
+def test_side_by_side_a_batch_goes_on_with_as_many_devices_as_it_had(
+    store: Store, cpus: list[Any], side_by_side: list[tuple[int, int]]
+) -> None:
+    """Lanes share a device there: the width on each would be another one."""
+    with pytest.raises(StoppedError):
+        run_climbers(store, cpus, stopping(1))
+    log = Log()
+    run_climbers(store, cpus[:1], log)
+    assert "resuming" not in log.phases()
+
+
+def test_one_after_the_other_a_batch_goes_on_with_any_number_of_devices(
+    store: Store, cpus: list[Any], uninterrupted: list[TrialResult]
+) -> None:
+    with pytest.raises(StoppedError):
+        run_climbers(store, cpus, stopping(1))
+    log = Log()
+    assert digests(run_climbers(store, cpus[:1], log)) == digests(uninterrupted)
+    assert log.phases()[0] == "resuming"
