@@ -77,7 +77,7 @@ class GraphNetwork:
             linked=linked,
             bias=genome.nodes.bias,
             response=genome.nodes.response,
-            activation=genome.nodes.activation.at[outputs].set(len(self.activations)),
+            activation=jnp.asarray(genome.nodes.activation).at[outputs].set(len(self.activations)),
             outputs=outputs,
         )
 

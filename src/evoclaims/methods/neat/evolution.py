@@ -101,12 +101,7 @@ def evolve(
 
 def policy(encoding: Encoding, state: Evolution) -> Policy:
     """Return the champion as a policy; its parameters are the genome."""
-
-    def act(genome: Genome, observation: Array) -> Array:
-        # A genome read from a file has NumPy's arrays.
-        return encoding.apply(encoding.express(jax.tree.map(jnp.asarray, genome)), observation)
-
-    return Policy(parameters=state.champion, function=act)
+    return Policy(parameters=state.champion, function=lambda genome, x: encoding.apply(encoding.express(genome), x))
 
 
 def _evaluate(

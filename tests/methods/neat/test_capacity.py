@@ -1,0 +1,60 @@
+"""Which size of arrays a generation runs in; that it makes no difference is shown in test_evolution."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from genomes import made, stacked
+
+from evoclaims.methods.neat import capacity
+from evoclaims.methods.neat.settings import Settings
+
+
+@pytest.mark.parametrize(
+    ("limits", "wanted"),
+    [
+        ((100, 400), [(32, 96), (100, 200), (100, 400)]),
+        ((50, 100), [(32, 96), (50, 100)]),
+        ((32, 96), [(32, 96)]),
+        ((16, 64), [(16, 64)]),
+        ((100, 200), [(32, 96), (100, 200)]),
+    ],
+)
+def test_smaller_arrays_are_offered_where_they_are_smaller(
+    limits: tuple[int, int], wanted: list[tuple[int, int]]
+) -> None:
+    assert capacity.capacities(Settings(nodes=limits[0], connections=limits[1])) == wanted
+
+
+@pytest.mark.parametrize(
+    ("nodes", "connections", "wanted"),
+    [(31, 94, (32, 96)), (32, 94, (100, 200)), (31, 95, (100, 200)), (99, 198, (100, 200)), (99, 199, (100, 400))],
+)
+def test_arrays_have_room_for_one_more_node_and_two_more_connections(
+    nodes: int, connections: int, wanted: tuple[int, int]
+) -> None:
+    small = made([0, 1, 2], {}, capacity=(100, 400))
+    large = replace(small, node_count=np.int32(nodes), connection_count=np.int32(connections))
+
+    def size(nodes: int, connections: int) -> jax.Array:
+        return jnp.array([nodes, connections], jnp.int32)
+
+    for groups in ((stacked([small, large]),), (stacked([small]), stacked([large, small]))):
+        chosen = capacity.in_capacity(Settings(), groups, lambda n, c, _: size(n, c), jnp.zeros(()))
+        assert tuple(np.asarray(chosen).tolist()) == wanted
+
+
+def test_the_choice_of_the_largest_genome_is_taken_for_all_trials_of_a_batch() -> None:
+    counts = jnp.array([[5, 5], [5, 40]], jnp.int32)
+    one = stacked([made([0, 1, 2], {}, capacity=(100, 400))] * 2)
+
+    def size(count: jax.Array) -> jax.Array:
+        genomes = replace(jax.tree.map(jnp.asarray, one), node_count=count)
+        return capacity.in_capacity(Settings(), (genomes,), lambda n, c, _: jnp.asarray(n, jnp.int32), count)
+
+    assert np.asarray(jax.jit(jax.vmap(size))(counts)).tolist() == [100, 100]
+    assert int(size(counts[0])) == 32

@@ -1,0 +1,168 @@
+"""NEAT in the engine: trials are the same alone, in batches, and after a stop."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import jax
+import numpy as np
+import pytest
+
+from evoclaims.core.errors import UserError
+from evoclaims.envs.gates.parity import NParity
+from evoclaims.envs.probes import Probe
+from evoclaims.methods.neat.neat import Neat
+from evoclaims.methods.neat.settings import PAPER, Mutation, Settings, Species
+from evoclaims.trials.budget import Budget
+from evoclaims.trials.lanes import Lanes
+from evoclaims.trials.progress import RunProgress
+from evoclaims.trials.result import TrialResult
+from evoclaims.trials.runner import run
+from evoclaims.trials.spec import Condition
+from evoclaims.trials.store import Store
+
+SETTINGS = Settings(
+    population=20,
+    nodes=10,
+    connections=24,
+    mutation=Mutation(node_add=0.4, connection_add=0.4),
+    species=Species(most=4, survival=0.4),
+)
+TASK = Probe(
+    "between",
+    cases=((((1.0, 1.0), 1),), (((0.0, 0.0), 0),), (((0.0, 1.0), 0),), (((1.0, 0.0), 0),), (((2.0, 2.0), 0),)),
+    cases_at_level=(1, 2, 4, 5),
+)
+"""Three levels that one neuron solves, and one that none does."""
+CONDITION = Condition(Neat(SETTINGS), TASK, "curriculum", Budget(generations=30, reports=6))
+SEEDS = (3, 0)
+
+
+@pytest.fixture(autouse=True)
+def _as_in_a_run() -> Iterator[None]:
+    """Keys are checked where NEAT's parts are tested; jax takes the keys of any scan under vmap for used."""
+    with jax.debug_key_reuse(False):
+        yield
+
+
+@pytest.fixture(scope="module")
+def device() -> list[Any]:
+    return list(jax.devices("cpu")[:1])
+
+
+@pytest.fixture(scope="module")
+def programs(device: list[Any]) -> Iterator[None]:
+    """Let all runs of this file share what has been compiled, whatever the store."""
+    kept: dict[tuple[str, int], Any] = {}
+    compile_width = Lanes._compile
+
+    def compiled_once(self: Lanes, width: int) -> Any:
+        if (self.layout, width) not in kept:
+            kept[self.layout, width] = compile_width(self, width)
+        return kept[self.layout, width]
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Lanes, "_compile", compiled_once)
+        yield
+
+
+@pytest.fixture(scope="module")
+def messages() -> Iterator[list[str]]:
+    """What jax logs while the first batch runs."""
+    told: list[str] = []
+    handler = logging.Handler()
+    handler.emit = lambda record: told.append(record.getMessage())  # type: ignore[method-assign]
+    logger = logging.getLogger("jax")
+    logger.addHandler(handler)
+    yield told
+    logger.removeHandler(handler)
+
+
+@pytest.fixture(scope="module")
+def batch(
+    tmp_path_factory: pytest.TempPathFactory, device: list[Any], programs: None, messages: list[str]
+) -> list[TrialResult]:
+    with jax.log_compiles():
+        return run(CONDITION, SEEDS, Store(tmp_path_factory.mktemp("batch")), device)
+
+
+def test_the_trials_differ_and_climb(batch: list[TrialResult]) -> None:
+    assert [result.status for result in batch] == ["done"] * 2
+    assert batch[0].digest != batch[1].digest
+    assert max(max(result.curves["level"]) for result in batch) > 1
+
+
+def test_a_run_compiles_its_start_its_chunk_and_its_score_once(batch: list[TrialResult], messages: list[str]) -> None:
+    compiled = [message for message in messages if message.startswith("Compiling ")]
+    assert len(compiled) == 3, compiled
+
+
+def test_a_trial_alone_is_the_same_trial_to_the_bit(
+    batch: list[TrialResult], tmp_path: Path, device: list[Any], programs: None
+) -> None:
+    (alone,) = run(CONDITION, SEEDS[1:], Store(tmp_path), device)
+    assert alone.digest == batch[1].digest
+
+
+def test_trials_side_by_side_have_the_same_structure_and_nearly_the_same_numbers(
+    batch: list[TrialResult], tmp_path: Path, device: list[Any], programs: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("evoclaims.trials.lanes.layout_for", lambda devices: "vector")
+    store = Store(tmp_path)
+    for one, other in zip(batch, run(CONDITION, SEEDS, store, device), strict=True):
+        assert (one.seed, one.status, one.levels["solved_at"]) == (other.seed, other.status, other.levels["solved_at"])
+        assert one.curves.keys() == other.curves.keys()
+        for name, curve in one.curves.items():
+            np.testing.assert_allclose(curve, other.curves[name], rtol=1e-5, err_msg=name)
+
+
+class StoppedError(Exception):
+    """Stands for whatever ends a process between two reports."""
+
+
+def test_a_stopped_run_goes_on_to_the_same_bits(
+    batch: list[TrialResult], tmp_path: Path, device: list[Any], programs: None
+) -> None:
+    store, told = Store(tmp_path), []
+
+    def stop(progress: RunProgress) -> None:
+        told.append(progress.phase)
+        if told.count("training") == 3:
+            raise StoppedError
+
+    with pytest.raises(StoppedError):
+        run(CONDITION, SEEDS, store, device, stop, checkpoint_seconds=0.0)
+    phases: list[str] = []
+    resumed = run(CONDITION, SEEDS, store, device, lambda progress: phases.append(progress.phase))
+    assert phases[0] == "resuming"
+    assert [result.digest for result in resumed] == [result.digest for result in batch]
+
+
+def test_a_chunk_moves_nothing_between_host_and_device(device: list[Any], programs: None) -> None:
+    lanes = Lanes(CONDITION, device)
+    state, bound = lanes.start(SEEDS, 2), lanes.place(np.full(2, 4, np.int32), 2)
+    advance = lanes.programs(2).advance
+    with jax.transfer_guard("disallow"):
+        _, report = advance(state, bound)
+    assert np.asarray(report.steps).tolist() == [4, 4]
+    text = advance.as_text()  # type: ignore[attr-defined]
+    assert not [word for word in ("callback", "infeed", "outfeed", "send(", "recv(") if word in text]
+
+
+def test_the_cost_counts_every_row_of_every_genome() -> None:
+    assert Neat(SETTINGS).cost(NParity(3)) == 20 * 8
+    assert Neat().cost(NParity(6)) == 5_000 * 64
+
+
+def test_the_default_is_the_papers() -> None:
+    assert Neat().settings == PAPER
+    assert (Neat.name, Neat.revision) == ("neat", 1)
+
+
+def test_a_task_that_does_not_fit_is_one_sentence() -> None:
+    small = Neat(Settings(population=20, nodes=6, connections=24, species=Species(most=4)))
+    with pytest.raises(UserError, match="starts with 7 nodes and 6 connections; at most 6 and 24"):
+        small.init(jax.random.key(0), NParity(6))

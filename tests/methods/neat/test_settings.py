@@ -1,0 +1,88 @@
+"""Hyperparameters that make no sense are refused in a sentence; the defaults are the paper's."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from evoclaims.core.canonical import canonical_json
+from evoclaims.core.errors import UserError
+from evoclaims.methods.neat.settings import CODE, PAPER, Attribute, Mutation, Settings, Species
+
+
+def test_the_defaults_are_the_papers_table() -> None:
+    assert (PAPER.population, PAPER.nodes, PAPER.connections) == (5_000, 100, 400)
+    assert (PAPER.activations, PAPER.output) == (("tanh",), "tanh")
+    mutation = PAPER.mutation
+    rates = (mutation.node_add, mutation.node_delete, mutation.connection_add, mutation.connection_delete)
+    assert rates == (0.2, 0.1, 0.2, 0.2)
+    for attribute, mean, std in ((mutation.bias, 0, 1), (mutation.response, 1, 0), (mutation.weight, 0, 1)):
+        assert (attribute.mean, attribute.std) == (mean, std)
+        assert (attribute.power, attribute.mutate_rate, attribute.replace_rate) == (0.15, 0.1, 0.015)
+        assert attribute.bound == 5.0
+    species = PAPER.species
+    assert (species.most, species.threshold, species.disjoint, species.difference) == (50, 2.0, 1.0, 0.4)
+    assert (species.stagnation, species.exempt, species.elites, species.survival) == (15, 2, 2, 0.01)
+    assert (species.change, species.on_level_up) == (0.5, "reset")
+
+
+def test_the_published_code_differs_where_it_does() -> None:
+    assert (CODE.population, CODE.mutation.node_add, CODE.species.most) == (1_024, 0.1, 20)
+    assert CODE.species.on_level_up == "keep"
+    assert canonical_json(CODE) != canonical_json(PAPER)
+    assert hash(CODE) == hash(CODE.__class__(**vars(CODE)))
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"mutate_rate": -0.1},
+        {"replace_rate": -0.1},
+        {"mutate_rate": 0.7, "replace_rate": 0.4},
+        {"std": -1.0},
+        {"power": -0.1},
+        {"bound": 0.0},
+    ],
+)
+def test_impossible_attributes_are_refused(wrong: dict[str, Any]) -> None:
+    with pytest.raises(UserError):
+        Attribute(**wrong)
+
+
+@pytest.mark.parametrize(
+    "name", ["node_add", "node_delete", "connection_add", "connection_delete", "activation_replace"]
+)
+@pytest.mark.parametrize("value", [-0.1, 1.1])
+def test_what_is_no_probability_is_refused_by_its_name(name: str, value: float) -> None:
+    with pytest.raises(UserError, match=f"{name} lies between 0 and 1"):
+        Mutation(**{name: value})
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"most": 0},
+        {"exempt": 0},
+        {"elites": -1},
+        {"stagnation": -1},
+        {"survival": 0.0},
+        {"survival": 1.5},
+        {"change": -0.5},
+        {"change": 1.5},
+        {"threshold": 0.0},
+        {"on_level_up": "forget"},
+    ],
+)
+def test_impossible_species_are_refused(wrong: dict[str, Any]) -> None:
+    with pytest.raises(UserError):
+        Species(**wrong)
+
+
+@pytest.mark.parametrize(
+    "wrong", [{"activations": ()}, {"activations": ("tanh", "step")}, {"output": "step"}, {"population": 99}]
+)
+def test_impossible_settings_are_refused(wrong: dict[str, Any]) -> None:
+    with pytest.raises(UserError):
+        Settings(**wrong)
+    assert Settings(population=100).population == 100
