@@ -5,9 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import reduce
+from operator import and_
 from typing import Any, Literal, get_args
 
 from evoclaims.core.errors import UnknownNameError, UserError
+from evoclaims.judging.assertion import Assertion
 from evoclaims.judging.kinds.band import Band
 from evoclaims.judging.kinds.equivalent import Equivalent
 from evoclaims.judging.kinds.every_trial import EveryTrial
@@ -208,6 +211,19 @@ class Profile:
         if not 0 <= level < self.size:
             raise UserError(f"{self.describe()!r} has levels 0 to {self.size - 1}, not {level}.")
         return Measure(self.source, f"{self.name} at level {level}", lambda t: self._row(t)[level], self.better)
+
+    def above(self, other: Profile, *, beyond: int) -> Assertion:
+        """Assert that this profile lies above `other` at every level beyond a level, counted from 0.
+
+        Raises:
+            UserError: when the two differ in their levels, or have none beyond `beyond`.
+        """
+        if self.size != other.size or not 0 <= beyond < self.size - 1:
+            raise UserError(
+                f"{self.describe()!r} with {self.size} levels cannot be compared with {other.describe()!r} with "
+                f"{other.size} at the levels beyond {beyond}."
+            )
+        return reduce(and_, (self.at(level) > other.at(level) for level in range(beyond + 1, self.size)))
 
     def falls(self) -> Trend:
         """Assert that the values fall with the level."""

@@ -67,6 +67,16 @@ class TrialGroup:
         return self._metric("furthest_reached", "furthest level reached")
 
     @property
+    def champion_is_mostly_hidden(self) -> Event:
+        """More than half of the final champion's neurons are hidden; of methods that grow networks."""
+        task = self.condition.task
+        return Event(
+            self,
+            "most neurons of the champion are hidden",
+            lambda t: t.curves["champion_nodes"][-1] > 2 * (task.observation_size + task.action_size),
+        )
+
+    @property
     def solves_every_level(self) -> Event:
         """The final policy is right on every row of every level."""
         return self.success_everywhere_is(1.0)
@@ -82,6 +92,10 @@ class TrialGroup:
         """The last level was never solved."""
         last = self.condition.task.levels - 1
         return Event(self, "does not solve the last level", lambda t: t.metrics["furthest_solved"] < last)
+
+    def solves_level(self, level: int) -> Event:
+        """This level, counted from 0, was solved while training."""
+        return Event(self, f"solves level {level}", lambda t: t.metrics["furthest_solved"] >= level)
 
     def solves_no_level_beyond(self, level: int) -> Event:
         """No level above `level` (counted from 0) was solved while training."""

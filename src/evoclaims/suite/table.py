@@ -33,11 +33,12 @@ _COLOURS = {
 def verdict_table(reports: Sequence[ClaimReport], width: int, colour: bool) -> str:
     """Return the table: claim, sentence, verdict, n, effect, p against the attainable p, evidence."""
     table = Table(expand=True, show_lines=False, pad_edge=False, box=None)
-    table.add_column("claim", no_wrap=True)
+    wide = width >= WIDE
+    # On a narrow terminal a long list of parameters must not squeeze the sentence.
+    table.add_column("claim", no_wrap=wide, overflow="fold", max_width=None if wide else 16)
     table.add_column("what is claimed", ratio=1, min_width=16)
     for heading in ("verdict", "n", "A12", "p (attainable)"):
         table.add_column(heading, no_wrap=True, justify="right" if heading in ("n", "A12") else "left")
-    wide = width >= WIDE
     if wide:
         table.add_column("evidence", no_wrap=True, style="dim")
     for report in sorted(reports, key=lambda r: (r.tier, r.claim[:1], len(r.claim), r.claim, r.case)):
