@@ -9,7 +9,7 @@ emits nothing is read as 0. A value that overflows is passed on as 0.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from typing import Any, Final
 
 import jax
@@ -115,7 +115,7 @@ class GraphNetwork:
         def fire(slot: Array, state: tuple[Array, Array]) -> tuple[Array, Array]:
             values, emits = state
             received = jnp.sum(graph.weights[slot][:, None] * values, axis=0)
-            value, fed = self._fire(graph, slot, received, emits)
+            value, fed = self.fire(graph, slot, received, emits)
             return values.at[slot].set(value), emits.at[slot].set(fed)
 
         return jax.lax.fori_loop(self.inputs, graph.bias.shape[0], fire, state)
@@ -127,28 +127,20 @@ class GraphNetwork:
         done = values[: self.inputs]
         for start in range(self.inputs, size, BLOCK):
             end = min(start + BLOCK, size)
+            part = Graph(
+                weights=graph.weights[start:end, start:end],
+                linked=graph.linked[start:end],
+                bias=graph.bias[start:end],
+                response=graph.response[start:end],
+                activation=graph.activation[start:end],
+                outputs=graph.outputs,
+            )
             earlier = graph.weights[start:end, :start] @ done
-            block, emits = self._block(graph, start, earlier, emits)
+            block, emits = _fire_block(self, part, jnp.asarray(start, jnp.int32), earlier, emits)
             done = jnp.concatenate([done, block])
         return done, emits
 
-    def _block(
-        self, graph: Graph, start: int, earlier: Float[Array, "block rows"], emits: Bool[Array, "nodes rows_or_1"]
-    ) -> tuple[Array, Array]:
-        """Return the values of the block of nodes from `start`, given what they receive from earlier blocks."""
-        end = start + earlier.shape[0]
-        within = graph.weights[start:end, start:end]
-
-        def fire(place: Array, state: tuple[Array, Array]) -> tuple[Array, Array]:
-            block, emits = state
-            received = earlier[place] + jnp.sum(within[place][:, None] * block, axis=0)
-            value, fed = self._fire(graph, start + place, received, emits)
-            return block.at[place].set(value), emits.at[start + place].set(fed)
-
-        made: tuple[Array, Array] = jax.lax.fori_loop(0, end - start, fire, (jnp.zeros_like(earlier), emits))
-        return made
-
-    def _fire(
+    def fire(
         self, graph: Graph, slot: Int[Array, ""], received: Float[Array, " rows"], emits: Bool[Array, "nodes rows_or_1"]
     ) -> tuple[Float[Array, " rows"], Bool[Array, " rows_or_1"]]:
         """Return what the node at `slot` emits, and whether it does."""
@@ -156,6 +148,29 @@ class GraphNetwork:
         z = graph.bias[slot] + graph.response[slot] * received
         value = apply_activation((*self.activations, "identity"), graph.activation[slot], z)
         return jnp.where(fed & jnp.isfinite(value), value, 0.0), fed
+
+
+@partial(jax.jit, static_argnums=0)  # blocks of one size are traced once
+def _fire_block(
+    network: GraphNetwork,
+    part: Graph,
+    start: Int[Array, ""],
+    earlier: Float[Array, "block rows"],
+    emits: Bool[Array, "nodes rows_or_1"],
+) -> tuple[Array, Array]:
+    """Return a block's values, given what it receives from earlier blocks, and who emits.
+
+    `part` holds the block's rows of the graph, and of the weights the columns of the block alone.
+    """
+
+    def fire(place: Array, state: tuple[Array, Array]) -> tuple[Array, Array]:
+        block, emits = state
+        received = earlier[place] + jnp.sum(part.weights[place][:, None] * block, axis=0)
+        value, fed = network.fire(part, place, received, emits)
+        return block.at[place].set(value), emits.at[start + place].set(fed)
+
+    made: tuple[Array, Array] = jax.lax.fori_loop(0, earlier.shape[0], fire, (jnp.zeros_like(earlier), emits))
+    return made
 
 
 @cache
