@@ -14,8 +14,8 @@ from evoclaims.methods.neat.settings import Settings
 from evoclaims.networks.genome import Genome
 
 SMALLER: Final = ((32, 96),)
-"""Capacities (nodes, connections) to have programs for, besides the largest: each costs compiling. This one is six times
-as fast as the paper's 100 nodes and 400 connections."""
+"""Capacities (nodes, connections) to have programs for, besides the largest: each costs compiling. This one is six
+times as fast as the paper's 100 nodes and 400 connections."""
 
 
 def capacities(settings: Settings) -> list[tuple[int, int]]:

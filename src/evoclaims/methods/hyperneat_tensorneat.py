@@ -1,0 +1,108 @@
+"""HyperNEAT (Stanley et al. 2009) of the real TensorNEAT, where a user has installed it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, ClassVar, get_args
+
+import jax.numpy as jnp
+from jaxtyping import Array, Bool, Float, Int, PRNGKeyArray
+
+from evoclaims.core.errors import UnknownNameError, UserError
+from evoclaims.envs.base import Task
+from evoclaims.methods.base import Policy, Progress
+from evoclaims.methods.foreign import implicit_promotions
+from evoclaims.methods.hyperneat import PAPER
+from evoclaims.methods.neat.settings import Settings
+from evoclaims.methods.tensorneat import TensorneatState, begin, evolve, library, neat, policy
+from evoclaims.networks.activations import ACTIVATIONS
+from evoclaims.networks.substrate import Extent
+
+
+@dataclass(frozen=True)
+class HyperneatTensorneat:
+    """TensorNEAT's HyperNEAT on a layered substrate.
+
+    Attributes:
+        settings: NEAT's, for the CPPN.
+        hidden: neurons in each hidden layer.
+        extent: see `networks.substrate.layered`.
+        threshold: a connection is drawn where the CPPN's |q| exceeds it.
+        max_weight: weight at |q| = 1.
+    """
+
+    name: ClassVar[str] = "hyperneat_tensorneat"
+    revision: ClassVar[int] = 1
+
+    settings: Settings = PAPER
+    hidden: tuple[int, ...] = (16,)
+    extent: Extent = "largest_layer"
+    threshold: float = 0.3
+    max_weight: float = 5.0
+
+    def __post_init__(self) -> None:
+        """Check the substrate."""
+        if self.extent not in get_args(Extent):
+            raise UnknownNameError("extent of a substrate", self.extent, get_args(Extent))
+        if min(self.hidden, default=1) < 1 or not 0 <= self.threshold < 1 or self.max_weight <= 0:
+            raise UserError(
+                "HyperNEAT's hidden layers have at least one neuron each, its threshold lies in [0, 1) and its largest "
+                f"weight above 0; {self.hidden}, {self.threshold} and {self.max_weight} do not."
+            )
+
+    def init(self, key: PRNGKeyArray, task: Task) -> TensorneatState:
+        """Draw the first population; a `UserError` says when TensorNEAT is missing or the network does not fit."""
+        return begin(key, self._algorithm(task))
+
+    def step(
+        self, key: PRNGKeyArray, task: Task, level: Int[Array, ""], state: TensorneatState
+    ) -> tuple[TensorneatState, Progress]:
+        """Run one generation; the counts it tells are the CPPNs'."""
+        return evolve(key, self._algorithm(task), self.settings.species, task, level, state)
+
+    def best(self, task: Task, state: TensorneatState) -> Policy:
+        """Return the best genome of the last population that was evaluated."""
+        return policy(self._algorithm(task), state)
+
+    def cost(self, task: Task) -> int:
+        """Return the environment steps of one generation, at the longest episode."""
+        return self.settings.population * task.horizon
+
+    def _algorithm(self, task: Task) -> Any:
+        """Build TensorNEAT's algorithm for a substrate of the task's size."""
+        library()
+        from tensorneat.algorithm.hyperneat import HyperNEATFeedForward, MLPSubstrate
+
+        layers = [task.observation_size + 1, *self.hidden, task.action_size]
+        edge = float({"largest_layer": max(layers), "unit": 1}[self.extent])
+        with implicit_promotions():
+            algorithm = HyperNEATFeedForward(
+                MLPSubstrate(layers, (-edge, edge, -edge, edge)),
+                neat(self.settings, 4, 1),
+                weight_threshold=self.threshold,
+                max_weight=self.max_weight,
+                output_transform=ACTIVATIONS["tanh"],
+            )
+        # Its own gene does not take the arguments that its genome calls genes with (commit ee20490).
+        algorithm.hyper_genome.node_gene = _neuron()
+        return algorithm
+
+
+def _neuron() -> Any:
+    """Make a gene of the substrate's neurons: tanh of the sum, and for outputs the sum."""
+    from tensorneat.genome import BaseNode
+
+    class Neuron(BaseNode):  # type: ignore[misc]
+        def forward(
+            self,
+            state: Any,
+            attrs: Array,
+            inputs: Float[Array, " nodes"],
+            is_output_node: Bool[Array, ""],
+            valid_mask: Bool[Array, " nodes"],
+        ) -> Float[Array, ""]:
+            """Return what a neuron emits; `inputs` are its weighted inputs where `valid_mask` says so."""
+            z = jnp.sum(inputs, where=valid_mask)
+            return jnp.where(is_output_node, z, jnp.tanh(z))
+
+    return Neuron()
