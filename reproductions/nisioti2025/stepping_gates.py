@@ -16,10 +16,12 @@ from evoclaims.methods.base import Method
 from evoclaims.methods.cma_es import CmaEs
 from evoclaims.methods.hand_built import HandBuilt
 from evoclaims.methods.hyperneat import HyperNeat
+from evoclaims.methods.hyperneat_tensorneat import HyperneatTensorneat
 from evoclaims.methods.neat.neat import Neat
 from evoclaims.methods.neat.settings import PAPER, Settings, Species
 from evoclaims.methods.ppo import Ppo
 from evoclaims.methods.random_search import RandomSearch
+from evoclaims.methods.tensorneat import NeatTensorneat
 from evoclaims.networks.all_skips import AllSkips
 from evoclaims.trials.budget import Budget
 from evoclaims.trials.spec import Condition, Progression
@@ -51,6 +53,15 @@ def _hand_built(parity: Circuit, alu: Circuit) -> Conditions:
     return {**built[0], **built[1]}
 
 
+def _tensorneat(parity: Circuit, alu: Circuit, neat: Settings, cppn: Settings, *budgets: Budget) -> Conditions:
+    """Put the library that the paper used beside our implementation of both its methods, for who has installed it."""
+    on_parity, on_alu = budgets
+    return {
+        **_on_every_task(parity, alu, NeatTensorneat(neat), on_parity, on_alu),
+        **_on_every_task(parity, alu, HyperneatTensorneat(cppn), on_parity, on_alu),
+    }
+
+
 def _full() -> Conditions:
     """Return the paper's own size."""
     parity, alu = NParity(bits=6), SimpleAlu()
@@ -62,6 +73,7 @@ def _full() -> Conditions:
         **_on_every_task(parity, alu, RandomSearch(population=256, network=network), *evolution),
         **_on_every_task(parity, alu, Neat(PAPER), *evolution),
         **_on_every_task(parity, alu, HyperNeat(hyperneat.PAPER), *evolution),
+        **_tensorneat(parity, alu, PAPER, hyperneat.PAPER, *evolution),
         **_on_every_task(_sampled(parity), _sampled(alu), Ppo(), *learning),
         **_hand_built(parity, alu),
     }
@@ -84,6 +96,7 @@ def _smoke() -> Conditions:
         **_on_every_task(parity, alu, RandomSearch(population=256, network=network), generations, generations),
         **_on_every_task(parity, alu, Neat(small), generations, generations),
         **_on_every_task(parity, alu, HyperNeat(cppn), generations, generations),
+        **_tensorneat(parity, alu, small, cppn, generations, generations),
         **_on_every_task(_sampled(parity), _sampled(alu), ppo, steps, steps),
         **_hand_built(parity, alu),
     }

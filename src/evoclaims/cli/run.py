@@ -40,13 +40,18 @@ def main(options: argparse.Namespace) -> int:
 
 
 def choose(tier: Tier, method: str | None, task: str | None) -> list[tuple[str, str]]:
-    """Return the conditions that a method and a task leave; an unknown name raises with the known ones."""
+    """Return the conditions that a method and a task leave; an unknown name raises with the known ones.
+
+    A method that says `optional`, since it needs what may not be installed, runs only when it is named.
+    """
     if method is not None and task is not None:
         tier.condition(method, task)
     known = list(tier.conditions)
     for name, position, kind in ((method, 0, "method"), (task, 1, "task")):
         if name is not None and name not in {names[position] for names in known}:
             raise UnknownNameError(kind, name, {names[position] for names in known})
+    if method is None:
+        known = [names for names in known if not getattr(tier.conditions[names].method, "optional", False)]
     return [names for names in known if method in (None, names[0]) and task in (None, names[1])]
 
 

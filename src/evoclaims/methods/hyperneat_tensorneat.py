@@ -33,6 +33,7 @@ class HyperneatTensorneat:
 
     name: ClassVar[str] = "hyperneat_tensorneat"
     revision: ClassVar[int] = 1
+    optional: ClassVar[bool] = True
 
     settings: Settings = PAPER
     hidden: tuple[int, ...] = (16,)
