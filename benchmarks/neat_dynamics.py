@@ -124,17 +124,22 @@ def grow(name: str, comparison: Comparison, side: str, seeds: int, at_once: int,
         )
 
 
+def shown(value: float) -> str:
+    """Return a number as it is printed."""
+    return "never" if value == NEVER else f"{value:.4g}"
+
+
 def tell(numbers: Mapping[str, Mapping[str, Mapping[str, float]]]) -> None:
     """Print every measure's values, and an exact two-sided p where both sides have some."""
     for measure, sides in numbers.items():
         print(measure)
         for side, by_seed in sides.items():
             values = sorted(by_seed.values())
-            shown = " ".join("never" if value == NEVER else f"{value:.4g}" for value in values)
-            spread = f"{statistics.mean(values):.2f} ± {statistics.stdev(values):.2f}, " if len(values) > 1 else ""
-            if NEVER in values:
-                spread = ""
-            print(f"  {side:<7} {spread}median {statistics.median(values):.4g} (n = {len(values)}): {shown}")
+            spread = ""
+            if len(values) > 1 and NEVER not in values:
+                spread = f"{statistics.mean(values):.2f} ± {statistics.stdev(values):.2f}, "
+            print(f"  {side:<7} {spread}median {shown(statistics.median_low(values))} (n = {len(values)}): ", end="")
+            print(*map(shown, values))
         if set(sides) == set(SIDES):
             a, b = (list(sides[side].values()) for side in SIDES)
             one, other = rank_test(a, b), rank_test(b, a)
