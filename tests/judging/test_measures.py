@@ -160,3 +160,16 @@ def test_compounds_are_flat_and_name_each_condition_once(source) -> None:
     assert (a & b & c).parts == (a & (b & c)).parts == (a, b, c)
     assert len((a & b | c).parts) == 2
     assert [s.label for s in (a & b & a).sources()] == ["a", "b"]
+
+
+def test_a_profile_above_another_is_above_at_every_level_beyond(source) -> None:
+    high, low = source("cma_es", []).success(4), source("ppo", []).success(4)
+    parts = [high.at(level) > low.at(level) for level in (1, 2, 3)]
+    assert high.above(low, beyond=0).plain() == (parts[0] & parts[1] & parts[2]).plain()
+    assert high.above(low, beyond=2).plain() == parts[2].plain()
+
+
+@pytest.mark.parametrize(("size", "beyond"), [(3, 0), (4, 3), (4, -1)])
+def test_profiles_are_compared_at_levels_that_both_have(source, size, beyond) -> None:
+    with pytest.raises(UserError, match="cannot be compared"):
+        source("cma_es", []).success(4).above(source("ppo", []).success(size), beyond=beyond)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -63,6 +64,8 @@ def test_each_measure_reads_its_own_number(group: Any, name: str, values: tuple[
         (lambda g: g.solves_every_level, (0, 0, 1)),
         (lambda g: g.solves_the_last_level, (0, 0, 1)),
         (lambda g: g.does_not_solve_the_last_level, (1, 1, 0)),
+        (lambda g: g.solves_level(0), (0, 0, 1)),
+        (lambda g: g.solves_level(-1), (1, 1, 1)),
         (lambda g: g.solves_no_level_beyond(0), (1, 1, 0)),
         (lambda g: g.solves_no_level_beyond(1), (1, 1, 1)),
         (lambda g: g.success_everywhere_is(0.5), (0, 1, 0)),
@@ -71,6 +74,15 @@ def test_each_measure_reads_its_own_number(group: Any, name: str, values: tuple[
 def test_each_event_holds_where_its_name_says(group: Any, event: Any, held: tuple[int, ...]) -> None:
     made = group(lambda seed: seed / 2)
     assert _read(event(made), made) == held
+
+
+def test_a_champion_is_mostly_hidden_when_more_than_half_of_its_nodes_are(group: Any) -> None:
+    made = group(lambda seed: 1.0)
+    visible = made.condition.task.observation_size + made.condition.task.action_size
+    trial = made.fetch([0])[0]
+    last = [2 * visible + more for more in (-1, 0, 1)]
+    grown = [replace(trial, seed=seed, curves={"champion_nodes": (99.0, float(n))}) for seed, n in enumerate(last)]
+    assert made.champion_is_mostly_hidden.sample({made.fingerprint: tuple(grown)}).values == (0, 0, 1)
 
 
 def test_the_success_of_a_level_can_be_compared_with_another(group: Any) -> None:
@@ -86,6 +98,9 @@ def test_measures_and_events_have_names_of_their_own_since_fingerprints_hash_the
         made.solves_every_level,
         made.solves_the_last_level,
         made.does_not_solve_the_last_level,
+        made.champion_is_mostly_hidden,
+        made.solves_level(0),
+        made.solves_level(1),
         made.solves_no_level_beyond(0),
         made.solves_no_level_beyond(1),
         made.success_everywhere_is(0.0),
