@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import jax
@@ -12,6 +12,9 @@ from workbench import Workbench
 
 from evoclaims.envs.gates.parity import NParity
 from evoclaims.methods.cma_es import CmaEs
+from evoclaims.methods.hyperneat import CPPN_FUNCTIONS, HyperNeat
+from evoclaims.methods.neat.neat import Neat
+from evoclaims.methods.neat.settings import Attribute, Mutation, Settings, Species
 from evoclaims.methods.ppo import Ppo
 from evoclaims.methods.random_search import RandomSearch
 from evoclaims.networks.all_skips import AllSkips
@@ -38,6 +41,18 @@ class Entry:
     curriculum: int
 
 
+SMALL = Settings(population=24, nodes=12, connections=36, species=Species(most=3))
+# Large steps, many parents and few deletions: the last probe's second level is an exclusive or, which the paper's
+# values solve rarely at this size.
+LARGE_STEPS = Attribute(mutate_rate=0.6, power=0.5)
+PROBING = Settings(
+    population=150,
+    nodes=12,
+    connections=36,
+    mutation=Mutation(weight=LARGE_STEPS, bias=LARGE_STEPS, node_delete=0.05, connection_delete=0.1),
+    species=Species(most=5, survival=0.2),
+)
+
 METHODS = {
     "random_search": Entry(
         method=RandomSearch(12, network=AllSkips(3)),
@@ -54,6 +69,22 @@ METHODS = {
         keeps_the_best=True,
         prober=CmaEs(256, network=AllSkips(8)),
         curriculum=200,
+    ),
+    "neat": Entry(
+        method=Neat(SMALL),
+        task=NParity(3),
+        cost=24 * 8,
+        keeps_the_best=True,
+        prober=Neat(PROBING),
+        curriculum=3000,
+    ),
+    "hyperneat": Entry(
+        method=HyperNeat(replace(SMALL, activations=CPPN_FUNCTIONS), hidden=(4,)),
+        task=NParity(3),
+        cost=24 * 8,
+        keeps_the_best=True,
+        prober=HyperNeat(replace(PROBING, activations=CPPN_FUNCTIONS), hidden=(8,), extent="unit"),
+        curriculum=3000,
     ),
     "ppo": Entry(
         method=Ppo(

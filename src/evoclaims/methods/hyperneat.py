@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
@@ -90,10 +91,10 @@ class HyperNeat:
 
     def __post_init__(self) -> None:
         """Check the numbers."""
-        if not 0 <= self.threshold < 1 or self.max_weight <= 0:
+        if not 0 <= self.threshold < 1 or not 0 < self.max_weight < math.inf:
             raise UserError(
-                f"HyperNEAT's threshold lies in [0, 1) and its largest weight above 0; {self.threshold} and "
-                f"{self.max_weight} do not."
+                "HyperNEAT's threshold lies in [0, 1) and its largest weight is finite and above 0: not "
+                f"{self.threshold} and {self.max_weight}."
             )
 
     def init(self, key: PRNGKeyArray, task: Task) -> Evolution:

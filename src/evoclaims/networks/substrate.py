@@ -28,9 +28,12 @@ class Substrate:
     layers: tuple[tuple[Point, ...], ...]
 
     def __post_init__(self) -> None:
-        """Check that there are inputs and outputs, and neurons in every layer."""
+        """Check that there are inputs and outputs, and neurons in every layer, each at a point."""
         if len(self.layers) < 2 or not all(self.layers):
             raise UserError("A substrate has a layer of inputs, one of outputs, and at least one neuron in each layer.")
+        for point in (point for layer in self.layers for point in layer):
+            if len(point) != 2 or not all(map(math.isfinite, point)):
+                raise UserError(f"A neuron of a substrate lies at two finite coordinates, not at {point}.")
 
     @property
     def shapes(self) -> list[tuple[int, int]]:
