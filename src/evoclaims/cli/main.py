@@ -70,6 +70,15 @@ def _parser() -> argparse.ArgumentParser:
     status = add("status", "show the verdicts that the stored trials give; run nothing")
     tier(status)
 
+    champion = add("champion", "replay a stored trial's champion on every level, and draw or export its network")
+    champion.add_argument("method", help="the method")
+    champion.add_argument("--on", metavar="TASK", required=True, help="the task")
+    tier(champion)
+    device(champion)
+    champion.add_argument("--seed", type=int, default=0, help="the trial's seed (0)")
+    champion.add_argument("--as", dest="form", metavar="FORM", help="also write its network: json, svg or png")
+    champion.add_argument("--out", metavar="FILE", help="where to (METHOD-TASK-SEED.FORM)")
+
     verify = add(
         "verify",
         "read every stored trial, champion and checkpoint back, and move bad ones aside so that their trials run again "

@@ -1,0 +1,160 @@
+"""Champions taken out of the store again: their parameters as the method's own tree, and what they score."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Protocol, runtime_checkable
+
+import jax
+import numpy as np
+from jaxtyping import Array, Int
+from numpy.typing import NDArray
+
+from evoclaims.core.errors import UserError
+from evoclaims.core.keys import EVALUATION, TRAINING, trial_key
+from evoclaims.core.provenance import what_fixes_bits
+from evoclaims.envs.base import Episode, Task
+from evoclaims.methods.base import Policy
+from evoclaims.networks.genome import Genome
+from evoclaims.networks.graph import GraphNetwork
+from evoclaims.networks.substrate import Substrate
+from evoclaims.trials.devices import MATMUL_PRECISION, layout_for
+from evoclaims.trials.outcome import named_leaves, provenance
+from evoclaims.trials.program import over_trials
+from evoclaims.trials.result import TrialResult
+from evoclaims.trials.rollout import score_every_level
+from evoclaims.trials.spec import Condition
+from evoclaims.trials.store import Store
+
+
+class GenomeNetwork(Protocol):
+    """What the network that a genome itself describes is made of (see `GraphNetwork`)."""
+
+    @property
+    def inputs(self) -> int:
+        """Number of inputs."""
+
+    @property
+    def outputs(self) -> int:
+        """Number of outputs."""
+
+    @property
+    def activations(self) -> tuple[str, ...]:
+        """Functions that node genes index."""
+
+    @property
+    def output(self) -> str:
+        """The outputs' function."""
+
+
+@runtime_checkable
+class Encoded(Protocol):
+    """A method whose policies' parameters may be genomes."""
+
+    def encoding(self, task: Task) -> GenomeNetwork:
+        """Return how a genome stands for a policy of the task's size."""
+
+
+@runtime_checkable
+class OnSubstrate(Protocol):
+    """An encoding by which a genome draws another network's weights."""
+
+    @property
+    def substrate(self) -> Substrate:
+        """Where that network's neurons lie."""
+
+    def express(self, genome: Genome) -> Sequence[Array]:
+        """Return the weights into each layer but the first, shapes [to, from]."""
+
+
+@dataclass(frozen=True)
+class Replay:
+    """What a champion has scored, then and now.
+
+    Attributes:
+        recorded, again: "success" and "fitness" by name, a value per level.
+        elsewhere: parts of the provenance that bits depend on and that are not the record's.
+    """
+
+    recorded: Mapping[str, tuple[float, ...]]
+    again: Mapping[str, tuple[float, ...]]
+    elsewhere: tuple[str, ...]
+
+    @property
+    def exact(self) -> bool:
+        """Whether every value is the recorded one; NaN is NaN."""
+        return all(np.array_equal(self.recorded[name], values, equal_nan=True) for name, values in self.again.items())
+
+
+def load(store: Store, condition: Condition, result: TrialResult) -> Any:
+    """Return a stored champion's parameters as the tree that the condition's policies take; leaves on the host.
+
+    Raises:
+        DamagedFileError: when the champion's file is missing, torn or not the one that the record names.
+        UserError: when the trial has no champion, or one that is not such a tree.
+    """
+    arrays = store.champion_of(result)
+    shapes = jax.eval_shape(lambda: _policy(condition).parameters)
+    if not arrays and jax.tree.leaves(shapes):
+        raise UserError(f"Seed {result.seed} of {condition.label} has no champion: it is {result.status}.")
+    return _filled(shapes, arrays, f"The champion of {condition.label}, seed {result.seed},")
+
+
+def replay(condition: Condition, result: TrialResult, parameters: Any, devices: Sequence[jax.Device]) -> Replay:
+    """Examine a champion on every level once more, with the keys of its trial's evaluation."""
+
+    def score(seed: Int[Array, ""], parameters: Any) -> Episode:
+        policy = replace(_policy(condition), parameters=parameters)
+        return score_every_level(condition.task, policy, trial_key(seed, EVALUATION))
+
+    arguments = jax.tree.map(lambda leaf: np.asarray(leaf)[None], (np.int32(result.seed), parameters))
+    with jax.default_matmul_precision(MATMUL_PRECISION):
+        compiled = jax.jit(over_trials(score, layout_for(list(devices))))
+        episode: Episode = jax.device_get(compiled(*jax.device_put(arguments, devices[0])))
+    again = {"success": episode.success[0], "fitness": episode.fitness[0]}
+    here, there = what_fixes_bits(provenance(devices)), what_fixes_bits(result.provenance)
+    return Replay(
+        recorded={name: result.levels[name] for name in again},
+        again={name: tuple(map(float, values)) for name, values in again.items()},
+        elsewhere=tuple(sorted(name for name in here.keys() & there.keys() if here[name] != there[name])),
+    )
+
+
+def network_of(condition: Condition, parameters: Any) -> GraphNetwork | None:
+    """Return the network that describes a champion which is a genome; None for any other."""
+    if not isinstance(parameters, Genome) or not isinstance(condition.method, Encoded):
+        return None
+    encoding = condition.method.encoding(condition.task)
+    return GraphNetwork(encoding.inputs, encoding.outputs, encoding.activations, encoding.output)
+
+
+def substrate_of(condition: Condition, parameters: Any) -> tuple[Substrate, list[NDArray[Any]]] | None:
+    """Return the substrate of a champion that draws a network on one, and the weights that it draws, layer by layer."""
+    if network_of(condition, parameters) is None:
+        return None
+    encoding = condition.method.encoding(condition.task)  # type: ignore[attr-defined]
+    if not isinstance(encoding, OnSubstrate):
+        return None
+    with jax.default_matmul_precision(MATMUL_PRECISION):
+        return encoding.substrate, [np.asarray(weights) for weights in encoding.express(parameters)]
+
+
+def _policy(condition: Condition) -> Policy:
+    """Return an untrained policy of the condition, whose parameters alone tell it from any other."""
+    method, task = condition.method, condition.task
+    return method.best(task, method.init(trial_key(0, TRAINING), task))
+
+
+def _filled(shapes: Any, arrays: Mapping[str, NDArray[Any]], what: str) -> Any:
+    """Return the tree of `shapes` with its leaves taken from `arrays` by their names."""
+    leaves, structure = jax.tree.flatten(shapes)
+    places = {int(i): name for name, i in named_leaves(jax.tree.unflatten(structure, range(len(leaves)))).items()}
+    names = [places[i] for i in range(len(leaves))]
+    expected = {name: (leaf.shape, leaf.dtype) for name, leaf in zip(names, leaves, strict=True)}
+    if {name: (array.shape, array.dtype) for name, array in arrays.items()} != expected:
+        raise UserError(
+            f"{what} does not have the arrays of this method's policies, so it was made by another version of the "
+            "code: name another storage, or check that version out."
+        )
+    return jax.tree.unflatten(structure, [arrays[name] for name in names])

@@ -1,0 +1,193 @@
+"""`evoclaims champion`: what it prints, writes and returns."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+import tiny_project
+
+from evoclaims.cli import main
+from evoclaims.core.canonical import content_hash
+from evoclaims.networks.export import from_json, optional
+from evoclaims.trials.store import Store
+
+# What the command imports late: pytester forgets the modules that a test has imported, and would load them twice.
+for _module in ("collections", "figure", "lines", "path"):
+    optional(f"matplotlib.{_module}")
+for _module in ("networkx", "evoclaims.cli.champion", "evoclaims.methods.cma_es", "evoclaims.methods.hyperneat"):
+    optional(_module)
+
+MORE = """
+from evoclaims.methods.cma_es import CmaEs
+from evoclaims.methods.hyperneat import HyperNeat
+from evoclaims.methods.neat.neat import Neat
+from evoclaims.methods.neat.settings import Settings, Species
+from evoclaims.networks.all_skips import AllSkips
+
+SMALL = Settings(population=8, nodes=8, connections=12, activations=("tanh", "sin"), species=Species(most=2))
+METHODS |= {"neat": Neat(SMALL), "hyperneat": HyperNeat(SMALL, hidden=(2,)), "cma_es": CmaEs(4, AllSkips(hidden=1))}
+REPRODUCTION = replace(REPRODUCTION, tiers={"smoke": Tier(conditions(3), Protocol.fixed(10))})
+"""
+
+Evoclaims = Callable[..., tuple[int, str, str]]
+
+
+@pytest.fixture
+def evoclaims(project: Any, shared_store: Path, capsys: pytest.CaptureFixture[str]) -> Evoclaims:
+    """A function that runs a command in a project with evolving methods; returns status, output and errors."""
+    project.pytester.makepyfile(tiny_paper=tiny_project.REPRODUCTION + MORE)
+
+    def run(*arguments: str, storage: Path = shared_store) -> tuple[int, str, str]:
+        capsys.readouterr()
+        status = main([*arguments, f"--storage={storage}"])
+        out, err = capsys.readouterr()
+        assert "Traceback" not in out + err
+        return status, out, err
+
+    return run
+
+
+@pytest.fixture
+def trained(evoclaims: Evoclaims) -> Evoclaims:
+    """The same, with one trial of neat, hyperneat, cma_es and a hand-built network in the store."""
+    for method in ("neat", "hyperneat", "cma_es", "right"):
+        assert evoclaims("run", method, "--trials=1", "--first-seed=4", "--device=cpu")[0] == 0
+    return evoclaims
+
+
+@pytest.mark.parametrize("method", ["neat", "hyperneat", "cma_es", "right"])
+def test_a_champion_is_replayed_and_equals_its_record(trained: Evoclaims, method: str) -> None:
+    status, out, err = trained("champion", method, "--on=parity", "--seed=4", "--device=cpu")
+    assert (status, err) == (0, "")
+    lines = out.splitlines()
+    assert lines[0] == f"{method} on parity (smoke)"
+    assert lines[1].startswith("  seed 4: done after ")
+    assert lines[2].split() == ["level", "success", "recorded", "fitness", "recorded"]
+    level, success, recorded, fitness, as_recorded = lines[3].split()
+    assert (level, success, fitness) == ("0", recorded, as_recorded)
+    assert lines[4:] == ["The replay equals the stored record exactly."]
+
+
+def _change_record(store: Store, edit_record: Callable[..., None] | None = None, **fields: Any) -> None:
+    """Write other fields into the only record of a store, sealed as one who knows how the seal is made."""
+    (path,) = store.record_paths()
+    plain = {**json.loads(path.read_text()), **fields}
+    plain["seal"] = content_hash({key: value for key, value in plain.items() if key != "seal"})
+    path.write_text(json.dumps(plain))
+
+
+def test_a_record_that_is_not_its_champions_gives_status_1_and_a_sentence(evoclaims: Evoclaims) -> None:
+    storage = Path("own")
+    evoclaims("run", "neat", "--trials=1", "--device=cpu", storage=storage)
+    (result,) = Store(storage).results([])
+    _change_record(Store(storage), levels={**result.levels, "success": [0.875]})
+    arguments = ("champion", "neat", "--on=parity", "--device=cpu", "--as=json")
+    status, out, _ = evoclaims(*arguments, storage=storage)
+    assert status == 1
+    assert re.search(r"^ +0 +[0-9.]+ +0.875 ", out, re.MULTILINE)
+    assert "The replay differs from the stored record, which was made with the same versions" in out
+    assert "equals" not in out
+    assert Path("neat-parity-0.json").exists()
+    _change_record(Store(storage), provenance={**result.provenance, "machine": "a mainframe"})
+    status, out, _ = evoclaims(*arguments, storage=storage)
+    assert status == 1
+    assert "made with other machine: rounding may differ there" in out
+
+
+def test_a_changed_champion_is_told(evoclaims: Evoclaims) -> None:
+    storage = Path("own")
+    evoclaims("run", "cma_es", "--trials=1", "--device=cpu", storage=storage)
+    (path,) = Store(storage).champion_paths()
+    path.write_bytes(path.read_bytes() + b" ")
+    status, _, err = evoclaims("champion", "cma_es", "--on=parity", storage=storage)
+    assert (status, err.count("\n")) == (2, 1)
+    assert "it is not the champion that the trial's record names" in err
+
+
+def test_the_json_is_the_champions_genome(trained: Evoclaims) -> None:
+    status, out, _ = trained("champion", "neat", "--on=parity", "--seed=4", "--as=json")
+    assert (status, out.splitlines()[-1]) == (0, "wrote neat-parity-4.json")
+    genome, network = from_json(Path("neat-parity-4.json").read_text())
+    assert (network.inputs, network.outputs, network.activations) == (2, 1, ("tanh", "sin"))
+    assert genome.nodes.key.shape == (8,)
+    assert trained("champion", "hyperneat", "--on=parity", "--seed=4", "--as=json", "--out=a/cppn.json")[0] == 0
+    assert from_json(Path("a/cppn.json").read_text())[1].inputs == 4
+
+
+def test_a_picture_shows_the_trial_and_the_network(trained: Evoclaims) -> None:
+    assert trained("champion", "neat", "--on=parity", "--seed=4", "--as=svg")[0] == 0
+    text = Path("neat-parity-4.svg").read_text()
+    for word in ("neat on parity (smoke), seed 4", "the network that evolved", "x1", "y0"):
+        assert f">{word}<" in text
+    assert trained("champion", "neat", "--on=parity", "--seed=4", "--as=png", "--out=it")[0] == 0
+    assert Path("it").read_bytes().startswith(b"\x89PNG")
+
+
+def test_hyperneats_picture_has_the_cppn_and_the_network_that_it_draws(trained: Evoclaims) -> None:
+    assert trained("champion", "hyperneat", "--on=parity", "--seed=4", "--as=svg")[0] == 0
+    text = Path("hyperneat-parity-4.svg").read_text()
+    for word in ("the CPPN that evolved", "x₂", "q", "the network that it draws", "bias", "y0"):
+        assert f">{word}<" in text
+
+
+def test_the_same_command_writes_the_same_file_over_the_old_one(trained: Evoclaims) -> None:
+    path = Path("neat-parity-4.svg")
+    path.write_text("old")
+    trained("champion", "neat", "--on=parity", "--seed=4", "--as=svg")
+    first = path.read_bytes()
+    trained("champion", "neat", "--on=parity", "--seed=4", "--as=svg")
+    assert path.read_bytes() == first != b"old"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "text"),
+    [
+        (("naet", "--on=parity"), "There is no method named 'naet'. Did you mean 'neat'?"),
+        (("neat", "--on=partiy"), "There is no task for neat named 'partiy'. Did you mean 'parity'?"),
+        (("neat", "--on=parity", "--tier=smok"), "There is no tier named 'smok'. Did you mean 'smoke'?"),
+        (("neat", "--on=parity", "--device=tpu"), "There is no device named 'tpu'."),
+        (("neat", "--on=parity", "--seed=-1"), "A seed is 0 or above and below 2147483648, not -1."),
+        (
+            ("neat", "--on=parity", "--seed=77"),
+            "holds no trial of neat on parity (smoke) with seed 77. `evoclaims run neat --on parity --tier smoke "
+            "--trials 1 --first-seed 77` runs it.",
+        ),
+        (
+            ("neat", "--on=parity", "--seed=4", "--as=pgn"),
+            "There is no form of a network named 'pgn'. Did you mean 'png'? Known: json, png, svg.",
+        ),
+        (("neat", "--on=parity", "--seed=4", "--out=x"), "--out names the file that --as writes; add --as json"),
+        (
+            ("neat", "--on=parity", "--seed=4", "--as=json", "--out=claims"),
+            "claims is a folder; name a file in it with",
+        ),
+        (("neat", "--on=parity", "--seed=4", "--as=json", "--out="), ". is a folder; name a file in it with --out."),
+        (
+            ("neat", "--on=parity", "--seed=4", "--as=json", "--out=tiny_paper.py/x"),
+            "Cannot write tiny_paper.py/x: File exists. Name another file with --out.",
+        ),
+        (("cma_es", "--on=parity", "--seed=4", "--as=svg"), "A champion of cma_es is no genome"),
+        (("right", "--on=parity", "--seed=4", "--as=json"), "A champion of right is no genome"),
+    ],
+)
+def test_a_users_mistake_is_one_sentence_and_status_2(
+    trained: Evoclaims, arguments: tuple[str, ...], text: str
+) -> None:
+    status, _, err = trained("champion", *arguments)
+    assert (status, err.count("\n")) == (2, 1)
+    assert err.startswith("evoclaims: ")
+    assert text in err
+    assert {path.name for path in Path().iterdir()} <= {"pyproject.toml", "tiny_paper.py", "claims", "__pycache__"}
+
+
+def test_the_command_that_a_missing_trial_names_runs_it(evoclaims: Evoclaims) -> None:
+    storage = Path("own")
+    _, _, err = evoclaims("champion", "cma_es", "--on=parity", "--seed=5", storage=storage)
+    command = re.findall("`evoclaims (.*)`", err)[0].split()
+    assert evoclaims(*command, storage=storage)[0] == 0
+    assert evoclaims("champion", "cma_es", "--on=parity", "--seed=5", storage=storage)[0] == 0

@@ -1,0 +1,192 @@
+"""Champions out of the store: they score what their records say, and what is not theirs is told."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, ClassVar
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from trial_toys import walk
+
+from evoclaims.core.errors import UserError
+from evoclaims.envs.base import Episode, PolicyFn
+from evoclaims.envs.gates.parity import NParity
+from evoclaims.methods.cma_es import CmaEs
+from evoclaims.methods.hand_built import HandBuilt
+from evoclaims.methods.hyperneat import HyperNeat
+from evoclaims.methods.neat.neat import Neat
+from evoclaims.methods.neat.settings import Settings, Species
+from evoclaims.methods.ppo import Ppo
+from evoclaims.networks.all_skips import AllSkips
+from evoclaims.networks.genome import Genome
+from evoclaims.networks.graph import GraphNetwork
+from evoclaims.trials import champions
+from evoclaims.trials.budget import Budget
+from evoclaims.trials.result import TrialResult
+from evoclaims.trials.runner import run
+from evoclaims.trials.spec import Condition
+from evoclaims.trials.store import DamagedFileError, Store
+
+SMALL = Settings(population=16, nodes=12, connections=24, activations=("tanh", "sin"), species=Species(most=4))
+METHODS = {
+    "neat": Neat(SMALL),
+    "hyperneat": HyperNeat(SMALL, hidden=(3,)),
+    "cma_es": CmaEs(8, network=AllSkips(hidden=2)),
+    "ppo": Ppo((4,), (4,), environments=4, batch_size=4, minibatches=2, updates_per_batch=1),
+    "hand_built": HandBuilt(),
+}
+
+
+@dataclass(frozen=True)
+class Moody(NParity):
+    """N-parity whose examination adds the outputs' mean to the fitness, and a mood that the key decides."""
+
+    name: ClassVar[str] = "moody"
+
+    def examine(self, policy: PolicyFn, key: jax.Array, level: Any) -> Episode:
+        episode = super().examine(policy, key, level)
+        outputs = jax.vmap(policy)(jnp.asarray(self.table.inputs))
+        return replace(episode, fitness=episode.fitness + jnp.mean(outputs) + jax.random.uniform(key))
+
+
+def _condition(name: str) -> Condition:
+    task = Moody(3, "sampled") if name == "ppo" else Moody(3)
+    return Condition(METHODS[name], task, "curriculum", Budget(generations=6, reports=2))
+
+
+@pytest.fixture(scope="module")
+def ran(tmp_path_factory: pytest.TempPathFactory, cpus: list[Any]) -> Callable[[str], tuple[Store, list[TrialResult]]]:
+    """A function that runs a method's trials, once."""
+    store = Store(tmp_path_factory.mktemp("champions"))
+    return lambda name: (store, run(_condition(name), range(3), store, cpus))
+
+
+@pytest.mark.parametrize("name", METHODS)
+def test_a_champion_loaded_from_the_store_replays_to_the_same_fitness(name: str, ran: Any, cpus: list[Any]) -> None:
+    store, results = ran(name)
+    assert len({result.levels["fitness"] for result in results}) == 3
+    for result in results:
+        parameters = champions.load(store, _condition(name), result)
+        replay = champions.replay(_condition(name), result, parameters, cpus)
+        assert replay.again == {key: result.levels[key] for key in ("success", "fitness")}
+        assert (replay.exact, replay.elsewhere) == (True, ())
+
+
+def test_a_replay_of_other_parameters_or_of_another_seed_is_not_exact(ran: Any, cpus: list[Any]) -> None:
+    store, (result, other, _) = ran("cma_es")
+    condition = _condition("cma_es")
+    parameters = champions.load(store, condition, result)
+    assert not champions.replay(condition, result, parameters * np.float32(0.99), cpus).exact
+    assert not champions.replay(condition, replace(result, seed=other.seed), parameters, cpus).exact
+
+
+def test_nan_is_replayed_as_nan(ran: Any, cpus: list[Any]) -> None:
+    store, (result, *_) = ran("cma_es")
+    condition = _condition("cma_es")
+    broken = np.full_like(champions.load(store, condition, result), np.nan)
+    nan = replace(result, levels={**result.levels, "fitness": (np.nan, np.nan)})
+    replay = champions.replay(condition, nan, broken, cpus)
+    assert np.isnan(replay.again["fitness"]).all()
+    assert replace(replay, again={"fitness": replay.again["fitness"]}).exact
+
+
+def test_what_differs_between_here_and_where_the_trial_was_made_is_named(ran: Any, cpus: list[Any]) -> None:
+    store, (result, *_) = ran("cma_es")
+    condition = _condition("cma_es")
+    parameters = champions.load(store, condition, result)
+    versions = {**result.provenance["versions"], "jax": "0.0.1"}
+    for provenance, named in (
+        ({**result.provenance, "machine": "a mainframe", "versions": versions}, ("machine", "versions")),
+        ({**result.provenance, "device": {"platform": "cpu", "kind": "abacus", "count": 1}}, ("kind",)),
+        ({**result.provenance, "git": None}, ()),
+        ({}, ("kind",)),
+    ):
+        replay = champions.replay(condition, replace(result, provenance=provenance), parameters, cpus)
+        assert replay.elsewhere == named
+
+
+def test_a_champion_whose_file_was_changed_is_told(ran: Any, tmp_path: Path) -> None:
+    store, (result, *_) = ran("neat")
+    condition, store = _condition("neat"), Store(shutil.copytree(store.root, tmp_path / "copy"))
+    path = store.champion_file(result)
+    data = bytearray(path.read_bytes())
+    data[len(data) // 2] ^= 1
+    path.write_bytes(data)
+    with pytest.raises(DamagedFileError, match="it is not the champion that the trial's record names"):
+        champions.load(store, condition, result)
+    path.unlink()
+    with pytest.raises(DamagedFileError, match="cannot be read"):
+        champions.load(store, condition, result)
+
+
+@pytest.mark.parametrize(
+    "arrays",
+    [
+        {"parameters": np.zeros(3, np.float32)},
+        {"parameters": np.zeros(4, np.float64)},
+        {"weights": np.zeros(4, np.float32)},
+        {"parameters": np.zeros(4, np.float32), "more": np.zeros(1)},
+    ],
+)
+def test_arrays_that_are_not_the_methods_are_told(arrays: dict[str, Any], cpus: list[Any], tmp_path: Path) -> None:
+    condition = walk()
+    (result,) = run(condition, [0], Store(tmp_path / "one"), cpus)
+    store = Store(tmp_path / "other")
+    store.put(result, arrays)
+    stored = store.get(result.id)
+    assert stored is not None
+    with pytest.raises(UserError, match="walker on n_parity, seed 0, does not have the arrays .* another version"):
+        champions.load(store, condition, stored)
+    assert champions.load(Store(tmp_path / "one"), condition, result).shape == (4,)
+
+
+def test_a_trial_without_a_champion_says_so(cpus: list[Any], tmp_path: Path) -> None:
+    condition = walk()
+    (result,) = run(condition, [0], Store(tmp_path / "one"), cpus)
+    store = Store(tmp_path / "other")
+    store.put(replace(result, status="crashed"), {})
+    stored = store.get(result.id)
+    assert stored is not None
+    with pytest.raises(UserError, match="Seed 0 of walker on n_parity has no champion: it is crashed"):
+        champions.load(store, condition, stored)
+
+
+def test_a_genome_comes_back_with_the_network_that_it_describes(ran: Any) -> None:
+    for name, sizes in (("neat", (3, 1)), ("hyperneat", (4, 1))):
+        store, (result, *_) = ran(name)
+        parameters = champions.load(store, _condition(name), result)
+        assert isinstance(parameters, Genome)
+        network = champions.network_of(_condition(name), parameters)
+        assert network == GraphNetwork(*sizes, ("tanh", "sin"), "tanh")
+    for name in ("cma_es", "ppo", "hand_built"):
+        store, (result, *_) = ran(name)
+        condition = _condition(name)
+        parameters = champions.load(store, condition, result)
+        assert champions.network_of(condition, parameters) is None
+        assert champions.substrate_of(condition, parameters) is None
+
+
+def test_only_a_genome_that_draws_on_a_substrate_has_one(ran: Any) -> None:
+    store, (result, *_) = ran("neat")
+    assert champions.substrate_of(_condition("neat"), champions.load(store, _condition("neat"), result)) is None
+    store, results = ran("hyperneat")
+    condition = _condition("hyperneat")
+    for result in results:
+        genome = champions.load(store, condition, result)
+        drawn = champions.substrate_of(condition, genome)
+        assert drawn is not None
+        substrate, weights = drawn
+        assert [len(layer) for layer in substrate.layers] == [4, 3, 1]
+        assert [matrix.shape for matrix in weights] == [(3, 4), (1, 3)]
+        signal = np.array([1.0, 0.0, 1.0, 1.0])
+        for matrix in weights:
+            signal = np.tanh(matrix @ signal)
+        encoding = METHODS["hyperneat"].encoding(condition.task)  # type: ignore[attr-defined]
+        acted = encoding.apply(encoding.express(genome), jnp.array([1.0, 0.0, 1.0]))
+        np.testing.assert_allclose(acted, signal, rtol=1e-5)
