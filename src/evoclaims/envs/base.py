@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from dataclasses import field
 from typing import Any, Protocol
 
 import jax.numpy as jnp
@@ -40,10 +41,17 @@ class Episode:
     Attributes:
         fitness: the episode's reward as evolution maximizes it.
         success: share of the level that is right, in [0, 1]; the level is solved at exactly 1.
+        metrics: further scalars that the task measures; the same names in all its episodes.
     """
 
     fitness: Float[Array, ""]
     success: Float[Array, ""]
+    metrics: Mapping[str, Float[Array, ""]] = field(default_factory=dict)
+
+    @property
+    def score(self) -> Episode:
+        """The episode without the task's own metrics: what a method's state remembers of it."""
+        return Episode(fitness=self.fitness, success=self.success)
 
 
 def share(part: Int[Array, ""], whole: Int[Array, ""]) -> Float[Array, ""]:

@@ -35,7 +35,7 @@ def evaluate(
 ) -> Episode:
     """Run one training episode per individual; the leaves of the result have shape [n]."""
     keys = jax.random.split(key, population.shape[0])
-    return jax.vmap(lambda p, k: task.episode(policy_of(network, task, p), k, level))(population, keys)
+    return jax.vmap(lambda p, k: task.episode(policy_of(network, task, p), k, level).score)(population, keys)
 
 
 def no_episode() -> Episode:

@@ -11,12 +11,12 @@ from evosax.algorithms.distribution_based.cma_es import CMA_ES
 from jaxtyping import Array, Float, Int, PRNGKeyArray
 
 from evoclaims.core.errors import UserError
+from evoclaims.core.foreign import implicit_promotions
 from evoclaims.core.keys import streams
 from evoclaims.core.pytree import pytree, strong
 from evoclaims.envs.base import Task
 from evoclaims.methods.base import Policy, Progress
 from evoclaims.methods.champion import Champion, champion_policy, evaluate_with_champion, first_champion
-from evoclaims.methods.foreign import implicit_promotions
 from evoclaims.networks.all_skips import AllSkips
 from evoclaims.networks.base import Network
 

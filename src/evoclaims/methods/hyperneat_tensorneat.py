@@ -9,9 +9,9 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int, PRNGKeyArray
 
 from evoclaims.core.errors import UnknownNameError, UserError
+from evoclaims.core.foreign import implicit_promotions
 from evoclaims.envs.base import Task
 from evoclaims.methods.base import Policy, Progress
-from evoclaims.methods.foreign import implicit_promotions
 from evoclaims.methods.hyperneat import PAPER
 from evoclaims.methods.neat.settings import Settings
 from evoclaims.methods.tensorneat import TensorneatState, begin, evolve, library, neat, policy

@@ -16,13 +16,13 @@ import optax
 from jaxtyping import Array, Float, Int, PRNGKeyArray
 
 from evoclaims.core.errors import UserError
+from evoclaims.core.foreign import implicit_promotions
 from evoclaims.core.keys import stream, streams
 from evoclaims.core.pytree import pytree, select, strong
 from evoclaims.envs.base import Episode, Task, share
 from evoclaims.methods.base import Policy, Progress
 from evoclaims.methods.brax_blocks import losses, networks, running_statistics, specs
 from evoclaims.methods.collect import Act, Interaction, collect
-from evoclaims.methods.foreign import implicit_promotions
 
 
 @pytree
@@ -41,7 +41,8 @@ class LevelTest:
     """When and how PPO's policy is tested for moving up a level.
 
     Attributes:
-        every: training steps between tests.
+        every: training steps between tests; 0 for none: no level is left, and the fitness that is told while training
+            is the mean training reward times the horizon. For tasks of one level whose episodes are long.
         sampled_episodes: 0 for the deterministic policy under the task's own examination; otherwise how many training
             episodes of the *stochastic* policy must all be without error, as in the authors' published code (128).
             Such an episode is one step, on a row drawn from the level.
@@ -52,9 +53,9 @@ class LevelTest:
 
     def __post_init__(self) -> None:
         """Check the counts."""
-        if self.every < 1 or self.sampled_episodes < 0:
+        if self.every < 0 or self.sampled_episodes < 0:
             raise UserError(
-                "PPO's level test is held every 1 or more training steps over 0 or more sampled episodes, not every "
+                "PPO's level test is held every 0 or more training steps over 0 or more sampled episodes, not every "
                 f"{self.every} over {self.sampled_episodes}."
             )
 
@@ -161,7 +162,10 @@ class Ppo:
                 steps=state.steps + 1,
             )
         )
-        tested = self._test(test_key, task, level, after)
+        if self.level_test.every:
+            tested = self._test(test_key, task, level, after)
+        else:
+            tested = Episode(fitness=jnp.mean(data.reward) * task.horizon, success=jnp.zeros(()))
         # A policy of NaNs still answers something, so that its fitness looks finite: ask the parameters themselves.
         finite = jax.tree.map(lambda leaf: jnp.all(jnp.isfinite(leaf)), parameters)
         return after, Progress(

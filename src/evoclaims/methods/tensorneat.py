@@ -16,12 +16,12 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int, PRNGKeyArray
 
 from evoclaims.core.errors import UserError
+from evoclaims.core.foreign import implicit_promotions
 from evoclaims.core.keys import streams
 from evoclaims.core.pytree import pytree, strong
 from evoclaims.envs.base import Episode, PolicyFn, Task
 from evoclaims.methods.base import Policy, Progress
 from evoclaims.methods.champion import no_episode
-from evoclaims.methods.foreign import implicit_promotions
 from evoclaims.methods.neat.settings import PAPER, Settings, Species
 from evoclaims.methods.tensorneat_genes import Genes
 from evoclaims.networks.activations import ACTIVATIONS

@@ -28,13 +28,18 @@ class Ascent:
 
 
 def start(levels: int, progression: Any) -> Ascent:
-    """Begin at level 0 ("curriculum") or at the last ("direct")."""
-    first = {"curriculum": 0, "direct": levels - 1}[progression]
+    """Begin at level 0 ("curriculum") or at the last ("direct", "whole_budget")."""
+    first = {"curriculum": 0, "direct": levels - 1, "whole_budget": levels - 1}[progression]
     return Ascent(
         level=jnp.array(first, jnp.int32),
         solved_at=jnp.full((levels,), NEVER, jnp.int32),
         finished=jnp.zeros((), bool),
     )
+
+
+def stops_when_finished(progression: Any) -> bool:
+    """Whether a trial ends when its last level is solved."""
+    return {"curriculum": True, "direct": True, "whole_budget": False}[progression]
 
 
 def climb(ascent: Ascent, success: Float[Array, ""], steps: Int[Array, ""]) -> Ascent:

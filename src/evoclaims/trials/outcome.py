@@ -49,6 +49,7 @@ def make_result(
         furthest_solved: highest level solved while training, -1 for none.
         furthest_reached: highest level trained on.
         steps, environment_steps: spent until the trial ended.
+    The task's own metrics of the final policy on the last level stand beside them.
     """
     cost = spec.condition.method.cost(spec.condition.task)
     success, fitness = np.asarray(score.final.success)[lane], np.asarray(score.final.fitness)[lane]
@@ -63,6 +64,7 @@ def make_result(
         "furthest_reached": float(report.level[lane]),
         "steps": float(steps),
         "environment_steps": float(steps * cost),
+        **{name: float(np.asarray(values)[lane, -1]) for name, values in score.final.metrics.items()},
     }
     levels = {
         "success": tuple(map(float, success)),

@@ -136,7 +136,8 @@ class Program:
 
     def _ended(self, trial: TrialState) -> Bool[Array, ""]:
         """Whether no further step will be taken."""
-        return trial.ascent.finished | trial.diverged | trial.idle | (trial.steps >= self.condition.steps)
+        done = trial.diverged | trial.idle | (trial.steps >= self.condition.steps)
+        return done | trial.ascent.finished if curriculum.stops_when_finished(self.condition.progression) else done
 
 
 def over_trials(function: Callable[..., Any], layout: str) -> Callable[..., Any]:

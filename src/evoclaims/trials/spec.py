@@ -12,7 +12,7 @@ from evoclaims.envs.base import Task
 from evoclaims.methods.base import Method
 from evoclaims.trials.budget import Budget
 
-Progression = Literal["curriculum", "direct"]
+Progression = Literal["curriculum", "direct", "whole_budget"]
 
 ENGINE_REVISION = 1
 """Raised when the engine changes what a trial computes, so that old records are not taken for new ones."""
@@ -30,7 +30,8 @@ class Condition:
     Attributes:
         method: the algorithm with its frozen hyperparameters.
         task: the task with its frozen parameters.
-        progression: "curriculum" starts at level 0 and climbs; "direct" stays on the last level.
+        progression: "curriculum" starts at level 0 and climbs; "direct" stays on the last level; both end when that is
+            solved. "whole_budget" stays on the last level to the end of the budget, whatever is solved.
         budget: training length and reports.
     """
 
@@ -63,7 +64,7 @@ class Condition:
     @property
     def label(self) -> str:
         """A short name for progress lines and tables, such as "cma_es on n_parity"."""
-        suffix = " (direct)" if self.progression == "direct" else ""
+        suffix = {"curriculum": "", "direct": " (direct)", "whole_budget": ""}[self.progression]
         return f"{self.method.name} on {self.task.name}{suffix}"
 
     @property

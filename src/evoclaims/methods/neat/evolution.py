@@ -116,7 +116,7 @@ def _evaluate(
     """Run an episode per genome, in arrays of the given capacity; leaves of the result are [population]."""
 
     def evaluate(key: PRNGKeyArray, genome: Genome) -> Episode:
-        return task.episode(partial(encoding.apply, encoding.express(genome)), key, level)
+        return task.episode(partial(encoding.apply, encoding.express(genome)), key, level).score
 
     small = resized(genomes, nodes, connections)
     return jax.vmap(evaluate)(jax.random.split(key, small.node_count.shape[0]), small)

@@ -1,0 +1,101 @@
+"""MuJoCo's constrained dynamics for few constraints: one Newton step with an exact line search.
+
+The accelerations a minimize ½ (a - a₀)ᵀ M (a - a₀) + ½ Σᵢ Dᵢ min(0, (J a - r)ᵢ)² (MuJoCo's documentation, "Computation",
+primal problem, pyramidal friction cones). MJX's solver searches its line by bracketing, in a loop of several hundred
+operations; the slope along a line is piecewise linear, so that its root can be had at once.
+"""
+
+from __future__ import annotations
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+SMALL = 3
+"""Up to this size a system is solved by formulas without loops, which a compiler fuses with what is around them."""
+
+
+def cholesky_solve(matrix: Float[Array, "n n"], right: Float[Array, " n"]) -> Float[Array, " n"]:
+    """Solve a symmetric positive definite system."""
+    n = right.shape[0]
+    if n > SMALL:
+        return jax.scipy.linalg.cho_solve(jax.scipy.linalg.cho_factor(matrix), right)
+    lower: list[list[Array]] = []
+    for i in range(n):
+        row: list[Array] = []
+        for j in range(i + 1):
+            rest = matrix[i, j] - sum((row[k] * (row if j == i else lower[j])[k] for k in range(j)), jnp.zeros(()))
+            row.append(jnp.sqrt(rest) if j == i else rest / lower[j][j])
+        lower.append(row)
+    forward: list[Array] = []
+    for i in range(n):
+        forward.append((right[i] - sum((lower[i][k] * forward[k] for k in range(i)), jnp.zeros(()))) / lower[i][i])
+    solution: list[Array] = [jnp.zeros(())] * n
+    for i in reversed(range(n)):
+        rest = forward[i] - sum((lower[k][i] * solution[k] for k in range(i + 1, n)), jnp.zeros(()))
+        solution[i] = rest / lower[i][i]
+    return jnp.stack(solution)
+
+
+def constrained_acceleration(
+    mass: Float[Array, "nv nv"],
+    force: Float[Array, " nv"],
+    warm: Float[Array, " nv"],
+    jacobian: Float[Array, "rows nv"],
+    reference: Float[Array, " rows"],
+    stiffness: Float[Array, " rows"],
+) -> Float[Array, " nv"]:
+    """Return the acceleration after one Newton step.
+
+    Args:
+        mass: M.
+        force: all smooth forces, M a₀.
+        warm: the last step's acceleration; the start, if it costs less than a₀.
+        jacobian, reference, stiffness: J, r and D, of constraints that push and never pull.
+    """
+    free = cholesky_solve(mass, force)
+    if not jacobian.shape[0]:
+        return free
+
+    def start_at(a: Array) -> tuple[Array, Array, Array]:
+        off = jacobian @ a - reference
+        shift = mass @ (a - free)
+        return 0.5 * shift @ (a - free) + 0.5 * jnp.sum(stiffness * jnp.minimum(off, 0.0) ** 2), off, shift
+
+    cost_free, off_free, shift_free = start_at(free)
+    cost_warm, off_warm, shift_warm = start_at(warm)
+    warmer = cost_warm < cost_free
+    a, off, shift = (
+        jnp.where(warmer, *pair) for pair in ((warm, free), (off_warm, off_free), (shift_warm, shift_free))
+    )
+    active = jnp.where(off < 0, stiffness, 0.0)
+    gradient = shift + (active * off) @ jacobian
+    hessian = mass + jnp.einsum("ri,r,rj->ij", jacobian, active, jacobian)
+    search = -cholesky_solve(hessian, gradient)
+    along = jacobian @ search
+    return a + _root(search @ shift, search @ (mass @ search), stiffness, off, along) * search
+
+
+def _root(
+    slope: Float[Array, ""],
+    curvature: Float[Array, ""],
+    stiffness: Float[Array, " rows"],
+    off: Float[Array, " rows"],
+    along: Float[Array, " rows"],
+) -> Float[Array, ""]:
+    """Return where slope + t curvature + Σᵢ Dᵢ vᵢ min(0, oᵢ + t vᵢ) is 0.
+
+    It rises in t and bends only where a row turns on or off: between the last bend at which it is negative and the first
+    at which it is not, it is a straight line.
+    """
+
+    def value(t: Array) -> Array:
+        return slope + t * curvature + jnp.sum(stiffness * along * jnp.minimum(0.0, off + t * along))
+
+    bends = -off / jnp.where(along == 0, 1.0, along)
+    ahead = jnp.where((along == 0) | (bends < 0), 0.0, bends)
+    low = jnp.max(jnp.where(jax.vmap(value)(ahead) < 0, ahead, 0.0))
+    # Which rows push just beyond `low`: by comparing bends, since rounding decides whether a row is 0 at its own bend.
+    pushing = jnp.where(along > 0, bends > low, jnp.where(along < 0, bends <= low, off < 0))
+    weight = jnp.where(pushing, stiffness * along, 0.0)
+    return (-slope - weight @ off) / jnp.maximum(curvature + weight @ along, 1e-12)

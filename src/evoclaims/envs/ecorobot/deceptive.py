@@ -1,0 +1,134 @@
+"""Deceptive mazes, easy and difficult (§3.2 of the paper): the straight way to the target ends at a wall."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar, Final, Literal, NamedTuple, get_args
+
+import jax.numpy as jnp
+from jaxtyping import Array, Bool, Float
+
+from evoclaims.core.errors import UnknownNameError
+from evoclaims.core.pytree import pytree
+from evoclaims.envs.ecorobot import stones
+from evoclaims.envs.ecorobot.maze import Area, Maze
+from evoclaims.envs.ecorobot.pose import Pose
+from evoclaims.envs.ecorobot.robot_task import Outing, Ruling
+from evoclaims.envs.ecorobot.scene import Box
+
+Difficulty = Literal["easy", "difficult"]
+
+
+class Plan(NamedTuple):
+    """A maze: its walls, the ground between them, start and target, and how near the target counts, m."""
+
+    walls: tuple[Box, ...]
+    area: Area
+    start: tuple[float, float]
+    target: tuple[float, float]
+    within: float
+
+
+EASY: Final = Plan(
+    walls=(
+        Box((0.0, 0.0), (6.0, 0.3), bottom=-1.0, top=1.0),
+        Box((0.0, 11.5), (6.0, 0.3), bottom=-1.0, top=1.0),
+        Box((-6.0, 5.5), (6.0, 0.3), angle=90.0, bottom=-1.0, top=1.0),
+        Box((6.0, 5.5), (6.0, 0.3), angle=90.0, bottom=-1.0, top=1.0),
+        Box((-3.0, 7.5), (4.0, 0.3), bottom=-1.0, top=1.0),
+    ),
+    area=((-6.0, 6.0), (0.0, 11.5)),
+    start=(-3.0, 1.0),
+    target=(-4.0, 9.0),
+    within=1.1,
+)
+DIFFICULT: Final = Plan(stones.WALLS, stones.AREA, stones.START, stones.TARGET, within=0.1)
+PLANS: Final = {"easy": EASY, "difficult": DIFFICULT}
+
+
+@pytree
+class Approach:
+    """How the robot stands to the target.
+
+    Attributes:
+        first: distance to where the target counts as reached, at the start, m.
+        done: whether it was reached.
+    """
+
+    first: Float[Array, ""]
+    done: Bool[Array, ""]
+
+
+@dataclass(frozen=True)
+class DeceptiveMaze(Maze):
+    """Reach the target: a step pays the decrease of the distance to it, as a share of the first distance.
+
+    The distance is to where the target counts as reached, so that rewards sum to 1 on the way there, whichever it is.
+
+    Attributes:
+        difficulty: "easy" (a bar across the way) or "difficult" (the walls of the stepping stones' maze).
+    """
+
+    name: ClassVar[str] = "deceptive_maze"  # type: ignore[misc]
+    revision: ClassVar[int] = 1
+
+    difficulty: Difficulty = "easy"
+
+    def __post_init__(self) -> None:
+        """Check the name of the difficulty."""
+        super().__post_init__()
+        if self.difficulty not in get_args(Difficulty):
+            raise UnknownNameError("difficulty", self.difficulty, get_args(Difficulty))
+
+    @property
+    def plan(self) -> Plan:
+        """The maze."""
+        return PLANS[self.difficulty]
+
+    @property
+    def boxes(self) -> tuple[Box, ...]:
+        """The walls."""
+        return self.plan.walls
+
+    @property
+    def area(self) -> Area:
+        """The ground between the outer walls."""
+        return self.plan.area
+
+    @property
+    def start(self) -> tuple[float, float]:
+        """Where the robot starts."""
+        return self.plan.start
+
+    @property
+    def target(self) -> tuple[float, float]:
+        """What is to be reached."""
+        return self.plan.target
+
+    def memory(self, pose: Pose) -> Approach:
+        """Note how far the target is."""
+        return Approach(first=self._distance(pose), done=jnp.zeros((), bool))
+
+    def rule(self, memory: Approach, before: Pose, after: Pose, action: Float[Array, " action"]) -> Ruling:
+        """Pay for the way gained; end at the target."""
+        distance = self._distance(after)
+        reached = distance <= 0.0
+        gained = self._distance(before) - jnp.maximum(distance, 0.0)
+        return Ruling(
+            memory=Approach(first=memory.first, done=memory.done | reached),
+            reward=gained / memory.first,
+            ended=reached,
+        )
+
+    def reached(self, outing: Outing) -> Bool[Array, ""]:
+        """Whether the target was reached."""
+        done: Bool[Array, ""] = outing.memory.done
+        return done
+
+    def measures(self, outing: Outing) -> dict[str, Array]:
+        """Return how far the target still is, m."""
+        return {"distance": jnp.maximum(self._distance(outing.pose), 0.0)}
+
+    def _distance(self, pose: Pose) -> Float[Array, ""]:
+        """Return how far it is to where the target counts as reached, m."""
+        return jnp.linalg.norm(pose.place[:2] - jnp.asarray(self.target, jnp.float32)) - self.plan.within

@@ -1,0 +1,54 @@
+"""Plain locomotion: Brax's own task for each of its robots, on free ground."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import jax.numpy as jnp
+from jaxtyping import Array, Bool, Float
+
+from evoclaims.envs.ecorobot.pose import Pose
+from evoclaims.envs.ecorobot.robot_task import RobotTask, Ruling
+from evoclaims.envs.ecorobot.robots import HALF_CHEETAH, Robot
+from evoclaims.envs.ecorobot.scene import Box
+
+
+def forward(
+    robot: Robot, seconds: float, before: Pose, after: Pose, action: Float[Array, " action"]
+) -> tuple[Float[Array, ""], Bool[Array, ""]]:
+    """Return Brax's reward of a step (forward velocity, health, minus the control cost), and whether health is lost.
+
+    Brax measures the humanoid's velocity at its centre of mass; here it is the torso's, as for all others.
+    """
+    velocity = (after.place[0] - before.place[0]) / seconds
+    low, high = robot.healthy_height
+    height = after.place[2]
+    healthy = (low <= height) & (height <= high) & (jnp.abs(after.pitch) <= robot.healthy_pitch)
+    reward = robot.forward_reward * velocity + robot.healthy_reward - robot.control_cost * jnp.sum(action**2)
+    return reward, ~healthy
+
+
+@dataclass(frozen=True)
+class Locomotion(RobotTask):
+    """Run forward, along x; the policy does not see where it is."""
+
+    name: ClassVar[str] = "locomotion"  # type: ignore[misc]
+    revision: ClassVar[int] = 1
+
+    robot: Robot = HALF_CHEETAH
+
+    @property
+    def boxes(self) -> tuple[Box, ...]:
+        """None."""
+        return ()
+
+    @property
+    def shows_place(self) -> bool:
+        """Free ground is the same everywhere."""
+        return False
+
+    def rule(self, memory: Any, before: Pose, after: Pose, action: Float[Array, " action"]) -> Ruling:
+        """Pay for the way made; end when the robot is no longer healthy."""
+        reward, lost = forward(self.robot, self.scene.seconds, before, after, action)
+        return Ruling(memory=memory, reward=reward, ended=lost)

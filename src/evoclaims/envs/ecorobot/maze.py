@@ -1,0 +1,89 @@
+"""What mazes share: the ground a robot can reach, and how much of it a path has covered."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Final
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Bool, Float
+from numpy.typing import NDArray
+
+from evoclaims.envs.ecorobot.robot_task import RobotTask
+from evoclaims.envs.ecorobot.scene import Box
+from evoclaims.envs.ecorobot.sensors import Rangefinders, Sensor
+
+Area = tuple[tuple[float, float], tuple[float, float]]
+"""Lowest and highest x, lowest and highest y, m."""
+
+CELLS: Final = (50, 50)
+"""The grid over which coverage is counted (§4 of the paper)."""
+FINE: Final = 4
+"""Points to each side of a cell on which reachability is worked out."""
+
+
+@dataclass(frozen=True)
+class Maze(RobotTask):
+    """A task among walls. The policy sees positions, velocities and five rangefinders."""
+
+    sensor: Sensor | None = Rangefinders()
+
+    @property
+    @abstractmethod
+    def area(self) -> Area:
+        """The ground between the outer walls."""
+
+    @property
+    @abstractmethod
+    def target(self) -> tuple[float, float]:
+        """What is to be reached, m."""
+
+    def reachable(self, cells: tuple[int, int] = CELLS) -> NDArray[np.bool_]:
+        """Return which cells of a grid over the area the torso's centre can get to, shape [cells along x, along y]."""
+        assert self.start is not None
+        return _reachable(self.boxes, self.area, self.start, self.robot.torso_radius, cells)
+
+    def path_measures(
+        self, path: Float[Array, "steps 2"], alive: Bool[Array, " steps"]
+    ) -> Mapping[str, Float[Array, ""]]:
+        """Return the share of the reachable cells that the path has been in."""
+        ground = self.reachable()
+        low = jnp.asarray([bounds[0] for bounds in self.area], jnp.float32)
+        high = jnp.asarray([bounds[1] for bounds in self.area], jnp.float32)
+        size = jnp.asarray(CELLS)
+        cell = jnp.clip(jnp.floor((path - low) / (high - low) * size).astype(jnp.int32), 0, size - 1)
+        been = jnp.zeros(CELLS, bool).at[cell[:, 0], cell[:, 1]].max(alive)
+        return {"coverage": jnp.sum(been & ground) / jnp.asarray(ground.sum(), jnp.float32)}
+
+
+@lru_cache(maxsize=64)
+def _reachable(
+    boxes: tuple[Box, ...], area: Area, start: tuple[float, float], radius: float, cells: tuple[int, int]
+) -> NDArray[np.bool_]:
+    """Flood the ground from the start, on a grid `FINE` times as fine as the cells."""
+    axes = [
+        low + (np.arange(count * FINE) + 0.5) * (high - low) / (count * FINE)
+        for (low, high), count in zip(area, cells, strict=True)
+    ]
+    points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
+    free = np.ones(points.shape[:2], bool)
+    for box in boxes:
+        local = (points - np.array(box.centre)) @ box.rotation[:2, :2]
+        outside = np.maximum(np.abs(local) - np.array(box.half_size), 0.0)
+        free &= np.hypot(outside[..., 0], outside[..., 1]) >= radius
+    first = tuple(int(np.argmin(np.abs(axis - at))) for axis, at in zip(axes, start, strict=True))
+    flooded, edge = np.zeros_like(free), [first]
+    flooded[first] = True
+    while edge:
+        x, y = edge.pop()
+        for i, j in ((x + 1, y), (x - 1, y), (x, y + 1), (x, y - 1)):
+            if 0 <= i < free.shape[0] and 0 <= j < free.shape[1] and free[i, j] and not flooded[i, j]:
+                flooded[i, j] = True
+                edge.append((i, j))
+    ground = flooded.reshape(cells[0], FINE, cells[1], FINE).any(axis=(1, 3))
+    ground.setflags(write=False)
+    return ground

@@ -1,0 +1,91 @@
+"""Locomotion over obstacles, of rising height or all of one (§3.2 of the paper)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar, Final, Literal, get_args
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from evoclaims.core.errors import UnknownNameError
+from evoclaims.core.pytree import pytree
+from evoclaims.envs.ecorobot.locomotion import forward
+from evoclaims.envs.ecorobot.pose import Pose
+from evoclaims.envs.ecorobot.robot_task import Outing, RobotTask, Ruling
+from evoclaims.envs.ecorobot.robots import HALF_CHEETAH, Robot
+from evoclaims.envs.ecorobot.scene import Box
+
+Heights = Literal["hierarchical", "medium", "high"]
+
+PLACES: Final = (9.0, 11.0, 13.0, 15.0, 17.0, 23.0, 25.0, 27.0, 29.0, 31.0, 43.0, 45.0, 47.0, 49.0, 51.0)
+"""x of the obstacles, m."""
+HALF_THICKNESS: Final = 0.2
+DEPTH: Final = 1.0
+"""How far obstacles reach below their top, m: one size for all, so that two boxes can stand for fifteen."""
+
+
+@pytree
+class Run:
+    """The furthest x that the torso has come to, m."""
+
+    furthest: Float[Array, ""]
+
+
+@dataclass(frozen=True)
+class Obstacles(RobotTask):
+    """Run forward through a corridor with fifteen obstacles across it.
+
+    Attributes:
+        heights: of their tops: "hierarchical" (five of 0.1 m, five of 0.2 m, five of 0.3 m), "medium" (all 0.2 m) or
+            "high" (all 0.3 m).
+
+    The corridor's walls at y = ±3 are not built: the half-cheetah moves in the plane y = 0.
+    """
+
+    name: ClassVar[str] = "obstacles"  # type: ignore[misc]
+    revision: ClassVar[int] = 1
+
+    robot: Robot = HALF_CHEETAH
+    heights: Heights = "hierarchical"
+
+    def __post_init__(self) -> None:
+        """Check the name of the heights."""
+        super().__post_init__()
+        if self.heights not in get_args(Heights):
+            raise UnknownNameError("profile of heights", self.heights, get_args(Heights))
+
+    @property
+    def tops(self) -> tuple[float, ...]:
+        """Height of each obstacle, m."""
+        profiles = {"hierarchical": (0.1,) * 5 + (0.2,) * 5 + (0.3,) * 5, "medium": (0.2,) * 15, "high": (0.3,) * 15}
+        return profiles[self.heights]
+
+    @property
+    def boxes(self) -> tuple[Box, ...]:
+        """The obstacles."""
+        return tuple(
+            Box((x, 0.0), (HALF_THICKNESS, 3.0), bottom=top - DEPTH, top=top)
+            for x, top in zip(PLACES, self.tops, strict=True)
+        )
+
+    @property
+    def near(self) -> int:
+        """Obstacles stand 2 m apart, and no robot is longer than that."""
+        return 2
+
+    def memory(self, pose: Pose) -> Run:
+        """Start where the torso is."""
+        return Run(furthest=pose.place[0])
+
+    def rule(self, memory: Run, before: Pose, after: Pose, action: Float[Array, " action"]) -> Ruling:
+        """Pay as in plain locomotion."""
+        reward, lost = forward(self.robot, self.scene.seconds, before, after, action)
+        return Ruling(memory=Run(furthest=jnp.maximum(memory.furthest, after.place[0])), reward=reward, ended=lost)
+
+    def measures(self, outing: Outing) -> dict[str, Array]:
+        """Return how many obstacles were left behind, and the furthest x, m."""
+        furthest = outing.memory.furthest
+        behind = jnp.asarray(np.array(PLACES) + HALF_THICKNESS, jnp.float32)
+        return {"obstacles": jnp.sum(furthest > behind).astype(jnp.float32), "furthest": furthest}

@@ -1,0 +1,72 @@
+"""Simulating a scene: MJX's functions, carrying from step to step only what a step cannot work out again."""
+
+from __future__ import annotations
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from evoclaims.core.foreign import implicit_promotions
+from evoclaims.core.pytree import pytree
+from evoclaims.envs.ecorobot.constraints import constrained_acceleration
+from evoclaims.envs.ecorobot.scene import Scene, mjx, on_device
+
+
+@pytree
+class Body:
+    """What moves.
+
+    Attributes:
+        position: generalized positions, MuJoCo's qpos; lengths in m, angles in rad, orientations as quaternions.
+        velocity: MuJoCo's qvel, per s.
+        acceleration: of the last step, per s², where the next one's solver starts.
+    """
+
+    position: Float[Array, " nq"]
+    velocity: Float[Array, " nv"]
+    acceleration: Float[Array, " nv"]
+
+
+def resting(position: Float[Array, " nq"], velocity: Float[Array, " nv"]) -> Body:
+    """Return a body at the start of an episode."""
+    return Body(position=position, velocity=velocity, acceleration=jnp.zeros_like(velocity))
+
+
+def act(scene: Scene, body: Body, control: Float[Array, " nu"]) -> Body:
+    """Hold the motors at `control` for one environment step."""
+
+    def frame(body: Body, _: None) -> tuple[Body, None]:
+        return _frame(scene, body, control), None
+
+    return jax.lax.scan(frame, body, None, length=scene.robot.frames)[0]
+
+
+def _frame(scene: Scene, body: Body, control: Float[Array, " nu"]) -> Body:
+    """Simulate one time step, as `mjx.step` does with semi-implicit Euler integration."""
+    with implicit_promotions():
+        model = on_device(scene.mjx)
+        if scene.near:
+            model = model.replace(geom_pos=model.geom_pos.at[jnp.array(scene.turning)].set(_nearest(scene, body)))
+        data = on_device(scene.blank).replace(qpos=body.position, qvel=body.velocity, ctrl=control)
+        data = mjx.kinematics(model, data)
+        data = mjx.com_pos(model, data)
+        data = mjx.crb(model, data)
+        data = mjx.collision(model, data)
+        data = mjx.make_constraint(model, data)
+        data = mjx.transmission(model, data)
+        data = mjx.fwd_velocity(model, data)
+        data = mjx.fwd_actuation(model, data)
+        mass = mjx.full_m(model, data)
+        force = data.qfrc_passive - data.qfrc_bias + data.qfrc_actuator
+        acceleration = constrained_acceleration(
+            mass, force, body.acceleration, data._impl.efc_J, data._impl.efc_aref, data._impl.efc_D
+        )
+        data = mjx.euler(model, data.replace(qacc=acceleration))
+    return Body(position=data.qpos, velocity=data.qvel, acceleration=acceleration)
+
+
+def _nearest(scene: Scene, body: Body) -> Float[Array, "near 3"]:
+    """Return the places of the boxes that are nearest to the torso along x."""
+    places = jnp.asarray(scene.places)
+    away = jnp.abs(places[:, 0] - body.position[0])
+    return places[jax.lax.top_k(-away, scene.near)[1]]

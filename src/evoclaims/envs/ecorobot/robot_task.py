@@ -1,0 +1,285 @@
+"""What all of ecorobot's tasks share: a robot in a scene, episodes of it, and an examination over several starts."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Bool, Float, Int, PRNGKeyArray
+
+from evoclaims.core.errors import UserError
+from evoclaims.core.keys import streams
+from evoclaims.core.pytree import pytree, select, strong
+from evoclaims.envs.base import Episode, PolicyFn, TaskState
+from evoclaims.envs.ecorobot import physics
+from evoclaims.envs.ecorobot.physics import Body
+from evoclaims.envs.ecorobot.pose import Pose, torso
+from evoclaims.envs.ecorobot.robots import SIMPLE_ROB, Robot
+from evoclaims.envs.ecorobot.scene import Box, Scene, scene
+from evoclaims.envs.ecorobot.sensors import Sensor
+
+
+@pytree
+class Outing:
+    """The inner state of an episode.
+
+    Attributes:
+        body: what moves.
+        pose: the torso's.
+        time: environment steps made.
+        memory: what the task's rules remember.
+        effort: sum of the squared actions so far.
+        overturned: steps spent upside-down.
+    """
+
+    body: Body
+    pose: Pose
+    time: Int[Array, ""]
+    memory: Any
+    effort: Float[Array, ""]
+    overturned: Float[Array, ""]
+
+
+@pytree
+class Ruling:
+    """What the rules say of one step.
+
+    Attributes:
+        memory: what they remember from now on.
+        reward: of the step.
+        ended: whether the task is over.
+    """
+
+    memory: Any
+    reward: Float[Array, ""]
+    ended: Bool[Array, ""]
+
+
+@dataclass(frozen=True)
+class RobotTask(ABC):
+    """A task of one level. A new one gives its name, its boxes and its `rule`; and `memory`, `measures` where needed.
+
+    Attributes:
+        robot: who acts.
+        sensor: what it perceives of the boxes; None for nothing.
+        episode_steps: environment steps after which an episode is truncated.
+        examined_episodes: episodes, from different starts, over which an examination averages.
+    """
+
+    robot: Robot = SIMPLE_ROB
+    sensor: Sensor | None = None
+    episode_steps: int = 1000
+    examined_episodes: int = 10
+
+    def __post_init__(self) -> None:
+        """Check the counts."""
+        if self.episode_steps < 1 or self.examined_episodes < 1:
+            raise UserError(
+                f"A task has episodes of at least 1 step and examines at least 1, not {self.episode_steps} and "
+                f"{self.examined_episodes}."
+            )
+
+    @property
+    @abstractmethod
+    def name(self) -> str:
+        """The registered name."""
+
+    @property
+    @abstractmethod
+    def boxes(self) -> tuple[Box, ...]:
+        """What stands in the world."""
+
+    @abstractmethod
+    def rule(self, memory: Any, before: Pose, after: Pose, action: Float[Array, " action"]) -> Ruling:
+        """Judge one step."""
+
+    @property
+    def near(self) -> int:
+        """How many boxes can be touched at a time; 0 for all (see `Scene`)."""
+        return 0
+
+    @property
+    def start(self) -> tuple[float, float] | None:
+        """Where the torso starts, exactly; None for where the robot's own noise puts it."""
+        return None
+
+    def memory(self, pose: Pose) -> Any:
+        """Return what the rules remember at the start."""
+        return ()
+
+    def shown(self, outing: Outing) -> Float[Array, " more"]:
+        """Return what the policy sees beside positions, velocities and sensors."""
+        return jnp.zeros(0)
+
+    def measures(self, outing: Outing) -> Mapping[str, Float[Array, ""]]:
+        """Return the task's own metrics of an episode that has ended."""
+        return {}
+
+    def reached(self, outing: Outing) -> Bool[Array, ""]:
+        """Whether the task's goal is reached; never, for tasks without one."""
+        return jnp.zeros((), bool)
+
+    def path_measures(self, path: Float[Array, "steps 2"], alive: Bool[Array, " steps"]) -> Mapping[str, Array]:
+        """Return metrics of the way that an examined robot took; `alive` marks the steps before the episode's end."""
+        return {}
+
+    @property
+    def shows_place(self) -> bool:
+        """Whether the policy sees where in the world the robot is."""
+        return True
+
+    @property
+    def levels(self) -> int:
+        """One."""
+        return 1
+
+    @property
+    def horizon(self) -> int:
+        """Environment steps of an episode."""
+        return self.episode_steps
+
+    @property
+    def action_size(self) -> int:
+        """Number of motors."""
+        return int(self.scene.model.nu)
+
+    @cached_property
+    def observation_size(self) -> int:
+        """Positions, velocities, readings, and what else is shown."""
+        key = jax.eval_shape(lambda: jax.random.key(0))
+        return int(jax.eval_shape(lambda k: self.reset(k, jnp.zeros((), jnp.int32)), key).observation.shape[0])
+
+    @property
+    def scene(self) -> Scene:
+        """The robot among the boxes."""
+        return scene(self.robot, self.boxes, self.near)
+
+    def reset(self, key: PRNGKeyArray, level: Int[Array, ""]) -> TaskState:
+        """Put the robot at the start, as Brax does: with a little noise on positions and velocities."""
+        position_key, velocity_key = streams(key, "position", "velocity")
+        robot, start = self.robot, jnp.asarray(self.scene.start)
+        position = start + jax.random.uniform(
+            position_key, start.shape, minval=-robot.position_noise, maxval=robot.position_noise
+        )
+        if self.start is not None:
+            position = position.at[:2].set(jnp.asarray(self.start, jnp.float32))
+        draw = jax.random.normal if robot.normal_velocity else _uniform
+        velocity = robot.velocity_noise * draw(velocity_key, (int(self.scene.model.nv),))
+        pose = torso(self.scene, position)
+        outing = strong(
+            Outing(
+                body=physics.resting(position, velocity),
+                pose=pose,
+                time=jnp.zeros((), jnp.int32),
+                memory=self.memory(pose),
+                effort=jnp.zeros(()),
+                overturned=jnp.zeros(()),
+            )
+        )
+        no = jnp.zeros((), bool)
+        return TaskState(
+            observation=self._observe(outing), reward=jnp.zeros(()), terminated=no, truncated=no, inner=outing
+        )
+
+    def step(self, state: TaskState, action: Float[Array, " action"]) -> TaskState:
+        """Act for `robot.frames` simulation steps."""
+        outing: Outing = state.inner
+        control = action
+        if self.robot.scales_actions:
+            low, high = jnp.asarray(self.scene.model.actuator_ctrlrange, jnp.float32).T
+            control = low + (action + 1.0) * (high - low) / 2.0
+        body = physics.act(self.scene, outing.body, control)
+        pose = torso(self.scene, body.position)
+        ruling = self.rule(outing.memory, outing.pose, pose, control)
+        following = strong(
+            Outing(
+                body=body,
+                pose=pose,
+                time=outing.time + 1,
+                memory=ruling.memory,
+                effort=outing.effort + jnp.sum(control**2),
+                overturned=outing.overturned + pose.upside_down,
+            )
+        )
+        return TaskState(
+            observation=self._observe(following),
+            reward=ruling.reward,
+            terminated=ruling.ended,
+            truncated=(following.time >= self.episode_steps) & ~ruling.ended,
+            inner=following,
+        )
+
+    def episode(self, policy: PolicyFn, key: PRNGKeyArray, level: Int[Array, ""]) -> Episode:
+        """Run one episode: fitness is the sum of its rewards, success whether the goal was reached."""
+        return self._play(policy, key, level, follow=False)
+
+    def examine(self, policy: PolicyFn, key: PRNGKeyArray, level: Int[Array, ""]) -> Episode:
+        """Run `examined_episodes` from different starts and average; success is the share that reached the goal."""
+        keys = jax.random.split(key, self.examined_episodes)
+        episodes = jax.vmap(lambda k: self._play(policy, k, level, follow=True))(keys)
+        averaged: Episode = jax.tree.map(lambda leaf: jnp.mean(leaf), episodes)
+        return averaged
+
+    def trajectory(self, policy: PolicyFn, key: PRNGKeyArray) -> tuple[Outing, Bool[Array, " steps"]]:
+        """Return every state of one episode, leaves [steps, …], and which belong to it: for pictures."""
+        level = jnp.zeros((), jnp.int32)
+
+        def step(carry: tuple[TaskState, Array], _: None) -> tuple[tuple[TaskState, Array], tuple[Outing, Array]]:
+            state, alive = carry
+            following = self.step(state, policy(state.observation))
+            ended = following.terminated | following.truncated
+            return (select(alive, following, state), alive & ~ended), (following.inner, alive)
+
+        start = (self.reset(key, level), jnp.ones((), bool))
+        return jax.lax.scan(step, start, None, length=self.episode_steps)[1]
+
+    def _play(self, policy: PolicyFn, key: PRNGKeyArray, level: Int[Array, ""], follow: bool) -> Episode:
+        """Play to the end; with `follow`, note the way taken for `path_measures`."""
+
+        def step(carry: tuple[TaskState, Array, Array], _: None) -> tuple[tuple[TaskState, Array, Array], Any]:
+            state, total, alive = carry
+            following = self.step(state, policy(state.observation))
+            noted = (following.inner.pose.place[:2], alive) if follow else None
+            total = total + jnp.where(alive, following.reward, 0.0)
+            ended = following.terminated | following.truncated
+            return (select(alive, following, state), total, alive & ~ended), noted
+
+        start = (self.reset(key, level), jnp.zeros(()), jnp.ones((), bool))
+        (state, total, _), way = jax.lax.scan(step, start, None, length=self.episode_steps)
+        outing: Outing = state.inner
+        steps = outing.time.astype(jnp.float32)
+        metrics = {
+            "x": outing.pose.place[0],
+            "y": outing.pose.place[1],
+            "reached": self.reached(outing).astype(jnp.float32),
+            "control_cost": self.robot.control_cost * outing.effort,
+            "effort": outing.effort,
+            "upside_down": outing.overturned / steps,
+            "episode_steps": steps,
+            **self.measures(outing),
+            **(self.path_measures(*way) if follow else {}),
+        }
+        return Episode(fitness=total, success=metrics["reached"], metrics=metrics)
+
+    def _observe(self, outing: Outing) -> Float[Array, " observation"]:
+        """Return positions, velocities, readings, and what else is shown."""
+        robot, body = self.robot, outing.body
+        limit = robot.velocity_limit
+        parts = [
+            body.position if self.shows_place else body.position[robot.free_coordinates :],
+            jnp.clip(body.velocity[: robot.seen_velocities], -limit, limit),
+            self.shown(outing),
+        ]
+        if self.sensor is not None:
+            parts.insert(2, self.sensor.read(self.scene, outing.pose))
+        return jnp.concatenate(parts)
+
+
+def _uniform(key: PRNGKeyArray, shape: tuple[int, ...]) -> Array:
+    """Draw from [-1, 1)."""
+    return jax.random.uniform(key, shape, minval=-1.0, maxval=1.0)

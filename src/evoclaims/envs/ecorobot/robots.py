@@ -1,0 +1,126 @@
+"""Robots: a MuJoCo model and what a task must know of it. A new robot is an XML file and one entry below."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from importlib import resources
+from typing import Final
+
+from evoclaims.core.registry import Registry
+
+OURS: Final = "evoclaims.envs.ecorobot:assets/"
+BRAX: Final = "brax:envs/assets/"
+
+
+@dataclass(frozen=True)
+class Robot:
+    """A body, with the numbers of its locomotion task in Brax.
+
+    Attributes:
+        name: the registered name.
+        xml: the model, "package:path". Its first body is the torso, on whose joints the robot moves through the world.
+        frames: simulation steps in one environment step.
+        torso_radius: where range sensors sit, m from the torso's centre.
+        forward_reward: for each m/s of forward velocity, in every step.
+        control_cost: paid in every step, times the sum of the squared actions.
+        healthy_reward: earned in every step in which the robot is healthy.
+        healthy_height: lowest and highest z of a healthy torso, m.
+        healthy_pitch: largest pitch of a healthy torso to either side, rad; only for planar robots.
+        start: the configuration at the start, where it is not the model's own.
+        position_noise, velocity_noise: of starts: half-width of a uniform distribution, scale of a normal one (uniform
+            for robots that Brax starts so).
+        normal_velocity: whether velocities start normally distributed, and not uniformly.
+        scales_actions: whether an action in [-1, 1] spans the motors' whole range, as Brax's humanoid does it; otherwise
+            motors take it as it is, clipped to their range.
+        free_coordinates: leading positions that say where in the world it is; plain locomotion does not show them.
+        seen_velocities: how many velocities a policy sees, from the first; None for all.
+        velocity_limit: velocities are shown clipped to it.
+        contacts: most contacts that are kept, the nearest ones.
+    """
+
+    name: str
+    xml: str
+    frames: int = 5
+    torso_radius: float = 0.25
+    forward_reward: float = 1.0
+    control_cost: float = 0.0
+    healthy_reward: float = 0.0
+    healthy_height: tuple[float, float] = (-math.inf, math.inf)
+    healthy_pitch: float = math.inf
+    start: tuple[float, ...] | None = None
+    position_noise: float = 0.1
+    velocity_noise: float = 0.1
+    normal_velocity: bool = True
+    scales_actions: bool = False
+    free_coordinates: int = 1
+    seen_velocities: int | None = None
+    velocity_limit: float = math.inf
+    contacts: int = 8
+
+    @property
+    def file(self) -> str:
+        """The path of the model's file."""
+        package, _, path = self.xml.partition(":")
+        return str(resources.files(package) / path)
+
+
+SIMPLE_ROB: Final = Robot(
+    "simple_rob", OURS + "simple_rob.xml", torso_radius=0.2, free_coordinates=2, seen_velocities=2, contacts=2
+)
+ANT: Final = Robot(
+    "ant",
+    BRAX + "ant.xml",
+    control_cost=0.5,
+    healthy_reward=1.0,
+    healthy_height=(0.2, 1.0),
+    free_coordinates=2,
+    start=(0.0, 0.0, 0.55, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, -1.0, 0.0, -1.0, 0.0, 1.0),
+)
+HALF_CHEETAH: Final = Robot("half_cheetah", BRAX + "half_cheetah.xml", torso_radius=0.05, control_cost=0.1)
+HOPPER: Final = Robot(
+    "hopper",
+    BRAX + "hopper.xml",
+    frames=4,
+    torso_radius=0.05,
+    control_cost=1e-3,
+    healthy_reward=1.0,
+    healthy_height=(0.7, math.inf),
+    healthy_pitch=0.2,
+    position_noise=5e-3,
+    velocity_noise=5e-3,
+    normal_velocity=False,
+    velocity_limit=10.0,
+)
+HUMANOID: Final = Robot(
+    "humanoid",
+    BRAX + "humanoid.xml",
+    torso_radius=0.1,
+    forward_reward=1.25,
+    control_cost=0.1,
+    healthy_reward=5.0,
+    healthy_height=(1.0, 2.0),
+    position_noise=1e-2,
+    velocity_noise=1e-2,
+    normal_velocity=False,
+    scales_actions=True,
+    free_coordinates=2,
+)
+WALKER2D: Final = Robot(
+    "walker2d",
+    BRAX + "walker2d.xml",
+    frames=4,
+    torso_radius=0.05,
+    control_cost=1e-3,
+    healthy_reward=1.0,
+    healthy_height=(0.8, 2.0),
+    healthy_pitch=1.0,
+    position_noise=5e-3,
+    velocity_noise=5e-3,
+    normal_velocity=False,
+    velocity_limit=10.0,
+)
+
+ROBOTS: Final = Registry(
+    "robot", {robot.name: robot for robot in (SIMPLE_ROB, ANT, HALF_CHEETAH, HOPPER, HUMANOID, WALKER2D)}
+)

@@ -1,0 +1,178 @@
+"""Scenes: a robot among boxes, composed with MuJoCo's `MjSpec` and compiled once."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import math
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from typing import Any, Final
+
+import jax
+import jax.numpy as jnp
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from evoclaims.core.errors import UserError
+from evoclaims.envs.ecorobot.robots import Robot
+
+# MJX prints two lines when NVIDIA's warp is not installed; nothing here uses warp.
+with contextlib.redirect_stdout(io.StringIO()):
+    from mujoco import mjx
+
+WORLD_GROUP: Final = 1
+"""The geom group of what the scene adds; sensors look at it."""
+
+
+@dataclass(frozen=True)
+class Box:
+    """A box that stands in the world: a wall, or an obstacle.
+
+    Attributes:
+        centre: x and y, m.
+        half_size: along its axis and across, m.
+        angle: of its axis, counterclockwise from +x, degrees.
+        bottom, top: z, m.
+    """
+
+    centre: tuple[float, float]
+    half_size: tuple[float, float]
+    angle: float = 0.0
+    bottom: float = -0.7
+    top: float = 0.7
+
+    def __post_init__(self) -> None:
+        """Check that it has a volume."""
+        numbers = (*self.centre, *self.half_size, self.angle, self.bottom, self.top)
+        if not all(map(math.isfinite, numbers)) or min(self.half_size) <= 0 or self.bottom >= self.top:
+            raise UserError(
+                f"A box has finite numbers, half-sizes above 0 and its bottom below its top, unlike {self}."
+            )
+
+    @property
+    def place(self) -> tuple[float, float, float]:
+        """Its centre in space, m."""
+        return (*self.centre, (self.bottom + self.top) / 2)
+
+    @property
+    def size(self) -> tuple[float, float, float]:
+        """Half-sizes along its axis, across, and up, m."""
+        return (*self.half_size, (self.top - self.bottom) / 2)
+
+    @property
+    def rotation(self) -> NDArray[np.float64]:
+        """Its axes as columns, shape [3, 3]."""
+        cosine, sine = math.cos(math.radians(self.angle)), math.sin(math.radians(self.angle))
+        return np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
+
+
+@dataclass(frozen=True)
+class Scene:
+    """A robot and the boxes around it.
+
+    Attributes:
+        robot: who acts.
+        boxes: what stands in the world.
+        near: how many boxes the robot can touch at a time; 0 for all. Of more boxes, those nearest to the torso along x
+            are put in their place before every step (`physics`): a row of obstacles costs no more than two of them.
+    """
+
+    robot: Robot
+    boxes: tuple[Box, ...] = ()
+    near: int = 0
+
+    def __post_init__(self) -> None:
+        """Check that boxes that take turns differ in nothing but their place."""
+        if self.near and len({(box.size, box.angle) for box in self.boxes}) > 1:
+            raise UserError("Boxes that take turns (near > 0) must have one size and one angle.")
+
+    @cached_property
+    def whole(self) -> mujoco.MjModel:
+        """The model with all boxes, for plain MuJoCo: pictures, and comparison."""
+        return _compiled(self.robot, self.boxes)
+
+    @cached_property
+    def model(self) -> mujoco.MjModel:
+        """The model that is simulated: with all boxes, or with those that take turns."""
+        return _compiled(self.robot, self.boxes[: self.near] if self.near else self.boxes)
+
+    @cached_property
+    def mjx(self) -> Any:
+        """The model that is simulated, as MJX takes it; its arrays are on the host, so that programs embed them."""
+        with jax.ensure_compile_time_eval():
+            return jax.device_get(mjx.put_model(self.model, impl="jax"))
+
+    @cached_property
+    def blank(self) -> Any:
+        """MJX's data for the model at the start; arrays on the host."""
+        with jax.ensure_compile_time_eval():
+            return jax.device_get(mjx.make_data(self.model, impl="jax"))
+
+    @cached_property
+    def start(self) -> NDArray[np.float32]:
+        """The robot's configuration before noise, shape [nq]."""
+        configured = self.model.qpos0 if self.robot.start is None else self.robot.start
+        return np.asarray(configured, np.float32)
+
+    @property
+    def seconds(self) -> float:
+        """Simulated time of one environment step."""
+        return float(self.model.opt.timestep) * self.robot.frames
+
+    @property
+    def turning(self) -> list[int]:
+        """Indices of the geoms that stand for the boxes nearby."""
+        ours = (self.model.geom_bodyid == 0) & (self.model.geom_group == WORLD_GROUP)
+        return [int(i) for i in np.flatnonzero(ours)] if self.near else []
+
+    @property
+    def places(self) -> NDArray[np.float32]:
+        """Centres of all boxes, shape [boxes, 3], m."""
+        return np.array([box.place for box in self.boxes], np.float32).reshape(-1, 3)
+
+
+@lru_cache(maxsize=64)
+def scene(robot: Robot, boxes: tuple[Box, ...] = (), near: int = 0) -> Scene:
+    """Return the scene, compiled at most once in a process."""
+    return Scene(robot, boxes, near)
+
+
+@lru_cache(maxsize=64)
+def _compiled(robot: Robot, boxes: tuple[Box, ...]) -> mujoco.MjModel:
+    """Build the model from the robot's own file, so that its defaults and its total mass stay as they are."""
+    try:
+        spec = mujoco.MjSpec.from_file(robot.file)
+    except (ValueError, FileNotFoundError) as error:
+        raise UserError(f"The model of the robot {robot.name} cannot be read: {error}") from error
+    option = spec.option
+    option.solver, option.iterations, option.ls_iterations = mujoco.mjtSolver.mjSOL_NEWTON, 1, 4
+    option.disableflags |= mujoco.mjtDisableBit.mjDSBL_EULERDAMP
+    # Brax's own numbers go: MJX (3.17) looks its setting up at the place of its name, not of its data, and would read one
+    # of theirs (the ant lost all contacts).
+    for numeric in list(spec.numerics):
+        spec.delete(numeric)
+    spec.add_numeric(name="max_contact_points", data=[robot.contacts])
+    for box in boxes:
+        half = math.radians(box.angle) / 2
+        spec.worldbody.add_geom(
+            type=mujoco.mjtGeom.mjGEOM_BOX,
+            pos=box.place,
+            size=box.size,
+            quat=[math.cos(half), 0.0, 0.0, math.sin(half)],
+            contype=0,
+            conaffinity=1,
+            friction=[1.0, 0.005, 0.0001],
+            solref=[0.02, 1.0],
+            solimp=[0.9, 0.95, 0.001, 0.5, 2.0],
+            condim=3,
+            group=WORLD_GROUP,
+            rgba=[0.55, 0.5, 0.45, 1.0],
+        )
+    return spec.compile()
+
+
+def on_device(tree: Any) -> Any:
+    """Turn the arrays of a host tree into jax arrays."""
+    return jax.tree.map(jnp.asarray, tree)

@@ -1,0 +1,121 @@
+"""Sensors: rays that a robot sends out and that end at the boxes of the scene, or at the floor."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Final, Protocol
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from evoclaims.core.errors import UserError
+from evoclaims.envs.ecorobot.pose import Pose
+from evoclaims.envs.ecorobot.scene import Scene
+
+ARENA: Final = math.hypot(8.0, 8.0)
+"""The diagonal of the paper's arena, m."""
+
+
+class Sensor(Protocol):
+    """What a robot perceives of the world, as part of its observation."""
+
+    @property
+    def size(self) -> int:
+        """Number of readings."""
+
+    def read(self, scene: Scene, pose: Pose) -> Float[Array, " size"]:
+        """Return the readings, each in [0, 1]."""
+
+
+@dataclass(frozen=True)
+class Rangefinders:
+    """Distances to the nearest box or the floor, from the front half of the torso's surface outwards.
+
+    Attributes:
+        count: rays, spread evenly from the right (-90°) over the front, the torso's x axis, to the left (90°).
+        reach: distance that reads 1, m; nothing within reach reads 1 too, and nothing else does.
+    """
+
+    count: int = 5
+    reach: float = ARENA
+
+    def __post_init__(self) -> None:
+        """Check the numbers."""
+        _check(self.count, self.reach)
+
+    @property
+    def size(self) -> int:
+        """One reading a ray."""
+        return self.count
+
+    def read(self, scene: Scene, pose: Pose) -> Float[Array, " size"]:
+        """Return distance / reach of each ray, 1 for nothing."""
+        angles = np.linspace(-90.0, 90.0, self.count) if self.count > 1 else np.zeros(1)
+        return jnp.minimum(distances(scene, pose, angles) / self.reach, 1.0)
+
+
+@dataclass(frozen=True)
+class PieSlices:
+    """Whether anything is to be seen in each sector around the robot.
+
+    Attributes:
+        count: sectors, the first one centred on the front, the others counterclockwise.
+        reach: how far it sees, m.
+    """
+
+    count: int = 4
+    reach: float = ARENA
+
+    def __post_init__(self) -> None:
+        """Check the numbers."""
+        _check(self.count, self.reach)
+
+    @property
+    def size(self) -> int:
+        """One reading a sector."""
+        return self.count
+
+    def read(self, scene: Scene, pose: Pose) -> Float[Array, " size"]:
+        """Return 1 for each sector in which one of five rays (at -45°, -22.5°, 0, 22.5°, 45°) hits, else 0."""
+        centres = np.arange(self.count) * 360.0 / self.count
+        angles = centres[:, None] + np.array([-45.0, -22.5, 0.0, 22.5, 45.0])
+        hit = distances(scene, pose, angles.ravel()) <= self.reach
+        return jnp.any(hit.reshape(self.count, 5), axis=1).astype(jnp.float32)
+
+
+def distances(scene: Scene, pose: Pose, angles: np.ndarray) -> Float[Array, " rays"]:
+    """Return how far each ray goes from the torso's surface, m; infinity where it meets nothing, 0 inside a box.
+
+    Args:
+        scene: whose boxes stop the rays.
+        pose: of the torso.
+        angles: of the rays in the torso's plane, counterclockwise from its front, degrees.
+    """
+    turned = np.radians(np.asarray(angles))
+    ahead = np.stack([np.cos(turned), np.sin(turned), np.zeros_like(turned)], axis=1)
+    directions = jnp.asarray(ahead, jnp.float32) @ pose.rotation.T
+    origins = pose.place[None] + scene.robot.torso_radius * directions
+    # The floor: met from above, by rays that lead down.
+    down = jnp.minimum(directions[:, 2], 0.0)
+    nearest = jnp.where(down < 0, jnp.maximum(origins[:, 2], 0.0) / jnp.maximum(-down, 1e-9), jnp.inf)
+    if not scene.boxes:
+        return nearest
+    axes = jnp.asarray(np.stack([box.rotation for box in scene.boxes]), jnp.float32)
+    sizes = jnp.asarray(np.stack([box.size for box in scene.boxes]), jnp.float32)
+    # In each box's own frame (slab method, Kay and Kajiya 1986): rays × boxes × axes.
+    local_origins = jnp.einsum("rbi,bij->rbj", origins[:, None] - jnp.asarray(scene.places)[None], axes)
+    local_directions = jnp.einsum("ri,bij->rbj", directions, axes)
+    steep = jnp.where(jnp.abs(local_directions) < 1e-9, 1e-9, local_directions)
+    one, other = (-sizes[None] - local_origins) / steep, (sizes[None] - local_origins) / steep
+    enters = jnp.max(jnp.minimum(one, other), axis=-1)
+    leaves = jnp.min(jnp.maximum(one, other), axis=-1)
+    hits = jnp.where((enters <= leaves) & (leaves >= 0), jnp.maximum(enters, 0.0), jnp.inf)
+    return jnp.minimum(nearest, jnp.min(hits, axis=1))
+
+
+def _check(count: int, reach: float) -> None:
+    """Reject sensors without rays or without reach."""
+    if count < 1 or not 0 < reach < math.inf:
+        raise UserError(f"A sensor has at least 1 ray and a finite reach above 0 m, not {count} and {reach}.")

@@ -1,0 +1,112 @@
+"""The maze with stepping stones (§3.2 of the paper): a deceptive maze whose marks lead through it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar, Final
+
+import jax.numpy as jnp
+from jaxtyping import Array, Bool, Float, Int
+
+from evoclaims.core.pytree import pytree
+from evoclaims.envs.ecorobot.maze import Area, Maze
+from evoclaims.envs.ecorobot.pose import Pose
+from evoclaims.envs.ecorobot.robot_task import Outing, Ruling
+from evoclaims.envs.ecorobot.scene import Box
+from evoclaims.envs.ecorobot.sensors import ARENA
+
+WALLS: Final = (
+    Box((0.0, 0.0), (4.0, 0.1)),
+    Box((0.0, 7.0), (4.0, 0.1)),
+    Box((-4.0, 3.5), (4.0, 0.1), angle=90.0),
+    Box((4.0, 3.5), (4.0, 0.1), angle=90.0),
+    Box((-2.0, 5.0), (2.0, 0.1), angle=10.0),
+    Box((-2.0, 3.5), (1.5, 0.1), angle=80.0),
+    Box((0.5, 3.5), (2.5, 0.1), angle=-30.0),
+    Box((0.0, 0.5), (0.5, 0.1), angle=30.0),
+    Box((2.5, 4.0), (1.5, 0.1), angle=-30.0),
+)
+AREA: Final[Area] = ((-4.0, 4.0), (0.0, 7.0))
+START: Final = (-3.0, 1.0)
+TARGET: Final = (-3.0, 6.0)
+STONES: Final = ((-1.0, 2.5), (3.2, 1.0), (3.2, 2.5), (0.0, 4.5), (1.0, 6.0), (-2.0, 6.0), TARGET)
+"""In their order; the target is the last."""
+BONUS: Final = 1000.0
+
+
+@pytree
+class Progress:
+    """How many stones have been crossed."""
+
+    crossed: Int[Array, ""]
+
+
+@dataclass(frozen=True)
+class SteppingStones(Maze):
+    """Cross seven stones in their order; they are marks, which touch nothing and which no sensor sees.
+
+    A step pays the stones crossed so far, plus 1 - (distance to the next) / (the arena's diagonal); crossing the last,
+    the target, pays 1,000 and ends the episode.
+
+    Attributes:
+        within: how near the torso's centre must come, m.
+        shows_goal: whether the policy sees where the next stone lies: goal-conditioned learning.
+    """
+
+    name: ClassVar[str] = "stepping_stones"  # type: ignore[misc]
+    revision: ClassVar[int] = 1
+
+    within: float = 0.1
+    shows_goal: bool = False
+
+    @property
+    def boxes(self) -> tuple[Box, ...]:
+        """The walls."""
+        return WALLS
+
+    @property
+    def area(self) -> Area:
+        """The ground between the outer walls."""
+        return AREA
+
+    @property
+    def start(self) -> tuple[float, float]:
+        """The lower left corner."""
+        return START
+
+    @property
+    def target(self) -> tuple[float, float]:
+        """The last stone."""
+        return TARGET
+
+    def memory(self, pose: Pose) -> Progress:
+        """Start without a stone."""
+        return Progress(crossed=jnp.zeros((), jnp.int32))
+
+    def rule(self, memory: Progress, before: Pose, after: Pose, action: Float[Array, " action"]) -> Ruling:
+        """Count a stone when the robot is at the one that is next."""
+        crossed = memory.crossed + (self._distance(memory, after) <= self.within)
+        now = Progress(crossed=crossed)
+        done = crossed == len(STONES)
+        reward = crossed.astype(jnp.float32) + 1.0 - self._distance(now, after) / ARENA
+        return Ruling(memory=now, reward=reward + jnp.where(done, BONUS, 0.0), ended=done)
+
+    def shown(self, outing: Outing) -> Float[Array, " more"]:
+        """Return the next stone's x and y, where the policy is told its goal."""
+        return self._next(outing.memory) if self.shows_goal else jnp.zeros(0)
+
+    def reached(self, outing: Outing) -> Bool[Array, ""]:
+        """Whether all stones are crossed."""
+        return outing.memory.crossed == len(STONES)
+
+    def measures(self, outing: Outing) -> dict[str, Array]:
+        """Return how many stones were crossed."""
+        return {"stones": outing.memory.crossed.astype(jnp.float32)}
+
+    def _next(self, memory: Progress) -> Float[Array, 2]:
+        """Return where the next stone lies; after the last, the last."""
+        return jnp.asarray(STONES, jnp.float32)[jnp.minimum(memory.crossed, len(STONES) - 1)]
+
+    def _distance(self, memory: Progress, pose: Pose) -> Float[Array, ""]:
+        """Return how far the next stone is, m."""
+        return jnp.linalg.norm(pose.place[:2] - self._next(memory))

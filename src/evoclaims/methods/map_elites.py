@@ -1,0 +1,272 @@
+"""MAP-Elites (Mouret and Clune 2015, arXiv:1504.04909) by QDax, over the ground where a robot ends its episode."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import partial
+from itertools import pairwise
+from typing import Any, ClassVar, Protocol, runtime_checkable
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Bool, Float, Int, PRNGKeyArray
+from numpy.typing import NDArray
+from qdax.core.containers.mapelites_repertoire import (
+    MapElitesRepertoire,
+    compute_euclidean_centroids,
+    get_cells_indices,
+)
+from qdax.core.emitters.mutation_operators import isoline_variation
+from qdax.core.emitters.standard_emitters import MixingEmitter
+from qdax.core.map_elites import MAPElites
+
+from evoclaims.core.errors import UserError
+from evoclaims.core.foreign import implicit_promotions
+from evoclaims.core.keys import streams
+from evoclaims.core.pytree import pytree, strong
+from evoclaims.envs.base import Episode, Task, share
+from evoclaims.methods.base import Policy, Progress
+from evoclaims.methods.champion import policy_of
+from evoclaims.networks.mlp import Mlp
+
+
+@runtime_checkable
+class MappedTask(Protocol):
+    """A task on a piece of ground; its episodes' metrics hold "x" and "y", where the robot was at the end, in metres.
+
+    An episode may also hold "reached": 1 when the robot got to the task's target.
+    """
+
+    @property
+    def area(self) -> tuple[tuple[float, float], tuple[float, float]]:
+        """Lowest and highest x, lowest and highest y, in metres."""
+
+    def reachable(self, cells: tuple[int, int]) -> NDArray[np.bool_]:
+        """Return which cells of a grid over the area the robot can get to, shape [cells along x, cells along y]."""
+
+
+@pytree
+class MapElitesState:
+    """The archive, and what has happened so far.
+
+    Attributes:
+        archive: QDax's repertoire; genotypes [cells, parameters], fitnesses [cells, 1] (-inf where no elite is),
+            descriptors [cells, 2] in metres, and each elite's success [cells].
+        evaluated: individuals evaluated so far.
+        reached: 1 once any individual has reached the task's target, else 0.
+    """
+
+    archive: Any
+    evaluated: Int[Array, ""]
+    reached: Float[Array, ""]
+
+
+@dataclass(frozen=True)
+class MapElites:
+    """QDax's MAP-Elites with iso+line variation of uniformly drawn elites (Vassiliades and Mouret 2018, GECCO).
+
+    The descriptor is where the episode ended, on a euclidean grid over the task's area. The first batches are drawn as
+    QDax's examples initialize their policies: LeCun-uniform weights, no biases. An individual that is not finite or
+    ended outside the area is evaluated for nothing. Elites keep the fitness of the level they were evaluated on.
+
+    Attributes:
+        network: the encoding: its weights and biases.
+        batch: individuals per iteration.
+        cells: cells of the grid along x and along y.
+        iso_sigma: standard deviation of the noise on every parameter.
+        line_sigma: standard deviation of the step along the line to another elite, as a share of the distance.
+        initial: individuals drawn at random before the first variation, rounded up to whole batches.
+    """
+
+    name: ClassVar[str] = "map_elites"
+    revision: ClassVar[int] = 1
+
+    network: Mlp = Mlp((32,) * 4)
+    batch: int = 100
+    cells: tuple[int, int] = (50, 50)
+    iso_sigma: float = 0.005
+    line_sigma: float = 0.05
+    initial: int = 100
+
+    def __post_init__(self) -> None:
+        """Check the sizes and the spreads."""
+        if self.batch < 1 or self.initial < 1:
+            raise UserError(
+                f"MAP-Elites needs at least 1 individual in a batch and 1 to begin with, not {self.batch} and "
+                f"{self.initial}."
+            )
+        if len(self.cells) != 2 or min(self.cells) < 1:
+            raise UserError(f"The grid of MAP-Elites is two numbers of cells, each at least 1, not {self.cells}.")
+        spreads = (self.iso_sigma, self.line_sigma)
+        if not all(math.isfinite(sigma) and sigma >= 0 for sigma in spreads) or sum(spreads) == 0:
+            raise UserError(
+                "MAP-Elites varies elites by finite standard deviations of at least 0, not both 0; iso_sigma and "
+                f"line_sigma are {self.iso_sigma} and {self.line_sigma}."
+            )
+
+    def init(self, key: PRNGKeyArray, task: Task) -> MapElitesState:
+        """Start with an empty archive; the key is not used.
+
+        Raises:
+            UserError: for a task without an area to map.
+        """
+        (x_min, x_max), (y_min, y_max) = _mapped(task).area
+        size = self.network.size(task.observation_size, task.action_size)
+        with implicit_promotions():
+            archive = MapElitesRepertoire.init_default(
+                jnp.zeros(size),
+                compute_euclidean_centroids(self.cells, [x_min, y_min], [x_max, y_max]),
+                one_extra_score={"success": jnp.zeros(())},
+                keys_extra_scores=("success",),
+            )
+        return MapElitesState(
+            archive=strong(archive), evaluated=jnp.zeros((), jnp.int32), reached=jnp.zeros((), jnp.float32)
+        )
+
+    def step(
+        self, key: PRNGKeyArray, task: Task, level: Int[Array, ""], state: MapElitesState
+    ) -> tuple[MapElitesState, Progress]:
+        """Draw or vary one batch, evaluate it and put it into the archive.
+
+        Metrics: "coverage" (share of the reachable cells that hold an elite), "elites" (how many there are) and
+        "reached" (see `MapElitesState`). Fitness and success are the best elite's; -inf and 0 where there is none.
+
+        Raises:
+            UserError: when the task's episodes do not tell where they end.
+        """
+        draw_key, vary_key, episode_key = streams(key, "draw", "vary", "episode")
+        drawn = lecun_uniform(draw_key, self.network, task.observation_size, task.action_size, self.batch)
+        with implicit_promotions():
+            varied, _ = self._algorithm().ask(state.archive, None, vary_key)
+        population = jnp.where(state.evaluated < self.initial, drawn, varied)
+        after = self.insert(task, state, population, self._evaluate(task, episode_key, level, population))
+        # Whatever is in the archive was in a batch.
+        return after, self._progress(task, after, healthy=jnp.all(jnp.isfinite(population)))
+
+    def insert(
+        self, task: Task, state: MapElitesState, population: Float[Array, "batch parameters"], episodes: Episode
+    ) -> MapElitesState:
+        """Return the state after a batch with the given episodes, leaves [batch].
+
+        An individual becomes its cell's elite when it is fitter than the last one; of a batch, the first of the best.
+        """
+        descriptors = jnp.stack([episodes.metrics["x"], episodes.metrics["y"]], axis=-1)
+        valid = _inside(_mapped(task), descriptors) & jnp.isfinite(episodes.fitness)
+        fitness = jnp.where(valid, episodes.fitness, -jnp.inf)
+        with implicit_promotions():
+            cell = get_cells_indices(descriptors, state.archive.centroids)
+            fitness = jnp.where(beaten(cell, fitness), -jnp.inf, fitness)
+            archive, _, _ = self._algorithm().tell(
+                population, fitness, descriptors, state.archive, None, {"success": episodes.success}
+            )
+        reached = valid & (episodes.metrics.get("reached", jnp.zeros(self.batch)) == 1)
+        return MapElitesState(
+            archive=strong(archive),
+            evaluated=state.evaluated + self.batch,
+            reached=jnp.maximum(state.reached, jnp.any(reached).astype(jnp.float32)),
+        )
+
+    def best(self, task: Task, state: MapElitesState) -> Policy:
+        """Return the fittest elite; its parameters are (its vector, the map of all elites' fitnesses).
+
+        The map, as of `fitness_map`, is not used by the policy: it is there to be stored with the champion.
+        """
+        elite = jnp.argmax(state.archive.fitnesses)
+        return Policy(
+            parameters=(state.archive.genotypes[elite], self.fitness_map(state)),
+            function=lambda parameters, observation: self.network.apply(parameters[0], observation, task.action_size),
+        )
+
+    def cost(self, task: Task) -> int:
+        """Return the environment steps of one iteration, at the longest episode."""
+        return self.batch * task.horizon
+
+    def fitness_map(self, state: MapElitesState) -> Float[Array, "x y"]:
+        """Return the elites' fitnesses, shape [cells along x, cells along y]; -inf where there is none."""
+        along_x, along_y = self.cells
+        # QDax counts cells along x first.
+        fitnesses: Float[Array, "x y"] = state.archive.fitnesses.reshape(along_y, along_x).T
+        return fitnesses
+
+    def _algorithm(self) -> MAPElites:
+        """Build QDax's algorithm, which is asked and told: it evaluates nothing itself."""
+        variation = partial(isoline_variation, iso_sigma=self.iso_sigma, line_sigma=self.line_sigma)
+        emitter = MixingEmitter(
+            mutation_fn=None, variation_fn=variation, variation_percentage=1.0, batch_size=self.batch
+        )
+        return MAPElites(scoring_function=None, emitter=emitter, metrics_function=lambda _: {})
+
+    def _evaluate(
+        self, task: Task, key: PRNGKeyArray, level: Int[Array, ""], population: Float[Array, "batch parameters"]
+    ) -> Episode:
+        """Run one episode per individual, leaves [batch]."""
+        keys = jax.random.split(key, self.batch)
+        episodes = jax.vmap(lambda p, k: task.episode(policy_of(self.network, task, p), k, level))(population, keys)
+        if not {"x", "y"} <= set(episodes.metrics):
+            told = ", ".join(sorted(episodes.metrics)) or "none"
+            raise UserError(
+                f'MAP-Elites maps episodes by their metrics "x" and "y"; the metrics of {task.name!r} are: {told}.'
+            )
+        return episodes
+
+    def _progress(self, task: Task, state: MapElitesState, healthy: Bool[Array, ""]) -> Progress:
+        """Tell of the best elite and of the archive."""
+        archive, fitnesses = state.archive, self.fitness_map(state)
+        elite = jnp.argmax(archive.fitnesses)
+        filled = fitnesses > -jnp.inf
+        ground = _mapped(task).reachable(self.cells)
+        return Progress(
+            fitness=archive.fitnesses[elite, 0],
+            success=archive.extra_scores["success"][elite],
+            healthy=healthy,
+            metrics={
+                "coverage": share(jnp.sum(filled & ground), jnp.asarray(ground.sum(), jnp.int32)),
+                "elites": jnp.sum(filled).astype(jnp.float32),
+                "reached": state.reached,
+            },
+        )
+
+
+def lecun_uniform(
+    key: PRNGKeyArray, network: Mlp, inputs: int, outputs: int, count: int
+) -> Float[Array, "count parameters"]:
+    """Draw perceptrons: weights from U(-√(3 / fan-in), √(3 / fan-in)) (LeCun et al. 1998), biases 0."""
+    widths, bounds = (inputs, *network.layers, outputs), []
+    for depth, (fan_in, fan_out) in enumerate(pairwise(widths), start=1):
+        last = depth == len(widths) - 1
+        feeding = fan_in + inputs * (network.skip and last)
+        bounds += [np.full(fan_in * fan_out, np.sqrt(3 / feeding)), np.zeros(fan_out)]
+        if network.skip and last:
+            bounds.append(np.full(inputs * fan_out, np.sqrt(3 / feeding)))
+    bound = np.concatenate(bounds).astype(np.float32)
+    return jax.random.uniform(key, (count, bound.size), minval=-1.0, maxval=1.0) * bound[None]
+
+
+def beaten(cell: Int[Array, " batch"], fitness: Float[Array, " batch"]) -> Bool[Array, " batch"]:
+    """Return who is not the first of the fittest of the batch in its cell.
+
+    QDax writes all that tie into the cell, in an order that an accelerator does not promise: the elite's genotype could
+    be one individual's and its descriptor another's.
+    """
+    index = jnp.arange(cell.shape[0])
+    fitter = fitness[None, :] > fitness[:, None]
+    earlier = (fitness[None, :] == fitness[:, None]) & (index[None, :] < index[:, None])
+    return jnp.any((cell[None, :] == cell[:, None]) & (fitter | earlier), axis=1)
+
+
+def _mapped(task: Task) -> MappedTask:
+    """Return the task as one with an area."""
+    if not isinstance(task, MappedTask):
+        raise UserError(
+            f"MAP-Elites maps where episodes end, and the task {task.name!r} has no area to map; use a task with "
+            "`area` and `reachable`, such as a maze."
+        )
+    return task
+
+
+def _inside(task: MappedTask, descriptors: Float[Array, "batch 2"]) -> Bool[Array, " batch"]:
+    """Return whose descriptor is in the area; one that is not finite is not."""
+    low, high = jnp.asarray(task.area, jnp.float32).T
+    return jnp.all((descriptors >= low[None]) & (descriptors <= high[None]), axis=1)
