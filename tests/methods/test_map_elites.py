@@ -1,0 +1,430 @@
+"""The archive against one kept by loops, what it leaves out, how its cells lie, and a plane that is explored."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+from workbench import Workbench, close, same_bits
+
+from evoclaims.core.canonical import canonical_json
+from evoclaims.core.errors import UserError
+from evoclaims.envs.base import Episode
+from evoclaims.envs.gates.parity import NParity
+from evoclaims.methods.map_elites import MapElites, beaten, lecun_uniform
+from evoclaims.networks.mlp import Mlp
+
+LEVEL = jnp.zeros((), jnp.int32)
+X, Y = 4, 3  # cells of the small grid, told apart by their numbers
+
+
+@dataclass(frozen=True)
+class Plane:
+    """A point that a policy moves from a lower left corner, through 4 m by 1.5 m; what is never called is not here.
+
+    Fitness is how far up it ends; the target is the upper right corner.
+    """
+
+    name: ClassVar[str] = "plane"
+    levels: ClassVar[int] = 1
+    observation_size: ClassVar[int] = 2
+    action_size: ClassVar[int] = 2
+    area: ClassVar[Any] = ((-1.0, 3.0), (0.5, 2.0))
+
+    horizon: int = 5
+    stride: float = 0.5
+    walled: bool = True
+
+    def reachable(self, cells: tuple[int, int]) -> NDArray[np.bool_]:
+        """All cells but the leftmost column's upper ones."""
+        ground = np.ones(cells, bool)
+        ground[0, 1:] = False
+        return ground
+
+    def episode(self, policy: Any, key: Any, level: Any) -> Episode:
+        (x_min, x_max), (y_min, y_max) = self.area
+        place = jnp.array([x_min + 0.1, y_min + 0.1])
+        for _ in range(self.horizon):
+            place = place + self.stride * policy(place)
+            if self.walled:
+                place = jnp.clip(place, jnp.array([x_min, y_min]), jnp.array([x_max, y_max]))
+        reached = ((place[0] > x_max - 0.3) & (place[1] > y_max - 0.3)).astype(jnp.float32)
+        return Episode(fitness=place[1], success=reached, metrics={"x": place[0], "y": place[1], "reached": reached})
+
+    def examine(self, policy: Any, key: Any, level: Any) -> Episode:
+        return self.episode(policy, key, level)
+
+
+SMALL = MapElites(network=Mlp((4,)), batch=8, cells=(X, Y), iso_sigma=0.2, line_sigma=0.2, initial=8)
+BENCH = Workbench(SMALL, Plane())
+(X_MIN, X_MAX), (Y_MIN, Y_MAX) = Plane.area
+WIDTH, HEIGHT = (X_MAX - X_MIN) / X, (Y_MAX - Y_MIN) / Y
+
+
+def _episodes(rows: list[tuple[float, float, float]]) -> Episode:
+    """Return episodes with the given fitness, x and y, and with their number as success."""
+    fitness, x, y = jnp.asarray(np.array(rows, np.float32).T)
+    return Episode(fitness=fitness, success=jnp.arange(len(rows), dtype=jnp.float32), metrics={"x": x, "y": y})
+
+
+def _population(first: int) -> Any:
+    """Return genotypes that are all different: their number, and 100 times that, and so on."""
+    size = SMALL.network.size(2, 2)
+    return (first + jnp.arange(8, dtype=jnp.float32))[:, None] * jnp.arange(1.0, size + 1)[None, :]
+
+
+INSERT = jax.jit(lambda state, population, episodes: SMALL.insert(Plane(), state, population, episodes))
+
+inside_x = st.builds(
+    lambda i, part: X_MIN + WIDTH * (i + part), st.integers(0, X - 1), st.sampled_from([0.1, 0.5, 0.9])
+)
+inside_y = st.builds(lambda j, part: Y_MIN + HEIGHT * (j + part), st.integers(0, Y - 1), st.sampled_from([0.1, 0.9]))
+nowhere = st.sampled_from([np.nan, np.inf, -np.inf, -1.01, 3.01, 1e9])
+fitnesses = st.sampled_from([-1e3, -1.0, 0.0, 0.5, 2.0]) | st.sampled_from([np.nan, np.inf, -np.inf])
+row = st.tuples(fitnesses, inside_x | nowhere, inside_y | nowhere) | st.tuples(
+    st.sampled_from([-1.0, 0.5]), st.just(X_MIN + 0.1), st.just(Y_MIN + 0.1)
+)
+batch = st.lists(row, min_size=8, max_size=8)
+
+
+@settings(max_examples=150, deadline=None)
+@given(st.lists(batch, min_size=1, max_size=3))
+def test_the_archive_is_the_one_that_loops_keep(batches: list[list[tuple[float, float, float]]]) -> None:
+    state, mine = BENCH.init(), {}
+    for number, rows in enumerate(batches):
+        population = _population(10 * number)
+        state = INSERT(state, population, _episodes(rows))
+        for individual, (fitness, x, y) in enumerate(rows):
+            if not (np.isfinite(fitness) and X_MIN <= x <= X_MAX and Y_MIN <= y <= Y_MAX):
+                continue
+            cell = int((x - X_MIN) // WIDTH), int((y - Y_MIN) // HEIGHT)
+            if cell not in mine or fitness > mine[cell][0]:
+                mine[cell] = fitness, x, y, individual, np.asarray(population[individual])
+    archive, table = state.archive, np.asarray(SMALL.fitness_map(state))
+    assert {tuple(map(int, cell)) for cell in np.argwhere(table > -np.inf)} == mine.keys()
+    for (i, j), (fitness, x, y, individual, genotype) in mine.items():
+        place = j * X + i
+        assert table[i, j] == archive.fitnesses[place, 0] == fitness
+        np.testing.assert_allclose(archive.descriptors[place], [x, y], rtol=1e-6)
+        assert archive.extra_scores["success"][place] == individual
+        np.testing.assert_array_equal(archive.genotypes[place], genotype)
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.lists(st.tuples(st.integers(0, 2), st.sampled_from([-np.inf, 0.0, 1.0])), min_size=6, max_size=6))
+def test_of_a_cells_individuals_the_first_of_the_fittest_alone_is_not_beaten(pairs: list[tuple[int, float]]) -> None:
+    cell, fitness = (np.array(values) for values in zip(*pairs, strict=True))
+    told = beaten(jnp.asarray(cell, jnp.int32), jnp.asarray(fitness, jnp.float32))
+    for here in range(3):
+        members = np.flatnonzero(cell == here)
+        left = members[~np.asarray(told)[members]]
+        assert left.tolist() == members[[np.argmax(fitness[members])]].tolist() if len(members) else not len(left)
+
+
+@pytest.mark.parametrize(
+    ("x", "y", "cell"),
+    [
+        (X_MIN, Y_MIN, (0, 0)),
+        (X_MAX, Y_MIN, (X - 1, 0)),
+        (X_MIN, Y_MAX, (0, Y - 1)),
+        (X_MAX, Y_MAX, (X - 1, Y - 1)),
+        (X_MIN + 2.5 * WIDTH, Y_MIN + 0.5 * HEIGHT, (2, 0)),
+        (X_MIN + 0.5 * WIDTH, Y_MIN + 1.5 * HEIGHT, (0, 1)),
+    ],
+)
+def test_the_map_counts_x_first_and_the_areas_border_belongs_to_it(x: float, y: float, cell: tuple[int, int]) -> None:
+    state = INSERT(BENCH.init(), _population(1), _episodes([(1.0, x, y)] * 8))
+    assert SMALL.fitness_map(state).shape == (X, Y)
+    assert np.argwhere(np.asarray(SMALL.fitness_map(state)) > -np.inf).tolist() == [list(cell)]
+
+
+def _centre(i: int, j: int) -> tuple[float, float]:
+    return X_MIN + WIDTH * (i + 0.5), Y_MIN + HEIGHT * (j + 0.5)
+
+
+@pytest.mark.parametrize(
+    ("cells", "elites", "covered"),
+    [
+        ([(0, 0), (3, 2), (1, 0), (1, 0)], 3, 3),
+        ([(0, 1), (0, 2), (2, 1)], 3, 1),  # the upper cells of the leftmost column cannot be reached
+        ([(1, 0), (2, 0)], 2, 2),  # with x and y exchanged the first of them could not
+    ],
+)
+def test_coverage_is_the_share_of_reachable_cells_that_hold_an_elite(
+    cells: list[tuple[int, int]], elites: int, covered: int
+) -> None:
+    rows = [(1.0, *_centre(*cell)) for cell in cells]
+    state = INSERT(BENCH.init(), _population(1), _episodes(rows + [(np.nan, *_centre(3, 1))] * (8 - len(rows))))
+    still = Workbench(SMALL, _Frozen())
+    _, (progress,) = still.run(1, state=state)
+    assert float(progress.metrics["elites"]) == elites
+    assert float(progress.metrics["coverage"]) == pytest.approx(covered / (X * Y - 2))
+
+
+class _Frozen(Plane):
+    """A plane on which whatever is evaluated now is invalid."""
+
+    def episode(self, policy: Any, key: Any, level: Any) -> Episode:
+        return replace(super().episode(policy, key, level), fitness=jnp.array(jnp.nan))
+
+
+class _Everywhere(Plane):
+    """A plane on which an episode ends anywhere, by chance."""
+
+    def episode(self, policy: Any, key: Any, level: Any) -> Episode:
+        x, y = jax.random.uniform(key, (2,)) * jnp.array([4.0, 1.5]) + jnp.array([-1.0, 0.5])
+        return replace(super().episode(policy, key, level), metrics={"x": x, "y": y})
+
+
+def test_a_full_map_is_covered_exactly_and_without_a_target_nothing_is_reached() -> None:
+    _, reports = Workbench(SMALL, _Everywhere()).run(30)
+    assert float(reports[-1].metrics["coverage"]) == 1.0
+    assert float(reports[-1].metrics["elites"]) == X * Y
+    assert all(float(progress.metrics["reached"]) == 0.0 for progress in reports)
+
+
+def test_what_is_invalid_stays_out_and_an_empty_archive_says_so() -> None:
+    for task in (_Frozen(), Plane(walled=False, stride=100.0)):
+        state, reports = Workbench(SMALL, task).run(2)
+        assert float(reports[-1].fitness) == -np.inf
+        assert float(reports[-1].metrics["elites"]) == 0
+        assert float(reports[-1].metrics["reached"]) == 0.0
+        assert np.isfinite(SMALL.best(task, state)(jnp.ones(2))).all()
+
+
+def test_every_elite_does_what_the_archive_says_of_it() -> None:
+    method = replace(SMALL, cells=(12, 9), batch=32)
+    state, reports = Workbench(method, Plane()).run(30)
+    archive, table = state.archive, np.asarray(method.fitness_map(state))
+    again = jax.vmap(
+        lambda p: Plane().episode(lambda seen: method.network.apply(p, seen, 2), jax.random.key(0), LEVEL)
+    )(archive.genotypes)
+    filled = np.flatnonzero(np.asarray(archive.fitnesses[:, 0]) > -np.inf)
+    assert len(filled) == int(reports[-1].metrics["elites"]) > 20
+    places = np.stack([again.metrics["x"], again.metrics["y"]], axis=-1)
+    np.testing.assert_allclose(archive.descriptors[filled], places[filled], atol=1e-4)
+    np.testing.assert_allclose(archive.fitnesses[filled, 0], again.fitness[filled], atol=1e-4)
+    for at in filled:
+        x, y = np.asarray(archive.descriptors[at], np.float64)
+        i, j = min(int((x + 1.0) / 4.0 * 12), 11), min(int((y - 0.5) / 1.5 * 9), 8)
+        assert table[i, j] == archive.fitnesses[at, 0]
+
+
+def test_no_elite_is_ever_lost_or_worsened_and_the_fittest_is_the_best_policy() -> None:
+    state, before, gains = BENCH.init(), np.full((X, Y), -np.inf), []
+    for number in range(25):
+        state, progress = BENCH.step(jax.random.key(number), LEVEL, state)
+        table = np.asarray(SMALL.fitness_map(state))
+        assert (table >= before).all()
+        assert float(progress.fitness) == table.max()
+        examined = BENCH.examine(state)
+        np.testing.assert_allclose(float(examined.fitness), table.max(), atol=1e-5)
+        assert float(examined.success) == float(progress.success)
+        gains.append(table.max() - before.max())
+        before = table
+    assert max(gains[1:]) > 0
+
+
+def test_the_champion_carries_the_map_and_acts_by_its_vector_alone() -> None:
+    state, _ = BENCH.run(5)
+    policy = SMALL.best(Plane(), state)
+    vector, table = policy.parameters
+    assert same_bits(table, SMALL.fitness_map(state))
+    seen = jnp.array([0.3, -0.7])
+    assert same_bits(policy(seen), SMALL.network.apply(vector, seen, 2))
+    assert same_bits(replace(policy, parameters=(vector, table * jnp.nan))(seen), policy(seen))
+    assert not same_bits(replace(policy, parameters=(vector / 2, table))(seen), policy(seen))
+
+
+def test_the_far_corner_is_found_by_variation_and_not_without() -> None:
+    """In twelve steps the point gets there only by going right nearly at full speed, as no first network does."""
+    task = Plane(horizon=12, stride=0.36)
+    method = replace(SMALL, network=Mlp((8,)), batch=32, cells=(20, 10), iso_sigma=0.05, line_sigma=0.1)
+    _, reports = Workbench(method, task).run(200)
+    sticky = [float(progress.metrics["reached"]) for progress in reports]
+    assert sticky == sorted(sticky)
+    assert sticky[0] == 0.0
+    assert sticky[-1] == 1.0
+    assert float(reports[-1].metrics["coverage"]) > 0.5
+    still = replace(method, iso_sigma=1e-6, line_sigma=0.0)
+    _, control = Workbench(still, task).run(200)
+    assert float(control[-1].metrics["reached"]) == 0.0
+    assert float(control[-1].metrics["coverage"]) < 0.2
+
+
+def _batches(
+    method: MapElites, state: Any, monkeypatch: pytest.MonkeyPatch, steps: int = 1, seed: int = 0
+) -> list[Any]:
+    """Take steps without compiling; return the batches that were evaluated."""
+    seen: list[Any] = []
+    original = MapElites.insert
+
+    def watched(self: Any, task: Any, state: Any, population: Any, episodes: Any) -> Any:
+        seen.append(np.asarray(population))
+        return original(self, task, state, population, episodes)
+
+    monkeypatch.setattr(MapElites, "insert", watched)
+    for number in range(steps):
+        state, _ = method.step(jax.random.key(seed + number), Plane(), LEVEL, state)
+    return seen
+
+
+def test_the_first_batches_are_drawn_anew_and_the_next_vary_elites(monkeypatch: pytest.MonkeyPatch) -> None:
+    method = replace(SMALL, initial=9, iso_sigma=1e-5, line_sigma=0.0)
+    first, second, third = _batches(method, method.init(jax.random.key(0), Plane()), monkeypatch, steps=3)
+
+    def nearest(batch: Any) -> Any:
+        return np.array([np.abs(earlier - one).max(axis=1).min() for one in batch])
+
+    earlier = first
+    assert nearest(second).min() > 1e-2
+    earlier = np.concatenate([first, second])
+    assert nearest(third).max() < 1e-4
+    assert len(np.unique(third, axis=0)) == len(third)
+
+
+def test_offspring_of_a_lone_elite_are_it_and_noise(monkeypatch: pytest.MonkeyPatch) -> None:
+    method = replace(SMALL, batch=400, iso_sigma=0.03, line_sigma=0.5)
+    rows = [(1.0, *_centre(1, 1))] * 8
+    state = replace(INSERT(BENCH.init(), _population(1), _episodes(rows)), evaluated=jnp.array(8, jnp.int32))
+    (children,) = _batches(method, state, monkeypatch)
+    noise = children - np.asarray(_population(1)[0])
+    assert np.std(noise) == pytest.approx(0.03, rel=0.05)
+    assert abs(np.mean(noise)) < 0.002
+    (others,) = _batches(method, state, monkeypatch, seed=1)
+    assert abs(np.corrcoef(noise.ravel(), (others - np.asarray(_population(1)[0])).ravel())[0, 1]) < 0.05
+
+
+def test_offspring_of_two_elites_lie_on_the_line_through_them(monkeypatch: pytest.MonkeyPatch) -> None:
+    method = replace(SMALL, batch=2000, iso_sigma=0.0, line_sigma=0.05)
+    rows = [(1.0, *_centre(1, 1)), (1.0, *_centre(2, 1))] + [(np.nan, 0.0, 0.0)] * 6
+    state = replace(INSERT(BENCH.init(), _population(1), _episodes(rows)), evaluated=jnp.array(8, jnp.int32))
+    (children,) = _batches(method, state, monkeypatch)
+    one, other = np.asarray(_population(1)[:2])
+    along = (children - one) @ (other - one) / np.sum((other - one) ** 2)
+    np.testing.assert_allclose(children, one + along[:, None] * (other - one), atol=1e-3)
+    from_parent = np.where(np.abs(along) < 0.5, along, 1 - along)
+    # Half of the pairs are an elite with itself, and stay where they are.
+    moved = np.abs(from_parent) > 1e-4
+    assert np.mean(moved) == pytest.approx(0.5, abs=0.06)
+    assert np.std(from_parent[moved]) == pytest.approx(0.05, rel=0.1)
+    assert np.mean(along > 0.5) == pytest.approx(0.5, abs=0.06)
+
+
+@pytest.mark.parametrize("skip", [False, True])
+def test_drawn_networks_have_lecuns_weights_and_no_biases(skip: bool) -> None:
+    network, count = Mlp((5, 3), skip=skip), 2000
+    drawn = np.asarray(lecun_uniform(jax.random.key(0), network, 7, 2, count))
+    assert drawn.shape == (count, network.size(7, 2))
+    start = 0
+    for fan_in, feeding, fan_out in ((7, 7, 5), (5, 5, 3), (3, 3 + 7 * skip, 2)):
+        weights = drawn[:, start : start + fan_in * fan_out]
+        biases = drawn[:, start + fan_in * fan_out : start + (fan_in + 1) * fan_out]
+        np.testing.assert_allclose(weights.std(axis=0), feeding**-0.5, rtol=0.08)
+        assert np.abs(weights).max() <= (3 / feeding) ** 0.5
+        assert not biases.any()
+        start += (fan_in + 1) * fan_out
+    if skip:
+        np.testing.assert_allclose(drawn[:, start:].std(axis=0), 10**-0.5, rtol=0.08)
+    else:
+        assert start == drawn.shape[1]
+
+
+def _shapes(tree: Any) -> list[tuple[Any, ...]]:
+    return [(leaf.shape, leaf.dtype, leaf.weak_type) for leaf in jax.tree.leaves(tree)]
+
+
+def test_the_state_keeps_its_structure_shapes_and_strong_dtypes() -> None:
+    before = jax.eval_shape(BENCH.init)
+    after, progress = jax.eval_shape(BENCH.plain_step, jax.random.key(0), LEVEL, before)
+    assert jax.tree.structure(before) == jax.tree.structure(after)
+    assert _shapes(before) == _shapes(after)
+    assert not [shape for shape in _shapes((before, after)) if shape[2]]
+    assert {leaf.shape for leaf in jax.tree.leaves(progress)} == {()}
+    assert {leaf.dtype for leaf in jax.tree.leaves(progress)} == {jnp.dtype("float32"), jnp.dtype("bool")}
+
+
+def test_stepping_compiles_once_and_the_same_key_gives_the_same_state() -> None:
+    (one, _), (same, _), (other, _) = BENCH.run(3, seed=4), BENCH.run(3, seed=4), BENCH.run(3, seed=5)
+    assert BENCH.traces == 1
+    assert same_bits(one, same)
+    assert not same_bits(one, other)
+
+
+def test_a_compiled_step_is_the_plain_step() -> None:
+    state, _ = BENCH.run(2)
+    key = jax.random.key(9)
+    close(BENCH.plain_step(key, LEVEL, state), BENCH.step(key, LEVEL, state), tolerance=1e-4)
+
+
+def test_trials_side_by_side_in_a_loop_are_the_trials_one_by_one() -> None:
+    seeds, steps = (3, 8), 4
+    alone = [BENCH.run(steps, seed=seed)[0] for seed in seeds]
+    keys = jnp.stack([jax.random.key(seed + 1) for seed in seeds])
+    starts = jax.tree.map(lambda *leaf: jnp.stack(leaf), *[BENCH.init(seed) for seed in seeds])
+
+    def trial(key: Any, state: Any) -> Any:
+        def body(carry: Any) -> Any:
+            step, state = carry
+            return step + 1, BENCH.plain_step(jax.random.fold_in(key, step), LEVEL, state)[0]
+
+        return jax.lax.while_loop(lambda carry: carry[0] < steps, body, (jnp.zeros((), jnp.int32), state))[1]
+
+    with jax.debug_key_reuse(False):  # jax takes the keys of any loop under vmap for used
+        together = jax.jit(jax.vmap(trial))(keys, starts)
+    for i, one in enumerate(alone):
+        close(one, jax.tree.map(lambda leaf, i=i: leaf[i], together), tolerance=1e-4)
+
+
+def test_numbers_that_are_not_finite_are_told_as_unhealthy() -> None:
+    state, (*_, progress) = BENCH.run(3)
+    assert bool(progress.healthy)
+    poisoned = replace(state, archive=state.archive.replace(genotypes=state.archive.genotypes * jnp.nan))
+    _, (progress,) = BENCH.run(1, state=poisoned)
+    assert not bool(progress.healthy)
+
+
+def test_it_costs_a_batch_of_episodes_and_has_a_canonical_form() -> None:
+    assert SMALL.cost(Plane()) == 8 * 5
+    assert MapElites().batch * 1000 == MapElites().cost(replace(Plane(), horizon=1000))
+    assert hash(replace(SMALL)) == hash(SMALL)
+    assert canonical_json(replace(SMALL, iso_sigma=0.1)) != canonical_json(SMALL)
+
+
+class _Blind(Plane):
+    """A plane whose episodes do not tell where they ended."""
+
+    def episode(self, policy: Any, key: Any, level: Any) -> Episode:
+        return replace(super().episode(policy, key, level), metrics={"distance": jnp.zeros(())})
+
+
+def test_a_task_that_cannot_be_mapped_is_one_sentence() -> None:
+    with pytest.raises(UserError, match="'n_parity' has no area to map; use a task with `area` and `reachable`"):
+        SMALL.init(jax.random.key(0), NParity(3))
+    with pytest.raises(UserError, match='metrics "x" and "y"; the metrics of \'plane\' are: distance.'):
+        Workbench(SMALL, _Blind()).run(1)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "sentence"),
+    [
+        ({"batch": 0}, "at least 1 individual in a batch and 1 to begin with, not 0 and 8"),
+        ({"initial": 0}, "not 8 and 0"),
+        ({"cells": (5,)}, "two numbers of cells, each at least 1, not (5,)"),
+        ({"cells": (5, 0)}, "not (5, 0)"),
+        ({"iso_sigma": -0.1}, "iso_sigma and line_sigma are -0.1 and 0.2"),
+        ({"line_sigma": float("nan")}, "are 0.2 and nan"),
+        ({"iso_sigma": 0.0, "line_sigma": 0.0}, "not both 0"),
+    ],
+)
+def test_a_wrong_hyperparameter_is_one_sentence(wrong: dict[str, Any], sentence: str) -> None:
+    with pytest.raises(UserError) as told:
+        replace(SMALL, **wrong)
+    assert sentence in str(told.value)
