@@ -1,8 +1,8 @@
 """How fast ecorobot is simulated: ours, a plain use of `mjx.step` on the same model, and plain C MuJoCo, in turns.
 
-`python benchmarks/ecorobot_steps.py` on CPU cores; `--environments 32768` on a GPU. A plain port carries all of MJX's data
-from step to step and simulates all boxes; ours carries positions, velocities and accelerations (see
-`evoclaims.envs.ecorobot.physics`). Everything is counted in environment steps, sensors and rewards included.
+`python benchmarks/ecorobot_steps.py` on CPU cores; `--environments 32768` on a GPU. A plain port carries all of MJX's
+data from step to step and simulates all boxes; ours carries positions, velocities and accelerations (see
+`evoclaims.envs.ecorobot.physics`). Counted are environment steps: ours with sensors and rewards, the others without.
 """
 
 from __future__ import annotations

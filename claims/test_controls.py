@@ -43,3 +43,27 @@ def test_a_right_circuit_scores_one_and_a_wrong_one_zero(trials, verdict, task):
 def test_a_method_is_not_better_than_itself(trials, verdict, method):
     runs = trials(method, on="n_parity")
     verdict(runs.mean_success.never_above_itself())
+
+
+@claim(
+    "C3",
+    says="PPO learns plain locomotion: far more reward than a random policy's",
+    where="control",
+    smoke="In 10,000 steps PPO learns to collect more reward with the half-cheetah than a random policy does",
+)
+@pytest.mark.parametrize("task", ["locomotion_half_cheetah", "locomotion_ant"])
+def test_ppo_learns_to_run(trials, verdict, task):
+    ppo = trials("ppo", on=task)
+    random_policy = trials("random_policy", on=task)
+    verdict(ppo.reward > random_policy.reward)
+
+
+@claim(
+    "C4",
+    says="A controller that knows the maze crosses all seven stones in their order within an episode",
+    where="control",
+    smoke="A controller that knows the maze crosses all seven stones in their order within an episode",
+)
+def test_all_stones_can_be_crossed(trials, verdict):
+    waypoints = trials("waypoints", on="stones")
+    verdict(waypoints.crosses(7).in_every_trial())

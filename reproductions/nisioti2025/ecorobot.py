@@ -14,7 +14,7 @@ from evoclaims.envs.ecorobot.deceptive import DeceptiveMaze
 from evoclaims.envs.ecorobot.locomotion import Locomotion
 from evoclaims.envs.ecorobot.obstacles import Obstacles
 from evoclaims.envs.ecorobot.robot_task import RobotTask
-from evoclaims.envs.ecorobot.robots import ANT, HALF_CHEETAH
+from evoclaims.envs.ecorobot.robots import ANT, HALF_CHEETAH, SIMPLE_ROB
 from evoclaims.envs.ecorobot.stones import SteppingStones
 from evoclaims.methods import hyperneat
 from evoclaims.methods.base import Method
@@ -62,7 +62,8 @@ class Size:
 
     Attributes:
         maze_steps, robot_steps: steps of an episode, in mazes with the simplest robot and of robots with limbs.
-        neat: settings of NEAT and of HyperNEAT's CPPNs.
+        neat, limbed_neat: settings of NEAT with the simplest robot and with robots that have limbs.
+        cppn: of HyperNEAT's CPPNs.
         cma_es: population of CMA-ES.
         hidden: neurons of the network that CMA-ES trains.
         ppo: PPO.
@@ -73,6 +74,8 @@ class Size:
     maze_steps: int
     robot_steps: int
     neat: Settings
+    limbed_neat: Settings
+    cppn: Settings
     cma_es: int
     hidden: int
     ppo: Ppo
@@ -95,13 +98,13 @@ def _conditions(size: Size) -> Conditions:
         CHEETAH_RUN: Locomotion(robot=HALF_CHEETAH, episode_steps=size.robot_steps),
         ANT_RUN: _ant(Locomotion, size),
     }
-    cppn = replace(size.neat, activations=hyperneat.CPPN_FUNCTIONS)
-    placed = HyperNeat(cppn, substrate=SIMPLE_ROB_SUBSTRATE)
-    layered = HyperNeat(cppn, extent="unit")
+    simple = {name for name, task in tasks.items() if task.robot == SIMPLE_ROB}
+    placed = HyperNeat(size.cppn, substrate=SIMPLE_ROB_SUBSTRATE)
+    layered = HyperNeat(size.cppn, extent="unit")
     cma_es = CmaEs(population=size.cma_es, network=AllSkips(hidden=size.hidden))
     methods: dict[str, Mapping[str, Method[Any]]] = {
-        "neat": dict.fromkeys(tasks, Neat(size.neat)),
-        "hyperneat": {name: placed if name in (STONES, EASY, DIFFICULT) else layered for name in tasks},
+        "neat": {name: Neat(size.neat if name in simple else size.limbed_neat) for name in tasks},
+        "hyperneat": {name: placed if name in simple else layered for name in tasks},
         "cma_es": dict.fromkeys(tasks, cma_es),
         "ppo": dict.fromkeys(tasks, size.ppo),
         "goal_ppo": dict.fromkeys(tasks, size.ppo),
@@ -112,7 +115,8 @@ def _conditions(size: Size) -> Conditions:
         "waypoints": dict.fromkeys(tasks, Waypoints()),
     }
     goals = {STONES: replace(stones, shows_goal=True), STONES_ANT: replace(ant_stones, shows_goal=True)}
-    seen: dict[str, Mapping[str, RobotTask]] = {"goal_ppo": goals, "waypoints": goals}
+    whole = {STONES: replace(stones, shows_goal=True, episode_steps=1_000)}
+    seen: dict[str, Mapping[str, RobotTask]] = {"goal_ppo": goals, "waypoints": whole}
     return {
         (method, task): Condition(methods[method][task], seen.get(method, tasks)[task], "whole_budget", budget)
         for method, budgets in size.budgets.items()
@@ -130,6 +134,7 @@ def _generations(**by_task: int) -> Mapping[str, Budget]:
     return {task: Budget(generations=generations) for task, generations in by_task.items()}
 
 
+_EVOLVING = Settings(population=1_024, species=Species(most=20))
 _LEARNING = Budget(environment_steps=150_000_000)
 _LOOK = Budget(generations=1, reports=1)
 
@@ -137,7 +142,9 @@ FULL = _conditions(
     Size(
         maze_steps=1_000,
         robot_steps=1_000,
-        neat=Settings(population=1_024, species=Species(most=20)),
+        neat=_EVOLVING,
+        limbed_neat=_EVOLVING,
+        cppn=replace(_EVOLVING, activations=hyperneat.CPPN_FUNCTIONS),
         cma_es=256,
         hidden=24,
         ppo=Ppo(
@@ -173,6 +180,7 @@ FULL = _conditions(
     )
 )
 
+_SMALL = Settings(population=32, nodes=32, connections=96, species=Species(most=4, survival=0.2))
 _SHORT = Budget(environment_steps=50_000, reports=10)
 _SHORTER = Budget(environment_steps=10_000, reports=10)
 
@@ -186,7 +194,9 @@ SMOKE = _conditions(
     Size(
         maze_steps=200,
         robot_steps=100,
-        neat=Settings(population=32, nodes=32, connections=96, species=Species(most=4, survival=0.2)),
+        neat=_SMALL,
+        limbed_neat=replace(_SMALL, nodes=64, connections=320),
+        cppn=replace(_SMALL, activations=hyperneat.CPPN_FUNCTIONS),
         cma_es=32,
         hidden=4,
         ppo=Ppo(
@@ -213,12 +223,13 @@ SMOKE = _conditions(
             },
             "hyperneat": {
                 STONES: _few(8),
+                STONES_ANT: _few(3),
                 EASY: _few(8),
                 EASY_ANT: _few(3),
                 DIFFICULT: _few(8),
                 HIERARCHICAL: _few(3),
             },
-            "cma_es": {STONES: _few(8), HIERARCHICAL: _few(3)},
+            "cma_es": {STONES: _few(8), STONES_ANT: _few(3), HIERARCHICAL: _few(3)},
             "ppo": {
                 STONES: _SHORT,
                 STONES_ANT: _SHORTER,
@@ -227,10 +238,11 @@ SMOKE = _conditions(
                 MEDIUM: _SHORTER,
                 HIGH: _SHORTER,
                 CHEETAH_RUN: _SHORTER,
+                ANT_RUN: _SHORTER,
             },
             "goal_ppo": {STONES: _SHORT},
             "map_elites": {STONES: _few(8), DIFFICULT: _few(8)},
-            "random_policy": {CHEETAH_RUN: _LOOK},
+            "random_policy": {CHEETAH_RUN: _LOOK, ANT_RUN: _LOOK},
             "waypoints": {STONES: _LOOK},
         },
     )

@@ -1,7 +1,7 @@
 """A controller that knows the maze by heart: the positive control of the stepping stones (C4).
 
-It learns nothing. Shortest paths to every stone are worked out beforehand; the robot follows the one to the stone that it
-is shown. A maze that it cannot cross within an episode would be one that no method can.
+It learns nothing. Shortest paths to every stone are worked out beforehand; the robot follows the one to the stone that
+it is shown. A maze that it cannot cross within an episode would be one that no method can.
 """
 
 from __future__ import annotations

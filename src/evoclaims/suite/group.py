@@ -106,6 +106,72 @@ class TrialGroup:
         name = "solves every level" if value == 1.0 else f"success is {value:g} on every level"
         return Event(self, name, lambda t: all(x == value for x in t.levels["success"]))
 
+    @property
+    def reward(self) -> Measure:
+        """Reward of an episode of the final policy on the last level, averaged over the examination's episodes."""
+        return self._metric("last_fitness", "episode reward")
+
+    @property
+    def stones(self) -> Measure:
+        """Stones that the final policy crosses in their order, averaged over the examination's episodes."""
+        return self._metric("stones", "stones crossed")
+
+    @property
+    def obstacles_passed(self) -> Measure:
+        """Obstacles that the final policy leaves behind, averaged over the examination's episodes."""
+        return self._metric("obstacles", "obstacles passed")
+
+    @property
+    def overturned(self) -> Measure:
+        """Share of the final policy's steps that the robot spends upside-down."""
+        return self._metric("upside_down", "share of steps upside-down")
+
+    @property
+    def control_cost(self) -> Measure:
+        """What the final policy's actions cost in an episode."""
+        return self._metric("control_cost", "control cost")
+
+    @property
+    def path_coverage(self) -> Measure:
+        """Share of the reachable cells that the final policy's way leads through."""
+        return Measure(self, "share of the maze covered", lambda t: t.metrics["coverage"])
+
+    @property
+    def archive_coverage(self) -> Measure:
+        """Share of the reachable cells that hold an elite; of methods with an archive."""
+        return Measure(self, "share of the maze covered", lambda t: t.curves["coverage"][-1])
+
+    @property
+    def reaches_the_target(self) -> Event:
+        """The final policy reaches the target in more than half of the examination's episodes."""
+        return Event(self, "reaches the target", lambda t: t.metrics["reached"] > 0.5)
+
+    @property
+    def never_reaches_the_target(self) -> Event:
+        """The final policy reaches the target in no episode of the examination."""
+        return Event(self, "never reaches the target", lambda t: t.metrics["reached"] == 0)
+
+    @property
+    def has_found_the_target(self) -> Event:
+        """Some individual has reached the target; of methods with an archive."""
+        return Event(self, "has found the target", lambda t: t.curves["reached"][-1] == 1)
+
+    def ends_within(self, distance: float) -> Event:
+        """The final policy ends within `distance` (m) of where the target counts as reached, on average."""
+        return Event(self, f"ends within {distance:g} m of the target", lambda t: t.metrics["distance"] <= distance)
+
+    def crosses_at_most(self, stones: float) -> Event:
+        """The final policy crosses no more stones than this, averaged over the examination's episodes."""
+        return Event(self, f"crosses at most {stones:g} stones", lambda t: t.metrics["stones"] <= stones)
+
+    def crosses(self, stones: float) -> Event:
+        """The final policy crosses exactly as many stones as this in every episode."""
+        return Event(self, f"crosses {stones:g} stones", lambda t: t.metrics["stones"] == stones)
+
+    def passes_at_most(self, obstacles: float) -> Event:
+        """The final policy leaves no more obstacles behind than this, averaged over the examination's episodes."""
+        return Event(self, f"passes at most {obstacles:g} obstacles", lambda t: t.metrics["obstacles"] <= obstacles)
+
     def _metric(self, key: str, name: str) -> Measure:
         """Return the measure that reads one of the record's metrics."""
         return Measure(self, name, lambda t: t.metrics[key])

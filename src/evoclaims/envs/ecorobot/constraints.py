@@ -1,8 +1,8 @@
 """MuJoCo's constrained dynamics for few constraints: one Newton step with an exact line search.
 
-The accelerations a minimize ½ (a - a₀)ᵀ M (a - a₀) + ½ Σᵢ Dᵢ min(0, (J a - r)ᵢ)² (MuJoCo's documentation, "Computation",
-primal problem, pyramidal friction cones). MJX's solver searches its line by bracketing, in a loop of several hundred
-operations; the slope along a line is piecewise linear, so that its root can be had at once.
+The accelerations a minimize ½ (a - a₀)ᵀ M (a - a₀) + ½ Σᵢ Dᵢ min(0, (J a - r)ᵢ)² (MuJoCo's documentation,
+"Computation", primal problem, pyramidal friction cones). MJX's solver searches its line by bracketing, in a loop of
+several hundred operations; the slope along a line is piecewise linear, so that its root can be had at once.
 """
 
 from __future__ import annotations
@@ -51,7 +51,9 @@ def constrained_acceleration(
         mass: M.
         force: all smooth forces, M a₀.
         warm: the last step's acceleration; the start, if it costs less than a₀.
-        jacobian, reference, stiffness: J, r and D, of constraints that push and never pull.
+        jacobian: J, of constraints that push and never pull.
+        reference: r.
+        stiffness: D.
     """
     free = cholesky_solve(mass, force)
     if not jacobian.shape[0]:
@@ -85,8 +87,8 @@ def _root(
 ) -> Float[Array, ""]:
     """Return where slope + t curvature + Σᵢ Dᵢ vᵢ min(0, oᵢ + t vᵢ) is 0.
 
-    It rises in t and bends only where a row turns on or off: between the last bend at which it is negative and the first
-    at which it is not, it is a straight line.
+    It rises in t and bends only where a row turns on or off: between the last bend at which it is negative and the
+    first at which it is not, it is a straight line.
     """
 
     def value(t: Array) -> Array:

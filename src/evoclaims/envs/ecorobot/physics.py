@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
@@ -41,6 +43,8 @@ def act(scene: Scene, body: Body, control: Float[Array, " nu"]) -> Body:
     return jax.lax.scan(frame, body, None, length=scene.robot.frames)[0]
 
 
+# MJX takes a second to trace; with a jit of its own this is traced once for each scene, and not for each use.
+@partial(jax.jit, static_argnums=0)
 def _frame(scene: Scene, body: Body, control: Float[Array, " nu"]) -> Body:
     """Simulate one time step, as `mjx.step` does with semi-implicit Euler integration."""
     with implicit_promotions():

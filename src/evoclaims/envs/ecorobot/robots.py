@@ -31,8 +31,8 @@ class Robot:
         position_noise, velocity_noise: of starts: half-width of a uniform distribution, scale of a normal one (uniform
             for robots that Brax starts so).
         normal_velocity: whether velocities start normally distributed, and not uniformly.
-        scales_actions: whether an action in [-1, 1] spans the motors' whole range, as Brax's humanoid does it; otherwise
-            motors take it as it is, clipped to their range.
+        scales_actions: whether an action in [-1, 1] spans the motors' whole range, as Brax's humanoid does it;
+            otherwise motors take it as it is, clipped to their range.
         free_coordinates: leading positions that say where in the world it is; plain locomotion does not show them.
         seen_velocities: how many velocities a policy sees, from the first; None for all.
         velocity_limit: velocities are shown clipped to it.

@@ -149,8 +149,8 @@ def _compiled(robot: Robot, boxes: tuple[Box, ...]) -> mujoco.MjModel:
     option = spec.option
     option.solver, option.iterations, option.ls_iterations = mujoco.mjtSolver.mjSOL_NEWTON, 1, 4
     option.disableflags |= mujoco.mjtDisableBit.mjDSBL_EULERDAMP
-    # Brax's own numbers go: MJX (3.17) looks its setting up at the place of its name, not of its data, and would read one
-    # of theirs (the ant lost all contacts).
+    # Brax's own numbers go: MJX (3.17) looks its setting up at the place of its name, not of its data, and would read
+    # one of theirs (the ant lost all contacts).
     for numeric in list(spec.numerics):
         spec.delete(numeric)
     spec.add_numeric(name="max_contact_points", data=[robot.contacts])

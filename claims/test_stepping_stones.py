@@ -1,0 +1,110 @@
+"""§5.2.1: what the paper says about the maze with stepping stones (Figs. 5 and 6).
+
+Smoke judges the sentences after a few generations of short episodes; so early no method has come far.
+"""
+
+import pytest
+
+from evoclaims import claim
+
+EVOLVED = ["hyperneat", "cma_es"]
+LEARNED = ["ppo", "goal_ppo"]
+
+
+@claim(
+    "S1",
+    says="NEAT accrues the highest rewards, reaching on average five out of seven stepping stones",
+    where="§5.2.1, Fig. 5",
+    smoke="After 8 generations of 32 genomes NEAT reaches no more than one stepping stone",
+)
+def test_neat_reaches_five_stones(trials, verdict, claim_tier):
+    neat = trials("neat", on="stones")
+    verdict({"full": neat.stones.between(4, 6), "smoke": neat.stones.between(0, 1)}[claim_tier])
+
+
+@claim(
+    "S2",
+    says="HyperNEAT and CMA-ES manage to reach about three stepping stones",
+    where="§5.2.1, Fig. 5",
+    smoke="After 8 generations HyperNEAT and CMA-ES reach no more than one stepping stone",
+)
+@pytest.mark.parametrize("method", EVOLVED)
+def test_others_reach_three_stones(trials, verdict, claim_tier, method):
+    evolved = trials(method, on="stones")
+    verdict({"full": evolved.stones.between(2, 4), "smoke": evolved.stones.between(0, 1)}[claim_tier])
+
+
+@claim(
+    "S3",
+    says="PPO reaches only the first stepping stone",
+    where="§5.2.1, Fig. 5",
+    smoke="After 50,000 steps PPO reaches no more than the first stepping stone",
+)
+@pytest.mark.parametrize("method", LEARNED)
+def test_ppo_stays_at_the_first_stone(trials, verdict, method):
+    ppo = trials(method, on="stones")
+    verdict(ppo.crosses_at_most(1).stays())
+
+
+@claim(
+    "S4",
+    says="NEAT accrues the highest rewards",
+    where="§5.2.1, Fig. 5",
+    smoke="NEAT accrues the highest rewards in 51,200 steps",
+)
+@pytest.mark.parametrize("other", ["hyperneat", "cma_es", "map_elites", "ppo", "goal_ppo"])
+def test_neat_collects_more_reward(trials, verdict, other):
+    neat = trials("neat", on="stones")
+    rest = trials(other, on="stones")
+    verdict(neat.reward > rest.reward)
+
+
+@claim(
+    "S5",
+    says="MAP-Elites performs equally bad but exhibits a drastically different behavior",
+    where="§5.2.1, Fig. 5",
+    smoke="After 8 iterations the best elite of MAP-Elites reaches no more than the first stepping stone",
+)
+def test_map_elites_collects_few_stones(trials, verdict):
+    map_elites = trials("map_elites", on="stones")
+    verdict(map_elites.crosses_at_most(1).stays())
+
+
+@claim(
+    "S6",
+    says="The agent has explored the whole maze (in contrast to PPO that only reached the first stepping stone)",
+    where="§5.2.1, Fig. 6",
+    smoke="After 8 iterations the elites of MAP-Elites stand on more of the maze than PPO's way leads through",
+)
+def test_map_elites_explores_the_maze(trials, verdict, claim_tier):
+    map_elites = trials("map_elites", on="stones")
+    ppo = trials("ppo", on="stones")
+    more = map_elites.archive_coverage > ppo.path_coverage
+    verdict({"full": more & map_elites.archive_coverage.between(0.8, 1.0), "smoke": more}[claim_tier])
+
+
+@claim(
+    "S7",
+    says="The classical deceptive task (that only differs from our maze in the absence of stepping stones) is solved "
+    "by MAP-Elites, which explores it in the same way",
+    where="§5.2.1, Fig. 6",
+    smoke="After 8 iterations MAP-Elites has not found the target, and covers the maze with stones and without alike",
+)
+def test_map_elites_finds_the_target_without_stones(trials, verdict, claim_tier):
+    plain = trials("map_elites", on="deceptive_maze_difficult")
+    stones = trials("map_elites", on="stones")
+    alike = plain.archive_coverage.equivalent_to(stones.archive_coverage, margin=0.1)
+    found = {"full": plain.has_found_the_target, "smoke": plain.never_reaches_the_target}[claim_tier]
+    verdict(found.in_most_trials() & alike)
+
+
+@claim(
+    "S8",
+    says="A difference is that CMA-ES performs worse than NEAT",
+    where="§5.2.1, Fig. 5",
+    smoke="In 51,200 steps CMA-ES collects less reward than NEAT",
+)
+def test_cma_es_is_below_neat(trials, verdict):
+    cma_es = trials("cma_es", on="stones")
+    neat = trials("neat", on="stones")
+    verdict(cma_es.reward < neat.reward)
