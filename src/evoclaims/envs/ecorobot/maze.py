@@ -57,7 +57,7 @@ class Maze(RobotTask):
         size = jnp.asarray(CELLS)
         cell = jnp.clip(jnp.floor((path - low) / (high - low) * size).astype(jnp.int32), 0, size - 1)
         been = jnp.zeros(CELLS, bool).at[cell[:, 0], cell[:, 1]].max(alive)
-        return {"coverage": jnp.sum(been & ground) / jnp.asarray(ground.sum(), jnp.float32)}
+        return {"coverage": jnp.sum(been & ground).astype(jnp.float32) / float(ground.sum())}
 
 
 @lru_cache(maxsize=64)

@@ -203,7 +203,7 @@ class RobotTask(ABC):
                 time=outing.time + 1,
                 memory=ruling.memory,
                 effort=outing.effort + jnp.sum(control**2),
-                overturned=outing.overturned + pose.upside_down,
+                overturned=outing.overturned + pose.upside_down.astype(jnp.float32),
             )
         )
         return TaskState(

@@ -170,7 +170,13 @@ def _compiled(robot: Robot, boxes: tuple[Box, ...]) -> mujoco.MjModel:
             group=WORLD_GROUP,
             rgba=[0.55, 0.5, 0.45, 1.0],
         )
-    return spec.compile()
+    # What MuJoCo (3.17) advises in place of the deprecated attribute `settotalmass`, which the half-cheetah has.
+    total, spec.compiler.settotalmass = spec.compiler.settotalmass, -1.0
+    model = spec.compile()
+    if total > 0:
+        mujoco.mj_setTotalmass(model, total)
+        mujoco.mj_setConst(model, mujoco.MjData(model))
+    return model
 
 
 def on_device(tree: Any) -> Any:

@@ -85,7 +85,7 @@ class SteppingStones(Maze):
 
     def rule(self, memory: Progress, before: Pose, after: Pose, action: Float[Array, " action"]) -> Ruling:
         """Count a stone when the robot is at the one that is next."""
-        crossed = memory.crossed + (self._distance(memory, after) <= self.within)
+        crossed = memory.crossed + (self._distance(memory, after) <= self.within).astype(jnp.int32)
         now = Progress(crossed=crossed)
         done = crossed == len(STONES)
         reward = crossed.astype(jnp.float32) + 1.0 - self._distance(now, after) / ARENA
