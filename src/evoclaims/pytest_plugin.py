@@ -42,6 +42,11 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         help="fail: inconclusive claims, or a run that has judged none of its claims, end with status 1 (report)",
     )
     group.addoption("--claims-stored", action="store_true", help="judge from stored trials alone; run nothing")
+    group.addoption(
+        "--claims-committed",
+        action="store_true",
+        help="with --claims-stored: take what the store lacks from the committed reference trials",
+    )
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -137,6 +142,7 @@ def make_session(config: pytest.Config) -> Session:
     """Load the project's reproduction and check store, device and sizes."""
     if _session in config.stash:
         return config.stash[_session]
+    from evoclaims.suite.archive import Archive
     from evoclaims.suite.config import load_config, load_reproduction
     from evoclaims.suite.live import LiveLine
     from evoclaims.suite.modes import RunMissing, StoredOnly
@@ -150,9 +156,10 @@ def make_session(config: pytest.Config) -> Session:
     store = Store(config.invocation_params.dir / config.getoption("claims_storage"))
     line = LiveLine(Uncaptured(config)) if config.pluginmanager.has_plugin("terminalreporter") else None
     mode: Any = RunMissing(store, config.getoption("claims_device"), line or ignore)
+    reproduction = load_reproduction(load_config(config.rootpath))
     if config.getoption("claims_stored"):
-        mode = StoredOnly(store)
-    made = Session(load_reproduction(load_config(config.rootpath)), store, mode, config.getoption("claims_trials"))
+        mode = StoredOnly(Archive(store, reproduction.references if config.getoption("claims_committed") else None))
+    made = Session(reproduction, store, mode, config.getoption("claims_trials"))
     made.protocol("smoke")
     mode.check()
     config.stash[_session] = made

@@ -11,6 +11,7 @@ import pytest
 
 from evoclaims.core.errors import UserError
 from evoclaims.suite import references
+from evoclaims.suite.archive import Archive
 from evoclaims.suite.claim import Claim
 from evoclaims.suite.modes import NotStoredError, RunMissing, StoredOnly
 from evoclaims.suite.reproduction import Reproduction
@@ -93,7 +94,7 @@ def test_an_unknown_name_is_a_sentence_with_the_known_ones(
 def test_trials_that_may_not_be_run_end_a_claim_as_not_run(
     reproduction: Reproduction, store: Store, says: Claim, made: Made
 ) -> None:
-    stored = Session(reproduction, store, StoredOnly(store))
+    stored = Session(reproduction, store, StoredOnly(Archive(store)))
     better, worse = _pair(stored)
     for seed in range(6):
         store.put(made(better.condition, seed, 1.0), {})
@@ -111,9 +112,9 @@ def test_stored_trials_are_read_in_the_order_of_the_seeds(store: Store, made: Ma
     condition = session.group("better", "small", "smoke").condition
     for seed in (0, 1, 2):
         store.put(made(condition, seed, 1.0), {})
-    assert [trial.seed for trial in StoredOnly(store)(condition, [2, 0])] == [2, 0]
+    assert [trial.seed for trial in StoredOnly(Archive(store))(condition, [2, 0])] == [2, 0]
     with pytest.raises(NotStoredError, match="1 of 3 trials"):
-        StoredOnly(store)(condition, [1, 2, 3])
+        StoredOnly(Archive(store))(condition, [1, 2, 3])
 
 
 def test_missing_trials_are_run_and_a_bad_store_or_device_is_found_before(tmp_path: Path, session: Session) -> None:
@@ -122,7 +123,7 @@ def test_missing_trials_are_run_and_a_bad_store_or_device_is_found_before(tmp_pa
     mode.check()
     assert [trial.metrics["mean_success"] for trial in mode(condition, [1, 0])] == [1.0, 1.0]
     (tmp_path / "file").write_text("")
-    for bad in (RunMissing(Store(tmp_path / "file"), "cpu", ignore), StoredOnly(Store(tmp_path / "file"))):
+    for bad in (RunMissing(Store(tmp_path / "file"), "cpu", ignore), StoredOnly(Archive(Store(tmp_path / "file")))):
         with pytest.raises(UserError, match="is a file, not a folder"):
             bad.check()
     with pytest.raises(UserError, match="There is no device named 'tpu'"):

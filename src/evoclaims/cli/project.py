@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 
 from evoclaims.core.errors import UserError
+from evoclaims.suite.archive import Archive
 from evoclaims.suite.config import SuiteConfig, find_root, load_config, load_reproduction
 from evoclaims.suite.report import ClaimReport
 from evoclaims.suite.reproduction import Reproduction
@@ -29,8 +30,13 @@ def open_store(name: str) -> Store:
     return Store(Path(name))
 
 
+def open_archive(storage: str, reproduction: Reproduction) -> Archive:
+    """Return the trials of the store in the folder `storage`, and the reproduction's reference trials."""
+    return Archive(open_store(storage), reproduction.references)
+
+
 def judge_stored(config: SuiteConfig, storage: str, tier: str) -> list[ClaimReport]:
-    """Judge a tier's claims from stored trials alone.
+    """Judge a tier's claims from stored trials, and committed reference trials where those are missing; run nothing.
 
     Raises:
         UserError: when the claims cannot be collected.
@@ -40,6 +46,7 @@ def judge_stored(config: SuiteConfig, storage: str, tier: str) -> list[ClaimRepo
         str(config.root / config.claims),
         f"--rootdir={config.root}",
         "--claims-stored",
+        "--claims-committed",
         f"--claims-storage={Path(storage).absolute()}",
         f"--claims-tier={tier}",
         "-pno:terminal",

@@ -6,11 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from evoclaims.core.errors import UserError
+from evoclaims.suite.archive import Archive
 from evoclaims.trials import devices
 from evoclaims.trials.progress import Watcher
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.runner import run
-from evoclaims.trials.spec import Condition, TrialSpec
+from evoclaims.trials.spec import Condition
 from evoclaims.trials.store import Store
 
 
@@ -38,19 +39,19 @@ class RunMissing:
 
 @dataclass(frozen=True)
 class StoredOnly:
-    """Read the store and run nothing."""
+    """Read the trials at hand and run nothing."""
 
-    store: Store
+    archive: Archive
 
     def check(self) -> None:
         """A store that is a file cannot be read."""
-        if self.store.root.exists() and not self.store.root.is_dir():
-            raise UserError(f"The trial store {self.store.root} is a file, not a folder: name another with --storage.")
+        root = self.archive.store.root
+        if root.exists() and not root.is_dir():
+            raise UserError(f"The trial store {root} is a file, not a folder: name another with --storage.")
 
     def __call__(self, condition: Condition, seeds: Sequence[int]) -> Sequence[TrialResult]:
         """Return one trial per seed, or raise `NotStoredError`."""
-        found = [self.store.get(TrialSpec(condition, seed).id) for seed in seeds]
-        results = [result for result in found if result is not None]
+        results = [result for result in self.archive.trials(condition, seeds) if result is not None]
         if len(results) < len(seeds):
             raise NotStoredError(f"{len(seeds) - len(results)} of {len(seeds)} trials of {condition.label} are missing")
         return results
