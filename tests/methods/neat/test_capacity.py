@@ -32,7 +32,22 @@ def _two_smaller_sizes(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_smaller_arrays_are_offered_where_they_are_smaller(
     limits: tuple[int, int], wanted: list[tuple[int, int]]
 ) -> None:
-    assert capacity.capacities(Settings(nodes=limits[0], connections=limits[1])) == wanted
+    assert capacity.capacities(Settings(nodes=limits[0], connections=limits[1]), 2, 1) == wanted
+
+
+@pytest.mark.parametrize(
+    ("inputs", "outputs", "wanted"),
+    [
+        (30, 1, [(32, 96), (100, 200), (100, 400)]),
+        (31, 1, [(100, 200), (100, 400)]),
+        (5, 19, [(100, 200), (100, 400)]),
+        (35, 8, [(100, 400)]),
+    ],
+)
+def test_arrays_that_the_first_networks_cannot_grow_in_are_not_offered(
+    inputs: int, outputs: int, wanted: list[tuple[int, int]]
+) -> None:
+    assert capacity.capacities(Settings(), inputs, outputs) == wanted
 
 
 @pytest.mark.parametrize(
@@ -49,7 +64,9 @@ def test_arrays_have_room_for_one_more_node_and_two_more_connections(
         return jnp.array([nodes, connections], jnp.int32)
 
     for groups in ((stacked([small, large]),), (stacked([small]), stacked([large, small]))):
-        chosen = capacity.in_capacity(Settings(), groups, lambda n, c, _: size(n, c), jnp.zeros(()))
+        chosen = capacity.in_capacity(
+            capacity.capacities(Settings(), 2, 1), groups, lambda n, c, _: size(n, c), jnp.zeros(())
+        )
         assert tuple(np.asarray(chosen).tolist()) == wanted
 
 
@@ -59,7 +76,9 @@ def test_the_choice_of_the_largest_genome_is_taken_for_all_trials_of_a_batch() -
 
     def size(count: jax.Array) -> jax.Array:
         genomes = replace(jax.tree.map(jnp.asarray, one), node_count=count)
-        return capacity.in_capacity(Settings(), (genomes,), lambda n, c, _: jnp.asarray(n, jnp.int32), count)
+        return capacity.in_capacity(
+            capacity.capacities(Settings(), 2, 1), (genomes,), lambda n, c, _: jnp.asarray(n, jnp.int32), count
+        )
 
     assert np.asarray(jax.jit(jax.vmap(size))(counts)).tolist() == [100, 100]
     assert int(size(counts[0])) == 32

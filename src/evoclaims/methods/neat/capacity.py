@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any, Final
 
@@ -18,20 +18,26 @@ SMALLER: Final = ((32, 96),)
 times as fast as the paper's 100 nodes and 400 connections."""
 
 
-def capacities(settings: Settings) -> list[tuple[int, int]]:
-    """Return the capacities (nodes, connections) that generations are compiled for, the largest last."""
+def capacities(settings: Settings, inputs: int, outputs: int) -> list[tuple[int, int]]:
+    """Return the capacities (nodes, connections) that generations are compiled for, the largest last.
+
+    None is so small that not even the first networks, which connect all inputs with all outputs, have room to grow.
+    """
     most = settings.nodes, settings.connections
-    return [*(size for size in SMALLER if size[0] <= most[0] and size[1] < most[1]), most]
+    least = inputs + outputs + 1, inputs * outputs + 2
+    smaller = (size for size in SMALLER if size[0] <= most[0] and size[1] < most[1])
+    return [*(size for size in smaller if least[0] <= size[0] and least[1] <= size[1]), most]
 
 
-def in_capacity(settings: Settings, genomes: tuple[Genome, ...], function: Callable[..., Any], *operands: Any) -> Any:
-    """Call `function(nodes, connections, *operands)` with the least capacity that holds the genomes' children.
+def in_capacity(
+    sizes: Sequence[tuple[int, int]], genomes: tuple[Genome, ...], function: Callable[..., Any], *operands: Any
+) -> Any:
+    """Call `function(nodes, connections, *operands)` with the least of the `sizes` that holds the genomes' children.
 
     A child may have one node and two connections more than its parent. The result must not depend on the capacity.
     """
     nodes = jnp.stack([jnp.max(each.node_count) for each in genomes]).max() + 1
     connections = jnp.stack([jnp.max(each.connection_count) for each in genomes]).max() + 2
-    sizes = capacities(settings)
     too_small = [(nodes > n) | (connections > c) for n, c in sizes[:-1]]
     index: Int[Array, ""] = jnp.sum(jnp.array(too_small, bool), dtype=jnp.int32)
     return switch_together(index, [partial(function, *size) for size in sizes], *operands)

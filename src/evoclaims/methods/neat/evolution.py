@@ -14,7 +14,7 @@ from evoclaims.core.pytree import pytree, select
 from evoclaims.envs.base import Episode, Task
 from evoclaims.methods.base import Policy, Progress
 from evoclaims.methods.champion import no_episode
-from evoclaims.methods.neat.capacity import in_capacity
+from evoclaims.methods.neat.capacity import capacities, in_capacity
 from evoclaims.methods.neat.population import Population, first_population, forget_records, next_population
 from evoclaims.methods.neat.settings import Settings
 from evoclaims.networks.genome import Genome, resized
@@ -79,7 +79,8 @@ def evolve(
         population = select(level == state.level, population, forget_records(population))
     episode_key, reproduction_key = streams(key, "episode", "reproduction")
     run = partial(_evaluate, encoding, task)
-    episodes = in_capacity(settings, (population.genomes,), run, episode_key, level, population.genomes)
+    sizes = capacities(settings, encoding.inputs, encoding.outputs)
+    episodes = in_capacity(sizes, (population.genomes,), run, episode_key, level, population.genomes)
     fitness = jnp.where(jnp.isnan(episodes.fitness), -jnp.inf, episodes.fitness)
     # Of equals the newest, as everywhere in NEAT.
     best = settings.population - 1 - jnp.argmax(fitness[::-1])

@@ -11,7 +11,7 @@ from jaxtyping import Array, Float, Int, PRNGKeyArray
 
 from evoclaims.core.keys import streams
 from evoclaims.core.pytree import pytree, select
-from evoclaims.methods.neat.capacity import in_capacity
+from evoclaims.methods.neat.capacity import capacities, in_capacity
 from evoclaims.methods.neat.crossover import crossover
 from evoclaims.methods.neat.reproduction import Parents, choose_parents, survive
 from evoclaims.methods.neat.settings import Settings
@@ -74,8 +74,9 @@ def next_population(
     parents = choose_parents(parents_key, settings.species, species, fitness)
     survivors = replace(population, species=species)
     breed = partial(_breed, settings, inputs, outputs)
+    sizes = capacities(settings, inputs, outputs)
     following: Population = in_capacity(
-        settings, (population.genomes, species.centres), breed, breeding_key, survivors, parents
+        sizes, (population.genomes, species.centres), breed, breeding_key, survivors, parents
     )
     return following
 
