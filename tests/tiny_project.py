@@ -33,6 +33,7 @@ from evoclaims.judging.protocol import Protocol
 from evoclaims.methods.base import Policy, Progress
 from evoclaims.methods.hand_built import HandBuilt, threshold_network
 from evoclaims.suite.reproduction import Reproduction, Tier
+from evoclaims.suite.variant import Variant, changed
 from evoclaims.trials.budget import Budget
 from evoclaims.trials.spec import Condition
 
@@ -74,11 +75,21 @@ def conditions(generations):
     return {(name, "parity"): Condition(m, NParity(2), "curriculum", budget) for name, m in METHODS.items()}
 
 
+def traded(method, task, condition):
+    """`right` becomes what `wrong` is; nothing else changes."""
+    return replace(condition, method=METHODS["wrong"]) if method == "right" else None
+
+
+def traded_in(generations):
+    return changed(conditions(generations), traded)
+
+
 REPRODUCTION = Reproduction(
     name="tiny",
     title="A Tiny Paper",
     folder=Path(__file__).parent,
     tiers={"smoke": Tier(conditions(1), Protocol.fixed(10)), "full": Tier(conditions(2), Protocol.fixed(10))},
+    variants={"traded": Variant("The right network is wrong", {"smoke": traded_in(1), "full": traded_in(2)})},
 )
 '''
 

@@ -7,6 +7,7 @@ from pathlib import Path
 from evoclaims.judging.protocol import FIXED_10, SEQUENTIAL
 from evoclaims.suite.reproduction import Reproduction, Tier
 from reproductions.nisioti2025 import ecorobot, stepping_gates
+from reproductions.nisioti2025.variants import VARIANTS
 
 REPRODUCTION = Reproduction(
     name="nisioti2025",
@@ -16,4 +17,6 @@ REPRODUCTION = Reproduction(
         "smoke": Tier(conditions={**stepping_gates.SMOKE, **ecorobot.SMOKE}, protocol=FIXED_10),
         "full": Tier(conditions={**stepping_gates.FULL, **ecorobot.FULL}, protocol=SEQUENTIAL),
     },
+    variants=VARIANTS,
+    figures=tuple(f"{__name__}.{name}" for name in (*(f"fig{n}" for n in range(3, 11)), "tables")),
 )

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Generator
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import pytest
@@ -42,6 +43,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         help="fail: inconclusive claims, or a run that has judged none of its claims, end with status 1 (report)",
     )
     group.addoption("--claims-stored", action="store_true", help="judge from stored trials alone; run nothing")
+    group.addoption("--claims-variant", metavar="NAME", default="", help="judge under a variant of the protocol")
     group.addoption(
         "--claims-committed",
         action="store_true",
@@ -159,8 +161,8 @@ def make_session(config: pytest.Config) -> Session:
     reproduction = load_reproduction(load_config(config.rootpath))
     if config.getoption("claims_stored"):
         mode = StoredOnly(Archive(store, reproduction.references if config.getoption("claims_committed") else None))
-    made = Session(reproduction, store, mode, config.getoption("claims_trials"))
-    made.protocol("smoke")
+    made = Session(reproduction, store, mode, config.getoption("claims_trials"), config.getoption("claims_variant"))
+    reproduction.tier("smoke", made.variant)
     mode.check()
     config.stash[_session] = made
     if line is not None:
@@ -263,6 +265,7 @@ def _claim_report(item: pytest.Item, call: pytest.CallInfo[None]) -> ClaimReport
         report = broken(claim, _case(item), tier, _sentence(call.excinfo))
     elif report is None:
         report = broken(claim, _case(item), tier, "the test ended without calling verdict(...), so it judged nothing")
+    report = replace(report, variant=item.config.getoption("claims_variant"))
     report = expecting(report, expectation_of(item, tier))
     session = item.config.stash.get(_session, None)
     if session is None:

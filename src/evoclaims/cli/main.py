@@ -59,16 +59,21 @@ def _parser() -> argparse.ArgumentParser:
     device(plan)
     plan.add_argument("--measure", action="store_true", help="time a few steps of conditions never run here")
 
-    run = add("run", "run conditions without judging them")
+    run = add("run", "run conditions without judging them; or what a variant of the protocol changes, and judge that")
     run.add_argument("method", nargs="?", help="only this method")
     run.add_argument("--on", metavar="TASK", help="only this task")
     tier(run)
     device(run)
+    run.add_argument("--variant", metavar="NAME", default="", help="run what this variant changes, then judge by it")
     run.add_argument("--trials", type=int, metavar="N", help="trials per condition (default: the tier's)")
     run.add_argument("--first-seed", type=int, default=0, metavar="SEED", help="seed of the first trial (0)")
 
     status = add("status", "show the verdicts that the stored trials give; run nothing")
     tier(status)
+
+    report = add("report", "write a web page and a Markdown file about all claims from the trials at hand; run nothing")
+    report.add_argument("--tier", default="all", help="smoke, full or all (default)")
+    report.add_argument("--out", metavar="FOLDER", default="report", help="where to (report/)")
 
     champion = add("champion", "replay a stored trial's champion on every level, and draw or export its network")
     champion.add_argument("method", help="the method")
@@ -78,6 +83,24 @@ def _parser() -> argparse.ArgumentParser:
     champion.add_argument("--seed", type=int, default=0, help="the trial's seed (0)")
     champion.add_argument("--as", dest="form", metavar="FORM", help="also write its network: json, svg or png")
     champion.add_argument("--out", metavar="FILE", help="where to (METHOD-TASK-SEED.FORM)")
+
+    look = add("look", "draw a robot's task, or show what a stored champion does in it")
+    look.add_argument("task", help="the task")
+    tier(look)
+    device(look)
+    look.add_argument("--method", help="the method whose champion is shown; else the task alone")
+    look.add_argument("--seed", type=int, default=0, help="the trial's seed (0)")
+    look.add_argument(
+        "--as",
+        dest="form",
+        metavar="FORM",
+        help="path (default): a picture of the paths of all episodes; page: an episode in 3D, for a browser; gif: an "
+        "episode, animated; elites: the map of MAP-Elites",
+    )
+    look.add_argument("--episode", type=int, default=0, metavar="N", help="which of the evaluation's episodes (0)")
+    look.add_argument(
+        "--out", metavar="FILE", help="where to (TASK.svg, METHOD-TASK-SEED-FORM.…); a picture is svg or png"
+    )
 
     verify = add(
         "verify",

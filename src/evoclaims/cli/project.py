@@ -35,7 +35,7 @@ def open_archive(storage: str, reproduction: Reproduction) -> Archive:
     return Archive(open_store(storage), reproduction.references)
 
 
-def judge_stored(config: SuiteConfig, storage: str, tier: str) -> list[ClaimReport]:
+def judge_stored(config: SuiteConfig, storage: str, tier: str, variant: str = "") -> list[ClaimReport]:
     """Judge a tier's claims from stored trials, and committed reference trials where those are missing; run nothing.
 
     Raises:
@@ -49,6 +49,7 @@ def judge_stored(config: SuiteConfig, storage: str, tier: str) -> list[ClaimRepo
         "--claims-committed",
         f"--claims-storage={Path(storage).absolute()}",
         f"--claims-tier={tier}",
+        f"--claims-variant={variant}",
         "-pno:terminal",
         "-pno:cacheprovider",
         "-pno:xdist",

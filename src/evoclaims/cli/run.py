@@ -1,24 +1,36 @@
-"""`evoclaims run`: conditions without pytest."""
+"""`evoclaims run`: conditions without pytest, and claims under a variant of the protocol."""
 
 from __future__ import annotations
 
 import argparse
+from collections.abc import Mapping
 
-from evoclaims.cli.project import open_project, open_store
+from evoclaims.cli.project import judge_stored, open_project, open_store
 from evoclaims.cli.terminal import StdoutTerminal
 from evoclaims.core.errors import UnknownNameError, UserError
 from evoclaims.judging.counting import MAX_TRIALS
+from evoclaims.suite.config import SuiteConfig
 from evoclaims.suite.live import LiveLine, duration
 from evoclaims.suite.modes import RunMissing
 from evoclaims.suite.reproduction import Tier
+from evoclaims.suite.robustness import matrix
+from evoclaims.suite.variant import Variant
 from evoclaims.trials.result import TrialResult
 
 
 def main(options: argparse.Namespace) -> int:
     """Run what is missing and list the trials."""
-    _, reproduction = open_project()
-    tier = reproduction.tier(options.tier)
+    config, reproduction = open_project()
+    tier = reproduction.tier(options.tier, options.variant)
     chosen = choose(tier, options.method, options.on)
+    if options.variant:
+        touched = reproduction.variants[options.variant].conditions.get(options.tier, {})
+        chosen = [names for names in chosen if names in touched]
+        if not chosen:
+            raise UserError(
+                f"The variant {options.variant} changes none of these conditions at the {options.tier} tier; it "
+                f"changes: {', '.join(sorted(' on '.join(names) for names in touched)) or 'none'}."
+            )
     n = options.trials if options.trials is not None else tier.protocol.last.n
     if not 1 <= n <= MAX_TRIALS:
         raise UserError(
@@ -36,7 +48,23 @@ def main(options: argparse.Namespace) -> int:
         print(f"{method} on {task} ({options.tier})")
         for result in results:
             print(f"  {describe(result)}")
+    if options.variant:
+        _print_matrix(config, options.storage, options.tier, {options.variant: reproduction.variants[options.variant]})
     return 0
+
+
+def _print_matrix(config: SuiteConfig, storage: str, tier: str, variants: Mapping[str, Variant]) -> None:
+    """Print how claims end under the protocol and under its variants."""
+    judged = {name: judge_stored(config, storage, tier, name) for name in variants}
+    rows = matrix(judge_stored(config, storage, tier), judged)
+    for name, variant in variants.items():
+        print(f"\n{name}: {variant.says}")
+    for row in rows:
+        for name, outcome in row.outcomes.items():
+            changed = f"{row.plain} -> {outcome}" if name in row.hangs_on else f"{outcome} either way"
+            print(f"  {row.claim}: {changed}")
+    if not rows:
+        print("  No claim can be judged yet: each needs all trials of its tier.")
 
 
 def choose(tier: Tier, method: str | None, task: str | None) -> list[tuple[str, str]]:

@@ -45,5 +45,5 @@ class Archive:
 
     def _read(self) -> Iterator[TrialResult]:
         """Read every file of reference trials."""
-        for path in sorted(self.references.glob("*/*.jsonl")) if self.references is not None else ():
+        for path in sorted(self.references.rglob("*.jsonl")) if self.references is not None else ():
             yield from references.load(path)

@@ -36,6 +36,7 @@ class ClaimReport:
         sources: for each condition: "method", "task", "condition" (id) and "trials" (ids).
         attainable: for each look: "n", "alpha", and the smallest p for ("supported") and against ("refuted").
         evidence: path of the file that holds all this.
+        variant: name of the variant of the protocol; empty for the protocol itself.
     """
 
     claim: str
@@ -51,6 +52,7 @@ class ClaimReport:
     sources: tuple[dict[str, Any], ...] = ()
     attainable: tuple[dict[str, Any], ...] = ()
     evidence: str = ""
+    variant: str = ""
 
     @property
     def name(self) -> str:
@@ -64,8 +66,9 @@ class ClaimReport:
 
     @property
     def failed(self) -> bool:
-        """Whether this ends the run with status 1: refuted or broken, and not accepted."""
-        return self.outcome in (Outcome.REFUTED, Outcome.ERROR) and not self.as_expected
+        """Whether this ends the run with status 1: refuted or broken, and not accepted; of a variant, broken alone."""
+        failures = (Outcome.ERROR,) if self.variant else (Outcome.REFUTED, Outcome.ERROR)
+        return self.outcome in failures and not self.as_expected
 
     @property
     def n(self) -> int:
@@ -117,8 +120,8 @@ def skipped(claim: Claim, case: str, tier: str, reason: str) -> ClaimReport:
 
 
 def expecting(report: ClaimReport, expectation: Expectation | None) -> ClaimReport:
-    """Add an accepted outcome to a report."""
-    if expectation is None:
+    """Add an accepted outcome to a report; what is accepted of the protocol is not of its variants."""
+    if expectation is None or report.variant:
         return report
     return replace(report, expected=str(expectation.outcome), because=expectation.because)
 
@@ -152,7 +155,8 @@ def _unjudged(claim: Claim, case: str, tier: str, outcome: Outcome, reason: str)
 def _path(report: ClaimReport, root: Path) -> Path:
     """Return where a report's file lies."""
     name = re.sub(r"[^A-Za-z0-9_.-]+", "-", report.name).strip("-")
-    return root / "verdicts" / report.tier / f"{name}.json"
+    folder = root / "verdicts" / report.tier
+    return (folder / "variants" / report.variant if report.variant else folder) / f"{name}.json"
 
 
 def _source(group: TrialGroup, seeds: Sequence[int]) -> dict[str, Any]:

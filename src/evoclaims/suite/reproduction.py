@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from evoclaims.core.errors import UnknownNameError
 from evoclaims.judging.protocol import Protocol
+from evoclaims.suite.variant import Variant
 from evoclaims.trials.spec import Condition
 
 
@@ -43,20 +44,34 @@ class Reproduction:
         title: the paper's title.
         folder: where the reproduction lies; its reference trials are in folder/reference.
         tiers: by name; "smoke" and "full".
+        variants: by name, of the protocol; claims are re-judged under them.
+        figures: modules that redraw the paper's figures and tables, in its order; each holds FIGURE, an
+            `evoclaims.figures.Figure` with the module's last name, and is imported only when it is drawn.
     """
 
     name: str
     title: str
     folder: Path
     tiers: Mapping[str, Tier]
+    figures: tuple[str, ...] = ()
+    variants: Mapping[str, Variant] = field(default_factory=dict)
 
-    def tier(self, name: str) -> Tier:
-        """Return a tier; an `UnknownNameError` lists the known ones."""
+    def tier(self, name: str, variant: str = "") -> Tier:
+        """Return a tier, as a variant changes it if one is named; an `UnknownNameError` lists the known ones."""
         if name not in self.tiers:
             raise UnknownNameError("tier", name, self.tiers)
-        return self.tiers[name]
+        if not variant:
+            return self.tiers[name]
+        if variant not in self.variants:
+            raise UnknownNameError("variant", variant, self.variants or {"(none)"})
+        tier, changes = self.tiers[name], self.variants[variant].conditions.get(name, {})
+        return replace(tier, conditions={**tier.conditions, **changes})
 
     @property
     def references(self) -> Path:
-        """The folder of committed reference trials."""
+        """The folder of committed reference trials, those of variants included."""
         return self.folder / "reference"
+
+    def references_of(self, variant: str) -> Path:
+        """The folder of the reference trials that only a variant has; without a name, of the protocol's own."""
+        return self.references / "variants" / variant if variant else self.references

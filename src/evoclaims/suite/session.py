@@ -31,16 +31,18 @@ class Session:
         store: where trials are kept.
         fetch: how trials are had.
         trials: a fixed number of trials in place of the tier's looks; None keeps the tier's protocol.
+        variant: name of a variant of the protocol; empty for the protocol itself.
     """
 
     reproduction: Reproduction
     store: Store
     fetch: Fetch
     trials: int | None = None
+    variant: str = ""
 
     def group(self, method: str, on: str, tier: str) -> TrialGroup:
         """Return the trials of a method on a task, not yet run."""
-        return TrialGroup(method, on, self.reproduction.tier(tier).condition(method, on), self.fetch)
+        return TrialGroup(method, on, self.reproduction.tier(tier, self.variant).condition(method, on), self.fetch)
 
     def protocol(self, tier: str) -> Protocol:
         """Return how claims of a tier are judged; with a fixed number of trials, by one look at the whole α."""
@@ -54,23 +56,33 @@ class Session:
         protocol = self.protocol(tier)
         name = f"{claim.id}[{case}]" if case else claim.id
         try:
+            if self.variant and self._untouched(tier, assertion):
+                raise NotStoredError(f"the variant {self.variant} changes none of its trials")
             verdict = judge(assertion, protocol, claim=name, tier=tier)
         except NotStoredError as error:
             mark = fingerprint(assertion, protocol, claim=name, tier=tier)
             verdict = Verdict(Outcome.NOT_RUN, str(error), assertion.describe(), mark)
-        return judged(claim, case, tier, assertion, protocol, verdict)
+        return replace(judged(claim, case, tier, assertion, protocol, verdict), variant=self.variant)
+
+    def _untouched(self, tier: str, assertion: Assertion) -> bool:
+        """Whether the protocol itself has all conditions that an assertion is about."""
+        plain = self.reproduction.tier(tier)
+        groups = [source for source in assertion.sources() if isinstance(source, TrialGroup)]
+        return all(plain.condition(group.method, group.task).id == group.fingerprint for group in groups)
 
     def drift(self, reports: Sequence[ClaimReport]) -> tuple[DriftReport, DigestCheck]:
         """Compare the trials behind `reports` with the committed reference trials of their tiers."""
         used: dict[tuple[str, str, str], set[str]] = {}
         for report in reports:
+            if self.variant and not report.n:  # most claims are not about what a variant changes
+                continue
             for source in report.sources:
                 used.setdefault((report.tier, source["method"], source["task"]), set()).update(source["trials"])
         cases = []
         for (tier, method, task), ids in sorted(used.items()):
             trials = [trial for trial in map(self.store.get, sorted(ids)) if trial is not None]
             if trials:
-                folder = self.reproduction.references
+                folder = self.reproduction.references_of(self.variant)
                 cases.append(references.drift_case(folder, tier, method, task, trials))
         return references.compare(cases)
 

@@ -1,0 +1,122 @@
+"""Details that the paper leaves open, or that its published code does otherwise: which conclusions hang on them?"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+from evoclaims.envs.ecorobot.robot_task import RobotTask
+from evoclaims.envs.gates.alu import SimpleAlu
+from evoclaims.envs.gates.cumulative import CumulativeParity
+from evoclaims.envs.gates.parity import NParity
+from evoclaims.methods.cma_es import CmaEs
+from evoclaims.methods.hyperneat import CODE as PUBLISHED_HYPERNEAT
+from evoclaims.methods.hyperneat import HyperNeat
+from evoclaims.methods.neat.neat import Neat
+from evoclaims.methods.neat.settings import Mutation
+from evoclaims.methods.ppo import LevelTest, Ppo
+from evoclaims.networks.all_skips import AllSkips
+from evoclaims.networks.mlp import Mlp
+from evoclaims.suite.variant import Variant, changed
+from evoclaims.trials.spec import Condition
+from reproductions.nisioti2025 import ecorobot, stepping_gates
+
+
+def _rows_so_far(method: str, task: str, condition: Condition) -> Condition | None:
+    """N-parity, with the rows of all levels so far."""
+    asked = condition.task
+    if not isinstance(asked, NParity) or condition.progression == "direct" or method.startswith("hand_built"):
+        return None
+    return replace(condition, task=CumulativeParity(asked.bits, asked.sampling))
+
+
+def _published_alu(method: str, task: str, condition: Condition) -> Condition | None:
+    """Simple ALU, as the published code has it."""
+    asked = condition.task
+    if not isinstance(asked, SimpleAlu) or method.startswith("hand_built"):
+        return None
+    return replace(condition, task=replace(asked, operations="published_code", multiplexer="published_code"))
+
+
+def _perceptron(method: str, task: str, condition: Condition) -> Condition | None:
+    """CMA-ES with the published script's network, or one as small as the smoke tier's others."""
+    trained: Any = condition.method
+    if not isinstance(trained, CmaEs):
+        return None
+    layers = (32,) * 4 if trained.network == AllSkips(hidden=24) else (8,) * 2
+    return replace(condition, method=replace(trained, network=Mlp(layers)))
+
+
+def _published_neat(method: str, task: str, condition: Condition) -> Condition | None:
+    """NEAT with the published code's rates and treatment of a new level; at full size its population too."""
+    evolved: Any = condition.method
+    if not isinstance(evolved, Neat):
+        return None
+    ours = evolved.settings
+    size = min(ours.population, 1_024)
+    species = replace(ours.species, most=min(ours.species.most, 20), on_level_up="keep")
+    settings = replace(ours, population=size, mutation=Mutation(node_add=0.1), species=species)
+    return replace(condition, method=replace(evolved, settings=settings))
+
+
+def _sigmoid(method: str, task: str, condition: Condition) -> Condition | None:
+    """HyperNEAT whose CPPNs have sigmoids only."""
+    evolved: Any = condition.method
+    if not isinstance(evolved, HyperNeat):
+        return None
+    settings = replace(evolved.settings, activations=PUBLISHED_HYPERNEAT.activations)
+    return replace(condition, method=replace(evolved, settings=settings))
+
+
+def _lucky_level_up(method: str, task: str, condition: Condition) -> Condition | None:
+    """PPO goes up a level when 128 rows drawn at random are answered right, tested 49 times in a whole budget."""
+    learner: Any = condition.method
+    if not isinstance(learner, Ppo) or isinstance(condition.task, RobotTask):
+        return None
+    test = LevelTest(every=max(1, condition.steps // 49), sampled_episodes=128)
+    return replace(condition, method=replace(learner, level_test=test))
+
+
+def _published_ppo(method: str, task: str, condition: Condition) -> Condition | None:
+    """PPO among robots, with the published code's hyperparameters."""
+    learner: Any = condition.method
+    if not isinstance(learner, Ppo) or not isinstance(condition.task, RobotTask):
+        return None
+    return replace(condition, method=replace(learner, unroll_length=20, discounting=0.95, updates_per_batch=8))
+
+
+def _variant(says: str, change: Any) -> Variant:
+    """Apply a change to both tiers."""
+    sizes = {
+        "smoke": {**stepping_gates.SMOKE, **ecorobot.SMOKE},
+        "full": {**stepping_gates.FULL, **ecorobot.FULL},
+    }
+    return Variant(says, {tier: changed(conditions, change) for tier, conditions in sizes.items()})
+
+
+VARIANTS = {
+    "rows_so_far": _variant(
+        "N-parity asks the rows of all levels so far at every level, as one published environment does", _rows_so_far
+    ),
+    "published_alu": _variant(
+        "Simple ALU as the published code has it: a multiplexer that ignores its select bit, XAX, no shift right",
+        _published_alu,
+    ),
+    "perceptron": _variant(
+        "CMA-ES trains a perceptron, in the published script of 4 x 32 neurons (at smoke 2 x 8)", _perceptron
+    ),
+    "published_neat": _variant(
+        "NEAT adds nodes with probability 0.1, keeps old records on a new level, and has at most 1,024 genomes in 20 "
+        "species, as in the published code",
+        _published_neat,
+    ),
+    "sigmoid": _variant("HyperNEAT's CPPNs have sigmoids only, as in the published code", _sigmoid),
+    "lucky_level_up": _variant(
+        "PPO goes up a level when its stochastic policy answers 128 random rows right, as in the published code",
+        _lucky_level_up,
+    ),
+    "published_ppo": _variant(
+        "PPO with robots unrolls 20 steps, discounts by 0.95 and updates 8 times a batch, as in the published code",
+        _published_ppo,
+    ),
+}

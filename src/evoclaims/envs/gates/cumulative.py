@@ -1,0 +1,49 @@
+"""N-parity that goes on asking what it asked before: a reading of the paper's curriculum, as a named variant."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import ClassVar
+
+import numpy as np
+
+from evoclaims.envs.gates.circuit import Circuit, Sampling
+from evoclaims.envs.gates.parity import NParity
+from evoclaims.envs.gates.truth_table import TruthTable
+
+
+@dataclass(frozen=True)
+class CumulativeParity(Circuit):
+    """Level k asks the tables of levels 0 … k of N-parity, one after the other.
+
+    One of the published environments does so with its curriculum switched on. The rows of early levels are asked once
+    for every level so far, so that forgetting them costs more than in `NParity`, and success weighs them alike.
+
+    Attributes:
+        bits: N, from 2 to 12.
+        sampling: see `Circuit`.
+    """
+
+    name: ClassVar[str] = "cumulative_parity"
+    revision: ClassVar[int] = 1
+
+    bits: int = 6
+    sampling: Sampling = "exhaustive"
+
+    def __post_init__(self) -> None:
+        """Check the size."""
+        _ = NParity(self.bits)
+        super().__post_init__()
+
+    @cached_property
+    def table(self) -> TruthTable:
+        """Levels one after the other, so that level k is a prefix: the first 4 + 8 + … + 2^(k + 2) rows."""
+        plain = NParity(self.bits).table
+        rows = np.concatenate([np.arange(count) for count in plain.rows_at_level])
+        return TruthTable(
+            inputs=plain.inputs[rows],
+            targets=plain.targets[rows],
+            active=plain.active[rows],
+            rows_at_level=tuple(int(end) for end in np.cumsum(plain.rows_at_level)),
+        )

@@ -1,0 +1,74 @@
+"""Claims under a variant of the protocol."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+
+import pytest
+from tiny_project import Project
+
+from evoclaims.cli import main
+
+Sentence = Callable[[pytest.RunResult, str], None]
+
+
+def test_a_variant_is_judged_from_its_own_trials_and_fails_nothing(project: Project) -> None:
+    project.write(first="supported", second="refuted")
+    out = project.json("-m", "smoke", "--claims-variant=traded", "-k", "first")
+    assert [(claim["outcome"], claim["variant"]) for claim in out["claims"]] == [("refuted", "traded")]
+    result = project.run("-m", "smoke", "--claims-variant=traded", "-k", "first")
+    assert result.ret == 0
+
+
+def test_claims_that_a_variant_does_not_touch_are_not_judged_again(project: Project) -> None:
+    project.write(first="supported", second="refuted")
+    out = project.json("-m", "smoke", "--claims-variant=traded")
+    assert {claim["claim"]: claim["outcome"] for claim in out["claims"]} == {"first": "refuted", "second": "not run"}
+    assert "changes none of its trials" in out["claims"][1]["reason"]
+
+
+def test_the_evidence_of_a_variant_lies_apart(project: Project) -> None:
+    project.write(first="supported")
+    project.run("-m", "smoke")
+    project.run("-m", "smoke", "--claims-variant=traded")
+    folder = project.store / "verdicts" / "smoke"
+    plain, varied = folder / "first.json", folder / "variants" / "traded" / "first.json"
+    assert [json.loads(path.read_text())["outcome"] for path in (plain, varied)] == ["supported", "refuted"]
+
+
+def test_what_is_accepted_of_the_protocol_is_not_of_a_variant(project: Project) -> None:
+    project.write(
+        """
+@says("first", expect="supported", because="so it is")
+def test_first(trials, verdict):
+    verdict(trials("right", on="parity").solves_every_level.in_most_trials())
+"""
+    )
+    assert project.json("-m", "smoke")["claims"][0]["expected"] == "supported"
+    assert project.json("-m", "smoke", "--claims-variant=traded")["claims"][0]["expected"] is None
+
+
+def test_an_unknown_variant_is_a_sentence_with_the_known_ones(project: Project, sentence: Sentence) -> None:
+    project.write(first="supported")
+    result = project.run("-m", "smoke", "--claims-variant=trade")
+    sentence(result, "There is no variant named 'trade'. Did you mean 'traded'? Known: traded.")
+    assert result.ret == 4
+
+
+def test_the_command_runs_what_a_variant_changes_and_says_what_hangs_on_it(
+    project: Project, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(project.path)
+    project.write(first="supported", second="refuted")
+    assert project.run("-m", "smoke", own_store=True).ret == 1
+    capsys.readouterr()
+    assert main(["run", "--variant", "traded"]) == 0
+    shown = capsys.readouterr().out
+    assert "right on parity (smoke)" in shown
+    assert "wrong on parity (smoke)" not in shown
+    assert "traded: The right network is wrong" in shown
+    assert "first: supported -> refuted" in shown
+    assert "second" not in shown
+    assert main(["run", "wrong", "--variant", "traded"]) == 2
+    assert "changes none of these conditions" in capsys.readouterr().err
