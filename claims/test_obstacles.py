@@ -5,7 +5,20 @@ Smoke judges the sentences after a few generations of episodes of 100 steps, whi
 
 import pytest
 
-from evoclaims import claim
+from evoclaims import Outcome, claim, expected
+
+HYPERNEAT_RUNS_AT_ONCE = expected(
+    Outcome.REFUTED,
+    tier="smoke",
+    because="3 generations: the weights that HyperNEAT's first networks draw already run forward, mean reward 85; NEAT "
+    "(-16) and PPO (4) have hardly begun",
+)
+PPO_HOLDS_STILL = expected(
+    Outcome.REFUTED,
+    tier="smoke",
+    because="10,000 steps: PPO has learnt to hold still, which costs next to nothing (6 of control cost against NEAT's "
+    "58); NEAT's champions of 3 generations flail",
+)
 
 
 @claim(
@@ -14,7 +27,14 @@ from evoclaims import claim
     where="§5.2.1, Fig. 7",
     smoke="NEAT collects the most reward in 9,600 steps",
 )
-@pytest.mark.parametrize("other", ["hyperneat", "cma_es", "ppo"])
+@pytest.mark.parametrize(
+    "other",
+    [
+        pytest.param("hyperneat", marks=HYPERNEAT_RUNS_AT_ONCE),
+        "cma_es",
+        pytest.param("ppo", marks=PPO_HOLDS_STILL),
+    ],
+)
 def test_neat_is_best_over_obstacles(trials, verdict, other):
     neat = trials("neat", on="obstacles")
     rest = trials(other, on="obstacles")
@@ -27,7 +47,7 @@ def test_neat_is_best_over_obstacles(trials, verdict, other):
     where="§5.2.1, Fig. 7",
     smoke="PPO collects more reward in 10,000 steps than HyperNEAT and CMA-ES",
 )
-@pytest.mark.parametrize("other", ["hyperneat", "cma_es"])
+@pytest.mark.parametrize("other", [pytest.param("hyperneat", marks=HYPERNEAT_RUNS_AT_ONCE), "cma_es"])
 def test_ppo_is_second_over_obstacles(trials, verdict, other):
     ppo = trials("ppo", on="obstacles")
     rest = trials(other, on="obstacles")
@@ -41,6 +61,7 @@ def test_ppo_is_second_over_obstacles(trials, verdict, other):
     where="§5.2.1, Fig. 7",
     smoke="After 10,000 steps PPO's policies pay more control cost than NEAT's, and flip the robot over more often",
 )
+@PPO_HOLDS_STILL
 def test_ppo_is_bumpy(trials, verdict):
     ppo = trials("ppo", on="obstacles")
     neat = trials("neat", on="obstacles")
@@ -71,6 +92,7 @@ def test_medium_obstacles_hold_back_neat_alone(trials, verdict, claim_tier):
     where="§5.2.1, Fig. 8",
     smoke="In 10,000 steps PPO passes no high obstacle, and NEAT collects more reward",
 )
+@PPO_HOLDS_STILL
 def test_high_obstacles_stop_ppo(trials, verdict):
     neat = trials("neat", on="obstacles_high")
     ppo = trials("ppo", on="obstacles_high")

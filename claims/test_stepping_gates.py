@@ -200,3 +200,17 @@ def test_neat_degrades_slightly_without_the_curriculum(trials, verdict):
 def test_neat_grows_large_networks(trials, verdict, task):
     neat = trials("neat", on=task)
     verdict(neat.champion_is_mostly_hidden.in_most_trials())
+
+
+@claim(
+    "G10",
+    says="NEAT grows large networks for the stepping gates tasks while the networks found for this maze are "
+    "surprisingly small",
+    where="§5.2.1",
+    smoke="After 8 generations in the maze with stepping stones, at most half of the neurons of NEAT's champions are "
+    "hidden",
+)
+@pytest.mark.parametrize("task", ["stones"])
+def test_neat_s_networks_stay_small_in_the_maze(trials, verdict, task):
+    neat = trials("neat", on=task)
+    verdict(neat.champion_is_mostly_input_and_output.in_most_trials())

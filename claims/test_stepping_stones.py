@@ -5,10 +5,32 @@ Smoke judges the sentences after a few generations of short episodes; so early n
 
 import pytest
 
-from evoclaims import claim
+from evoclaims import Outcome, claim, expected
 
-EVOLVED = ["hyperneat", "cma_es"]
-LEARNED = ["ppo", "goal_ppo"]
+EVOLVED = [
+    pytest.param(
+        "hyperneat",
+        marks=expected(
+            Outcome.REFUTED,
+            tier="full",
+            because="champions that crossed two stones in the one episode that made them champions cross 0.1 to 1.2 in "
+            "ten others (docs/protocol.md)",
+        ),
+    ),
+    "cma_es",
+]
+LEARNED = [
+    "ppo",
+    pytest.param(
+        "goal_ppo",
+        marks=expected(
+            Outcome.REFUTED,
+            tier="full",
+            because="shown the next stone, PPO crosses 0 to 6.6 stones (mean 3.7), and in three trials of ten reaches "
+            "the target in most episodes; in the published code no stone pays (docs/protocol.md)",
+        ),
+    ),
+]
 
 
 @claim(

@@ -24,7 +24,7 @@ from evoclaims.methods.map_elites import MapElites
 from evoclaims.methods.neat.neat import Neat
 from evoclaims.methods.neat.settings import Settings, Species
 from evoclaims.methods.ppo import LevelTest, Ppo
-from evoclaims.methods.random_search import RandomSearch
+from evoclaims.methods.random_policy import RandomPolicy
 from evoclaims.methods.waypoints import Waypoints
 from evoclaims.networks.all_skips import AllSkips
 from evoclaims.networks.mlp import Mlp
@@ -109,8 +109,8 @@ def _conditions(size: Size) -> Conditions:
         "ppo": dict.fromkeys(tasks, size.ppo),
         "goal_ppo": dict.fromkeys(tasks, size.ppo),
         "map_elites": dict.fromkeys(tasks, size.map_elites),
-        # One network with random weights, as a policy: what control C3 compares with.
-        "random_policy": dict.fromkeys(tasks, RandomSearch(population=1, network=Mlp((32,) * 4))),
+        # Control C3: nothing is learnt.
+        "random_policy": dict.fromkeys(tasks, RandomPolicy()),
         # Control C4: nothing to train.
         "waypoints": dict.fromkeys(tasks, Waypoints()),
     }

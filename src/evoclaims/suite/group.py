@@ -77,6 +77,16 @@ class TrialGroup:
         )
 
     @property
+    def champion_is_mostly_input_and_output(self) -> Event:
+        """No more than half of the final champion's neurons are hidden; of methods that grow networks."""
+        task = self.condition.task
+        return Event(
+            self,
+            "at most half of the champion's neurons are hidden",
+            lambda t: t.curves["champion_nodes"][-1] <= 2 * (task.observation_size + task.action_size),
+        )
+
+    @property
     def solves_every_level(self) -> Event:
         """The final policy is right on every row of every level."""
         return self.success_everywhere_is(1.0)

@@ -13,8 +13,8 @@ from evoclaims.judging.tripwire import DigestCheck, compare_digests
 from evoclaims.trials.records import RecordError, dump, parse
 from evoclaims.trials.result import TrialResult
 
-METRICS = ("mean_success", "environment_steps")
-"""What the drift check compares: how well a trial ended, and how long it took."""
+METRICS = ("mean_success", "last_fitness", "environment_steps")
+"""What the drift check compares: how well a trial ended, in success and in reward, and how long it took."""
 
 
 def path_of(folder: Path, tier: str, method: str, task: str) -> Path:
