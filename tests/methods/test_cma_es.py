@@ -15,10 +15,10 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from evoclaims.core.errors import UserError
+from evoclaims.core.foreign import implicit_promotions
 from evoclaims.core.pytree import strong
 from evoclaims.envs.base import Episode
 from evoclaims.methods.cma_es import CmaEs, ordinal_weights
-from evoclaims.core.foreign import implicit_promotions
 
 DIMENSIONS, POPULATION = 5, 16
 Vector = NDArray[np.float64]

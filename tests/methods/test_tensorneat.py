@@ -17,8 +17,8 @@ import pytest
 from workbench import Workbench, close, same_bits
 
 from evoclaims.core.errors import UserError
-from evoclaims.envs.gates.parity import NParity
 from evoclaims.core.foreign import implicit_promotions
+from evoclaims.envs.gates.parity import NParity
 from evoclaims.methods.hyperneat import HyperNeat
 from evoclaims.methods.hyperneat_tensorneat import HyperneatTensorneat
 from evoclaims.methods.neat.distance import distance
