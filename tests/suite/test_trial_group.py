@@ -83,6 +83,7 @@ def test_a_champion_is_mostly_hidden_when_more_than_half_of_its_nodes_are(group:
     last = [2 * visible + more for more in (-1, 0, 1)]
     grown = [replace(trial, seed=seed, curves={"champion_nodes": (99.0, float(n))}) for seed, n in enumerate(last)]
     assert made.champion_is_mostly_hidden.sample({made.fingerprint: tuple(grown)}).values == (0, 0, 1)
+    assert made.champion_is_mostly_input_and_output.sample({made.fingerprint: tuple(grown)}).values == (1, 1, 0)
 
 
 def test_the_success_of_a_level_can_be_compared_with_another(group: Any) -> None:
@@ -99,6 +100,7 @@ def test_measures_and_events_have_names_of_their_own_since_fingerprints_hash_the
         made.solves_the_last_level,
         made.does_not_solve_the_last_level,
         made.champion_is_mostly_hidden,
+        made.champion_is_mostly_input_and_output,
         made.solves_level(0),
         made.solves_level(1),
         made.solves_no_level_beyond(0),
