@@ -12,7 +12,9 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
+from evoclaims import pytest_options
 from evoclaims.core.errors import UnknownNameError, UserError
+from evoclaims.pytest_options import TIERS
 from evoclaims.pytest_summary import ATTRIBUTE, TROUBLE, Summary
 
 if TYPE_CHECKING:
@@ -21,7 +23,6 @@ if TYPE_CHECKING:
     from evoclaims.suite.report import ClaimReport
     from evoclaims.suite.session import Session, Verdicts
 
-TIERS = ("smoke", "full")
 _session: pytest.StashKey[Session] = pytest.StashKey()
 _line: pytest.StashKey[LiveLine] = pytest.StashKey()
 _verdicts: pytest.StashKey[Verdicts] = pytest.StashKey()
@@ -29,26 +30,7 @@ _verdicts: pytest.StashKey[Verdicts] = pytest.StashKey()
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     """Add the options."""
-    group = parser.getgroup("claims", "claims of a paper (evoclaims)")
-    group.addoption("--claims-storage", metavar="DIR", default=".evoclaims", help="folder of trials (.evoclaims)")
-    group.addoption("--claims-tier", metavar="TIER", help="judge this tier's claims: smoke or full; as -m TIER")
-    group.addoption("--claims-trials", metavar="N", type=int, help="judge by one look at N trials a condition")
-    group.addoption("--claims-only", metavar="IDS", help="judge only these claims, such as G1,G7")
-    group.addoption("--claims-device", metavar="DEVICE", default="auto", help="auto (default), cpu or gpu")
-    group.addoption("--claims-json", metavar="FILE", help="write all verdicts to FILE, also when there are none")
-    group.addoption(
-        "--claims-undecided",
-        choices=("report", "fail"),
-        default="report",
-        help="fail: inconclusive claims, or a run that has judged none of its claims, end with status 1 (report)",
-    )
-    group.addoption("--claims-stored", action="store_true", help="judge from stored trials alone; run nothing")
-    group.addoption("--claims-variant", metavar="NAME", default="", help="judge under a variant of the protocol")
-    group.addoption(
-        "--claims-committed",
-        action="store_true",
-        help="with --claims-stored: take what the store lacks from the committed reference trials",
-    )
+    pytest_options.add(parser)
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -62,9 +44,7 @@ def pytest_configure(config: pytest.Config) -> None:
         config.addinivalue_line("markers", line)
     if not hasattr(config, "workerinput"):  # an xdist worker leaves the summary to its controller
         config.pluginmanager.register(Summary(config, make_session), "claims-summary")
-    tier = config.getoption("claims_tier")
-    if tier is not None and tier not in TIERS:
-        raise pytest.UsageError(str(UnknownNameError("tier", tier, TIERS)))
+    pytest_options.check(config)
 
 
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:

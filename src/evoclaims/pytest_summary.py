@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+import os
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -14,6 +15,7 @@ from evoclaims.core.errors import UserError
 if TYPE_CHECKING:
     from evoclaims.judging.baseline import DriftReport
     from evoclaims.judging.tripwire import DigestCheck
+    from evoclaims.suite.regression import Regression
     from evoclaims.suite.report import ClaimReport
     from evoclaims.suite.session import Session
 
@@ -33,6 +35,7 @@ class Summary:
         self._make_session = make_session
         self.reports: list[ClaimReport] = []
         self._drift: tuple[DriftReport, DigestCheck] | None = None
+        self._regression: Regression | None = None
         self._troubles: list[str] = []
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
@@ -54,12 +57,13 @@ class Summary:
     def pytest_sessionfinish(self, session: pytest.Session) -> None:
         """Compare with the reference trials, write the JSON report and settle the exit status.
 
-        0: nothing refuted, nothing drifted. 1: something was refuted without being accepted, broke, or drifted; or,
-        with --claims-undecided=fail, no claim was judged. 4: xdist's workers refused to begin. 5 (pytest's "no
-        tests"): claims were selected, but no trial was looked at (all are skipped, say), so that nothing was measured.
+        0: nothing refuted, nothing drifted. 1: something was refuted without being accepted, broke, or drifted; or a
+        verdict changed as --claims-compare-fail names it; or, with --claims-undecided=fail, no claim was judged.
+        4: xdist's workers refused to begin. 5 (pytest's "no tests"): claims were selected, but no trial was looked at
+        (all are skipped, say), so that nothing was measured.
         """
         refused = bool(self._troubles)
-        for finish in (self._compare, self._write_json):
+        for finish in (self._compare, self._compare_with_accepted, self._write_json):
             try:
                 finish()
             except UserError as error:
@@ -74,9 +78,19 @@ class Summary:
         if self.reports:
             self._drift = self._make_session(self._config).drift(self.reports)
 
+    def _compare_with_accepted(self) -> None:
+        """Compare the verdicts with those last accepted, which are of the protocol itself and not of a variant."""
+        from evoclaims.suite.regression import regression
+
+        if self.reports and not self._config.getoption("claims_variant"):
+            folder = self._make_session(self._config).reproduction.folder
+            self._regression = regression(folder, self.reports, self._config.getoption("claims_compare_fail"))
+
     def _status(self) -> pytest.ExitCode:
         """Return the exit status of a run in which no test failed."""
         if self._troubles or (self._drift is not None and self._drift[0].drifted):
+            return pytest.ExitCode.TESTS_FAILED
+        if self._regression is not None and self._regression.matched:
             return pytest.ExitCode.TESTS_FAILED
         if self.reports and not self._judged and self._config.getoption("claims_undecided") == "fail":
             return pytest.ExitCode.TESTS_FAILED
@@ -106,15 +120,28 @@ class Summary:
         if explained:
             terminalreporter.write_line(explained)
             terminalreporter.write_line("")
-        if self._drift is not None:
-            drift, digests = self._drift
-            terminalreporter.write_line(table.drift_lines(drift, len(digests.changed), digests.compared))
+        notes = self._notes()
+        for note in notes:
+            terminalreporter.write_line(note)
         for trouble in self._troubles:
             terminalreporter.write_line(f"error: {trouble}", red=True)
+        warning = self._write_step_summary(notes)
+        if warning:
+            terminalreporter.write_line(f"warning: {warning}", yellow=True)
         terminalreporter.write_line(f"claims: {table.totals(self.reports)}", bold=True)
         if not any(report.n for report in self.reports):
             what = "No trial was looked at" if self._judged else "No claim was judged"
             terminalreporter.write_line(f"{what}: nothing was measured.", red=True)
+
+    def _notes(self) -> list[str]:
+        """Return what the comparisons with reference trials and with accepted verdicts found, in lines."""
+        from evoclaims.suite import table
+
+        notes = []
+        if self._drift is not None:
+            drift, digests = self._drift
+            notes += table.drift_lines(drift, len(digests.changed), digests.compared).splitlines()
+        return [*notes, *(self._regression.lines if self._regression else ())]
 
     def _write_json(self) -> None:
         """Write all verdicts to the file that --claims-json names; none, too, are said, and no old file is left."""
@@ -133,3 +160,20 @@ class Summary:
             raise UserError(
                 f"Cannot write the verdicts to {path}: {reason}. Name a file that can be written with --claims-json."
             ) from error
+
+    def _write_step_summary(self, notes: Sequence[str]) -> str:
+        """Append the verdicts to the page that GitHub shows of a step; return why it cannot be written, if it cannot.
+
+        This is called where a terminal is talked to, so that the runs within commands of `evoclaims` add nothing.
+        """
+        from evoclaims.suite.markdown import run_summary
+
+        name = os.environ.get("GITHUB_STEP_SUMMARY")
+        if not name:
+            return ""
+        try:
+            with open(name, "a", encoding="utf-8") as page:
+                page.write(run_summary(self.reports, [*notes, *self._troubles]))
+        except OSError as error:
+            return f"Cannot write the verdicts to GitHub's summary {name}: {error.strerror or error}."
+        return ""

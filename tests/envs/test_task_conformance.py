@@ -1,8 +1,9 @@
-"""What every task keeps to, probes and gates alike."""
+"""What every task keeps to: gates, probes and robots alike."""
 
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import jax
@@ -11,22 +12,43 @@ import numpy as np
 import pytest
 
 from evoclaims.core.canonical import canonical_json
+from evoclaims.envs.ecorobot.deceptive import DeceptiveMaze
+from evoclaims.envs.ecorobot.locomotion import Locomotion
+from evoclaims.envs.ecorobot.obstacles import Obstacles
+from evoclaims.envs.ecorobot.robots import SIMPLE_ROB
+from evoclaims.envs.ecorobot.stones import SteppingStones
 from evoclaims.envs.gates.alu import SimpleAlu
 from evoclaims.envs.gates.parity import NParity
 from evoclaims.envs.probes import PROBES
 
-TASKS: dict[str, Any] = {
+EXACT: dict[str, Any] = {
     "parity": NParity(3),
     "parity, sampled": NParity(3, "sampled"),
     "alu": SimpleAlu(3),
     "alu, sampled": SimpleAlu(3, sampling="sampled"),
     **PROBES,
 }
+"""Tasks whose examinations draw nothing."""
+
+_SHORT: Any = {"episode_steps": 4, "examined_episodes": 2}
+ROBOTS: dict[str, Any] = {
+    "stepping stones": SteppingStones(shows_goal=True, **_SHORT),
+    "deceptive maze": DeceptiveMaze(**_SHORT),
+    "obstacles": Obstacles(robot=SIMPLE_ROB, **_SHORT),
+    "locomotion": Locomotion(robot=SIMPLE_ROB, **_SHORT),
+}
+"""Tasks whose episodes start at random, and whose physics rounds as the compiler arranges it."""
+TASKS = {**EXACT, **ROBOTS}
 LEVEL = jnp.zeros((), jnp.int32)
 
 
 @pytest.fixture(params=TASKS.values(), ids=list(TASKS))
 def task(request: pytest.FixtureRequest) -> Any:
+    return request.param
+
+
+@pytest.fixture(params=EXACT.values(), ids=list(EXACT))
+def exact(request: pytest.FixtureRequest) -> Any:
     return request.param
 
 
@@ -60,6 +82,7 @@ def test_a_fresh_episode_has_neither_ended_nor_paid(task: Any) -> None:
     assert (float(state.reward), bool(state.terminated), bool(state.truncated)) == (0.0, False, False)
 
 
+@pytest.mark.parametrize("task", [*EXACT.values(), ROBOTS["locomotion"]], ids=[*EXACT, "locomotion"])
 def test_every_level_ends_within_the_horizon(task: Any) -> None:
     step = jax.jit(lambda state: task.step(state, _act(task, state.observation)))
     for level in range(task.levels):
@@ -67,13 +90,16 @@ def test_every_level_ends_within_the_horizon(task: Any) -> None:
         while not (state.terminated or state.truncated):
             state, steps = step(state), steps + 1
             assert steps <= task.horizon
+        assert not (state.terminated and state.truncated)
 
 
-def test_a_batch_matches_the_loop_plain_and_jitted(task: Any) -> None:
-    def play(key: jax.Array, level: jax.Array) -> Any:
-        return task.step(task.reset(key, level), jnp.ones(task.action_size))
+def _played(task: Any, key: jax.Array, level: jax.Array) -> Any:
+    return task.step(task.reset(key, level), jnp.ones(task.action_size))
 
-    levels = jnp.arange(6, dtype=jnp.int32) % task.levels
+
+def test_a_batch_matches_the_loop_plain_and_jitted(exact: Any) -> None:
+    play = partial(_played, exact)
+    levels = jnp.arange(6, dtype=jnp.int32) % exact.levels
     batch = jax.vmap(play)(jax.random.split(jax.random.key(1), 6), levels)
     jitted = jax.jit(play)
     for i, (one, two) in enumerate(
@@ -84,14 +110,33 @@ def test_a_batch_matches_the_loop_plain_and_jitted(task: Any) -> None:
         _equal(alone, jitted(two, levels[i]))
 
 
-def test_examinations_lie_between_0_and_1_and_do_not_depend_on_the_key(task: Any) -> None:
-    examine = jax.jit(lambda key, level: task.examine(lambda o: _act(task, o), key, level))
-    for level in range(task.levels):
+def test_a_batch_of_robots_matches_the_loop_but_for_rounding() -> None:
+    play = partial(_played, ROBOTS["stepping stones"])
+    batch = jax.jit(jax.vmap(play, in_axes=(0, None)))(jax.random.split(jax.random.key(1), 3), LEVEL)
+    jitted = jax.jit(play)
+    for i, key in enumerate(jax.random.split(jax.random.key(1), 3)):
+        alone = jax.tree.map(lambda leaf, i=i: leaf[i], batch)
+        jax.tree.map(partial(np.testing.assert_allclose, rtol=1e-5, atol=1e-6), alone, jitted(key, LEVEL))
+
+
+def test_examinations_lie_between_0_and_1_and_do_not_depend_on_the_key(exact: Any) -> None:
+    examine = jax.jit(lambda key, level: exact.examine(lambda o: _act(exact, o), key, level))
+    for level in range(exact.levels):
         one = examine(jax.random.key(1), jnp.asarray(level, jnp.int32))
         _equal(one, examine(jax.random.key(2), jnp.asarray(level, jnp.int32)))
         assert 0.0 <= float(one.success) <= 1.0
         assert one.success.dtype == one.fitness.dtype == jnp.float32
         assert one.success.shape == one.fitness.shape == ()
+
+
+def test_an_examination_of_a_robot_depends_on_the_key_alone() -> None:
+    task = ROBOTS["locomotion"]
+    examine = jax.jit(lambda key: task.examine(lambda o: _act(task, o), key, LEVEL))
+    one, again, other = (examine(jax.random.key(seed)) for seed in (1, 1, 2))
+    _equal(one, again)
+    assert float(one.fitness) != float(other.fitness)
+    assert one.success.dtype == one.fitness.dtype == jnp.float32
+    assert one.success.shape == one.fitness.shape == ()
 
 
 def test_a_task_is_hashable_and_has_a_canonical_form(task: Any) -> None:

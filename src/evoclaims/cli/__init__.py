@@ -1,4 +1,4 @@
-"""The command line: `evoclaims plan | run | champion | status | verify | reference`."""
+"""The command line: `evoclaims plan | run | champion | look | status | verify | reference`."""
 
 from evoclaims.cli.main import main
 

@@ -6,21 +6,20 @@ import argparse
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from rich.console import Console
 from rich.table import Table
 
-from evoclaims.cli.project import open_project, open_store
+from evoclaims.cli.project import open_project
 from evoclaims.cli.run import describe
+from evoclaims.cli.stored import Stored, load, write
 from evoclaims.core.errors import UnknownNameError, UserError
-from evoclaims.core.files import write_atomically
 from evoclaims.networks import export, picture
+from evoclaims.networks.genome import Genome
 from evoclaims.networks.graph import GraphNetwork
 from evoclaims.trials import champions, devices
 from evoclaims.trials.champions import Replay
 from evoclaims.trials.records import printable
-from evoclaims.trials.spec import Condition, TrialSpec
 
 
 @dataclass(frozen=True)
@@ -28,16 +27,23 @@ class Subject:
     """A champion that is a genome, as the forms of export take it.
 
     Attributes:
-        condition: its trial's.
-        title: names the trial.
-        parameters: the genome.
+        trial: its trial.
         network: what the genome describes.
     """
 
-    condition: Condition
-    title: str
-    parameters: Any
+    trial: Stored
     network: GraphNetwork
+
+    @property
+    def genome(self) -> Genome:
+        """The genome."""
+        genome: Genome = self.trial.parameters
+        return genome
+
+    @property
+    def title(self) -> str:
+        """Names the trial."""
+        return f"{self.trial.title}, seed {self.trial.result.seed}"
 
 
 def main(options: argparse.Namespace) -> int:
@@ -47,51 +53,41 @@ def main(options: argparse.Namespace) -> int:
     if options.out is not None and options.form is None:
         raise UserError(f"--out names the file that --as writes; add --as {', '.join(FORMS)}.")
     _, reproduction = open_project()
-    condition = reproduction.tier(options.tier).condition(options.method, options.on)
-    spec, store = TrialSpec(condition, options.seed), open_store(options.storage)
-    chosen = devices.choose(options.device)
-    result = store.get(spec.id)
-    if result is None:
-        raise UserError(
-            f"{printable(store.root)} holds no trial of {options.method} on {options.on} ({options.tier}) with seed "
-            f"{options.seed}. `evoclaims run {options.method} --on {options.on} --tier {options.tier} --trials 1 "
-            f"--first-seed {options.seed}` runs it."
-        )
-    parameters = champions.load(store, condition, result)
-    title = f"{options.method} on {options.on} ({options.tier})"
+    tier, chosen = reproduction.tier(options.tier), devices.choose(options.device)
+    trial = load(options.storage, tier, options.tier, options.method, options.on, options.seed)
     made = None
     if options.form is not None:
-        network = champions.network_of(condition, parameters)
+        network = champions.network_of(trial.condition, trial.parameters)
         if network is None:
             raise UserError(
                 f"A champion of {options.method} is no genome but arrays of parameters, of which there is no graph to "
                 f"write as {options.form}. Leave --as out to replay it; its arrays are in "
-                f"{printable(store.champion_file(result))}."
+                f"{printable(trial.file)}."
             )
-        made = FORMS[options.form](Subject(condition, f"{title}, seed {options.seed}", parameters, network))
-    replay = champions.replay(condition, result, parameters, chosen)
-    print(f"{title}\n  {describe(result)}")
+        made = FORMS[options.form](Subject(trial, network))
+    replay = champions.replay(trial.condition, trial.result, trial.parameters, chosen)
+    print(f"{trial.title}\n  {describe(trial.result)}")
     Console().print(_table(replay))
     print(_judgement(replay))
     if made is not None:
         default = f"{options.method}-{options.on}-{options.seed}.{options.form}"
         path = Path(default if options.out is None else options.out)
-        _write(path, made)
+        write(path, made)
         print(f"wrote {printable(path)}")
     return int(not replay.exact)
 
 
 def _json(subject: Subject) -> bytes:
     """Return the genome as JSON."""
-    return export.to_json(subject.parameters, subject.network).encode()
+    return export.to_json(subject.genome, subject.network).encode()
 
 
 def _picture(file_format: picture.Format) -> Callable[[Subject], bytes]:
     """Return the function that draws a subject's network, and beside it the one that it draws on a substrate."""
 
     def drawn(subject: Subject) -> bytes:
-        graph = export.to_networkx(subject.parameters, subject.network)
-        drawing = champions.substrate_of(subject.condition, subject.parameters)
+        graph = export.to_networkx(subject.genome, subject.network)
+        drawing = champions.substrate_of(subject.trial.condition, subject.genome)
         if drawing is None:
             panel = picture.network_panel(graph, subject.network, "the network that evolved")
             return picture.draw([panel], subject.title, file_format)
@@ -132,14 +128,3 @@ def _judgement(replay: Replay) -> str:
         "The replay differs from the stored record, which was made with the same versions on the same kind of machine: "
         "the code computes something else now, or the record is not this champion's."
     )
-
-
-def _write(path: Path, data: bytes) -> None:
-    """Write a file that the user has named."""
-    if path.is_dir():
-        raise UserError(f"{printable(path)} is a folder; name a file in it with --out.")
-    try:
-        write_atomically(path, data)
-    except UserError as error:
-        reason = getattr(error.__cause__, "strerror", None) or error.__cause__
-        raise UserError(f"Cannot write {printable(path)}: {reason}. Name another file with --out.") from error

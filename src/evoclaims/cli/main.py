@@ -102,6 +102,11 @@ def _parser() -> argparse.ArgumentParser:
         "--out", metavar="FILE", help="where to (TASK.svg, METHOD-TASK-SEED-FORM.…); a picture is svg or png"
     )
 
+    reproduce = add("reproduce", "redraw figures and tables of the paper from the trials at hand; run nothing")
+    reproduce.add_argument("figure", help="its name, such as fig3; all for every one")
+    tier(reproduce)
+    reproduce.add_argument("--out", metavar="DIR", help="folder for PNG, SVG and CSV (figures/TIER)")
+
     verify = add(
         "verify",
         "read every stored trial, champion and checkpoint back, and move bad ones aside so that their trials run again "
@@ -111,4 +116,29 @@ def _parser() -> argparse.ArgumentParser:
 
     reference = add("reference", "write the stored trials of a tier as the committed reference trials")
     tier(reference)
+
+    accept = add("accept", "write the verdicts of now into verdicts.toml, as accepted; 1 when that changed the file")
+    accept.add_argument("--tier", default="all", help="smoke, full or all (default)")
+
+    compare = add(
+        "compare",
+        "show what changed: verdicts of now against the accepted ones; or a git revision against the working tree; or "
+        "a store (OLD) against --storage; or two revisions, or two stores, against each other; run nothing",
+    )
+    compare.add_argument("places", nargs="*", metavar="OLD [NEW]", help="a git revision or a folder of trials")
+    compare.add_argument("--tier", default="all", help="smoke, full or all (default)")
+    compare.add_argument("--fail", metavar="CHANGES", help="end with 1 on these, such as 'supported->refuted,*->error'")
+    compare.add_argument(
+        "--timeline", metavar="CLAIM", nargs="?", const="", help="list accepted verdicts by date, of CLAIM or of all"
+    )
+
+    export = add("export", "write the trials at hand, or the verdicts that they give, as a table")
+    export.add_argument("--tier", default="all", help="smoke, full or all (default)")
+    export.add_argument("--verdicts", action="store_true", help="one row per claim instead of one per trial")
+    export.add_argument("--as", dest="form", metavar="FORM", default="json", help="json (default), csv or parquet")
+    export.add_argument("--out", metavar="FILE", help="where to (trials.FORM, verdicts.FORM)")
+
+    badge = add("badge", "draw how many claims ended how, as a small SVG picture")
+    tier(badge)
+    badge.add_argument("--out", metavar="FILE", help="where to (claims-TIER.svg)")
     return parser

@@ -69,7 +69,7 @@ class Waypoints:
 
         def function(targets: Any, observation: Float[Array, " observation"]) -> Float[Array, " action"]:
             place, velocity, goal = observation[:2], observation[3:5], observation[-2:]
-            stone = jnp.argmin(jnp.sum((jnp.asarray(STONES, jnp.float32) - goal) ** 2, axis=1))
+            stone = jnp.argmin(jnp.sum((jnp.asarray(STONES, jnp.float32) - goal[None]) ** 2, axis=1))
             cell = jnp.round((place - jnp.asarray([low_x, low_y], jnp.float32)) / GRID).astype(jnp.int32)
             cell = jnp.clip(cell, 0, jnp.asarray(targets.shape[1:3], jnp.int32) - 1)
             way = targets[stone, cell[0], cell[1]] - place

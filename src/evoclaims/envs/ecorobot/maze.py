@@ -55,7 +55,9 @@ class Maze(RobotTask):
         low = jnp.asarray([bounds[0] for bounds in self.area], jnp.float32)
         high = jnp.asarray([bounds[1] for bounds in self.area], jnp.float32)
         size = jnp.asarray(CELLS)
-        cell = jnp.clip(jnp.floor((path - low) / (high - low) * size).astype(jnp.int32), 0, size - 1)
+        share = (path - low[None]) / (high - low)[None]
+        cell = jnp.floor(share * size[None].astype(jnp.float32)).astype(jnp.int32)
+        cell = jnp.clip(cell, 0, size[None] - 1)
         been = jnp.zeros(CELLS, bool).at[cell[:, 0], cell[:, 1]].max(alive)
         return {"coverage": jnp.sum(been & ground).astype(jnp.float32) / float(ground.sum())}
 
