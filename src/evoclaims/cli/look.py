@@ -1,0 +1,206 @@
+"""`evoclaims look`: a robot's task drawn, or what a stored champion does in it."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any, Final, get_args
+
+import numpy as np
+
+from evoclaims.cli.outings import Outings, run_again
+from evoclaims.cli.project import open_project
+from evoclaims.cli.run import describe
+from evoclaims.cli.stored import Stored, load, write
+from evoclaims.core.errors import UnknownNameError, UserError
+from evoclaims.envs.ecorobot import film, page, pictures
+from evoclaims.envs.ecorobot.marks import marks
+from evoclaims.envs.ecorobot.motion import Motion, motion
+from evoclaims.envs.ecorobot.robot_task import RobotTask
+from evoclaims.methods.map_elites import MapElites
+from evoclaims.networks.picture import Format
+from evoclaims.suite.reproduction import Tier
+from evoclaims.trials import devices
+from evoclaims.trials.records import printable
+
+PICTURE: Final = get_args(Format)
+
+
+@dataclass(frozen=True)
+class Subject:
+    """A trial to look at, read from the store when it is first needed.
+
+    Attributes:
+        options: which trial, which of its evaluation's episodes, and where to run them again.
+        tier: of the trial.
+        task: of the trial.
+    """
+
+    options: argparse.Namespace
+    tier: Tier
+    task: RobotTask
+
+    @cached_property
+    def trial(self) -> Stored:
+        """The trial."""
+        options = self.options
+        return load(options.storage, self.tier, options.tier, options.method, options.task, options.seed)
+
+    @cached_property
+    def outings(self) -> Outings:
+        """The evaluation's episodes, run again."""
+        chosen = devices.choose(self.options.device)
+        return run_again(self.trial, self.task, chosen[0])
+
+    @property
+    def title(self) -> str:
+        """Names the trial."""
+        return f"{self.trial.title}, seed {self.options.seed}"
+
+    @property
+    def motion(self) -> Motion:
+        """Of the chosen episode."""
+        return motion(self.task.scene, self.outings.positions[self.options.episode])
+
+    @property
+    def difference(self) -> str:
+        """Say how the episodes differ from what was judged; nothing when as many reach the goal."""
+        options, recorded = self.options, self.trial.result.levels["success"][0]
+        again = float(np.mean(self.outings.reached))
+        if np.isclose(again, recorded):
+            return ""
+        return (
+            f"The share of episodes that reach the goal is {again:g} here, and {recorded:g} in the record: these are "
+            f"not quite the episodes that were judged. `evoclaims champion {options.method} --on {options.task} --tier "
+            f"{options.tier} --seed {options.seed}` compares all values."
+        )
+
+    @property
+    def episode_title(self) -> str:
+        """Names the trial and the chosen episode."""
+        episode = self.options.episode
+        end = "reaches the goal" if self.outings.reached[episode] else "ends"
+        return f"{self.title}, episode {episode}: {end} after {len(self.outings.positions[episode]):,} steps"
+
+
+@dataclass(frozen=True)
+class Form:
+    """A way to look at a trial.
+
+    Attributes:
+        endings: of the files that it writes, the first when none is named.
+        make: returns a file's contents, given the trial and the ending.
+        episodes: whether it shows the evaluation's episodes.
+    """
+
+    endings: tuple[str, ...]
+    make: Callable[[Subject, str], bytes]
+    episodes: bool = True
+
+
+def main(options: argparse.Namespace) -> int:
+    """Draw the task; with --method, show what the champion does."""
+    _, reproduction = open_project()
+    tier = reproduction.tier(options.tier)
+    path, data = _task_alone(options, tier) if options.method is None else _champion(options, tier)
+    write(path, data)
+    print(f"wrote {printable(path)}")
+    return 0
+
+
+def _task_alone(options: argparse.Namespace, tier: Tier) -> tuple[Path, bytes]:
+    """Return the file to write without --method, and its contents."""
+    if options.form is not None:
+        raise UserError(f"--as {printable(options.form)} shows what a champion does; name its method with --method.")
+    # Methods that see more of a task than others share its ground.
+    tasks = {name: condition.task for (_, name), condition in tier.conditions.items()}
+    if options.task not in tasks:
+        raise UnknownNameError("task", options.task, tasks)
+    task = _with_robot(tier, options.task, tasks[options.task])
+    path, ending = _target(options.out, options.task, PICTURE)
+    return path, pictures.draw(task, [], f"{options.task} ({options.tier})", ending)
+
+
+def _champion(options: argparse.Namespace, tier: Tier) -> tuple[Path, bytes]:
+    """Return the file to write with --method, and its contents."""
+    name = "path" if options.form is None else options.form
+    if name not in FORMS:
+        raise UnknownNameError("way to look at a champion", name, FORMS)
+    form = FORMS[name]
+    task = _with_robot(tier, options.task, tier.condition(options.method, options.task).task)
+    if not 0 <= options.episode < task.examined_episodes:
+        raise UserError(
+            f"The evaluation has {task.examined_episodes} episodes, 0 to {task.examined_episodes - 1}; "
+            f"--episode is {options.episode}."
+        )
+    path, ending = _target(options.out, f"{options.method}-{options.task}-{options.seed}-{name}", form.endings)
+    subject = Subject(options, tier, task)
+    data = form.make(subject, ending)
+    print(f"{subject.trial.title}\n  {describe(subject.trial.result)}")
+    if form.episodes and subject.difference:
+        print(subject.difference)
+    return path, data
+
+
+def _with_robot(tier: Tier, name: str, task: Any) -> RobotTask:
+    """Return the task as one with a robot."""
+    if not isinstance(task, RobotTask):
+        known = sorted({on for (_, on), condition in tier.conditions.items() if isinstance(condition.task, RobotTask)})
+        others = f"Tasks with one: {', '.join(known)}." if known else "No task of this tier has one."
+        raise UserError(f"{name} has no robot and no ground, so there is nothing to look at. {others}")
+    return task
+
+
+def _target(out: str | None, default: str, endings: tuple[str, ...]) -> tuple[Path, str]:
+    """Return the file to write, and its ending, which tells the format."""
+    path = Path(f"{default}.{endings[0]}" if out is None else out)
+    ending = path.suffix.removeprefix(".").lower()
+    if ending not in endings:
+        raise UserError(
+            f"--out names a file that ends in .{' or .'.join(endings)}, which tells its format; "
+            f"{printable(path)!r} does not."
+        )
+    return path, ending
+
+
+def _path(subject: Subject, ending: str) -> bytes:
+    """Draw the paths of all episodes."""
+    outings = subject.outings
+    count = f"{sum(outings.reached)} of {len(outings.reached)} episodes reach the goal"
+    title = f"{subject.title}\n{count}" if marks(subject.task) else subject.title
+    return pictures.draw(subject.task, outings.torsos, title, ending)
+
+
+def _page(subject: Subject, ending: str) -> bytes:
+    """Show the chosen episode in space."""
+    return page.page(subject.task, subject.motion, subject.episode_title)
+
+
+def _gif(subject: Subject, ending: str) -> bytes:
+    """Film the chosen episode."""
+    return film.film(subject.task, subject.motion, subject.episode_title)
+
+
+def _elites(subject: Subject, ending: str) -> bytes:
+    """Draw the map of elites that MAP-Elites stores with its champion."""
+    method, on = subject.options.method, subject.options.task
+    if not isinstance(subject.tier.condition(method, on).method, MapElites):
+        conditions = subject.tier.conditions.items()
+        known = [
+            name for (name, task), condition in conditions if task == on and isinstance(condition.method, MapElites)
+        ]
+        others = f"{', '.join(known)} does" if known else "no method of this tier does here"
+        raise UserError(f"{method} keeps no map of elites; on {on}, {others}.")
+    _, fitnesses = subject.trial.parameters
+    return pictures.draw_elites(subject.task, np.asarray(fitnesses), subject.title, ending)
+
+
+FORMS: Final[Mapping[str, Form]] = {
+    "path": Form(PICTURE, _path),
+    "page": Form(("html",), _page),
+    "gif": Form(("gif",), _gif),
+    "elites": Form(PICTURE, _elites, episodes=False),
+}

@@ -1,0 +1,68 @@
+"""A stored trial as commands take it, and the files that they write for its user."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from evoclaims.cli.project import open_store
+from evoclaims.core.errors import UserError
+from evoclaims.core.files import write_atomically
+from evoclaims.suite.reproduction import Tier
+from evoclaims.trials import champions
+from evoclaims.trials.records import printable
+from evoclaims.trials.result import TrialResult
+from evoclaims.trials.spec import Condition, TrialSpec
+
+
+@dataclass(frozen=True)
+class Stored:
+    """A trial out of the store.
+
+    Attributes:
+        title: names what was run.
+        condition: what was run.
+        result: its record.
+        parameters: of its champion (see `champions.load`).
+        file: where the champion is.
+    """
+
+    title: str
+    condition: Condition
+    result: TrialResult
+    parameters: Any
+    file: Path
+
+
+def load(storage: str, tier: Tier, tier_name: str, method: str, task: str, seed: int) -> Stored:
+    """Return a stored trial with its champion.
+
+    Raises:
+        UserError: for unknown names, a trial that is not stored (with the command that runs it), and as
+            `champions.load` does.
+    """
+    condition, title = tier.condition(method, task), f"{method} on {task} ({tier_name})"
+    spec, store = TrialSpec(condition, seed), open_store(storage)
+    result = store.get(spec.id)
+    if result is None:
+        raise UserError(
+            f"{printable(store.root)} holds no trial of {title} with seed {seed}. "
+            f"`evoclaims run {method} --on {task} --tier {tier_name} --trials 1 --first-seed {seed}` runs it."
+        )
+    return Stored(title, condition, result, champions.load(store, condition, result), store.champion_file(result))
+
+
+def write(path: Path, data: bytes) -> None:
+    """Write a file that the user has named with --out.
+
+    Raises:
+        UserError: when it cannot be written there.
+    """
+    if path.is_dir():
+        raise UserError(f"{printable(path)} is a folder; name a file in it with --out.")
+    try:
+        write_atomically(path, data)
+    except UserError as error:
+        reason = getattr(error.__cause__, "strerror", None) or error.__cause__
+        raise UserError(f"Cannot write {printable(path)}: {reason}. Name another file with --out.") from error

@@ -1,0 +1,174 @@
+"""Pictures of ecorobot, drawn by matplotlib without a screen; the same input gives the same bytes."""
+
+from __future__ import annotations
+
+import io
+import math
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any, Final, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from evoclaims.core.errors import UnknownNameError, UserError
+from evoclaims.envs.ecorobot.marks import Mark, marks
+from evoclaims.envs.ecorobot.maze import Maze
+from evoclaims.envs.ecorobot.motion import at_start
+from evoclaims.envs.ecorobot.painting import (
+    BELOW,
+    FROM_ABOVE,
+    FROM_THE_SIDE,
+    PATHS,
+    ROBOT,
+    WALL,
+    TorsoPath,
+    ground_shown,
+    mark_sign,
+    paint_earth,
+    paint_ground,
+    paint_paths,
+    paint_robot,
+    plane_of,
+)
+from evoclaims.envs.ecorobot.robot_task import RobotTask
+from evoclaims.networks.export import optional
+from evoclaims.networks.picture import Format
+
+ROW: Final = 15.0
+"""About how much of a course one row shows, m."""
+ROWS: Final = 5
+"""Most rows of a course: longer ones are drawn smaller."""
+WIDTH: Final = {FROM_ABOVE: 7.5, FROM_THE_SIDE: 11.0}
+"""Of what is drawn, inches."""
+
+
+def draw(task: RobotTask, paths: Sequence[NDArray[np.floating]], title: str, file_format: str) -> bytes:
+    """Draw a task's ground from above, or its course from the side, and the torso's paths; return the file's contents.
+
+    Args:
+        task: whose robot is shown to scale where it starts.
+        paths: of the torso's centre, shapes [steps, 3], m; none for the task alone. Places that are not finite are
+            left out.
+        title: what to write above.
+        file_format: "svg" or "png".
+
+    Raises:
+        UserError: for another format, or when matplotlib is not installed.
+    """
+    seen = [path[np.isfinite(path).all(axis=1)] for path in paths]
+    with plain():
+        figure = _course(task, seen, title) if plane_of(task) == FROM_THE_SIDE else _ground(task, seen, title)[0]
+        return _saved(figure, file_format)
+
+
+def draw_elites(task: RobotTask, fitnesses: NDArray[np.floating], title: str, file_format: str) -> bytes:
+    """Draw the fitness of each elite where its episode ended.
+
+    Args:
+        task: a maze.
+        fitnesses: over the maze's area, shape [cells along x, cells along y]; -inf where there is no elite.
+        title: what to write above, before the counts.
+        file_format: "svg" or "png".
+
+    Raises:
+        UserError: for a task without an area, another format, or when matplotlib is not installed.
+    """
+    if not isinstance(task, Maze):
+        raise UserError(f"A map of elites lies over the area of a maze, which {task.name!r} is not.")
+    filled = np.isfinite(fitnesses)
+    ground = task.reachable(fitnesses.shape)
+    counts = f"{filled.sum():,} elites; {(filled & ground).sum():,} of {ground.sum():,} reachable cells hold one"
+    with plain():
+        figure, axis = _ground(task, [], f"{title}\n{counts}")
+        edges = [np.linspace(low, high, n + 1) for (low, high), n in zip(task.area, fitnesses.shape, strict=True)]
+        mesh = axis.pcolormesh(*edges, np.ma.masked_where(~filled, fitnesses).T, cmap="viridis", zorder=0.5)
+        figure.colorbar(mesh, ax=axis, pad=0.02, label="fitness of the elite whose episode ended here")
+        return _saved(figure, file_format)
+
+
+@contextmanager
+def plain() -> Iterator[None]:
+    """Draw in matplotlib's own style: a user's must not change the picture."""
+    matplotlib = optional("matplotlib")
+    with matplotlib.rc_context():
+        matplotlib.rcdefaults()
+        matplotlib.rcParams.update({"svg.hashsalt": "evoclaims", "svg.fonttype": "none"})
+        yield
+
+
+def _ground(task: RobotTask, paths: Sequence[TorsoPath], title: str) -> tuple[Any, Any]:
+    """Build the picture from above; return figure and axis."""
+    low, high = ground_shown(task, paths)
+    size = (high - low) * WIDTH[FROM_ABOVE] / (high - low).max() + np.array([1.0, 1.9])
+    figure = _figure(size)
+    axis = figure.add_subplot()
+    paint_ground(axis, task, paths)
+    paint_robot(axis, at_start(task), 0, FROM_ABOVE, zorder=2.5)
+    paint_paths(axis, paths, FROM_ABOVE)
+    axis.set_title(title, fontsize=10)
+    _legend(figure, task, len(paths), columns=2)
+    return figure, axis
+
+
+def _course(task: RobotTask, paths: Sequence[TorsoPath], title: str) -> Any:
+    """Build the picture from the side, in rows one below the other."""
+    start = at_start(task)
+    covered = np.concatenate([start.torso, *paths])
+    low = float(covered[:, 0].min()) - 1.5
+    ends = [box.centre[0] + box.half_size[0] for box in task.boxes]
+    high = max([float(covered[:, 0].max()), *ends, low + ROW - 1.0]) + 1.0
+    rows = min(math.ceil((high - low) / ROW), ROWS)
+    length = (high - low) / rows
+    top = max([1.0, float(covered[:, 2].max()), *(box.top for box in task.boxes)]) + 0.2
+    width = WIDTH[FROM_THE_SIDE]
+    figure = _figure((width + 1.0, rows * (width / length * (top + BELOW) + 0.45) + 1.0))
+    axes = figure.subplots(rows, 1, squeeze=False)[:, 0]
+    for row, axis in enumerate(axes):
+        paint_earth(axis, start)
+        for number, box in enumerate(task.boxes, start=1):
+            place = (box.centre[0], -BELOW / 2)
+            label = f"{number}: {box.top:g} m"
+            axis.text(*place, label, ha="center", va="center", fontsize=6.5, zorder=5, clip_on=True)
+        paint_robot(axis, start, 0, FROM_THE_SIDE, zorder=2.5)
+        paint_paths(axis, paths, FROM_THE_SIDE)
+        axis.set(xlim=(low + row * length, low + (row + 1) * length), ylim=(-BELOW, top))
+    axes[0].set_title(title, fontsize=10)
+    axes[-1].set_xlabel("x, m")
+    _legend(figure, task, len(paths), columns=3)
+    return figure
+
+
+def _figure(size: Any) -> Any:
+    """Return an empty figure of this size, in inches."""
+    return optional("matplotlib.figure").Figure(figsize=size, dpi=130, layout="compressed")
+
+
+def _legend(figure: Any, task: RobotTask, paths: int, columns: int) -> None:
+    """Explain below the picture what is shown in it."""
+    lines, patches = optional("matplotlib.lines"), optional("matplotlib.patches")
+    handles = [patches.Patch(facecolor=ROBOT, label=f"{task.robot.name} at the start, to scale")]
+    if task.boxes:
+        word = "wall" if isinstance(task, Maze) else "obstacle: its number and height"
+        handles.append(patches.Patch(facecolor=WALL, label=word))
+    first = {mark.target: mark for mark in reversed(marks(task))}
+    for target, mark in sorted(first.items()):
+        word = "target" if target else "stones, to be crossed in order"
+        sign = mark_sign(Mark((np.nan, np.nan), mark.within, mark.label, target))
+        sign.set_label(f"{word} (within {mark.within:g} m)")
+        handles.append(sign)
+    if paths:
+        text = f"paths of the torso in {paths} episodes, and their ends" if paths > 1 else "path of the torso, its end"
+        handles.append(lines.Line2D([], [], color=PATHS[0], marker="s", ms=4.5, mec="white", label=text))
+    style = {"fontsize": 8, "frameon": False, "labelspacing": 0.8}
+    figure.legend(handles=handles, loc="outside lower center", ncols=columns, **style)
+
+
+def _saved(figure: Any, file_format: str) -> bytes:
+    """Return the file's contents, without its date."""
+    if file_format not in get_args(Format):
+        raise UnknownNameError("format of a picture", file_format, get_args(Format))
+    file = io.BytesIO()
+    metadata = {"svg": {"Date": None}, "png": {"Software": None}}[file_format]
+    figure.savefig(file, format=file_format, metadata=metadata, bbox_inches="tight", pad_inches=0.12)
+    return file.getvalue()

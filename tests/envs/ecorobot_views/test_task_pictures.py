@@ -1,0 +1,171 @@
+"""Pictures of tasks, paths and maps of elites: what is in them, and where."""
+
+from __future__ import annotations
+
+import io
+import re
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from evoclaims.core.errors import UnknownNameError, UserError
+from evoclaims.envs.ecorobot.deceptive import DeceptiveMaze
+from evoclaims.envs.ecorobot.locomotion import Locomotion
+from evoclaims.envs.ecorobot.obstacles import Obstacles
+from evoclaims.envs.ecorobot.painting import PATHS, STONE, TARGET, WALL, paint_ground, paint_paths
+from evoclaims.envs.ecorobot.pictures import draw, draw_elites
+from evoclaims.envs.ecorobot.robots import ANT
+from evoclaims.envs.ecorobot.stones import STONES, SteppingStones
+from evoclaims.networks.export import optional
+
+MAZE = SteppingStones()
+PATH = np.stack([np.linspace(-3.0, 2.0, 30), np.linspace(1.0, 1.5, 30), np.full(30, 0.2)], axis=1)
+
+
+def _texts(svg: bytes) -> list[str]:
+    """Return the texts of a picture."""
+    return re.findall(r"<text[^>]*>([^<]*)</text>", svg.decode())
+
+
+def _pixels(png: bytes) -> NDArray[np.uint8]:
+    """Return red, green and blue of each pixel, shape [rows, columns, 3]."""
+    image = optional("PIL.Image").open(io.BytesIO(png)).convert("RGB")
+    return np.asarray(image)
+
+
+def _axis() -> Any:
+    return optional("matplotlib.figure").Figure().add_subplot()
+
+
+def test_a_mazes_picture_names_its_stones_and_what_is_to_be_seen() -> None:
+    texts = _texts(draw(MAZE, [], "a title", "svg"))
+    for text in ("a title", "simple_rob at the start, to scale", "wall", "x, m", "y, m", *map(str, range(1, 8))):
+        assert text in texts
+    assert "stones, to be crossed in order (within 0.1 m)" in texts
+    assert "target (within 0.1 m)" in texts
+    assert not any("path" in text for text in texts)
+
+
+def test_a_courses_picture_tells_each_obstacles_number_and_height() -> None:
+    texts = _texts(draw(Obstacles(), [], "a course", "svg"))
+    heights = [0.1] * 5 + [0.2] * 5 + [0.3] * 5
+    assert {f"{i}: {height} m" for i, height in enumerate(heights, start=1)} <= set(texts)
+    assert "half_cheetah at the start, to scale" in texts
+
+
+def test_the_ground_has_each_wall_and_each_mark_at_its_place() -> None:
+    colours, axis = optional("matplotlib.colors"), _axis()
+    paint_ground(axis, MAZE, [])
+
+    def of(colour: str) -> list[Any]:
+        return [patch for patch in axis.patches if patch.get_facecolor()[:3] == colours.to_rgb(colour)]
+
+    for wall, box in zip(of(WALL), MAZE.boxes, strict=True):
+        corners = wall.get_xy()[:-1]
+        away = np.abs((corners - np.array(box.centre)) @ box.rotation[:2, :2])
+        np.testing.assert_allclose(away, np.tile(box.half_size, (len(corners), 1)), atol=1e-5)
+    assert [(mark.center, mark.radius) for mark in of(STONE) + of(TARGET)] == [(stone, 0.1) for stone in STONES]
+
+
+def test_the_easy_mazes_target_is_as_wide_as_it_counts() -> None:
+    axis = _axis()
+    paint_ground(axis, DeceptiveMaze(), [])
+    (target,) = [patch for patch in axis.patches if hasattr(patch, "radius")]
+    assert (target.center, target.radius) == ((-4.0, 9.0), 1.1)
+
+
+@pytest.mark.parametrize("plane", [(0, 1), (0, 2)])
+def test_a_path_is_a_line_through_its_places_with_a_sign_at_its_end(plane: tuple[int, int]) -> None:
+    axis = _axis()
+    paint_paths(axis, [PATH, PATH[:4]], plane)
+    first, first_end, second, second_end = axis.get_lines()
+    np.testing.assert_array_equal(first.get_xydata(), PATH[:, plane])
+    np.testing.assert_array_equal(first_end.get_xydata(), PATH[-1:, plane])
+    np.testing.assert_array_equal(second_end.get_xydata(), PATH[3:4, plane])
+    assert (first.get_color(), second.get_color()) == PATHS[:2]
+
+
+def test_the_picture_reaches_as_far_as_a_path_that_leaves_the_maze() -> None:
+    axis = _axis()
+    paint_ground(axis, MAZE, [PATH + np.array([7.0, 0.0, 0.0])])
+    assert axis.get_xlim()[1] == pytest.approx(9.5)
+    assert axis.get_xlim()[0] == pytest.approx(-4.6)
+
+
+def test_paths_are_told_in_the_legend() -> None:
+    assert "paths of the torso in 2 episodes, and their ends" in _texts(draw(MAZE, [PATH, PATH], "", "svg"))
+    assert "path of the torso, its end" in _texts(draw(Obstacles(), [PATH], "", "svg"))
+
+
+def test_places_that_are_not_finite_are_left_out() -> None:
+    broken = np.concatenate([PATH, np.full((3, 3), np.nan), np.full((1, 3), np.inf)])
+    for task in (MAZE, Obstacles()):
+        assert draw(task, [broken], "", "svg") == draw(task, [PATH], "", "svg")
+        draw(task, [np.full((2, 3), np.nan)], "", "svg")
+
+
+def test_a_task_without_walls_is_drawn() -> None:
+    assert "ant at the start, to scale" in _texts(draw(Locomotion(robot=ANT), [PATH], "", "svg"))
+
+
+@pytest.mark.parametrize("file_format", ["svg", "png"])
+def test_the_same_picture_has_the_same_bytes_whatever_the_users_style(file_format: str) -> None:
+    first = draw(MAZE, [PATH], "twice", file_format)
+    with optional("matplotlib").rc_context({"font.size": 30, "axes.facecolor": "black"}):
+        assert draw(MAZE, [PATH], "twice", file_format) == first
+    assert first.startswith({"svg": b"<?xml", "png": b"\x89PNG"}[file_format])
+
+
+def test_a_hostile_title_stays_text() -> None:
+    svg = draw(MAZE, [], "</text><script>alert(1)</script>", "svg").decode()
+    assert "<script" not in svg
+    assert "&lt;script&gt;alert(1)" in svg
+
+
+def _with_elite(x: int, y: int) -> NDArray[np.float32]:
+    fitnesses = np.full((50, 50), -np.inf, np.float32)
+    fitnesses[x, y] = 3.0
+    return fitnesses
+
+
+def test_an_elite_is_drawn_where_its_episode_ended() -> None:
+    pictures = [_pixels(draw_elites(MAZE, _with_elite(*cell), "map", "png")) for cell in ((45, 5), (10, 45))]
+    rows, columns = np.nonzero((pictures[0] != pictures[1]).any(axis=-1))
+    # The first elite is at x = 3.28 m, y = 0.77 m, the other at x = -2.32 m, y = 6.37 m: one to the right and below.
+    right = columns > (columns.min() + columns.max()) / 2
+    assert (pictures[0][rows[right], columns[right]] != 255).any(axis=-1).all()
+    assert (pictures[1][rows[right], columns[right]] == 255).all()
+    assert rows[right].min() > rows[~right].max()
+    # A picture's metre has equal length on both axes; a cell is 0.16 m wide and 0.14 m high.
+    metre = (columns[right].mean() - columns[~right].mean()) / 5.6
+    assert rows[right].mean() - rows[~right].mean() == pytest.approx(5.6 * metre, rel=0.02)
+    assert np.ptp(columns[right]) + 1 == pytest.approx(0.16 * metre, abs=2)
+
+
+def test_a_map_of_elites_tells_how_many_there_are() -> None:
+    fitnesses = _with_elite(10, 8)
+    fitnesses[0, 0] = 1.0  # in the corner, where the walls are
+    reachable = int(MAZE.reachable((50, 50)).sum())
+    texts = _texts(draw_elites(MAZE, fitnesses, "a map", "svg"))
+    assert f"2 elites; 1 of {reachable:,} reachable cells hold one" in texts
+    assert "fitness of the elite whose episode ended here" in texts
+
+
+def test_an_empty_map_of_elites_is_drawn() -> None:
+    texts = _texts(draw_elites(MAZE, np.full((5, 4), -np.inf), "a map", "svg"))
+    assert any(text.startswith("0 elites; 0 of ") for text in texts)
+
+
+def test_only_a_maze_has_a_map_of_elites() -> None:
+    with pytest.raises(UserError, match="over the area of a maze, which 'obstacles' is not"):
+        draw_elites(Obstacles(), np.zeros((2, 2)), "", "svg")
+
+
+def test_a_format_that_is_not_known_is_told() -> None:
+    sentence = "There is no format of a picture named 'pgn'. Did you mean 'png'?"
+    with pytest.raises(UnknownNameError, match=re.escape(sentence)):
+        draw(MAZE, [], "", "pgn")
+    with pytest.raises(UnknownNameError, match=re.escape(sentence)):
+        draw_elites(MAZE, np.zeros((2, 2)), "", "pgn")
