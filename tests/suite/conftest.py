@@ -31,6 +31,7 @@ def _made(condition: Condition, seed: int, value: float, status: Status = "done"
     metrics = {
         "mean_success": value,
         "last_success": value / 2,
+        "last_fitness": value - 1.0,
         "furthest_solved": float(levels - 1 if value == 1.0 else -1),
         "furthest_reached": float(levels - 1),
         "steps": 2.0,

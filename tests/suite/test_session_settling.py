@@ -163,6 +163,7 @@ def test_the_same_trials_have_not_drifted(session: Session, says: Claim, made: M
     assert not drift.drifted
     assert [(row.metric, row.status, row.n_new, row.n_ref) for row in drift.rows] == [
         ("mean_success", "no drift", 6, 10),
+        ("last_fitness", "no drift", 6, 10),
         ("environment_steps", "no drift", 6, 10),
     ]
     assert digests.compared == 0  # these records do not say where they were made
@@ -172,11 +173,11 @@ def test_shifted_trials_have_drifted(session: Session, says: Claim, made: Made) 
     _committed(session, made, lambda seed: seed / 100)
     drift, _ = session.drift(_settled(session, made, says, lambda seed: 0.5 + seed / 100))
     assert drift.drifted
-    assert [row.metric for row in drift.rows if row.drifted] == ["mean_success"]
+    assert [row.metric for row in drift.rows if row.drifted] == ["mean_success", "last_fitness"]
 
 
 def test_without_reference_trials_nothing_is_said_to_be_unchanged(session: Session, says: Claim, made: Made) -> None:
     drift, _ = session.drift(_settled(session, made, says, lambda seed: 1.0))
     assert {row.status for row in drift.rows} == {"no reference"}
     assert not drift.drifted
-    assert len(drift.unchecked) == 2
+    assert len(drift.unchecked) == 3

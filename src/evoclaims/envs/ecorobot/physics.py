@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 from functools import partial
+from typing import Final
 
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Float
+from jaxtyping import Array, Bool, Float
 
 from evoclaims.core.foreign import implicit_promotions
 from evoclaims.core.pytree import pytree
 from evoclaims.envs.ecorobot.constraints import constrained_acceleration
 from evoclaims.envs.ecorobot.scene import Scene, mjx, on_device
+
+LARGEST: Final = 1e10
+"""What MuJoCo takes for a number beyond reason (mjMAXVAL)."""
 
 
 @pytree
@@ -41,6 +45,16 @@ def act(scene: Scene, body: Body, control: Float[Array, " nu"]) -> Body:
         return _frame(scene, body, control), None
 
     return jax.lax.scan(frame, body, None, length=scene.robot.frames)[0]
+
+
+def is_stable(body: Body) -> Bool[Array, ""]:
+    """Whether the simulation has not burst, by MuJoCo's own test of positions, velocities and accelerations.
+
+    Large steps let a fast ant gain speed without end. C MuJoCo warns and puts such a robot back at the start; MJX goes
+    on to numbers that are none.
+    """
+    numbers = jnp.concatenate([body.position, body.velocity, body.acceleration])
+    return jnp.all(jnp.abs(numbers) <= LARGEST)  # False of NaN
 
 
 # MJX takes a second to trace; with a jit of its own this is traced once for each scene, and not for each use.

@@ -187,13 +187,18 @@ class RobotTask(ABC):
         )
 
     def step(self, state: TaskState, action: Float[Array, " action"]) -> TaskState:
-        """Act for `robot.frames` simulation steps."""
+        """Act for `robot.frames` simulation steps.
+
+        A step in which the simulation bursts (`physics.is_stable`) did not happen: it pays nothing, and all ends there.
+        """
         outing: Outing = state.inner
         control = action
         if self.robot.scales_actions:
             low, high = jnp.asarray(self.scene.model.actuator_ctrlrange, jnp.float32).T
             control = low + (action + 1.0) * (high - low) / 2.0
         body = physics.act(self.scene, outing.body, control)
+        stable = physics.is_stable(body)
+        body = select(stable, body, outing.body)
         pose = torso(self.scene, body.position)
         ruling = self.rule(outing.memory, outing.pose, pose, control)
         following = strong(
@@ -206,11 +211,12 @@ class RobotTask(ABC):
                 overturned=outing.overturned + pose.upside_down.astype(jnp.float32),
             )
         )
+        ended = ruling.ended | ~stable
         return TaskState(
             observation=self._observe(following),
-            reward=ruling.reward,
-            terminated=ruling.ended,
-            truncated=(following.time >= self.episode_steps) & ~ruling.ended,
+            reward=jnp.where(stable, ruling.reward, 0.0),
+            terminated=ended,
+            truncated=(following.time >= self.episode_steps) & ~ended,
             inner=following,
         )
 

@@ -1,0 +1,20 @@
+"""Fig. 6: where MAP-Elites' elites end, in the deceptive maze and in the maze with stepping stones."""
+
+from evoclaims.figures.elites import ElitesMap, Ground
+from evoclaims.figures.figure import Figure
+
+FIGURE = Figure(
+    name="fig6",
+    title="Maps of elites in the deceptive maze and in the maze with stepping stones",
+    where="§5.2.1, Fig. 6",
+    paint=ElitesMap(
+        grounds=(
+            Ground("without stones", "map_elites", "deceptive_maze_difficult"),
+            Ground("with stepping stones", "map_elites", "stones"),
+        ),
+        told=(
+            ("share of the reachable cells with an elite", lambda trials: trials.archive_coverage),
+            ("reward of the best elite", lambda trials: trials.reward),
+        ),
+    ),
+)

@@ -1,0 +1,295 @@
+"""One panel of a bar chart: every trial a dot, published numbers beside, what is missing named and never a zero."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+from evoclaims.figures import brackets
+from evoclaims.figures.brackets import Comparison
+from evoclaims.figures.readings import NOT_RUN, MeasureOf, Readings
+from evoclaims.figures.reported import Reported
+from evoclaims.figures.sheet import Row, measured
+from evoclaims.figures.style import FAINT, INK, SMALL, TEXT, lighter
+from evoclaims.networks.export import optional
+
+GAP: Final = 0.7
+"""Room between groups of bars, in slots."""
+BASE, BRACKET = 1.25, 7.5 / 72
+"""Height of the numbers' range and of a bracket, inches."""
+ASIDE: Final = 0.14
+"""How far a bar stands from the middle of its slot, for the sake of a published number."""
+UNDER: Final = 0.03
+"""Share of the range that is shown below and above it."""
+
+
+@dataclass(frozen=True)
+class Series:
+    """A method, as figures show it."""
+
+    method: str
+    label: str
+    colour: str
+
+
+@dataclass(frozen=True)
+class Bar:
+    """One bar.
+
+    Attributes:
+        at: name of its place on the axis; bars of one place stand side by side.
+        series: the method.
+        task: name of the task.
+        measure: what is measured.
+        reported: the published number.
+    """
+
+    at: str
+    series: Series
+    task: str
+    measure: MeasureOf
+    reported: Reported | None = None
+
+
+@dataclass(frozen=True)
+class Panel:
+    """A panel of bars.
+
+    Attributes:
+        title: above it.
+        bars: in the order of the axis.
+        ylabel, xlabel: of the axes.
+        limits: what the axis shows at least; the numbers decide beyond.
+        across: whether each method is compared with itself between places.
+        beside: whether published numbers are drawn; else they are only told.
+    """
+
+    title: str
+    bars: tuple[Bar, ...]
+    ylabel: str
+    xlabel: str = ""
+    limits: tuple[float, float] | None = None
+    across: bool = False
+    beside: bool = True
+
+
+@dataclass(frozen=True)
+class Filled:
+    """A bar with what was read."""
+
+    bar: Bar
+    readings: Readings
+
+    @property
+    def reported(self) -> Reported | None:
+        """The published number."""
+        return self.bar.reported
+
+
+@dataclass(frozen=True)
+class Measured:
+    """A panel with what was read, and its comparisons."""
+
+    panel: Panel
+    bars: tuple[Filled, ...]
+    comparisons: tuple[Comparison, ...]
+
+    @property
+    def shows_reported(self) -> bool:
+        """Whether a published number is drawn."""
+        return self.panel.beside and any(bar.reported for bar in self.bars)
+
+    @property
+    def grouped(self) -> bool:
+        """Whether places have names; else bars are named by their methods."""
+        return any(bar.bar.at for bar in self.bars)
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Where everything of a panel lies.
+
+    Attributes:
+        measured: the panel.
+        row: its room on the page.
+        slots: the middle of each bar's slot, which is 1 wide.
+        bars: the middle of each bar.
+        limits: of the vertical axis.
+        bracket: height of a bracket, in the axis' units.
+        brackets: for each bracket its comparison, and its height.
+        slanted: whether the names of the axis are.
+    """
+
+    measured: Measured
+    row: Row
+    slots: tuple[float, ...]
+    bars: tuple[float, ...]
+    limits: tuple[float, float]
+    bracket: float
+    brackets: tuple[tuple[Comparison, float], ...]
+    slanted: bool
+
+
+def lay_out(one: Measured, width: float) -> Layout:
+    """Lay a panel out on a frame of `width` inches: its height grows with the brackets that it needs."""
+    slots, at = [], 0.0
+    for i, bar in enumerate(one.bars):
+        at += GAP if i and bar.bar.at != one.bars[i - 1].bar.at else 0.0
+        slots.append(at)
+        at += 1.0
+    bars = [slot - ASIDE * one.shows_reported for slot in slots]
+    tops = [_top(bar, one) for bar in one.bars]
+    low = min([0.0, *(one.panel.limits or ()), *(_foot(bar, one) for bar in one.bars)])
+    high = max([*(one.panel.limits or ()), *tops])
+    high = high if high > low else low + 1.0  # nothing has run
+    span = high - low
+    bracket = span * BRACKET / BASE
+    stars = [comparison for comparison in one.comparisons if comparison.asterisks]
+    ends = [(bars[comparison.left], bars[comparison.right]) for comparison in stars]
+    spans = [(min(pair), max(pair)) for pair in ends]
+    words = [1.3 * bracket * bar.readings.incomplete for bar in one.bars]  # room for "8/10" above a bar
+    below = [(place, top + more) for place, top, more in zip(bars, tops, words, strict=True)]
+    heights = brackets.stack(spans, below, bracket)
+    top = max([high, *(height for _, height in below), *(height + bracket for height in heights)])
+    limits = (low - UNDER * span * (low < 0), top + UNDER * span)
+    slot = width / (at + GAP)
+    names = _names(one)
+    slanted = any(measured(name, TEXT) > slot * members - 0.04 for name, members, _ in names)
+    under = 0.12 + (max(measured(name, TEXT) for name, *_ in names) * 0.5 + 0.1 if slanted else 0.14)
+    row = Row(
+        height=(limits[1] - limits[0]) / span * BASE,
+        below=under + (0.16 if one.panel.xlabel else 0.0),
+        above=0.24 if one.panel.title else 0.1,
+    )
+    placed = tuple(zip(stars, heights, strict=True))
+    return Layout(one, row, tuple(slots), tuple(bars), limits, bracket, placed, slanted)
+
+
+def paint(axis: Any, layout: Layout) -> None:
+    """Paint a panel into its axes."""
+    one = layout.measured
+    axis.set(
+        xlim=(-0.5 - GAP / 2, layout.slots[-1] + 0.5 + GAP / 2),
+        ylim=layout.limits,
+        xlabel=one.panel.xlabel,
+    )
+    axis.set_title(one.panel.title, loc="left", pad=5.0)
+    axis.axhline(0.0, color=INK, linewidth=0.6, zorder=1)
+    for bar, slot, middle in zip(one.bars, layout.slots, layout.bars, strict=True):
+        _paint_bar(axis, bar, middle, 0.64 if one.shows_reported else 0.84)
+        if one.shows_reported and bar.reported:
+            _paint_reported(axis, bar.reported, slot + 0.34)
+    for comparison, height in layout.brackets:
+        ends = sorted((layout.bars[comparison.left], layout.bars[comparison.right]))
+        brackets.paint(axis, (ends[0], ends[1]), height, layout.bracket, comparison.asterisks)
+    names = _names(one)
+    middles = [sum(layout.slots[first : first + members]) / members for _, members, first in names]
+    style = {"rotation": 30.0, "ha": "right", "rotation_mode": "anchor"} if layout.slanted else {}
+    axis.set_xticks(middles, [name for name, *_ in names], **style)
+    axis.tick_params(axis="x", length=0.0, pad=3.0)
+    _number(axis, layout)
+
+
+def _number(axis: Any, layout: Layout) -> None:
+    """Number the vertical axis as far as numbers go: there is no success of 1.4 to read off beside the brackets."""
+    one, (low, high) = layout.measured, layout.limits
+    top = max([*(one.panel.limits or ()), *(_top(bar, one) for bar in one.bars)])
+    locator = optional("matplotlib.ticker").MaxNLocator(5, steps=[1, 2, 5, 10])
+    ticks = [tick for tick in locator.tick_values(low, top) if low <= tick <= top * (1 + 1e-9)]
+    axis.set_yticks(ticks if top > low else [])
+    axis.spines["left"].set_bounds(low, top if top > low else high)
+    axis.set_ylabel(one.panel.ylabel, y=((top if top > low else high) - low) / (high - low) / 2)
+
+
+def legend(panels: Sequence[Measured]) -> list[Any]:
+    """Return the handles of a legend for panels: their methods where those have no names on the axis, and signs."""
+    lines, patches = optional("matplotlib.lines"), optional("matplotlib.patches")
+    series = {bar.bar.series: None for one in panels if one.grouped for bar in one.bars}
+    handles = [patches.Patch(facecolor=lighter(s.colour), edgecolor=s.colour, label=s.label) for s in series]
+    if any(one.shows_reported for one in panels):
+        handles.append(lines.Line2D([], [], label="reported by the paper", **_DIAMOND))
+    if any(bar.readings.broken for one in panels for bar in one.bars):
+        handles.append(lines.Line2D([], [], label="trial without a value", **_CROSS))
+    return handles
+
+
+_DIAMOND: Final = {
+    **{"marker": "D", "markersize": 3.6, "markerfacecolor": "white", "markeredgecolor": INK, "markeredgewidth": 0.8},
+    **{"color": INK, "linestyle": "", "zorder": 5},
+}
+_CROSS: Final = {"marker": "x", "markersize": 4.0, "markeredgewidth": 1.0, "color": INK, "linestyle": "", "zorder": 6}
+
+
+def _paint_bar(axis: Any, filled: Filled, middle: float, width: float) -> None:
+    """Paint one bar with its dots; or say that nothing has run."""
+    readings, colour = filled.readings, filled.bar.series.colour
+    if readings.values:
+        style = {"facecolor": lighter(colour), "edgecolor": colour, "linewidth": 0.8, "zorder": 2}
+        axis.bar(middle, readings.mean, width, **style)
+    if len(readings.values) > 1:
+        style = {"elinewidth": 0.8, "capsize": 1.8, "capthick": 0.8, "ecolor": INK, "zorder": 3}
+        axis.errorbar(middle, readings.mean, yerr=readings.deviation, fmt="none", **style)
+    places = [middle + 0.8 * width * share for share in _across(len(readings.each))]
+    pairs = list(zip(places, readings.each, strict=True))
+    dots = [(place, reading.value) for place, reading in pairs if reading.value is not None]
+    if dots:
+        axis.scatter(*zip(*dots, strict=True), s=5.5, c=colour, edgecolors="white", linewidths=0.3, zorder=4)
+    foot = axis.get_xaxis_transform()
+    broken = [place for place, reading in pairs if reading.value is None and reading.status != NOT_RUN]
+    if broken:
+        axis.plot(broken, [0.05] * len(broken), transform=foot, **_CROSS)
+    words = {"ha": "center", "va": "bottom", "fontsize": SMALL, "color": FAINT}
+    if not dots and not broken:
+        axis.text(middle, 0.04, NOT_RUN, transform=foot, rotation=90, **words)
+    elif readings.incomplete:
+        count = f"{len(dots)}/{len(pairs)}"
+        top = (middle, _top_of_data(readings))
+        axis.annotate(count, top, xytext=(0, 1.5), textcoords="offset points", **words)
+
+
+def _paint_reported(axis: Any, reported: Reported, place: float) -> None:
+    """Paint a published number."""
+    style = {"elinewidth": 0.7, "capsize": 1.2, "ecolor": FAINT, "clip_on": False, **_DIAMOND}
+    axis.errorbar(place, reported.value, yerr=reported.error or None, **style)
+
+
+def _across(count: int) -> list[float]:
+    """Return where each seed's dot lies across its bar, from -0.5 to 0.5: a seed has the same place in all bars."""
+    return [0.0] if count == 1 else [i / (count - 1) - 0.5 for i in range(count)]
+
+
+def _names(one: Measured) -> list[tuple[str, int, int]]:
+    """Return the names below the axis, over how many bars each stands, and the first of them."""
+    if not one.grouped:
+        return [(bar.bar.series.label, 1, i) for i, bar in enumerate(one.bars)]
+    names: list[tuple[str, int, int]] = []
+    for i, bar in enumerate(one.bars):
+        if names and names[-1][0] == bar.bar.at:
+            names[-1] = (bar.bar.at, names[-1][1] + 1, names[-1][2])
+        else:
+            names.append((bar.bar.at, 1, i))
+    return names
+
+
+def _top_of_data(readings: Readings) -> float:
+    """Return the upper end of a bar with its dots and error bar; 0 for none."""
+    if not readings.values:
+        return 0.0
+    deviation = readings.deviation if len(readings.values) > 1 else 0.0
+    return max(readings.mean + deviation, *readings.values, 0.0)
+
+
+def _top(bar: Filled, one: Measured) -> float:
+    """Return the upper end of all that is drawn at a bar."""
+    reported = bar.reported if one.panel.beside else None
+    return max(_top_of_data(bar.readings), reported.value + (reported.error or 0.0) if reported else 0.0)
+
+
+def _foot(bar: Filled, one: Measured) -> float:
+    """Return the lower end of all that is drawn at a bar."""
+    values = bar.readings.values
+    deviation = bar.readings.deviation if len(values) > 1 else 0.0
+    reported = bar.reported if one.panel.beside else None
+    ends = [bar.readings.mean - deviation, *values] if values else []
+    return min([0.0, *ends, *([reported.value - (reported.error or 0.0)] if reported else [])])

@@ -1,0 +1,94 @@
+"""Significance brackets as the paper draws them: Kruskal-Wallis, then Mann-Whitney U for each pair; none decides."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+from evoclaims.figures.style import INK, TEXT
+from evoclaims.judging.descriptive import ASTERISKS, kruskal_wallis, pairwise_mann_whitney
+
+LEVEL: Final = ASTERISKS[-1][0]
+"""Pairs are compared where the Kruskal-Wallis test of their family is below this."""
+EXPLAINED: Final = (
+    f"Brackets: two-sided Mann–Whitney U, where Kruskal–Wallis gives p\u00a0<\u00a0{LEVEL:g}; "
+    + ", ".join(f"{stars}\u00a0p\u00a0<\u00a0{threshold:g}" for threshold, stars in reversed(ASTERISKS))
+    + "."
+)
+"""What the brackets mean; formulae are not broken across lines."""
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Two samples of a family of samples, compared.
+
+    Attributes:
+        left, right: their indices.
+        family: the indices of all samples of the family that hold something.
+        p: of the two-sided Mann-Whitney U test.
+        overall: p of the family's Kruskal-Wallis test.
+        asterisks: for the figure; empty unless both tests find something.
+    """
+
+    left: int
+    right: int
+    family: tuple[int, ...]
+    p: float
+    overall: float
+    asterisks: str
+
+
+def compare(samples: Sequence[Sequence[float]], families: Sequence[Sequence[int]]) -> tuple[Comparison, ...]:
+    """Compare every pair of each family.
+
+    Args:
+        samples: numbers; empty where no trial has run, which is compared with nothing.
+        families: indices of the samples that are compared with each other.
+    """
+    found = []
+    for family in families:
+        present = tuple(i for i in family if samples[i])
+        if len(present) < 2:
+            continue
+        overall = kruskal_wallis([samples[i] for i in present])
+        for pair in pairwise_mann_whitney({str(i): samples[i] for i in present}):
+            stars = pair.asterisks if overall < LEVEL else ""
+            found.append(Comparison(int(pair.left), int(pair.right), present, pair.p, overall, stars))
+    return tuple(found)
+
+
+def stack(spans: Sequence[tuple[float, float]], tops: Sequence[tuple[float, float]], row: float) -> list[float]:
+    """Return the height of a bracket over each span, low ones first for short spans, so that none meets another.
+
+    Args:
+        spans: left and right end of each bracket.
+        tops: place and height of what stands below, such as bars.
+        row: height of a bracket with its asterisks.
+    """
+    heights = [0.0] * len(spans)
+    placed: list[int] = []
+    for i in sorted(range(len(spans)), key=lambda i: (spans[i][1] - spans[i][0], spans[i])):
+        left, right = spans[i]
+        below = [height for place, height in tops if left <= place <= right]
+        below += [heights[j] + row for j in placed if spans[j][0] <= right and left <= spans[j][1]]
+        heights[i] = max(below) + 0.35 * row
+        placed.append(i)
+    return heights
+
+
+def paint(axis: Any, span: tuple[float, float], height: float, row: float, asterisks: str) -> None:
+    """Paint one bracket."""
+    left, right = span
+    foot = height - 0.2 * row
+    axis.plot([left, left, right, right], [foot, height, height, foot], color=INK, linewidth=0.6, clip_on=False)
+    # Asterisks are raised: their line of text starts below what is seen of them.
+    axis.annotate(
+        asterisks,
+        ((left + right) / 2, height),
+        xytext=(0, -2.2),
+        textcoords="offset points",
+        ha="center",
+        va="bottom",
+        fontsize=TEXT,
+    )

@@ -1,0 +1,32 @@
+"""A reproduction's figures, by name; a figure's module is imported when it is asked for."""
+
+from __future__ import annotations
+
+import importlib
+
+from evoclaims.core.errors import UnknownNameError, UserError
+from evoclaims.figures.figure import Figure
+from evoclaims.suite.reproduction import Reproduction
+
+
+def names(reproduction: Reproduction) -> tuple[str, ...]:
+    """Return the names of all figures, in the order of the paper."""
+    return tuple(module.rpartition(".")[2] for module in reproduction.figures)
+
+
+def load(reproduction: Reproduction, name: str) -> Figure:
+    """Return a figure by its name, which is its module's.
+
+    Raises:
+        UnknownNameError: for another name; it lists the known ones.
+        UserError: when the module holds no figure of this name.
+    """
+    if not reproduction.figures:
+        raise UserError(f"The reproduction {reproduction.name!r} names no figures: Reproduction(figures=...) is empty.")
+    modules = dict(zip(names(reproduction), reproduction.figures, strict=True))
+    if name not in modules:
+        raise UnknownNameError("figure", name, modules)
+    figure = getattr(importlib.import_module(modules[name]), "FIGURE", None)
+    if not isinstance(figure, Figure) or figure.name != name:
+        raise UserError(f"The module {modules[name]!r} has no FIGURE = Figure(name={name!r}, ...).")
+    return figure

@@ -1,0 +1,157 @@
+"""Maps of elites: the fitness of each elite where its episode ended, from champions in the store."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from evoclaims.core.errors import UserError
+from evoclaims.envs.ecorobot.maze import Maze
+from evoclaims.envs.ecorobot.painting import paint_ground
+from evoclaims.figures import sheet
+from evoclaims.figures.figure import Drawing, Heading, Scope
+from evoclaims.figures.readings import MeasureOf, Readings, absences, frame, read
+from evoclaims.figures.style import FAINT, SMALL, TEXT, plain
+from evoclaims.trials import champions
+
+LINE: Final = 0.12
+"""Height of a line below a panel, inches."""
+HOW: Final = (
+    "Colour: fitness of the elite whose episode ended in the cell; white: no elite. Numbers: stones in their order. "
+    "Red: the target."
+)
+
+
+@dataclass(frozen=True)
+class Ground:
+    """A maze that a map lies over.
+
+    Attributes:
+        title: of the panel.
+        method, task: the condition.
+    """
+
+    title: str
+    method: str
+    task: str
+
+
+class Map(NamedTuple):
+    """The map of one trial: its seed, its id, and fitnesses [cells along x, along y], -inf where there is no elite."""
+
+    seed: int
+    trial: str
+    fitnesses: NDArray[np.floating]
+
+
+@dataclass(frozen=True)
+class ElitesMap:
+    """Maps side by side, each of the first trial whose champion is stored; of all trials what their records say.
+
+    Attributes:
+        grounds: one a panel.
+        told: what is told of all trials below each panel: measures by what they are called.
+        width: of the figure, inches.
+    """
+
+    grounds: tuple[Ground, ...]
+    told: tuple[tuple[str, MeasureOf], ...]
+    width: float = 7.0
+
+    def __call__(self, scope: Scope, heading: Heading) -> Drawing:
+        """Draw the maps from a tier's trials."""
+        read_all = [
+            [(name, read(scope, one.method, one.task, measure)) for name, measure in self.told] for one in self.grounds
+        ]
+        maps = [_first_map(scope, one) for one in self.grounds]
+        absent = absences(readings for told in read_all for _, readings in told)
+        without = [_unmapped(scope, one) for one, found in zip(self.grounds, maps, strict=True) if found is None]
+        missing = (*absent, *without)
+        with plain():
+            row = sheet.Row(0.0, below=0.44 + 2 * len(self.told) * LINE, right=0.6, columns=len(self.grounds))
+            wide = row.wide(self.width)
+            figure, axes = sheet.build(heading, self.width, [replace(row, height=wide)], [], [*missing, HOW])
+            for axis, one, found, told in zip(axes, self.grounds, maps, read_all, strict=True):
+                _paint(axis, _task(scope, one), one, found, told, wide)
+        panels = zip(self.grounds, maps, read_all, strict=True)
+        table = frame((row for one, found, told in panels for row in _rows(one, found, told)), "x", "y")
+        shown = sum(len(readings.values) for told in read_all for _, readings in told)
+        return Drawing(figure, table, (HOW,), missing, shown, f"{heading.title} ({heading.place})")
+
+
+def _task(scope: Scope, ground: Ground) -> Maze:
+    """Return the maze of a panel."""
+    task = scope.tier.condition(ground.method, ground.task).task
+    if not isinstance(task, Maze):
+        raise UserError(f"A map of elites lies over the area of a maze, which {ground.task!r} is not.")
+    return task
+
+
+def _first_map(scope: Scope, ground: Ground) -> Map | None:
+    """Return the map of the first trial whose champion is in the store; None without any."""
+    condition = scope.tier.condition(ground.method, ground.task)
+    for result in scope.group(ground.method, ground.task).fetch(scope.seeds):
+        if scope.archive.store.champion_files(result.id):
+            _, fitnesses = champions.load(scope.archive.store, condition, result)
+            return Map(result.seed, result.id, np.asarray(fitnesses))
+    return None
+
+
+def _unmapped(scope: Scope, ground: Ground) -> str:
+    """Say that no map is stored, and what to do."""
+    return (
+        f"No map of {ground.method} on {ground.task} is stored (maps lie with champions, which reference trials leave "
+        f"out): `evoclaims run {ground.method} --on {ground.task} --tier {scope.tier_name} --trials 1` makes one."
+    )
+
+
+def _paint(
+    axis: Any, task: Maze, ground: Ground, found: Map | None, told: list[tuple[str, Readings]], wide: float
+) -> None:
+    """Paint one map over its maze, and below it what is told of all trials, in lines of `wide` inches."""
+    paint_ground(axis, task, ())
+    axis.set_anchor("NW")
+    title = ground.title if found is None else f"{ground.title} (seed {found.seed})"
+    axis.set_title(title, loc="left", pad=5.0)
+    if found is None:
+        style = {"ha": "center", "va": "center", "fontsize": TEXT, "color": FAINT, "zorder": 9}
+        box = {"facecolor": "white", "edgecolor": FAINT, "linewidth": 0.5, "boxstyle": "round,pad=0.4"}
+        axis.text(0.5, 0.5, "no map of elites is stored", transform=axis.transAxes, bbox=box, **style)
+    else:
+        edges = [np.linspace(*ends, count + 1) for ends, count in zip(task.area, found.fitnesses.shape, strict=True)]
+        shown = np.ma.masked_where(~np.isfinite(found.fitnesses), found.fitnesses)
+        mesh = axis.pcolormesh(*edges, shown.T, cmap="viridis", zorder=0.5)
+        bar = axis.figure.colorbar(mesh, cax=axis.inset_axes((1.03, 0.1, 0.03, 0.8)))
+        bar.outline.set_linewidth(0.5)
+    lines = [line for name, readings in told for line in sheet.wrap(f"{name}: {_summary(readings)}", wide, SMALL)]
+    corner = {"xycoords": "axes fraction", "xytext": (0, -30), "textcoords": "offset points"}
+    axis.annotate("\n".join(lines), (0.0, 0.0), va="top", fontsize=SMALL, **corner)
+
+
+def _summary(readings: Readings) -> str:
+    """Return a measure of all trials in words."""
+    if not readings.values:
+        return "no values"
+    spread = f" ± {_text(readings.deviation)}" if len(readings.values) > 1 else ""
+    words = f"{_text(readings.mean)}{spread} ({len(readings.values)} of {len(readings.each)} trials)"
+    return words.replace(" ", "\u00a0")  # kept on one line
+
+
+def _text(value: float) -> str:
+    """Return a number with about three digits."""
+    return f"{value:,.0f}" if abs(value) >= 100 else f"{value:.2f}"
+
+
+def _rows(ground: Ground, found: Map | None, told: list[tuple[str, Readings]]) -> Iterator[dict[str, Any]]:
+    """Yield a panel's rows of the table: what is told of all trials, then the elites of the map, by cell."""
+    for name, readings in told:
+        yield from readings.rows(panel=ground.title, at=name, series=ground.method)
+    if found is not None:
+        names = {"panel": ground.title, "at": "map", "series": ground.method, "method": ground.method}
+        common = {**names, "task": ground.task, "what": "elite", "seed": found.seed, "trial": found.trial}
+        for x, y in zip(*np.nonzero(np.isfinite(found.fitnesses)), strict=True):
+            yield {**common, "value": float(found.fitnesses[x, y]), "x": int(x), "y": int(y)}

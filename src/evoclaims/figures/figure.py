@@ -1,0 +1,118 @@
+"""A figure or table of a paper, and the drawing that a reproduction's trials make of it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+from evoclaims.suite.archive import Archive
+from evoclaims.suite.group import TrialGroup
+from evoclaims.suite.reproduction import Reproduction, Tier
+from evoclaims.trials.result import TrialResult
+from evoclaims.trials.spec import Condition
+
+SIZES: Final = {
+    "full": "full tier: the paper's size",
+    "smoke": "smoke tier: smaller tasks and budgets than the paper's",
+}
+"""What the tiers are."""
+
+
+@dataclass(frozen=True)
+class Scope:
+    """What a figure is drawn from.
+
+    Attributes:
+        archive: the trials.
+        reproduction: whose conditions are drawn.
+        tier_name: at which tier.
+    """
+
+    archive: Archive
+    reproduction: Reproduction
+    tier_name: str
+
+    @property
+    def tier(self) -> Tier:
+        """The tier; an `UnknownNameError` lists the known ones."""
+        return self.reproduction.tier(self.tier_name)
+
+    @property
+    def seeds(self) -> tuple[int, ...]:
+        """Of the trials that the tier looks at."""
+        protocol = self.tier.protocol
+        return protocol.seeds(protocol.last.n)
+
+    def group(self, method: str, task: str) -> TrialGroup:
+        """Return a condition's trials as claims speak of them; those that there are."""
+        return TrialGroup(method, task, self.tier.condition(method, task), self._present)
+
+    def _present(self, condition: Condition, seeds: Sequence[int]) -> list[TrialResult]:
+        """Return the trials of these seeds that the archive holds."""
+        return [trial for trial in self.archive.trials(condition, seeds) if trial is not None]
+
+
+@dataclass(frozen=True, eq=False)
+class Drawing:
+    """A figure, drawn.
+
+    Attributes:
+        figure: a `matplotlib.figure.Figure`.
+        table: a `pandas.DataFrame` with every number that is drawn, and the ids of the trials.
+        caption: sentences that say how to read it; they stand on the figure too.
+        missing: sentences that say what is not there, or broke; they stand on the figure too.
+        shown: how many numbers of ours are drawn; 0 when there was nothing to draw.
+        title: what the figure shows, and its place in the paper.
+    """
+
+    figure: Any
+    table: Any
+    caption: tuple[str, ...]
+    missing: tuple[str, ...]
+    shown: int
+    title: str
+
+
+@dataclass(frozen=True)
+class Heading:
+    """What stands above a drawing.
+
+    Attributes:
+        title: what is shown.
+        place: where in the paper, and at which tier.
+    """
+
+    title: str
+    place: str
+
+
+Painter = Callable[[Scope, Heading], Drawing]
+
+
+@dataclass(frozen=True)
+class Figure:
+    """One figure or table of a paper.
+
+    Attributes:
+        name: a short name, such as "fig3"; files are named after it.
+        title: what it shows.
+        where: section and figure.
+        paint: draws it.
+    """
+
+    name: str
+    title: str
+    where: str
+    paint: Painter
+
+    def draw(self, archive: Archive, reproduction: Reproduction, tier: str) -> Drawing:
+        """Draw the figure from a tier's trials; what there is none of is said on it.
+
+        Raises:
+            UnknownNameError: for another tier.
+            UserError: when a record is torn, or matplotlib is not installed.
+        """
+        scope = Scope(archive, reproduction, tier)
+        reproduction.tier(tier)
+        return self.paint(scope, Heading(self.title, f"{self.where} – {SIZES.get(tier, tier)}"))

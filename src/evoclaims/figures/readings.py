@@ -1,0 +1,166 @@
+"""What is read from each trial of a condition, with what cannot be read kept in sight."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from evoclaims.figures.figure import Scope
+from evoclaims.judging.measure import Measure
+from evoclaims.judging.sample import is_failed
+from evoclaims.suite.group import TrialGroup
+from evoclaims.trials.records import printable
+from evoclaims.trials.result import TrialResult
+from evoclaims.trials.spec import TrialSpec
+
+MeasureOf = Callable[[TrialGroup], Measure]
+
+NOT_FINITE, NOT_RUN = "not finite", "not run"
+PLACE, WHAT = ("panel", "at", "series", "method", "task"), ("what", "against", "n")
+COLUMNS = (*PLACE, *WHAT, "seed", "trial", "status", "value", "error")
+"""Of the table of a figure: one number a row. `what` is "trial", "mean" (`error`: the standard deviation), "reported"
+(`error`: as published), or the name of a test (`value`: p; `against`: the other side)."""
+
+
+@dataclass(frozen=True)
+class Reading:
+    """One trial's number.
+
+    Attributes:
+        seed, trial: which trial; `trial` is its id.
+        status: the record's; "not finite" for a finished trial with such a number, "not run" for none.
+        value: the number; None where there is none to draw.
+        rank: what rank tests see: the number, or -inf or inf, the worst, for a trial that diverged or ran out of time.
+    """
+
+    seed: int
+    trial: str
+    status: str
+    value: float | None
+    rank: float | None
+
+
+@dataclass(frozen=True)
+class Readings:
+    """A measure of a condition's trials.
+
+    Attributes:
+        method, task: the condition's names.
+        name: what is measured.
+        each: in the order of seeds.
+    """
+
+    method: str
+    task: str
+    name: str
+    each: tuple[Reading, ...]
+
+    @property
+    def values(self) -> tuple[float, ...]:
+        """The numbers that can be drawn."""
+        return tuple(reading.value for reading in self.each if reading.value is not None)
+
+    @property
+    def ranks(self) -> tuple[float, ...]:
+        """What rank tests see."""
+        return tuple(reading.rank for reading in self.each if reading.rank is not None)
+
+    @property
+    def broken(self) -> int:
+        """How many trials have run and left no number."""
+        return sum(reading.value is None and reading.status != NOT_RUN for reading in self.each)
+
+    @property
+    def incomplete(self) -> bool:
+        """Whether some trials have left a number, and not all."""
+        return 0 < len(self.values) < len(self.each)
+
+    @property
+    def mean(self) -> float:
+        """The mean of the numbers; NaN without any."""
+        return math.fsum(self.values) / len(self.values) if self.values else math.nan
+
+    @property
+    def deviation(self) -> float:
+        """The sample standard deviation of the numbers; NaN below two."""
+        squares = math.fsum((value - self.mean) ** 2 for value in self.values)
+        return math.sqrt(squares / (len(self.values) - 1)) if len(self.values) > 1 else math.nan
+
+    def rows(self, **common: Any) -> list[dict[str, Any]]:
+        """Return the table's rows of the trials and of their mean; `common` goes into each."""
+        names = {**common, "method": self.method, "task": self.task}
+        rows = [
+            {**names, "what": "trial", "seed": r.seed, "trial": r.trial, "status": r.status, "value": r.value}
+            for r in self.each
+        ]
+        summary = {"what": "mean", "n": len(self.values), "value": self.mean, "error": self.deviation}
+        return [*rows, {**names, **summary}] if self.values else rows
+
+
+def read(scope: Scope, method: str, task: str, measure_of: MeasureOf) -> Readings:
+    """Read a measure from every trial that the scope's tier looks at."""
+    group = scope.group(method, task)
+    measure = measure_of(group)
+    trials = scope.archive.trials(group.condition, scope.seeds)
+    ids = [TrialSpec(group.condition, seed).id for seed in scope.seeds]
+    each = [_reading(measure, *found) for found in zip(scope.seeds, ids, trials, strict=True)]
+    return Readings(method, task, measure.name, tuple(each))
+
+
+def frame(rows: Iterable[Mapping[str, Any]], *more: str) -> Any:
+    """Return rows as a `pandas.DataFrame` with `COLUMNS` and `more`; counts and seeds are whole or missing."""
+    import pandas as pd
+
+    return pd.DataFrame(list(rows), columns=[*COLUMNS, *more]).astype(dict.fromkeys(("n", "seed", *more), "Int64"))
+
+
+def absences(readings: Iterable[Readings]) -> tuple[str, ...]:
+    """Say which trials are not there and which left no number, each condition once."""
+    kept = {(one.method, one.task): one for one in readings}
+    absent = [_name(one) for one in kept.values() if all(r.status == NOT_RUN for r in one.each)]
+    partial = [one for one in kept.values() if 0 < _count(one, NOT_RUN) < len(one.each)]
+    sentences = [f"Not run: {', '.join(absent)}."] if absent else []
+    if partial:
+        counts = [f"{_name(one)} ({len(one.each) - _count(one, NOT_RUN)} of {len(one.each)} trials)" for one in partial]
+        sentences.append(f"Run in part: {', '.join(counts)}.")
+    for one in kept.values():
+        statuses = Counter(r.status for r in one.each if r.value is None and r.status != NOT_RUN)
+        sentences += [f"{_name(one)}: {count} of {len(one.each)} trials {_end(s)}." for s, count in statuses.items()]
+    return tuple(sentences)
+
+
+def _reading(measure: Measure, seed: int, trial_id: str, trial: TrialResult | None) -> Reading:
+    """Read one trial."""
+    if trial is None:
+        return Reading(seed, trial_id, NOT_RUN, None, None)
+    if trial.status == "crashed":  # an accident of the machine, which says nothing about the method
+        return Reading(seed, trial_id, trial.status, None, None)
+    if is_failed(trial):
+        return Reading(seed, trial_id, trial.status, None, -math.inf if measure.better == "higher" else math.inf)
+    value = float(measure.read(trial))
+    if math.isfinite(value):
+        return Reading(seed, trial_id, trial.status, value, value)
+    return Reading(seed, trial_id, NOT_FINITE, None, None if math.isnan(value) else value)
+
+
+def _count(readings: Readings, status: str) -> int:
+    """Return how many trials have a status."""
+    return sum(reading.status == status for reading in readings.each)
+
+
+def _name(readings: Readings) -> str:
+    """Return a condition's name."""
+    return printable(f"{readings.method} on {readings.task}")
+
+
+def _end(status: str) -> str:
+    """Say how trials ended, and what became of them in means and rank tests."""
+    ends = {
+        "diverged": "diverged (no value; the worst rank in tests)",
+        "timeout": "ran out of time (no value; the worst rank in tests)",
+        "crashed": "crashed (left out)",
+    }
+    return ends.get(status, "ended with a number that is not finite (left out of the mean)")

@@ -1,0 +1,129 @@
+"""The page of a figure: heading, legend, rows of panels, notes; sizes in inches, so that nothing is squeezed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any, Final
+
+from evoclaims.figures.figure import Heading
+from evoclaims.figures.style import FAINT, SMALL, TEXT, TITLE
+from evoclaims.networks.export import optional
+
+LEFT, RIGHT, EDGE = 0.56, 0.1, 0.06
+LINE: Final = 1.3 / 72
+"""Height of a line of text, inches for each point of its size."""
+
+
+@dataclass(frozen=True)
+class Row:
+    """Panels side by side.
+
+    Attributes:
+        height: of the panels' frames.
+        below: room for the names of ticks and of the axis.
+        above: room for the panels' titles.
+        right: room at each panel's right.
+        columns: how many panels.
+    """
+
+    height: float
+    below: float = 0.4
+    above: float = 0.22
+    right: float = RIGHT
+    columns: int = 1
+
+    def wide(self, width: float) -> float:
+        """Return the width of a panel's frame on a page of `width` inches."""
+        return width / self.columns - LEFT - self.right
+
+
+def build(
+    heading: Heading, width: float, rows: Sequence[Row], legend: Sequence[Any], notes: Sequence[str]
+) -> tuple[Any, list[Any]]:
+    """Return a figure and the axes of its panels, row by row.
+
+    Args:
+        heading: written above.
+        width: of the whole.
+        rows: of panels; of none, the axes are those of the notes alone.
+        legend: handles with labels, for the line below the heading.
+        notes: sentences written below.
+    """
+    room = width - 2 * EDGE
+    title, place = wrap(heading.title, room, TITLE, bold=True), wrap(heading.place, room, SMALL)
+    told = [line for note in notes for line in wrap(note, room, SMALL)]
+    columns = _columns(legend, room)
+    lines_of_legend = -(-len(legend) // columns) if legend else 0
+    head = EDGE + len(title) * TITLE * LINE + len(place) * SMALL * LINE + 0.04
+    key = lines_of_legend * (TEXT * LINE + 0.02)
+    body = sum(row.above + row.height + row.below for row in rows)
+    height = head + key + body + len(told) * SMALL * LINE + EDGE
+    figure = optional("matplotlib.figure").Figure(figsize=(width, height), facecolor="white")
+    _write(figure, title, EDGE, EDGE, TITLE, fontweight="bold")
+    _write(figure, place, EDGE, EDGE + len(title) * TITLE * LINE, SMALL, color=FAINT)
+    if legend:
+        figure.legend(
+            handles=list(legend),
+            loc="upper left",
+            bbox_to_anchor=(EDGE / width, 1 - head / height),
+            ncols=columns,
+            frameon=False,
+            borderpad=0,
+            borderaxespad=0,
+            handlelength=1.4,
+            handletextpad=0.5,
+            columnspacing=1.2,
+            labelspacing=0.3,
+        )
+    axes, top = [], head + key
+    for row in rows:
+        axes += _frames(figure, row, top)
+        top += row.above + row.height + row.below
+    _write(figure, told, EDGE, top, SMALL)
+    return figure, axes
+
+
+@lru_cache(maxsize=4096)
+def measured(text: str, size: float, bold: bool = False) -> float:
+    """Return the width of a line of text, inches."""
+    font = optional("matplotlib.font_manager").FontProperties(size=size, weight="bold" if bold else "normal")
+    width: float = optional("matplotlib.textpath").text_to_path.get_text_width_height_descent(text, font, False)[0]
+    return width / 72
+
+
+def wrap(text: str, width: float, size: float, *, bold: bool = False) -> list[str]:
+    """Break a text at its spaces into lines of at most `width` inches; a longer word has a line of its own."""
+    room = 0.98 * width  # renderers round the widths of letters
+    lines: list[str] = []
+    for word in text.split(" "):
+        longer = f"{lines[-1]} {word}" if lines else word
+        if lines and measured(longer, size, bold) <= room:
+            lines[-1] = longer
+        else:
+            lines.append(word)
+    return lines
+
+
+def _frames(figure: Any, row: Row, top: float) -> list[Any]:
+    """Add a row's axes, `top` inches below the page's upper edge."""
+    width, height = figure.get_size_inches()
+    bottom, wide = height - top - row.above - row.height, row.wide(width)
+    lefts = [LEFT + i * width / row.columns for i in range(row.columns)]
+    return [figure.add_axes((left / width, bottom / height, wide / width, row.height / height)) for left in lefts]
+
+
+def _columns(legend: Sequence[Any], room: float) -> int:
+    """Return into how many columns the legend's entries fit."""
+    widths = [measured(handle.get_label(), TEXT) + 0.36 for handle in legend]
+    fitting = (n for n in range(len(legend), 1, -1) if sum(max(widths[i::n]) for i in range(n)) <= room)
+    return next(fitting, 1)
+
+
+def _write(figure: Any, lines: Sequence[str], left: float, top: float, size: float, **style: Any) -> None:
+    """Write lines of text, one below the other."""
+    width, height = figure.get_size_inches()
+    for number, line in enumerate(lines):
+        y = 1 - (top + number * size * LINE) / height
+        figure.text(left / width, y, line, fontsize=size, va="top", ha="left", **style)

@@ -1,0 +1,69 @@
+"""How figures look: one style whatever the user's own is, and colours that all readers can tell apart."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Final
+
+from evoclaims.networks.export import optional
+
+BLUE, SKY, GREEN, ORANGE, VERMILION, PURPLE, YELLOW = (
+    "#0072b2",
+    "#56b4e9",
+    "#009e73",
+    "#e69f00",
+    "#d55e00",
+    "#cc79a7",
+    "#f0e442",
+)
+"""The palette of Okabe and Ito (2008), which readers with any colour vision can tell apart."""
+INK, FAINT = "#222222", "#5f5f5f"
+TITLE, TEXT, SMALL = 8.5, 7.0, 6.5
+"""Sizes of letters, pt."""
+COLUMN: Final = 3.5
+"""Width of a column of a page, inches: what a figure is drawn for unless it says otherwise."""
+
+
+@contextmanager
+def plain() -> Iterator[None]:
+    """Draw, or write, in this module's style.
+
+    Raises:
+        UserError: when matplotlib is not installed.
+    """
+    matplotlib = optional("matplotlib")
+    with matplotlib.rc_context():
+        matplotlib.rcdefaults()
+        matplotlib.rcParams.update(
+            {
+                "svg.hashsalt": "evoclaims",
+                "svg.fonttype": "none",
+                "text.parse_math": False,  # a dollar sign is a dollar sign
+                "font.size": TEXT,
+                "text.color": INK,
+                "axes.edgecolor": INK,
+                "axes.labelcolor": INK,
+                "axes.linewidth": 0.6,
+                "axes.spines.top": False,
+                "axes.spines.right": False,
+                "axes.titlesize": TEXT,
+                "axes.labelsize": TEXT,
+                "axes.formatter.limits": (-9, 9),
+                "xtick.labelsize": TEXT,
+                "ytick.labelsize": TEXT,
+                "xtick.major.width": 0.6,
+                "ytick.major.width": 0.6,
+                "xtick.major.size": 2.5,
+                "ytick.major.size": 2.5,
+                "legend.fontsize": TEXT,
+                "hatch.linewidth": 0.6,
+            }
+        )
+        yield
+
+
+def lighter(colour: str, share: float = 0.5) -> str:
+    """Return a colour mixed with white; `share` is white's."""
+    channels = [int(colour[i : i + 2], 16) for i in (1, 3, 5)]
+    return "#" + "".join(f"{round(c + (255 - c) * share):02x}" for c in channels)

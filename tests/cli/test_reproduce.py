@@ -1,0 +1,137 @@
+"""`evoclaims reproduce`: what it writes, prints and returns."""
+
+from __future__ import annotations
+
+import re
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+import tiny_project
+
+from evoclaims.cli import main
+from evoclaims.networks.export import optional
+
+# What the command imports late: pytester forgets the modules that a test has imported, and would load them twice.
+for _module in ("backends.backend_agg", "backends.backend_svg", "figure", "lines", "patches", "textpath"):
+    optional(f"matplotlib.{_module}")
+for _module in ("pandas", "scipy.stats", "evoclaims.cli.reproduce", "evoclaims.figures.bars"):
+    optional(_module)
+
+FIGURES = 'REPRODUCTION = replace(REPRODUCTION, figures=("fig1", "fig2"))'
+FIGURE = """
+from evoclaims.figures.bar_panel import Series
+from evoclaims.figures.bars import BarChart, compared
+from evoclaims.figures.figure import Figure
+from evoclaims.figures.reported import Published
+
+METHODS = tuple(Series(name, name, "#0072b2") for name in {methods})
+PANEL = compared(
+    "success", lambda t: t.mean_success, METHODS, {{"": "parity"}}, Published({{}}, {{}}), ylabel="success"
+)
+FIGURE = Figure(name="{name}", title="Success", where="§1, Fig. 1", paint=BarChart((PANEL,)))
+"""
+
+Evoclaims = Callable[..., tuple[int, str, str]]
+
+
+@pytest.fixture
+def evoclaims(project: Any, capsys: pytest.CaptureFixture[str]) -> Evoclaims:
+    """A function that runs a command in a project with two figures; returns status, output and errors."""
+    files = {"fig1": ("right", "wrong"), "fig2": ("coin",)}
+    modules = {name: FIGURE.format(name=name, methods=methods) for name, methods in files.items()}
+    project.pytester.makepyfile(tiny_paper=tiny_project.REPRODUCTION + FIGURES, **modules)
+
+    def run(*arguments: str) -> tuple[int, str, str]:
+        capsys.readouterr()
+        status = main(arguments)
+        out, err = capsys.readouterr()
+        assert "Traceback" not in out + err
+        return status, out, err
+
+    return run
+
+
+@pytest.fixture
+def stored(evoclaims: Evoclaims) -> Evoclaims:
+    """The same, with all trials of one bar in the store."""
+    assert evoclaims("run", "right", "--device=cpu")[0] == 0
+    return evoclaims
+
+
+def test_a_figure_is_written_three_ways_and_what_is_missing_is_said(stored: Evoclaims) -> None:
+    status, out, err = stored("reproduce", "fig1")
+    assert (status, err) == (0, "")
+    assert out.splitlines() == ["fig1: wrote figures/smoke/fig1.png, .svg and .csv", "  Not run: wrong on parity."]
+    folder = Path("figures/smoke")
+    assert (folder / "fig1.png").read_bytes().startswith(b"\x89PNG")
+    assert "not run" in (folder / "fig1.svg").read_text()
+    assert len(re.findall(",parity,trial,", (folder / "fig1.csv").read_text())) == 20
+    assert sorted(path.name for path in folder.iterdir()) == ["fig1.csv", "fig1.png", "fig1.svg"]
+
+
+def test_all_figures_go_into_the_folder_that_is_named(stored: Evoclaims) -> None:
+    status, out, _ = stored("reproduce", "all", "--out", "there/it")
+    assert status == 0
+    assert [line.partition(":")[0] for line in out.splitlines() if "wrote" in line] == ["fig1", "fig2"]
+    assert len(list(Path("there/it").iterdir())) == 6
+    assert not Path("figures").exists()
+
+
+def test_a_figure_without_any_trial_is_written_and_ends_with_1(stored: Evoclaims) -> None:
+    status, out, _ = stored("reproduce", "fig2", "--tier", "full")
+    assert status == 1
+    assert "not run" in Path("figures/full/fig2.svg").read_text()
+    assert out.splitlines()[-1] == (
+        "Nothing could be drawn: of fig2 no trial of the full tier is at hand. `evoclaims run --tier full` runs them."
+    )
+
+
+def test_committed_trials_are_drawn_where_the_store_has_none(stored: Evoclaims) -> None:
+    stored("run", "wrong", "--device=cpu")
+    assert stored("reproduce", "fig1")[:2] == (0, "fig1: wrote figures/smoke/fig1.png, .svg and .csv\n")
+    first = Path("figures/smoke/fig1.csv").read_bytes()
+    Path("claims/test_claims.py").write_text(tiny_project.claims(a="supported", b="refuted"))
+    assert stored("reference")[0] == 0
+    assert stored("reproduce", "fig1", "--storage=empty", "--out=again")[0] == 0
+    assert Path("again/fig1.csv").read_bytes() == first
+
+
+@pytest.mark.parametrize(
+    ("arguments", "text"),
+    [
+        (("fig3",), "There is no figure named 'fig3'. Did you mean 'fig2'? Known: fig1, fig2."),
+        (("fig1", "--tier", "ful"), "There is no tier named 'ful'."),
+        (("fig1", "--storage", "pyproject.toml"), "it cannot be read (Not a directory)"),
+        (("fig1", "--out", "pyproject.toml"), "Cannot write pyproject.toml/fig1.png: "),
+    ],
+)
+def test_a_users_mistake_is_one_sentence_and_status_2(
+    evoclaims: Evoclaims, arguments: tuple[str, ...], text: str
+) -> None:
+    status, _, err = evoclaims("reproduce", *arguments)
+    assert (status, err.count("\n")) == (2, 1)
+    assert err.startswith("evoclaims: ")
+    assert text in err
+
+
+def test_a_folder_that_cannot_be_written_is_answered_with_the_right_option(evoclaims: Evoclaims) -> None:
+    _, _, err = evoclaims("reproduce", "fig1", "--out", "pyproject.toml")
+    assert err.endswith("Name another folder with --out.\n")
+
+
+def test_a_project_without_figures_says_so(project: Any, evoclaims: Evoclaims) -> None:
+    project.pytester.makepyfile(tiny_paper=tiny_project.REPRODUCTION)
+    for name in ("fig1", "all"):
+        status, _, err = evoclaims("reproduce", name)
+        assert (status, "names no figures" in err) == (2, True)
+
+
+def test_without_matplotlib_it_is_said_how_to_install_it(evoclaims: Evoclaims, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    status, _, err = evoclaims("reproduce", "fig1")
+    assert status == 2
+    assert 'pip install "evoclaims[pictures]"' in err
+    assert not Path("figures").exists()

@@ -1,0 +1,69 @@
+"""Published numbers: read with their places, or refused."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from evoclaims.core.errors import UnknownNameError, UserError
+from evoclaims.figures.reported import Reported, load
+
+SOUND = """
+[plots.maze.reward]
+place = "Fig. 5"
+methods.neat = { mean = [5, 6.5], error = [1, 0.5] }
+methods.ppo.mean = [1]
+
+[tables.neat]
+place = "Table 1"
+values = { "population size" = 5000 }
+"""
+
+
+def _write(folder: Path, text: str) -> Path:
+    path = folder / "reported.toml"
+    path.write_text(text)
+    return path
+
+
+def test_a_number_has_its_error_bar_and_its_place(tmp_path: Path) -> None:
+    published = load(_write(tmp_path, SOUND))
+    assert published.value("maze", "reward", "neat", 1) == Reported(6.5, 0.5, "Fig. 5")
+    assert published.value("maze", "reward", "ppo") == Reported(1.0, None, "Fig. 5")
+    assert published.table("neat") == {"place": "Table 1", "values": {"population size": 5000}}
+
+
+def test_what_is_not_published_is_nothing(tmp_path: Path) -> None:
+    published = load(_write(tmp_path, SOUND))
+    for task, quantity, method, at in (
+        ("maze", "reward", "neat", 2),
+        ("maze", "reward", "cma_es", 0),
+        ("maze", "stones", "neat", 0),
+        ("gate", "reward", "neat", 0),
+    ):
+        assert published.value(task, quantity, method, at) is None
+    with pytest.raises(UnknownNameError, match="no published table named 'ppo'. Known: neat"):
+        published.table("ppo")
+
+
+@pytest.mark.parametrize(
+    ("text", "what"),
+    [
+        ("[plots.maze.reward]\nmethods.neat.mean = [1]\n", "maze.reward"),
+        ('[plots.maze.reward]\nplace = "Fig. 5"\n', "maze.reward"),
+        ('[plots.maze.reward]\nplace = "Fig. 5"\nmethods.neat = { mean = [1, 2], error = [1] }\n', "maze.reward"),
+        ('[plots.maze.reward]\nplace = "Fig. 5"\nmethods.neat.error = [1]\n', "maze.reward"),
+        ("[tables.neat]\nvalues = { a = 1 }\n", "neat"),
+        ('[tabels.neat]\nplace = "x"\nvalues = { a = 1 }\n', "tabels"),
+    ],
+)
+def test_a_number_without_its_place_or_a_torn_plot_is_refused(tmp_path: Path, text: str, what: str) -> None:
+    with pytest.raises(UserError, match=f"these are neither: {what}"):
+        load(_write(tmp_path, text))
+
+
+def test_a_file_that_cannot_be_read_is_named(tmp_path: Path) -> None:
+    for path in (tmp_path / "absent.toml", _write(tmp_path, "[plots")):
+        with pytest.raises(UserError, match=f"Cannot read the published numbers in {path}"):
+            load(path)

@@ -1,0 +1,60 @@
+"""Every figure of the reproduction, drawn at both tiers from the committed reference trials."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+from small_paper import collisions
+
+from evoclaims.figures import catalogue
+from evoclaims.figures.figure import Drawing
+from evoclaims.suite.archive import Archive
+from evoclaims.trials.store import Store
+from reproductions.nisioti2025 import REPRODUCTION
+
+FIGURES = catalogue.names(REPRODUCTION)
+
+
+@pytest.fixture(scope="module")
+def archive(tmp_path_factory: pytest.TempPathFactory) -> Archive:
+    """The committed trials, and an empty store."""
+    return Archive(Store(tmp_path_factory.mktemp("figures") / "store"), REPRODUCTION.references)
+
+
+def _trials(drawing: Drawing) -> set[Any]:
+    table = drawing.table
+    return set(table[(table["what"] == "trial") & (table["status"] != "not run")]["trial"])
+
+
+@pytest.mark.parametrize("tier", ["full", "smoke"])
+@pytest.mark.parametrize("name", FIGURES)
+def test_a_figure_draws_and_its_words_do_not_collide(archive: Archive, name: str, tier: str) -> None:
+    drawing = catalogue.load(REPRODUCTION, name).draw(archive, REPRODUCTION, tier)
+    assert collisions(drawing) == []
+    assert len(drawing.table) > 0
+
+
+@pytest.mark.parametrize("tier", ["full", "smoke"])
+def test_the_gates_figures_show_every_committed_trial(archive: Archive, tier: str) -> None:
+    conditions = REPRODUCTION.tier(tier).conditions
+    shown = {
+        "fig3": [(m, t) for m in ("neat", "hyperneat", "cma_es", "ppo") for t in ("n_parity", "simple_alu")],
+        "fig4": [(m, t) for m in ("neat", "ppo") for t in ("n_parity", "n_parity_direct")],
+    }
+    for name, names in shown.items():
+        drawing = catalogue.load(REPRODUCTION, name).draw(archive, REPRODUCTION, tier)
+        committed = [trial for pair in names for trial in archive.trials(conditions[pair], range(10))]
+        assert None not in committed
+        assert _trials(drawing) == {trial.id for trial in committed if trial is not None}
+        assert drawing.missing == ()
+
+
+def test_importing_the_reproduction_does_not_import_matplotlib() -> None:
+    code = "import reproductions.nisioti2025, sys; print('matplotlib' in sys.modules, 'pandas' in sys.modules)"
+    root = Path(__file__).parents[2]
+    done = subprocess.run([sys.executable, "-c", code], cwd=root, capture_output=True, text=True, check=True)
+    assert done.stdout.split()[0] == "False"
