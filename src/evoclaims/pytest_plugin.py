@@ -143,6 +143,7 @@ def make_session(config: pytest.Config) -> Session:
         mode = StoredOnly(Archive(store, reproduction.references if config.getoption("claims_committed") else None))
     made = Session(reproduction, store, mode, config.getoption("claims_trials"), config.getoption("claims_variant"))
     reproduction.tier("smoke", made.variant)
+    made.protocol("smoke")
     mode.check()
     config.stash[_session] = made
     if line is not None:

@@ -1,0 +1,37 @@
+"""`evoclaims accept`: the verdicts that the trials at hand give become the accepted ones."""
+
+from __future__ import annotations
+
+import argparse
+from datetime import UTC, datetime
+
+from evoclaims.cli.project import judge_stored, open_archive, open_project
+from evoclaims.cli.tiers import tiers_of
+from evoclaims.core.files import write_atomically
+from evoclaims.suite import history
+from evoclaims.suite.accepting import accept
+from evoclaims.trials.records import printable
+
+
+def main(options: argparse.Namespace) -> int:
+    """Write verdicts.toml and print what is new in it; 1 when anything is, so that no automation accepts unseen."""
+    config, reproduction = open_project()
+    tiers = tiers_of(reproduction, options.tier)
+    path = reproduction.folder / history.FILE
+    before = history.load(path)
+    reports = [report for tier in tiers for report in judge_stored(config, options.storage, tier)]
+    made = accept(before, reports, open_archive(options.storage, reproduction), f"{datetime.now(UTC):%Y-%m-%d}")
+    for line in made.left:
+        print(f"left alone: {line}")
+    now = {history.key_of(report) for report in reports}
+    for tier, claim in before.keys() - now:
+        if tier in tiers:
+            print(f"kept: {printable(claim)} ({printable(tier)}), which is no longer among the claims")
+    if not made.accepted:
+        print(f"{printable(path)} stays as it is: no verdict differs from the accepted one.")
+        return 0
+    write_atomically(path, history.dump(made.history).encode())
+    for line in made.accepted:
+        print(f"accepted: {line}")
+    print(f"wrote {printable(path)}: look at the changes and commit them")
+    return 1

@@ -1,0 +1,23 @@
+"""`evoclaims badge`: how the claims of a tier stand, as a small picture."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from evoclaims.cli.project import judge_stored, open_project
+from evoclaims.cli.stored import write
+from evoclaims.report.badge import colour_of, message_of, svg
+from evoclaims.trials.records import printable
+
+
+def main(options: argparse.Namespace) -> int:
+    """Judge from the trials at hand and write the picture."""
+    config, reproduction = open_project()
+    reproduction.tier(options.tier)
+    reports = judge_stored(config, options.storage, options.tier)
+    out = Path(options.out or f"claims-{options.tier}.svg")
+    message = message_of(reports)
+    write(out, svg(f"claims ({options.tier})", message, colour_of(reports)).encode())
+    print(f"wrote {printable(out)}: {message}")
+    return 0

@@ -1,0 +1,159 @@
+"""`evoclaims compare`: verdicts and trials of now, of a git revision, or of a store, against others."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from evoclaims.cli.project import judge_stored, open_project, open_store
+from evoclaims.cli.tiers import tiers_of
+from evoclaims.core.errors import UserError
+from evoclaims.judging.baseline import DriftReport
+from evoclaims.judging.tripwire import DigestCheck
+from evoclaims.suite import history, sides, transitions
+from evoclaims.suite.config import SuiteConfig
+from evoclaims.suite.report import ClaimReport
+from evoclaims.suite.reproduction import Reproduction
+from evoclaims.suite.revision import Revision, find_revision
+from evoclaims.suite.sides import Side
+from evoclaims.suite.timeline import timeline
+from evoclaims.suite.transitions import Kind
+from evoclaims.trials.records import printable
+from evoclaims.trials.store import Store
+
+UNSAID = (Kind.SAME, Kind.NOT_RUN)
+"""What is counted and not listed."""
+
+MOST_NAMES = 6
+"""Most names of conditions that a line lists."""
+
+
+def main(options: argparse.Namespace) -> int:
+    """Print what changed, or a timeline; 1 when a change that --fail names is among it."""
+    patterns = transitions.parse_patterns(options.fail) if options.fail is not None else ()
+    if len(options.places) > 2:
+        raise UserError(f"Two stores or two revisions can be compared, not {len(options.places)}.")
+    config, reproduction = open_project()
+    tiers = tiers_of(reproduction, options.tier)
+    if options.timeline is not None:
+        if options.places or patterns:
+            raise UserError("--timeline shows the accepted verdicts alone; leave out what else is to be compared.")
+        kept = history.load(reproduction.folder / history.FILE)
+        print(timeline({key: entries for key, entries in kept.items() if key[0] in tiers}, options.timeline))
+        return 0
+    old, new = (side.of(tiers) for side in _Places(config, reproduction, tiers, options.storage).sides(options.places))
+    found = transitions.compare(old.verdicts, new.verdicts)
+    drift, digests = sides.compare_trials(old, new)
+    for line in (
+        f"old: {printable(old.name)}",
+        f"new: {printable(new.name)}",
+        f"verdicts: {transitions.counts(found)}",
+        *(f"  {transitions.describe(one)}" for one in found if one.kind not in UNSAID),
+        *_drift_lines(drift, digests, new),
+        *_one_sided(old, new),
+        *(printable(trouble) for side in (old, new) for trouble in side.troubles),
+    ):
+        print(line)
+    matched = transitions.matched(found, patterns)
+    for one in matched:
+        print(f"FAIL {transitions.describe(one)}")
+    return int(bool(matched))
+
+
+@dataclass(frozen=True)
+class _Places:
+    """Where verdicts and trials are found."""
+
+    config: SuiteConfig
+    reproduction: Reproduction
+    tiers: Sequence[str]
+    storage: str
+
+    def sides(self, places: Sequence[str]) -> tuple[Side, Side]:
+        """Return old and new, as the names on the command line say."""
+        if not places:
+            accepted = sides.working_tree(self.reproduction)
+            if not accepted.verdicts:
+                raise UserError("No verdict has been accepted yet: `evoclaims accept` accepts those of now.")
+            store = open_store(self.storage)
+            reports = self._judged(self.storage)
+            now = replace(sides.store(self.reproduction, store, reports), verdicts=transitions.standings(reports))
+            name = f"judged from the store {store.root}, and from reference trials where it has none"
+            return replace(accepted, name="accepted verdicts, and reference trials"), replace(now, name=name)
+        found = [self._place(place) for place in places]
+        revisions = [place for place in found if isinstance(place, Revision)]
+        stores = [place for place in found if isinstance(place, Store)]
+        if revisions and stores:
+            raise UserError(
+                f"{printable(revisions[0].name)} is a revision and {printable(stores[0].root)} a store: two of a kind "
+                "can be compared."
+            )
+        if revisions:
+            read = [sides.revision(self.reproduction, place) for place in revisions]
+            return (read[0], read[1]) if len(read) == 2 else (read[0], sides.working_tree(self.reproduction))
+        opened = [self._store(place) for place in (*stores, open_store(self.storage))[:2]]
+        return opened[0], opened[1]
+
+    def _place(self, name: str) -> Revision | Store:
+        """Return what a name stands for."""
+        path = Path(name)
+        if path.is_absolute() or name.startswith("."):  # git knows no revision of such a name
+            revision = None
+        elif path.is_dir():
+            try:
+                revision = find_revision(name, self.reproduction.folder)
+            except UserError:  # without a repository a folder is a folder
+                revision = None
+        else:
+            revision = find_revision(name, self.reproduction.folder)
+        if revision is not None and path.is_dir():
+            raise UserError(
+                f"{printable(name)} is both a folder and a git revision: write ./{printable(name)} for the folder, or "
+                f"the revision's hash, {revision.sha[:12]}."
+            )
+        if revision is not None:
+            return revision
+        if not path.is_dir():
+            raise UserError(f"There is neither a git revision nor a folder called {printable(name)}.")
+        return open_store(name)
+
+    def _store(self, store: Store) -> Side:
+        """Judge a store from its own trials."""
+        if not store.ids():
+            raise UserError(f"The folder {printable(store.root)} holds no trials, so there is nothing to compare.")
+        return sides.store(self.reproduction, store, self._judged(str(store.root)))
+
+    def _judged(self, storage: str) -> list[ClaimReport]:
+        """Judge all claims of the tiers."""
+        return [report for tier in self.tiers for report in judge_stored(self.config, storage, tier)]
+
+
+def _drift_lines(drift: DriftReport, digests: DigestCheck, new: Side) -> Iterator[str]:
+    """Yield what the comparison of trials found."""
+    names = {trials[0].condition: name for name, trials in new.trials.items() if trials}
+    drifted = [row for row in drift.rows if row.drifted]
+    tested = len(drift.rows) - len(drift.unchecked)
+    yield f"trials: {tested} comparisons, {len(drifted)} drifted (exact rank tests, Holm, α = {drift.alpha:g})"
+    for row in drifted:
+        yield f"  DRIFT in {printable(row.label)}: {row.metric}, p = {row.p_holm:.2g} (Holm)"
+    for line in dict.fromkeys(f"  not checked: {row.label}: {row.detail or row.status}" for row in drift.unchecked):
+        yield printable(line)
+    yield f"to the bit: {digests.compared} trials compared, {len(digests.changed)} changed"
+    seeds: dict[str, list[int]] = {}
+    for change in digests.changed:
+        seeds.setdefault(change.condition, []).append(change.seed)
+    for condition, those in seeds.items():
+        yield printable(
+            f"  CHANGED in {names.get(condition, condition)}: seeds {', '.join(map(str, sorted(set(those))))}"
+        )
+
+
+def _one_sided(old: Side, new: Side) -> Iterator[str]:
+    """Yield a line for the conditions that one side alone has trials of."""
+    for word, names in (("old", old.trials.keys() - new.trials.keys()), ("new", new.trials.keys() - old.trials.keys())):
+        rest = len(names) - MOST_NAMES
+        listed = ", ".join(sorted(names)[:MOST_NAMES]) + (f" and {rest} more" if rest > 0 else "")
+        if names:
+            yield printable(f"trials of the {word} side alone: {listed}")

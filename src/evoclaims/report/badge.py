@@ -1,0 +1,75 @@
+"""Badges: a label and a message as a small SVG picture, drawn without any font or script from elsewhere."""
+
+from __future__ import annotations
+
+import unicodedata
+from collections import Counter
+from collections.abc import Sequence
+from html import escape
+from typing import Final
+
+from evoclaims.judging.verdict import Outcome
+from evoclaims.suite.report import ClaimReport
+from evoclaims.trials.records import printable
+
+GREEN, BLUE, RED, GREY = "#2e7d32", "#1565c0", "#c62828", "#616161"
+_NARROW: Final = frozenset("fijlrtI.,:;|!'()[]{}/ ")
+_WIDTHS: Final = {"narrow": 4.2, "usual": 7.0, "wide": 12.0}
+"""Units that a character takes at 11 units of type; `textLength` makes the text fit this estimate."""
+
+_SVG: Final = """\
+<svg xmlns="http://www.w3.org/2000/svg" width="{width}" height="20" role="img" aria-label="{label}: {message}">
+<title>{label}: {message}</title>
+<rect width="{width}" height="20" rx="3" fill="{colour}"/>
+<path d="M3 0h{left_inner}v20H3a3 3 0 0 1-3-3V3a3 3 0 0 1 3-3z" fill="#424242"/>
+<g fill="#fff" font-family="Verdana,DejaVu Sans,sans-serif" font-size="11">
+<text x="6" y="14" textLength="{label_length}" lengthAdjust="spacingAndGlyphs">{label}</text>
+<text x="{message_at}" y="14" textLength="{message_length}" lengthAdjust="spacingAndGlyphs">{message}</text>
+</g>
+</svg>
+"""
+
+
+def svg(label: str, message: str, colour: str) -> str:
+    """Return a badge as SVG; texts are shown as they stand, on one line.
+
+    Args:
+        label: on the left, on grey.
+        message: on the right.
+        colour: behind the message, as CSS says it, such as "#2e7d32".
+    """
+    label, message = (printable(" ".join(text.split())) for text in (label, message))
+    left, right = (round(sum(map(_width, text))) for text in (label, message))
+    return _SVG.format(
+        width=left + right + 24,
+        left_inner=left + 9,
+        message_at=left + 18,
+        label_length=left,
+        message_length=right,
+        label=escape(label),
+        message=escape(message),
+        colour=escape(colour),
+    )
+
+
+def message_of(reports: Sequence[ClaimReport]) -> str:
+    """Return how many claims ended how, such as "supported 24 / refuted 5 / inconclusive 2"."""
+    counts = Counter(report.outcome for report in reports)
+    return " / ".join(f"{outcome} {counts[outcome]}" for outcome in Outcome if counts[outcome]) or "no claims"
+
+
+def colour_of(reports: Sequence[ClaimReport]) -> str:
+    """Return red where something failed, grey where nothing is judged, green where all is supported, else blue."""
+    judged = [report for report in reports if report.outcome != Outcome.NOT_RUN]
+    if any(report.failed for report in judged):
+        return RED
+    if not judged:
+        return GREY
+    return GREEN if all(report.outcome == Outcome.SUPPORTED for report in reports) else BLUE
+
+
+def _width(character: str) -> float:
+    """Return about how wide a character is."""
+    if unicodedata.east_asian_width(character) in "WF":
+        return _WIDTHS["wide"]
+    return _WIDTHS["narrow" if character in _NARROW else "usual"]

@@ -1,0 +1,74 @@
+"""The champion of a condition's typical trial, and the drawing of its network."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any, Final
+
+from evoclaims.core.errors import UserError
+from evoclaims.networks import export, picture
+from evoclaims.report.glance import Glance
+from evoclaims.report.model import Champion
+from evoclaims.report.words import clean
+from evoclaims.trials import champions
+from evoclaims.trials.spec import Condition
+from evoclaims.trials.store import Store
+
+LARGEST: Final = 400_000
+"""Most bytes of a drawing that a page takes in."""
+
+
+def champion_of(store: Store, condition: Condition, trials: Sequence[Glance]) -> Champion:
+    """Return the champion of the median trial, with its network where it is a graph and its file is in the store."""
+    chosen = typical(trials)
+    if chosen is None:
+        return Champion("No trial has run to its end, so there is no champion to show.")
+    trial, which = chosen
+    try:
+        result = store.get(trial.trial)
+        if result is None or not result.champion or not store.champion_file(result).exists():
+            return Champion(f"The champion’s parameters ({which}) are not in the store: records alone are kept here.")
+        panels = network_panels(condition, champions.load(store, condition, result))
+        if panels is None:
+            return Champion(f"The champion ({which}) is no graph but arrays of weights, of which there is no drawing.")
+        drawn = picture.draw(panels, f"{condition.label}, {which}", "svg")
+    except UserError as error:
+        return Champion(f"The champion ({which}) cannot be drawn: {clean(error)}")
+    if len(drawn) > LARGEST:
+        return Champion(f"The champion’s drawing ({which}) is too large for this page: {len(drawn) // 1000} kB.")
+    return Champion(f"The champion’s network: {which}.", drawn)
+
+
+def typical(trials: Sequence[Glance]) -> tuple[Glance, str] | None:
+    """Return the trial whose mean success is the median (the lower one of two), and words that say so.
+
+    Only finished trials count; of equals the one with the lowest seed is taken.
+    """
+    scored = [(t.score, t.seed, t) for t in trials if t.status == "done" and t.score is not None]
+    ranked = sorted((one for one in scored if math.isfinite(one[0])), key=lambda one: one[:2])
+    if not ranked:
+        return None
+    middle = ranked[(len(ranked) - 1) // 2][0]
+    trial = next(t for score, _, t in ranked if score == middle)
+    return trial, f"seed {trial.seed}, the median of {len(ranked)} by mean success"
+
+
+def network_panels(condition: Condition, parameters: Any) -> list[picture.Panel] | None:
+    """Return the network of a champion, beside it the one that it draws on a substrate; None for one without a graph.
+
+    Raises:
+        UserError: when networkx is not installed.
+    """
+    network = champions.network_of(condition, parameters)
+    if network is None:
+        return None
+    graph = export.to_networkx(parameters, network)
+    drawing = champions.substrate_of(condition, parameters)
+    if drawing is None:
+        return [picture.network_panel(graph, network, "the network that evolved")]
+    ends = ("x₁", "y₁", "x₂", "y₂"), ("q",)
+    return [
+        picture.network_panel(graph, network, "the CPPN that evolved", *ends),
+        picture.substrate_panel(*drawing, "the network that it draws"),
+    ]

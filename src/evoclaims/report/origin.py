@@ -1,0 +1,107 @@
+"""Where trials were made, in words; a provenance is free JSON, so nothing is taken for granted."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+from evoclaims.report.words import clean, counted, listed, plural
+
+SHORT: Final = 9
+"""Digits of a revision that are shown."""
+
+
+@dataclass(frozen=True)
+class Origin:
+    """What a trial's provenance says.
+
+    Attributes:
+        device: such as "NVIDIA H200 (gpu)".
+        machine: operating system, architecture and processor.
+        revision: of the code; empty when unknown.
+        dirty: whether the code differed from that revision; None when unknown.
+        versions: of packages, by name; those that are absent are left out.
+        settings: what else results depend on, by name.
+    """
+
+    device: str
+    machine: str
+    revision: str
+    dirty: bool | None
+    versions: tuple[tuple[str, str], ...]
+    settings: tuple[tuple[str, str], ...]
+
+    @staticmethod
+    def of(provenance: Mapping[str, Any]) -> Origin:
+        """Read a record's provenance."""
+        device, git = _mapping(provenance.get("device")), _mapping(provenance.get("git"))
+        kind, platform = clean(device.get("kind") or ""), clean(device.get("platform") or "")
+        known = " ".join([kind, f"({platform})" if platform not in ("", kind) else ""]).strip()
+        dirty = git.get("dirty")
+        rest = provenance.keys() - {"device", "git", "machine", "versions"}
+        return Origin(
+            device=known or "unknown device",
+            machine=clean(provenance.get("machine") or "unknown machine"),
+            revision=clean(git.get("sha") or ""),
+            dirty=dirty if isinstance(dirty, bool) else None,
+            versions=_pairs(_mapping(provenance.get("versions"))),
+            settings=_pairs({name: provenance[name] for name in sorted(rest)}),
+        )
+
+    @property
+    def code(self) -> str:
+        """The revision in short, with what is known about changes to it."""
+        state = {True: "with uncommitted changes", False: "clean", None: "changes unknown"}[self.dirty]
+        return f"{self.revision[:SHORT]}, {state}" if self.revision else "unknown revision"
+
+
+@dataclass(frozen=True)
+class Made:
+    """Trials of one origin.
+
+    Attributes:
+        origin: theirs.
+        count: how many.
+    """
+
+    origin: Origin
+    count: int
+
+
+def grouped(origins: Iterable[Origin]) -> tuple[Made, ...]:
+    """Count trials by origin, the commonest first."""
+    return tuple(Made(origin, count) for origin, count in Counter(origins).most_common())
+
+
+def warnings(made: Sequence[Made]) -> tuple[str, ...]:
+    """Return what a reader should know before trusting the trials together: sentences, none when all is well."""
+    every = [one.origin for one in made for _ in range(one.count)]
+    found = []
+    if len({origin.device for origin in every}) > 1:
+        found.append(f"Trials from mixed devices: {counted(origin.device for origin in every)}.")
+    dirty = sum(origin.dirty is True for origin in every)
+    if dirty:
+        found.append(f"{plural(dirty, 'trial')} of {len(every)} ran code with uncommitted changes.")
+    unknown = sum(not origin.revision for origin in every)
+    if unknown:
+        found.append(f"{plural(unknown, 'trial')} of {len(every)} ran code of unknown revision.")
+    return tuple(found)
+
+
+def _mapping(value: object) -> Mapping[str, Any]:
+    """Return a JSON object; an empty one for anything else."""
+    return value if isinstance(value, dict) else {}
+
+
+def _pairs(values: Mapping[str, Any]) -> tuple[tuple[str, str], ...]:
+    """Return names and values as texts, without absent ones."""
+    return tuple((clean(name), _text(value)) for name, value in values.items() if value not in (None, "", {}, []))
+
+
+def _text(value: Any) -> str:
+    """Return a JSON value in a few words."""
+    if isinstance(value, dict):
+        return listed((f"{name} {_text(part)}" for name, part in value.items()), most=40)
+    return clean(value)

@@ -1,0 +1,283 @@
+"""`evoclaims compare`: now against accepted, revisions, stores, and the gate that fails on chosen changes."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from evoclaims.cli import main
+from evoclaims.judging.verdict import Outcome
+from evoclaims.suite import history, references
+from evoclaims.trials.result import TrialResult, digest
+from evoclaims.trials.store import Store
+
+Evoclaims = Callable[..., tuple[int, str, str]]
+FILE = Path("verdicts.toml")
+
+
+@pytest.fixture
+def evoclaims(project: Any, capsys: pytest.CaptureFixture[str]) -> Evoclaims:
+    """A function that runs a command in a project whose trials are stored; returns status, output and errors."""
+    project.write(a="supported", b="refuted")
+    project.run("--claims-only=a,b")
+
+    def run(*arguments: str) -> tuple[int, str, str]:
+        capsys.readouterr()
+        status = main([*arguments, f"--storage={project.store}"])
+        out, err = capsys.readouterr()
+        assert "Traceback" not in out + err
+        return status, out, err
+
+    return run
+
+
+@pytest.fixture
+def accepted(evoclaims: Evoclaims) -> Evoclaims:
+    """The same, with the verdicts of the smoke tier accepted."""
+    assert evoclaims("accept", "--tier=smoke")[0] == 1
+    return evoclaims
+
+
+@pytest.fixture
+def git(project: Any, monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
+    """A function that runs git in the project, which becomes a repository."""
+    for name in [name for name in os.environ if name.startswith("GIT_")]:
+        monkeypatch.delenv(name)
+    monkeypatch.setenv("GIT_CONFIG_GLOBAL", os.devnull)
+    monkeypatch.setenv("GIT_CONFIG_NOSYSTEM", "1")
+
+    def run(*arguments: str) -> None:
+        settings = ("-c", "user.name=t", "-c", "user.email=t@t", "-c", "init.defaultBranch=main")
+        subprocess.run(["git", *settings, *arguments], cwd=project.path, check=True, capture_output=True)
+
+    run("init", "--quiet")
+    return run
+
+
+def _edit(**changes: Any) -> None:
+    """Change the accepted verdict of `a`."""
+    kept = history.load(FILE)
+    FILE.write_text(history.dump({**kept, ("smoke", "a"): (replace(kept["smoke", "a"][0], **changes),)}))
+
+
+def _spoiled(trial: TrialResult) -> TrialResult:
+    """Return what a broken library might have made of a trial that went well."""
+    levels = {name: (0.0,) * len(values) for name, values in trial.levels.items()}
+    metrics = {**trial.metrics, "mean_success": 0.0}
+    new = digest(trial.status, metrics, levels, trial.curves, b"")
+    return replace(trial, metrics=metrics, levels=levels, digest=new, champion="")
+
+
+def _copy(source: Path, to: Path, change: Callable[[TrialResult], TrialResult], only: str) -> None:
+    """Fill a store with the changed trials of one method."""
+    for trial in Store(source).results([]):
+        if trial.spec["method"]["name"] == only and trial.spec["budget"]["generations"] == 1 and trial.seed < 10:
+            Store(to).put(change(replace(trial, champion="")), {})
+
+
+def test_what_is_as_accepted_is_counted_and_not_listed(accepted: Evoclaims, project: Any) -> None:
+    status, out, _ = accepted("compare", "--tier=smoke", "--fail=*->*")
+    assert status == 0
+    assert out.splitlines()[:4] == [
+        "old: accepted verdicts, and reference trials",
+        f"new: judged from the store {project.store}, and from reference trials where it has none",
+        "verdicts: 2 the same",
+        "trials: 0 comparisons, 0 drifted (exact rank tests, Holm, α = 0.01)",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("fail", "status"),
+    [("refuted->supported", 1), ("*->supported", 1), ("supported->refuted", 0), ("supported->refuted,refuted->*", 1)],
+)
+def test_a_changed_verdict_fails_only_where_it_is_asked_to(accepted: Evoclaims, fail: str, status: int) -> None:
+    _edit(outcome=Outcome.REFUTED)
+    ended, out, _ = accepted("compare", f"--fail={fail}")
+    assert ended == status
+    assert "verdicts: 1 the same, 1 changed" in out
+    assert "  a (smoke): refuted -> supported\n" in out
+    assert ("FAIL a (smoke): refuted -> supported\n" in out) == bool(status)
+
+
+def test_a_changed_fingerprint_is_a_new_history_and_no_change(accepted: Evoclaims) -> None:
+    _edit(outcome=Outcome.REFUTED, fingerprint="e" * 64)
+    status, out, _ = accepted("compare", "--fail=*->*")
+    assert status == 0
+    assert "  a (smoke): a new history begins, since what is judged has changed (fingerprint eeeeeeeeeeee -> " in out
+
+
+def test_a_tier_can_be_left_out_of_a_comparison(accepted: Evoclaims) -> None:
+    _edit(outcome=Outcome.REFUTED)
+    status, out, _ = accepted("compare", "--tier=full", "--fail=*->*")
+    assert (status, "a (smoke)" in out) == (0, False)
+
+
+def test_new_trials_that_drifted_from_the_references_are_said(evoclaims: Evoclaims, project: Any) -> None:
+    trials = [t for t in Store(project.store).results([]) if t.spec["method"]["name"] == "hand_built"]
+    right = [trial for trial in trials if trial.spec["budget"]["generations"] == 1 and trial.seed < 10]
+    references.write(references.path_of(Path("reference"), "smoke", "right", "parity"), map(_spoiled, right))
+    evoclaims("accept", "--tier=smoke")
+    _, out, _ = evoclaims("compare", "--tier=smoke")
+    assert "  DRIFT in smoke/right-parity: mean_success, p = " in out
+    assert "to the bit: 10 trials compared, 10 changed" in out
+    assert "  CHANGED in smoke/right-parity: seeds 0, 1, 2, 3, 4, 5, 6, 7, 8, 9\n" in out
+    assert "trials of the new side alone: smoke/wrong-parity" in out
+
+
+def test_a_revisions_accepted_verdicts_are_compared_with_those_of_the_working_tree(
+    accepted: Evoclaims, git: Callable[..., None], project: Any
+) -> None:
+    path = references.path_of(Path("reference"), "smoke", "right", "parity")
+    right = [t for t in Store(project.store).results([]) if t.spec["method"]["name"] == "hand_built"]
+    right = [trial for trial in right if trial.spec["budget"]["generations"] == 1 and trial.seed < 10]
+    references.write(path, right)
+    git("add", ".")
+    git("commit", "-m", "sound")
+    assert accepted("compare", "HEAD", "--fail=*->*")[0] == 0
+    _edit(outcome=Outcome.REFUTED)
+    references.write(path, map(_spoiled, right))
+    Path("tiny_paper.py").write_text(Path("tiny_paper.py").read_text() + "\n")
+    status, out, _ = accepted("compare", "HEAD", "--fail=supported->refuted")
+    assert status == 1
+    assert out.splitlines()[1] == "new: the working tree"
+    assert "  a (smoke): supported -> refuted\n" in out
+    assert "  DRIFT in smoke/right-parity: mean_success, p = " in out
+    assert "10 trials compared, 10 changed" in out
+    git("add", ".")
+    git("commit", "-m", "spoiled")
+    status, out, _ = accepted("compare", "HEAD", "HEAD~1", "--fail=supported->refuted")
+    assert (status, "  a (smoke): refuted -> supported\n" in out) == (0, True)
+    assert "new: the revision HEAD~1 (" in out
+
+
+def test_no_code_of_a_revision_is_run(accepted: Evoclaims, git: Callable[..., None]) -> None:
+    sound = Path("tiny_paper.py").read_text()
+    Path("tiny_paper.py").write_text("open('ran', 'w')\nraise SystemExit('the code of an old revision was run')\n")
+    git("add", ".")
+    git("commit", "-m", "mean")
+    Path("tiny_paper.py").write_text(sound)
+    status, out, _ = accepted("compare", "HEAD")
+    assert (status, "verdicts: 2 the same" in out) == (0, True)
+    assert not Path("ran").exists()
+
+
+def test_two_stores_are_each_judged_from_their_own_trials(evoclaims: Evoclaims, project: Any) -> None:
+    _copy(project.store, Path("sound"), lambda trial: trial, "hand_built")
+    _copy(project.store, Path("spoiled"), _spoiled, "hand_built")
+    wrong = [t for t in Store(project.store).results([]) if t.spec["method"]["name"] == "hand_built_negated"]
+    references.write(references.path_of(Path("reference"), "smoke", "wrong", "parity"), wrong)
+    status, out, _ = evoclaims("compare", "sound", "spoiled", "--fail=supported->refuted")
+    assert status == 1
+    assert out.splitlines()[:3] == ["old: the store sound", "new: the store spoiled", out.splitlines()[2]]
+    assert "FAIL a (smoke): supported -> refuted" in out
+    assert "  DRIFT in smoke/right-parity: mean_success, p = " in out
+    assert "b (smoke)" not in out  # its reference trials are of neither store
+
+
+def test_one_store_is_compared_with_the_projects_own(evoclaims: Evoclaims, project: Any) -> None:
+    _copy(project.store, Path("spoiled"), _spoiled, "hand_built")
+    status, out, _ = evoclaims("compare", "./spoiled", "--fail=refuted->supported,not run->refuted")
+    assert status == 1
+    assert f"new: the store {project.store}" in out
+    assert "FAIL a (smoke): refuted -> supported" in out
+    assert "FAIL b (smoke): not run -> refuted" in out
+
+
+def test_a_damaged_record_is_said_and_the_rest_is_compared(evoclaims: Evoclaims, project: Any) -> None:
+    for name in ("one", "other"):
+        _copy(project.store, Path(name), lambda trial: trial, "hand_built")
+    store = Store(Path("other"))
+    store.record_path(store.ids()[0]).write_text("torn")
+    _, out, _ = evoclaims("compare", "one", "other")
+    assert "  a (smoke): supported -> error" in out
+    assert f"not read: Cannot use {store.record_path(store.ids()[0])}: it is not one whole JSON text" in out
+
+
+def test_a_timeline_shows_the_versions_that_differ(accepted: Evoclaims) -> None:
+    kept = history.load(FILE)
+    (now,) = kept["smoke", "a"]
+    old = replace(now, accepted="2020-01-01", versions={**now.versions, "jax": "0.4.0"})
+    FILE.write_text(history.dump({**kept, ("smoke", "a"): (old, now)}))
+    status, out, _ = accepted("compare", "--timeline", "a")
+    first, second, third = out.splitlines()
+    assert (status, first) == (0, "a (smoke)")
+    assert second.startswith("  2020-01-01  supported (n = 10, p = 0.028)  ")
+    assert f"jax 0.4.0 -> {now.versions['jax']}" in third
+    assert len(accepted("compare", "--timeline")[1].splitlines()) == 5
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("--fail=supported->refutd",), "There is no outcome named 'refutd'. Did you mean 'refuted'?"),
+        (("--fail=refuted",), "'refuted' is no change of a verdict"),
+        (("a", "b", "c"), "Two stores or two revisions can be compared, not 3."),
+        (("--tier=ful",), "There is no tier named 'ful'."),
+        (("--timeline", "x"), "There is no accepted claim named 'x'. Known: a, b."),
+        (("HEAD", "--timeline"), "--timeline shows the accepted verdicts alone"),
+        (("--timeline", "--fail=*->*"), "--timeline shows the accepted verdicts alone"),
+        (("nothing",), "There is neither a git revision nor a folder called nothing."),
+        (("pyproject.toml",), "There is neither a git revision nor a folder called pyproject.toml."),
+        (("./nothing",), "There is neither a git revision nor a folder called ./nothing."),
+        (("/nothing",), "There is neither a git revision nor a folder called /nothing."),
+        (("\x1b[2J",), r"There is neither a git revision nor a folder called \x1b[2J."),
+        (("claims",), "The folder claims holds no trials, so there is nothing to compare."),
+        (("HEAD", "./claims"), "HEAD is a revision and claims a store: two of a kind can be compared."),
+        (("both",), "both is both a folder and a git revision: write ./both for the folder, or the revision's hash, "),
+        (("bare",), "The revision bare has neither verdicts.toml nor reference trials in "),
+        (("--", "--output=x"), "There is neither a git revision nor a folder called --output=x."),
+    ],
+)
+def test_a_users_mistake_is_one_sentence(
+    accepted: Evoclaims,
+    git: Callable[..., None],
+    capsys: pytest.CaptureFixture[str],
+    arguments: tuple[str, ...],
+    said: str,
+) -> None:
+    git("commit", "--allow-empty", "-m", "empty")
+    git("branch", "bare")
+    git("add", "verdicts.toml")
+    git("commit", "-m", "accepted")
+    git("branch", "both")
+    Path("both").mkdir()
+    capsys.readouterr()
+    status = main(["compare", *arguments])
+    err = capsys.readouterr().err
+    assert (status, err.count("\n")) == (2, 1)
+    assert said in err
+
+
+def test_without_a_repository_a_revision_is_one_sentence_and_folders_still_compare(
+    evoclaims: Evoclaims, project: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("GIT_CEILING_DIRECTORIES", str(project.path.parent))
+    status, _, err = evoclaims("compare", "HEAD")
+    assert (status, "lies in no git repository" in err) == (2, True)
+    _copy(project.store, Path("one"), lambda trial: trial, "hand_built")
+    assert evoclaims("compare", "one", "one")[0] == 0
+
+
+def test_a_torn_reference_of_a_revision_is_one_sentence(accepted: Evoclaims, git: Callable[..., None]) -> None:
+    path = references.path_of(Path("reference"), "smoke", "right", "parity")
+    path.parent.mkdir(parents=True)
+    path.write_text("torn\n")
+    git("add", ".")
+    git("commit", "-m", "torn")
+    path.unlink()
+    status, _, err = accepted("compare", "HEAD")
+    assert status == 2
+    assert "Line 1 of reference/smoke/right-parity.jsonl at HEAD is no reference trial: it is not one whole" in err
+
+
+def test_before_the_first_accept_there_is_nothing_to_compare_with(evoclaims: Evoclaims) -> None:
+    for arguments in ((), ("--timeline",)):
+        status, _, err = evoclaims("compare", *arguments)
+        assert status == 2
+        assert "No verdict has been accepted yet: `evoclaims accept` accepts those of now." in err

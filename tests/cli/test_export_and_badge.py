@@ -1,0 +1,117 @@
+"""`evoclaims export` and `evoclaims badge`: the files that they write."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import pandas
+import pandas.core.arrays.arrow.extension_types  # registers types, once: pytester forgets what tests import
+import pytest
+
+from evoclaims.cli import main
+from evoclaims.suite import references
+from evoclaims.trials.store import Store
+
+Evoclaims = Callable[..., tuple[int, str, str]]
+
+
+@pytest.fixture
+def evoclaims(project: Any, capsys: pytest.CaptureFixture[str]) -> Evoclaims:
+    """A function that runs a command in a project whose store is its own; returns status, output and errors."""
+    project.write(a="supported", b="refuted")
+
+    def run(*arguments: str) -> tuple[int, str, str]:
+        capsys.readouterr()
+        status = main(arguments)
+        out, err = capsys.readouterr()
+        assert "Traceback" not in out + err
+        return status, out, err
+
+    return run
+
+
+@pytest.fixture
+def stored(evoclaims: Evoclaims) -> Evoclaims:
+    """The same, with ten trials of the right network and two of the wrong one."""
+    assert evoclaims("run", "right", "--device=cpu")[0] == 0
+    assert evoclaims("run", "wrong", "--device=cpu", "--trials=2")[0] == 0
+    return evoclaims
+
+
+def test_trials_are_exported_in_each_form(stored: Evoclaims) -> None:
+    for form in ("json", "csv", "parquet"):
+        assert stored("export", "--as", form) == (0, f"wrote trials.{form}: 12 trials\n", "")
+    plain = json.loads(Path("trials.json").read_text())
+    assert plain["schema"] == 1
+    for table in (
+        pandas.DataFrame(plain["rows"]),
+        pandas.read_csv("trials.csv"),
+        pandas.read_parquet("trials.parquet"),
+    ):
+        assert table.groupby("method")["metrics.mean_success"].agg(["size", "mean"]).to_dict("index") == {
+            "right": {"size": 10, "mean": 1.0},
+            "wrong": {"size": 2, "mean": 0.0},
+        }
+        assert set(table["tier"]) == {"smoke"}
+        assert table["provenance.versions.jax"].notna().all()
+
+
+def test_a_tier_without_trials_is_one_sentence(stored: Evoclaims) -> None:
+    assert stored("export", "--tier=smoke")[0] == 0
+    status, _, err = stored("export", "--tier=full")
+    assert (status, err.count("\n")) == (2, 1)
+    assert "Neither .evoclaims nor the reference trials hold a trial of this tier; `evoclaims run` runs some." in err
+
+
+def test_reference_trials_fill_in_what_the_store_lacks(stored: Evoclaims) -> None:
+    trials = list(Store(Path(".evoclaims")).results([]))
+    references.write(references.path_of(Path("reference"), "smoke", "right", "parity"), trials)
+    status, out, _ = stored("export", "--storage=elsewhere", "--out=here/t.json")
+    assert (status, out) == (0, "wrote here/t.json: 12 trials\n")
+    assert stored("export")[1] == "wrote trials.json: 12 trials\n"
+
+
+def test_verdicts_are_exported_one_row_a_claim(stored: Evoclaims) -> None:
+    assert stored("export", "--verdicts", "--tier=smoke")[:2] == (0, "wrote verdicts.json: 2 verdicts\n")
+    rows = json.loads(Path("verdicts.json").read_text())["rows"]
+    assert [(row["claim"], row["outcome"], row["n"]) for row in rows] == [("a", "supported", 10), ("b", "not run", 0)]
+    assert stored("export", "--verdicts")[1] == "wrote verdicts.json: 4 verdicts\n"
+
+
+def test_a_damaged_record_is_left_out_and_said(stored: Evoclaims) -> None:
+    store = Store(Path(".evoclaims"))
+    path = store.record_path(store.ids()[0])
+    path.write_text("torn")
+    status, out, err = stored("export")
+    assert (status, out) == (1, "wrote trials.json: 11 trials\n")
+    assert f"left out: Cannot use {path}: it is not one whole JSON text" in err
+
+
+def test_a_badge_counts_the_verdicts_of_a_tier(stored: Evoclaims) -> None:
+    assert stored("badge") == (0, "wrote claims-smoke.svg: supported 1 / not run 1\n", "")
+    root = ElementTree.parse("claims-smoke.svg").getroot()
+    assert root.get("aria-label") == "claims (smoke): supported 1 / not run 1"
+    assert stored("badge", "--tier=full", "--out=a/b.svg")[1] == "wrote a/b.svg: not run 2\n"
+    assert Path("a/b.svg").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("export", "--as=xml"), "There is no form named 'xml'. Known: csv, json, parquet."),
+        (("export", "--tier=ful"), "There is no tier named 'ful'. Did you mean 'full'? Known: all, full, smoke."),
+        (("export", "--storage=pyproject.toml"), "is a file, not a folder"),
+        (("export",), "Neither .evoclaims nor the reference trials hold a trial"),
+        (("export", "--verdicts", "--out=claims"), "claims is a folder; name a file in it with --out."),
+        (("badge", "--tier=ful"), "There is no tier named 'ful'."),
+        (("badge", "--out=claims"), "claims is a folder; name a file in it with --out."),
+    ],
+)
+def test_a_users_mistake_is_one_sentence(evoclaims: Evoclaims, arguments: tuple[str, ...], said: str) -> None:
+    status, _, err = evoclaims(*arguments)
+    assert (status, err.count("\n")) == (2, 1)
+    assert said in err

@@ -1,0 +1,179 @@
+"""A run beside the verdicts last accepted, and the page that GitHub shows of it."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from evoclaims.cli import main
+from evoclaims.judging.verdict import Outcome
+from evoclaims.suite import history
+
+Sentence = Callable[[pytest.RunResult, str], None]
+ALMOST = "verdict(trials('right', on='parity').solves_every_level.in_most_trials(p0=0.6))"
+
+
+def _rewrite(project: Any, **bodies: str) -> None:
+    """Write other claims where this process has read some already."""
+    sys.modules.pop("test_claims")
+    project.write(**bodies)
+
+
+@pytest.fixture(autouse=True)
+def _no_page(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("GITHUB_STEP_SUMMARY", raising=False)
+
+
+@pytest.fixture
+def accepted(project: Any) -> Any:
+    """The project with two claims whose verdicts are accepted."""
+    project.write(a="supported", b="undecided")
+    project.run()
+    assert main(["accept", "--tier=smoke", f"--storage={project.store}"]) == 1
+    return project
+
+
+def _edit(**changes: Any) -> None:
+    """Change the accepted verdict of `a`."""
+    path = Path("verdicts.toml")
+    kept = history.load(path)
+    path.write_text(history.dump({**kept, ("smoke", "a"): (replace(kept["smoke", "a"][0], **changes),)}))
+
+
+def test_without_accepted_verdicts_nothing_is_said_of_them(project: Any) -> None:
+    project.write(a="supported")
+    result = project.run()
+    assert result.ret == 0
+    result.stdout.no_fnmatch_line("*accepted verdicts*")
+
+
+def test_verdicts_as_accepted_are_one_line(accepted: Any) -> None:
+    result = accepted.run("--claims-compare-fail=*->*")
+    assert result.ret == 0
+    result.stdout.fnmatch_lines(["against the accepted verdicts: 2 the same"])
+
+
+@pytest.mark.parametrize(
+    ("option", "status", "mark"),
+    [
+        ((), 0, ""),
+        (("--claims-compare-fail=supported->refuted",), 0, ""),
+        (("--claims-compare-fail=*->supported",), 1, "REGRESSION "),
+    ],
+)
+def test_a_changed_verdict_is_listed_and_fails_the_run_where_it_is_asked_to(
+    accepted: Any, option: tuple[str, ...], status: int, mark: str
+) -> None:
+    _edit(outcome=Outcome.REFUTED)
+    result = accepted.run(*option)
+    assert result.ret == status
+    result.stdout.fnmatch_lines(
+        ["against the accepted verdicts: 1 the same, 1 changed", f"{mark}a (smoke): refuted -> supported"]
+    )
+
+
+def test_claims_that_a_run_leaves_out_are_not_gone(accepted: Any) -> None:
+    result = accepted.run("--claims-only=a")
+    result.stdout.fnmatch_lines(["against the accepted verdicts: 1 the same"])
+
+
+def test_a_claim_that_is_judged_otherwise_begins_a_new_history(accepted: Any) -> None:
+    _rewrite(accepted, a=ALMOST, b="undecided")
+    _edit(outcome=Outcome.REFUTED)
+    result = accepted.run("--claims-compare-fail=*->*")
+    assert result.ret == 0
+    result.stdout.fnmatch_lines(
+        [
+            "against the accepted verdicts: 1 the same, 1 under changed rules",
+            "a (smoke): a new history begins, since what is judged has changed *",
+        ]
+    )
+
+
+def test_a_regression_fails_a_run_of_several_processes_too(accepted: Any) -> None:
+    _edit(outcome=Outcome.REFUTED)
+    result = accepted.run_apart("-n2", "--claims-compare-fail=refuted->supported", f"--claims-storage={accepted.store}")
+    assert result.ret == 1
+    result.stdout.fnmatch_lines(["REGRESSION a (smoke): refuted -> supported"])
+
+
+def test_a_gate_without_accepted_verdicts_does_not_stand_open(project: Any, sentence: Sentence) -> None:
+    project.write(a="supported")
+    result = project.run("--claims-compare-fail=supported->refuted")
+    assert result.ret == 1
+    sentence(result, "error: There are no accepted verdicts to compare with, since")
+    result.stdout.fnmatch_lines(["claims: 1 supported"])
+
+
+def test_accepted_verdicts_that_are_torn_fail_the_run_and_hide_no_verdict(accepted: Any, sentence: Sentence) -> None:
+    Path("verdicts.toml").write_text("torn =")
+    result = accepted.run()
+    assert result.ret == 1
+    sentence(result, "verdicts.toml holds no accepted verdicts: it is no whole TOML file")
+    result.stdout.fnmatch_lines(["claims: 1 supported, 1 inconclusive"])
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (
+            ("--claims-compare-fail=suported->refuted",),
+            "There is no outcome named 'suported'. Did you mean 'supported'?",
+        ),
+        (("--claims-compare-fail=",), "No change of a verdict is named"),
+        (("--claims-compare-fail=*->error", "--claims-variant=traded"), "leave one of them out"),
+    ],
+)
+def test_a_wrong_value_is_one_sentence_before_anything_runs(
+    project: Any, sentence: Sentence, arguments: tuple[str, ...], said: str
+) -> None:
+    project.write(a="supported")
+    result = project.run(*arguments, own_store=True)
+    assert result.ret == pytest.ExitCode.USAGE_ERROR
+    sentence(result, said)
+    assert not (project.path / ".evoclaims").exists()
+
+
+def test_verdicts_of_a_variant_are_not_compared_with_those_of_the_protocol(accepted: Any) -> None:
+    result = accepted.run("--claims-variant=traded")
+    result.stdout.no_fnmatch_line("*accepted verdicts*")
+
+
+def test_github_is_shown_the_verdicts_after_what_is_there_already(
+    accepted: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    page = accepted.path / "page.md"
+    page.write_text("before\n")
+    monkeypatch.setenv("GITHUB_STEP_SUMMARY", str(page))
+    _edit(outcome=Outcome.REFUTED)
+    accepted.run()
+    lines = page.read_text().splitlines()
+    assert lines[:4] == ["before", "## Claims", "", "**1 supported, 1 inconclusive**"]
+    assert sum(line.startswith(("| a ", "| b ")) for line in lines) == 2
+    assert r"* a \(smoke\)\: refuted \-&gt; supported" in lines
+    assert any(line.startswith(r"* reference trials\: ") for line in lines)
+
+
+def test_a_page_that_cannot_be_written_is_a_warning_and_no_failure(
+    project: Any, sentence: Sentence, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("GITHUB_STEP_SUMMARY", str(project.path / "nowhere" / "page.md"))
+    project.write(a="supported")
+    result = project.run()
+    assert result.ret == 0
+    sentence(result, "warning: Cannot write the verdicts to GitHub's summary")
+    result.stdout.fnmatch_lines(["claims: 1 supported"])
+
+
+def test_commands_that_judge_stored_trials_add_nothing_to_the_page(
+    accepted: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    page = accepted.path / "page.md"
+    monkeypatch.setenv("GITHUB_STEP_SUMMARY", str(page))
+    assert main(["status", f"--storage={accepted.store}"]) == 0
+    assert not page.exists()

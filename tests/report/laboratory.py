@@ -1,0 +1,145 @@
+"""A small paper whose trials are made by hand, and its claims judged by the real judge and gathered into a report."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from evoclaims.envs.gates.parity import NParity
+from evoclaims.judging.assertion import Assertion
+from evoclaims.judging.protocol import Protocol
+from evoclaims.methods.hand_built import HandBuilt
+from evoclaims.methods.neat.neat import Neat
+from evoclaims.methods.neat.settings import Settings, Species
+from evoclaims.report.gather import gather
+from evoclaims.report.model import Page, Plate, Section
+from evoclaims.suite.archive import Archive
+from evoclaims.suite.claim import Claim
+from evoclaims.suite.history import History
+from evoclaims.suite.modes import StoredOnly
+from evoclaims.suite.report import ClaimReport, broken
+from evoclaims.suite.reproduction import Reproduction, Tier
+from evoclaims.suite.session import Session
+from evoclaims.trials.budget import Budget
+from evoclaims.trials.result import TrialResult, digest
+from evoclaims.trials.spec import Condition, TrialSpec
+from evoclaims.trials.store import Store
+
+SMALL = Settings(population=16, nodes=12, connections=24, activations=("tanh",), species=Species(most=4))
+METHODS: dict[str, Any] = {"better": HandBuilt(), "worse": HandBuilt(negated=True), "neat": Neat(SMALL)}
+CONDITIONS = {
+    (name, "small"): Condition(method, NParity(3), "curriculum", Budget(generations=2))
+    for name, method in METHODS.items()
+}
+HERE = {
+    "device": {"platform": "cpu", "kind": "cpu", "count": 2},
+    "git": {"sha": "a" * 40, "dirty": False},
+    "machine": "Linux x86_64",
+    "versions": {"python": "3.11.7", "jax": "0.10.2", "qdax": None},
+}
+
+Judge = Callable[[Callable[[str], Any]], Assertion]
+
+
+def record(condition: Condition, seed: int, value: float, **changes: Any) -> TrialResult:
+    """Return a sound record whose numbers follow from `value`."""
+    spec, levels = TrialSpec(condition, seed), condition.task.levels
+    metrics = {"mean_success": value, "last_success": value, "furthest_solved": 1.0, "furthest_reached": 1.0}
+    success = {"success": (value,) * levels}
+    points = 5
+    finite = value if math.isfinite(value) else 0.0
+    curves = {
+        "environment_steps": tuple(10.0 * (i + 1) for i in range(points)),
+        "success": tuple(finite * i / points for i in range(points)),
+        "level": (0.0,) * points,
+    }
+    made = TrialResult(
+        id=spec.id,
+        condition=condition.id,
+        spec=spec.plain,
+        seed=seed,
+        status="done",
+        metrics=metrics,
+        levels=success,
+        curves=curves,
+        digest=digest("done", metrics, success, curves, b""),
+        timing={"run": 1.0},
+        provenance=HERE,
+    )
+    return replace(made, **changes)
+
+
+@dataclass(frozen=True)
+class Laboratory:
+    """One store and the claims about it."""
+
+    folder: Path
+    protocol: Protocol = field(default_factory=lambda: Protocol.fixed(6))
+
+    @property
+    def store(self) -> Store:
+        return Store(self.folder / "store")
+
+    @cached_property
+    def reproduction(self) -> Reproduction:
+        tiers = {"smoke": Tier(CONDITIONS, self.protocol), "full": Tier(CONDITIONS, self.protocol)}
+        return Reproduction("tiny", "A Tiny Paper", self.folder / "reproduction", tiers)
+
+    @property
+    def archive(self) -> Archive:
+        return Archive(self.store, self.reproduction.references)
+
+    def put(self, method: str, values: Iterable[float], **changes: Any) -> list[TrialResult]:
+        """Store a trial for each value, with the seeds 0, 1, …"""
+        made = [record(CONDITIONS[method, "small"], seed, value, **changes) for seed, value in enumerate(values)]
+        for trial in made:
+            self.store.put(trial, {})
+        return made
+
+    def judge(self, assert_: Judge, tier: str = "full", case: str = "", **texts: str) -> ClaimReport:
+        """Judge a claim from the store, as `evoclaims report` does."""
+        claim = Claim(**{"id": "T1", "says": "Better is better", "where": "§1.2, Fig. 3", "smoke": "In small", **texts})
+        session = Session(self.reproduction, self.store, StoredOnly(self.archive))
+        try:
+            return session.settle(claim, case, tier, assert_(lambda method: session.group(method, "small", tier)))
+        except Exception as error:  # as the pytest plugin does
+            return broken(claim, case, tier, str(error))
+
+    def page(
+        self,
+        *reports: ClaimReport,
+        history: History | None = None,
+        plates: Sequence[Plate] = (),
+        sentences: dict[str, str] | None = None,
+    ) -> Page:
+        """Gather reports by their tiers."""
+        verdicts = {tier: [r for r in reports if r.tier == tier] for tier in ("full", "smoke")}
+        return gather(
+            self.reproduction,
+            {tier: found for tier, found in verdicts.items() if found},
+            self.archive,
+            history or {},
+            sentences=sentences or {},
+            plates=plates,
+            generated="Written by a test.",
+        )
+
+    def section(self, report: ClaimReport, **arguments: Any) -> Section:
+        """Return the section of one claim."""
+        return self.page(report, **arguments).sections[0]
+
+
+def better_wins(group: Callable[[str], Any]) -> Assertion:
+    """Claim that one method is above the other."""
+    above: Assertion = group("better").mean_success > group("worse").mean_success
+    return above
+
+
+def better_solves(group: Callable[[str], Any]) -> Assertion:
+    """Claim that a method solves the task."""
+    solved: Assertion = group("better").solves_every_level.in_most_trials()
+    return solved

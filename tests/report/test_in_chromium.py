@@ -1,0 +1,210 @@
+"""The page in a real browser: no complaints, no requests, filters by hand and by address, every image."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import jax
+import pytest
+from chromium import NAMES, Chromium, found
+from laboratory import CONDITIONS, SMALL, Laboratory, better_solves, better_wins, record
+
+from evoclaims.core.keys import TRAINING, trial_key
+from evoclaims.methods.neat.neat import Neat
+from evoclaims.report.model import Plate
+from evoclaims.report.page import html
+from evoclaims.trials.outcome import named_leaves
+
+PLATE = (
+    b'<svg xmlns="http://www.w3.org/2000/svg" width="40" height="30" viewBox="0 0 40 30">'
+    b'<style>rect{fill:#123}</style><rect width="40" height="30" style="stroke:red"/></svg>'
+)
+HOSTILE = "<img src=x onerror=\"document.title='broken in'\"><script>document.title='broken in'</script>"
+
+pytestmark = pytest.mark.skipif(
+    found() is None,
+    reason=f"no Chromium here: none of {', '.join(NAMES)} is on the path (Debian: apt install chromium)",
+)
+
+
+@pytest.fixture(scope="module")
+def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Chromium]:
+    """A browser for the whole module."""
+    program = found()
+    assert program is not None
+    started = Chromium(program, tmp_path_factory.mktemp("profile"))
+    yield started
+    started.close()
+
+
+@pytest.fixture(scope="module")
+def address(tmp_path_factory: pytest.TempPathFactory) -> str:
+    """A report with claims of every end, at both tiers, with a drawn champion, a figure and hostile texts."""
+    folder = tmp_path_factory.mktemp("paper")
+    lab = Laboratory(folder)
+    lab.put("better", [1.0, 1.0, 1.0, 0.8, float("nan"), 1.0])
+    lab.put("worse", [0.1, 0.2, 0.3, 0.3, 0.4, 0.5])
+    condition, method = CONDITIONS["neat", "small"], Neat(SMALL)
+    genome = method.best(condition.task, method.init(trial_key(0, TRAINING), condition.task)).parameters
+    for seed in range(6):
+        lab.store.put(record(condition, seed, 1.0), named_leaves(jax.device_get(genome)))
+
+    def neat_wins(group: Any) -> Any:
+        return group("neat").mean_success > group("worse").mean_success
+
+    def neat_loses(group: Any) -> Any:
+        return group("worse").mean_success > group("neat").mean_success
+
+    def missing(group: Any) -> Any:
+        return group("better").solves_level(0).in_most_trials()
+
+    claims = [
+        ("G1", neat_wins, "§5.1"),
+        ("G2", neat_loses, "§5.1"),
+        ("S1", better_wins, "§5.2"),
+        ("S2", missing, "§5.2"),
+    ]
+    reports = [
+        lab.judge(
+            claim, tier=tier, id=name, where=where, says=f"The sentence of {name} {HOSTILE}", smoke=f"{name} small"
+        )
+        for tier in ("full", "smoke")
+        for name, claim, where in claims
+    ]
+    empty = Laboratory(folder / "empty")
+    reports.append(empty.judge(better_solves, id="C1", where="control"))
+    page = lab.page(*reports, plates=[Plate("Fig. 3", "says", PLATE)])
+    path = folder / "index.html"
+    path.write_text(html(page), encoding="utf-8")
+    return path.as_uri()
+
+
+def _visible(browser: Chromium) -> list[str]:
+    """Return the ids of the claims that are shown."""
+    shown: list[str] = browser.evaluate(
+        "[...document.querySelectorAll('section.claim')].filter(s => s.checkVisibility()).map(s => s.id)"
+    )
+    return shown
+
+
+ALL = ["G1-full", "G2-full", "S1-full", "S2-full", "C1-full", "G1-smoke", "G2-smoke", "S1-smoke", "S2-smoke"]
+
+
+def test_the_page_loads_without_a_complaint_or_a_request(browser: Chromium, address: str) -> None:
+    browser.open(address)
+    assert browser.complaints == []
+    assert [request for request in browser.requests if not request.startswith("data:")] == [address]
+    assert _visible(browser) == ALL
+    assert browser.evaluate("document.getElementById('shown').textContent") == "9 of 9 claims"
+
+
+def test_hostile_text_runs_nothing(browser: Chromium, address: str) -> None:
+    browser.open(address)
+    assert browser.evaluate("document.title") == "Claims of tiny"
+    assert "<script>" in browser.evaluate("document.querySelector('#G1-full blockquote').textContent")
+
+
+def test_a_script_that_is_not_the_pages_own_is_refused(browser: Chromium, address: str) -> None:
+    browser.open(address)
+    browser.evaluate(
+        "document.body.append(Object.assign(document.createElement('script'), {textContent: 'window.broken = 1'}))"
+    )
+    assert browser.evaluate("window.broken") is None
+    assert any("Content Security Policy" in complaint for complaint in browser.complaints)
+
+
+def test_every_image_loads(browser: Chromium, address: str) -> None:
+    browser.open(address)
+    images = browser.evaluate(
+        """Promise.all([
+          ...[...document.images].map((image) => image.decode().then(() => [image.complete, image.naturalWidth])),
+          ...[...document.querySelectorAll('svg image')].map((image) => {
+            const copy = new Image();
+            copy.src = image.href.baseVal;
+            return copy.decode().then(() => [copy.complete, copy.naturalWidth]);
+          }),
+        ])"""
+    )
+    assert len(images) == 2
+    assert all(complete and width > 0 for complete, width in images)
+    assert images[0] == [True, 40]
+
+
+def test_shared_drawings_are_drawn_where_they_are_used(browser: Chromium, address: str) -> None:
+    browser.open(f"{address}#G1-full")
+    browser.evaluate("document.querySelectorAll('#G1-full details').forEach(one => { one.open = true })")
+    boxes = browser.evaluate(
+        "[...document.querySelectorAll('#G1-full use')].map(use => use.getBoundingClientRect().width > 50)"
+    )
+    assert boxes == [True] * 3
+
+
+@pytest.mark.parametrize(
+    ("query", "expected"),
+    [
+        ("verdict=supported", ["G1-full", "G1-smoke"]),
+        ("verdict=refuted&verdict=error", ["G2-full", "S1-full", "G2-smoke", "S1-smoke"]),
+        ("verdict=not+run", ["C1-full"]),
+        ("tier=smoke&section=%C2%A75.2", ["S1-smoke", "S2-smoke"]),
+        ("section=control", ["C1-full"]),
+        ("method=neat&tier=full", ["G1-full", "G2-full"]),
+        ("words=SENTENCE+g2", ["G2-full"]),
+        ("words=no+such+words", []),
+    ],
+)
+def test_the_address_sets_the_filters(browser: Chromium, address: str, query: str, expected: list[str]) -> None:
+    browser.open(f"{address}#?{query}")
+    assert _visible(browser) == expected
+    assert browser.evaluate("document.getElementById('nothing').checkVisibility()") is (not expected)
+    faint = browser.evaluate("document.querySelectorAll('.chip.faint').length")
+    assert faint == len(ALL) - len(expected)
+    assert browser.complaints == []
+
+
+def test_filters_work_by_keyboard_and_are_kept_in_the_address(browser: Chromium, address: str) -> None:
+    browser.open(address)
+    for _ in range(40):
+        browser.press("Tab", "Tab", 9)
+        if browser.evaluate("document.activeElement.value") == "refuted":
+            break
+    browser.press(" ", "Space", 32, " ")
+    assert _visible(browser) == ["G2-full", "G2-smoke"]
+    assert browser.evaluate("location.hash") == "#?verdict=refuted"
+    browser.evaluate("document.querySelector('[type=search]').focus()")
+    for letter in "small":
+        browser.press(letter, f"Key{letter.upper()}", ord(letter.upper()), letter)
+    assert _visible(browser) == ["G2-smoke"]
+    assert browser.evaluate("location.hash") == "#?verdict=refuted&words=small"
+    browser.press("Tab", "Tab", 9)
+    browser.press("Enter", "Enter", 13, "\r")
+    assert browser.evaluate("new Promise(done => setTimeout(() => done(location.hash), 50))") == ""
+    assert _visible(browser) == ALL
+
+
+def test_a_link_to_a_claim_shows_it_whatever_the_filters_say(browser: Chromium, address: str) -> None:
+    browser.open(f"{address}#?verdict=refuted")
+    browser.evaluate("document.querySelector('[data-for=S2-smoke]').click()")
+    browser.evaluate("new Promise(done => setTimeout(done, 50))")
+    assert "S2-smoke" in _visible(browser)
+    top = browser.evaluate("document.getElementById('S2-smoke').getBoundingClientRect().top")
+    assert 0 <= top < 900
+    browser.evaluate(
+        "new Promise(done => { addEventListener('hashchange', () => setTimeout(done, 50)); history.back() })"
+    )
+    assert _visible(browser) == ["G2-full", "G2-smoke"]
+
+
+@pytest.mark.parametrize("width", [320, 390, 1280])
+@pytest.mark.parametrize("dark", [False, True])
+def test_the_page_fits_its_window_and_follows_the_colour_scheme(
+    browser: Chromium, address: str, width: int, dark: bool
+) -> None:
+    browser.open(address, width=width, dark=dark)
+    browser.evaluate("document.querySelectorAll('details').forEach(one => { one.open = true })")
+    assert browser.evaluate("document.documentElement.scrollWidth") <= width
+    paper, ink = browser.evaluate(
+        "['backgroundColor', 'color'].map(name => Number(getComputedStyle(document.body)[name].match(/\\d+/)[0]))"
+    )
+    assert (ink > paper + 100) if dark else (paper > ink + 100)
+    assert browser.complaints == []

@@ -1,0 +1,217 @@
+"""What a report says of claims and trials, and of everything that may be wrong with them."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from typing import Any
+
+import jax
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from laboratory import CONDITIONS, HERE, SMALL, Laboratory, better_solves, better_wins, record
+
+from evoclaims.core.keys import TRAINING, trial_key
+from evoclaims.judging.verdict import Outcome
+from evoclaims.methods.neat.neat import Neat
+from evoclaims.report.champion import typical
+from evoclaims.report.glance import Reader
+from evoclaims.report.words import Anchors
+from evoclaims.suite.archive import Archive
+from evoclaims.suite.history import Entry
+from evoclaims.trials.outcome import named_leaves
+
+
+def test_a_section_holds_what_was_claimed_judged_and_looked_at(filled: Laboratory) -> None:
+    report = filled.judge(better_wins, case="small")
+    page = filled.page(report)
+    section = page.sections[0]
+    assert (section.anchor, section.name, section.places) == ("T1-small-full", "T1[small]", ("§1.2",))
+    assert (section.outcome, section.n, section.methods) == (Outcome.SUPPORTED, 6, ("better", "worse"))
+    assert section.p == section.attainable_p == pytest.approx(1 / 924)
+    assert section.a12 == 1.0
+    assert [(look.n, look.alpha) for look in section.looks] == [(6, 0.05)]
+    (part,) = section.parts
+    labels = [f"{method} on small: mean success over levels" for method in ("better", "worse")]
+    assert [strip.label for strip in part.strips] == labels
+    assert [(dot.seed, dot.value) for dot in part.strips[0].dots] == list(enumerate([1.0, 0.9, 0.9, 0.8, 0.8, 0.7]))
+    assert section.devices == "12 × cpu"
+    assert section.warnings == ()
+    conditions = [page.conditions[key] for key in section.conditions]
+    assert [one.label for one in conditions] == ["better on small", "worse on small"]
+    assert ("task bits", "3") in conditions[0].settings
+    assert [panel.name for panel in conditions[0].curves] == ["success"]
+    assert conditions[0].says == "6 trials. Level is 0 throughout."
+
+
+def test_every_trial_is_read_once_for_all_claims(filled: Laboratory, monkeypatch: pytest.MonkeyPatch) -> None:
+    reports = [filled.judge(better_wins, id=name) for name in ("T1", "T2", "T3")]
+    asked: list[str] = []
+    get = Archive.get
+    monkeypatch.setattr(Archive, "get", lambda self, trial: asked.append(trial) or get(self, trial))
+    page = filled.page(*reports)
+    assert len(asked) == len(set(asked)) == 12
+    assert len(page.conditions) == 2
+
+
+def test_claims_stand_in_the_order_of_the_paper(filled: Laboratory) -> None:
+    reports = [
+        filled.judge(better_wins, id=name, where=where)
+        for name, where in (("C1", "control"), ("G10", "§5.2"), ("G2", "§5.2"), ("A1", "§5.10"), ("Z1", "§4"))
+    ]
+    page = filled.page(*reports)
+    assert [section.name for section in page.sections] == ["Z1", "G2", "G10", "A1", "C1"]
+    assert list(page.boards[0].by_place) == ["§4", "§5.2", "§5.10", "control"]
+
+
+def test_a_smaller_tier_shows_the_papers_own_sentence_too(filled: Laboratory) -> None:
+    report = filled.judge(better_wins, tier="smoke")
+    section = filled.section(report, sentences={"T1": "Better is better"})
+    assert (section.paper, section.statement) == ("Better is better", "In small")
+    full = filled.section(filled.judge(better_wins), sentences={"T1": "Better is better"})
+    assert (full.paper, full.statement) == ("", "Better is better")
+
+
+def test_diverged_trials_stand_apart_and_are_said(lab: Laboratory) -> None:
+    lab.put("better", [1.0] * 6)
+    lab.put("worse", [0.1] * 4)
+    for seed in (4, 5):
+        lab.store.put(record(CONDITIONS["worse", "small"], seed, 0.3, status="diverged"), {})
+    section = lab.section(lab.judge(better_wins))
+    better, worse = section.parts[0].strips
+    assert better.apart == ()
+    assert (worse.apart, len(worse.dots), worse.n) == (((4, "diverged"), (5, "diverged")), 4, 6)
+    assert section.warnings == (
+        "2 of 12 trials did not run to their end (2 × diverged; seeds 4, 5). They take the worst rank.",
+    )
+
+
+def test_a_nan_is_an_error_that_shows_which_trial_holds_it(lab: Laboratory) -> None:
+    lab.put("better", [1.0, 1.0, float("nan"), 1.0, 1.0, 1.0])
+    lab.put("worse", [0.1] * 6)
+    page = lab.page(lab.judge(better_wins))
+    section = page.sections[0]
+    assert section.outcome is Outcome.ERROR
+    assert "NaN in the finished trial of seed 2" in section.reason
+    assert section.parts[0].strips[0].apart == ((2, "NaN"),)
+    assert "The mean success of finished trials is NaN (seeds 2)." in section.warnings
+    assert page.notices == (f"1 claim ended in error. {section.reason}",)
+
+
+def test_trials_from_mixed_devices_and_changed_code_are_said(lab: Laboratory) -> None:
+    lab.put("better", [1.0] * 6)
+    other = {**HERE, "device": {"platform": "gpu", "kind": "NVIDIA H200"}, "git": {"sha": "b" * 40, "dirty": True}}
+    lab.put("worse", [0.0] * 5, provenance=other)
+    lab.store.put(record(CONDITIONS["worse", "small"], 5, 0.0, provenance={}), {})
+    section = lab.section(lab.judge(better_wins))
+    assert section.warnings == (
+        "Trials from mixed devices: 6 × cpu, 5 × NVIDIA H200 (gpu), 1 × unknown device.",
+        "5 trials of 12 ran code with uncommitted changes.",
+        "1 trial of 12 ran code of unknown revision.",
+    )
+    assert [(one.count, one.origin.code) for one in section.made] == [
+        (6, "aaaaaaaaa, clean"),
+        (5, "bbbbbbbbb, with uncommitted changes"),
+        (1, "unknown revision"),
+    ]
+
+
+def test_strange_provenance_breaks_nothing(lab: Laboratory) -> None:
+    lab.put("better", [1.0] * 6, provenance={"device": "cpu", "git": [1], "versions": None, "x64": False, "deep": {}})
+    section = lab.section(lab.judge(better_solves))
+    assert section.made[0].origin.device == "unknown device"
+    assert section.made[0].origin.settings == (("x64", "False"),)
+
+
+def test_a_claim_without_trials_says_why(lab: Laboratory) -> None:
+    lab.put("better", [1.0] * 2)
+    page = lab.page(lab.judge(better_solves))
+    section = page.sections[0]
+    assert section.outcome is Outcome.NOT_RUN
+    assert section.reason == "4 of 6 trials of hand_built on n_parity are missing"
+    assert (section.parts, section.conditions, section.made) == ((), (), ())
+    assert page.notices[0].startswith("No claim has been judged: neither the store nor the committed reference trials")
+
+
+def test_no_claims_at_all_is_said(lab: Laboratory) -> None:
+    assert lab.page().notices == ("There are no claims to report on.",)
+
+
+def test_a_store_of_another_schema_version_is_said(filled: Laboratory) -> None:
+    path = next(filled.store.record_paths())
+    path.write_text(json.dumps({**json.loads(path.read_text()), "schema": 2}))
+    page = filled.page(filled.judge(better_wins))
+    assert page.sections[0].outcome is Outcome.ERROR
+    assert "its schema is 2 and this version of evoclaims reads schema 1" in page.notices[0]
+
+
+def test_a_record_that_breaks_after_judging_is_said_and_left_out(filled: Laboratory) -> None:
+    report = filled.judge(better_wins)
+    next(filled.store.record_paths()).write_text("{")
+    page = filled.page(report)
+    assert "it is not one whole JSON text" in page.notices[0]
+    assert sum(made.count for made in page.sections[0].made) == 11
+
+
+def test_the_history_says_when_rules_changed_and_what_differs_now(filled: Laboratory) -> None:
+    report = filled.judge(better_wins)
+    assert report.verdict is not None
+    now = report.verdict["fingerprint"]
+
+    def entry(outcome: Outcome, fingerprint: str, date: str) -> Entry:
+        return Entry(outcome, "why", 6, 0.5, fingerprint, date, {"jax": "0.10.2"}, "cpu", "a" * 40 + "-dirty", "")
+
+    old, same = entry(Outcome.SUPPORTED, "f" * 64, "2026-01-01"), entry(Outcome.REFUTED, now, "2026-02-02")
+
+    def shown(*entries: Entry) -> Any:
+        return filled.section(report, history={("full", "T1"): entries})
+
+    section = shown(old, same)
+    assert [(one.date, one.outcome, one.new_rules) for one in section.history] == [
+        ("2026-01-01", "supported", False),
+        ("2026-02-02", "refuted", True),
+    ]
+    assert section.history[0].made == "cpu, revision aaaaaaaaa-dirty"
+    assert section.change == "Accepted on 2026-02-02 as refuted; now supported."
+    assert shown(old).change == "What was fixed beforehand has changed since 2026-01-01: a new history begins."
+    assert shown(replace(same, outcome=Outcome.SUPPORTED)).change == ""
+    assert shown().history == ()
+
+
+def test_the_typical_trial_is_the_lower_median_of_the_finished_ones(lab: Laboratory) -> None:
+    lab.put("better", [0.9, 0.2, 0.6, 0.6, float("nan")])
+    lab.store.put(record(CONDITIONS["better", "small"], 5, 0.0, status="diverged"), {})
+    ids = [record(CONDITIONS["better", "small"], seed, 0.0).id for seed in range(6)]
+    chosen = typical(Reader(lab.archive).read(ids))
+    assert chosen is not None
+    assert (chosen[0].seed, chosen[1]) == (2, "seed 2, the median of 4 by mean success")
+    assert typical(()) is None
+
+
+def test_a_champion_that_is_a_graph_is_drawn_and_others_say_why_not(lab: Laboratory) -> None:
+    condition, method = CONDITIONS["neat", "small"], Neat(SMALL)
+    genome = method.best(condition.task, method.init(trial_key(0, TRAINING), condition.task)).parameters
+    for seed in range(6):
+        lab.store.put(record(condition, seed, 1.0), named_leaves(jax.device_get(genome)))
+    lab.put("better", [1.0] * 6)
+
+    def solves(method: str) -> Any:
+        return lab.judge(lambda group: group(method).solves_every_level.in_most_trials(), id=method)
+
+    page = lab.page(solves("neat"), solves("better"))
+    drawn, records = (page.conditions[section.conditions[0]].champion for section in page.sections[::-1])
+    assert drawn.says == "The champion’s network: seed 0, the median of 6 by mean success."
+    assert drawn.picture.lstrip().startswith(b"<?xml")
+    assert (records.picture, "are not in the store" in records.says) == (b"", True)
+    lab.store.champion_path(record(condition, 0, 1.0).id).write_bytes(b"torn")
+    torn = lab.page(solves("neat")).conditions[page.sections[1].conditions[0]].champion
+    assert (torn.picture, "it is not the champion that the trial's record names" in torn.says) == (b"", True)
+
+
+@given(st.lists(st.tuples(st.text(), st.text(), st.sampled_from(["full", "smoke"])), max_size=20))
+def test_anchors_are_safe_in_an_address_and_never_given_twice(names: list[tuple[str, str, str]]) -> None:
+    anchors = Anchors()
+    given_ = [anchors.new(*name) for name in names]
+    assert len(set(given_)) == len(names)
+    assert all(anchor.isascii() and not set(anchor) & set(" #?%&<>\"'/") and anchor for anchor in given_)

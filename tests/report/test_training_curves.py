@@ -1,0 +1,89 @@
+"""Curves over training: few points, one line a trial or quantiles, gaps where a value is no number."""
+
+from __future__ import annotations
+
+import itertools
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from laboratory import CONDITIONS, Laboratory, record
+
+from evoclaims.report.curves import MOST_LINES, CurvePanel, panels
+from evoclaims.report.glance import POINTS, Glance, Reader
+
+
+@pytest.fixture
+def read(tmp_path: Path) -> Any:
+    """A function that stores one trial for each set of curves, each time afresh, and looks at them."""
+    times = itertools.count()
+
+    def look(*curves: dict[str, Any]) -> tuple[Glance, ...]:
+        lab = Laboratory(tmp_path / str(next(times)))
+        made = [record(CONDITIONS["better", "small"], seed, 1.0, curves=one) for seed, one in enumerate(curves)]
+        for trial in made:
+            lab.store.put(trial, {})
+        return Reader(lab.archive).read([trial.id for trial in made])
+
+    return look
+
+
+def _curve(values: Any) -> dict[str, Any]:
+    values = tuple(map(float, values))
+    return {"environment_steps": tuple(10.0 * (i + 1) for i in range(len(values))), "success": values}
+
+
+def _only(found: tuple[tuple[CurvePanel, ...], str]) -> CurvePanel:
+    ((panel,), _) = found
+    return panel
+
+
+def test_long_curves_keep_their_ends_and_at_most_a_hundred_points(read: Any) -> None:
+    trials = read(_curve(range(1234)))
+    assert trials[0].reports == 1234
+    line = _only(panels(trials)).lines[0]
+    assert len(line.y) == POINTS == 100
+    assert (line.y[0], line.y[-1], line.x[-1]) == (0.0, 1233.0, 12340.0)
+    assert panels(trials)[1] == "At most 100 of 1234 reports are drawn."
+    assert len(read(_curve(range(7)))[0].curves["success"]) == 7
+
+
+def test_few_trials_are_drawn_one_by_one_and_many_as_quantiles(read: Any) -> None:
+    few = _only(panels(read(*(_curve([0, i]) for i in range(MOST_LINES)))))
+    assert (len(few.lines), few.band) == (MOST_LINES, None)
+    many = _only(panels(read(*(_curve([0, i, i]) for i in range(101)))))
+    assert [line.label for line in many.lines] == ["median of 101 trials"]
+    assert many.band is not None
+    assert [line.y[-1] for line in (many.band[0], *many.lines, many.band[1])] == [10.0, 50.0, 90.0]
+
+
+def test_a_trial_that_ended_early_keeps_its_last_value_among_many(read: Any) -> None:
+    trials = read(*(_curve([0, 0, 0, 0]) for _ in range(MOST_LINES // 2)), *(_curve([0, 9]) for _ in range(MOST_LINES)))
+    panel = _only(panels(trials))
+    assert panel.lines[0].y[-1] == 9.0
+
+
+def test_values_that_are_no_numbers_leave_gaps_and_are_counted(read: Any) -> None:
+    nan = float("nan")
+    panel = _only(panels(read(_curve([0, nan, 2]), _curve([1, 1, float("inf")]), _curve([0, 1, 2]))))
+    assert panel.broken == 2
+    assert np.isnan(panel.lines[0].y[1])
+    many = _only(panels(read(*(_curve([0, nan, i]) for i in range(MOST_LINES + 1)))))
+    assert np.isnan(many.lines[0].y).any()
+    assert np.isfinite(many.lines[0].y[[0, -1]]).all()
+
+
+def test_what_never_changes_is_said_and_not_drawn(read: Any) -> None:
+    trials = read(*({**_curve([0, i]), "level": (2.0, 2.0)} for i in (1, 2)))
+    found, says = panels(trials)
+    assert [panel.name for panel in found] == ["success"]
+    assert says == "Level is 2 throughout."
+
+
+def test_trials_with_one_point_or_a_broken_axis_have_no_curve(read: Any) -> None:
+    broken = {"environment_steps": (1.0, float("nan")), "success": (0.0, 1.0)}
+    found, says = panels(read(_curve([1]), broken))
+    assert (found, says) == ((), "No trial has a curve of more than one point.")
+    assert panels(()) == ((), "")
+    assert panels(read(_curve([0, 1]), _curve([1])))[1] == "1 of 2 trials have at most one point."
