@@ -16,10 +16,10 @@ from evoclaims.cli.project import open_project
 from evoclaims.cli.run import describe
 from evoclaims.cli.stored import Stored, load, write
 from evoclaims.core.errors import UnknownNameError, UserError
-from evoclaims.envs.ecorobot import film, page, pictures
-from evoclaims.envs.ecorobot.marks import marks
-from evoclaims.envs.ecorobot.motion import Motion, motion
 from evoclaims.envs.ecorobot.robot_task import RobotTask
+from evoclaims.envs.ecorobot.views import film, page, pictures
+from evoclaims.envs.ecorobot.views.marks import marks
+from evoclaims.envs.ecorobot.views.motion import Motion, motion
 from evoclaims.methods.map_elites import MapElites
 from evoclaims.networks.picture import Format
 from evoclaims.suite.reproduction import Tier

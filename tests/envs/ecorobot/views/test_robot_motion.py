@@ -9,11 +9,11 @@ import pytest
 
 from evoclaims.core.errors import UserError
 from evoclaims.envs.ecorobot.deceptive import DeceptiveMaze
-from evoclaims.envs.ecorobot.motion import at_start, motion
 from evoclaims.envs.ecorobot.obstacles import PLACES, Obstacles
 from evoclaims.envs.ecorobot.robots import ANT
 from evoclaims.envs.ecorobot.scene import Box, scene
 from evoclaims.envs.ecorobot.stones import START, SteppingStones
+from evoclaims.envs.ecorobot.views.motion import at_start, motion
 
 STONES, RUN, ANT_MAZE = SteppingStones(), Obstacles(), DeceptiveMaze(robot=ANT)
 

@@ -13,12 +13,12 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from evoclaims.envs.ecorobot.marks import marks
 from evoclaims.envs.ecorobot.maze import Maze
-from evoclaims.envs.ecorobot.motion import Motion, Shape
 from evoclaims.envs.ecorobot.robot_task import RobotTask
+from evoclaims.envs.ecorobot.views.marks import marks
+from evoclaims.envs.ecorobot.views.motion import Motion, Shape
 
-ASSETS: Final = resources.files("evoclaims.envs.ecorobot") / "assets"
+ASSETS: Final = resources.files("evoclaims.envs.ecorobot.views") / "assets"
 DIGITS: Final = 6
 """Of what stands still; what moves keeps every bit."""
 

@@ -12,10 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evoclaims.core.errors import UnknownNameError, UserError
-from evoclaims.envs.ecorobot.marks import Mark, marks
 from evoclaims.envs.ecorobot.maze import Maze
-from evoclaims.envs.ecorobot.motion import at_start
-from evoclaims.envs.ecorobot.painting import (
+from evoclaims.envs.ecorobot.robot_task import RobotTask
+from evoclaims.envs.ecorobot.views.marks import Mark, marks
+from evoclaims.envs.ecorobot.views.motion import at_start
+from evoclaims.envs.ecorobot.views.painting import (
     BELOW,
     FROM_ABOVE,
     FROM_THE_SIDE,
@@ -31,7 +32,6 @@ from evoclaims.envs.ecorobot.painting import (
     paint_robot,
     plane_of,
 )
-from evoclaims.envs.ecorobot.robot_task import RobotTask
 from evoclaims.networks.export import optional
 from evoclaims.networks.picture import Format
 

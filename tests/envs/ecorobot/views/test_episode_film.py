@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from evoclaims.envs.ecorobot import film as films
-from evoclaims.envs.ecorobot.film import FRAME, film
-from evoclaims.envs.ecorobot.motion import motion
 from evoclaims.envs.ecorobot.obstacles import Obstacles
 from evoclaims.envs.ecorobot.stones import SteppingStones
+from evoclaims.envs.ecorobot.views import film as films
+from evoclaims.envs.ecorobot.views.film import FRAME, film
+from evoclaims.envs.ecorobot.views.motion import motion
 from evoclaims.networks.export import optional
 
 MAZE, RUN = SteppingStones(), Obstacles()

@@ -9,8 +9,9 @@ from typing import Any, Final
 
 import numpy as np
 
-from evoclaims.envs.ecorobot.motion import Motion
-from evoclaims.envs.ecorobot.painting import (
+from evoclaims.envs.ecorobot.robot_task import RobotTask
+from evoclaims.envs.ecorobot.views.motion import Motion
+from evoclaims.envs.ecorobot.views.painting import (
     BELOW,
     FROM_ABOVE,
     FROM_THE_SIDE,
@@ -21,8 +22,7 @@ from evoclaims.envs.ecorobot.painting import (
     paint_robot,
     plane_of,
 )
-from evoclaims.envs.ecorobot.pictures import plain
-from evoclaims.envs.ecorobot.robot_task import RobotTask
+from evoclaims.envs.ecorobot.views.pictures import plain
 from evoclaims.networks.export import optional
 
 MOST_FRAMES: Final = 160

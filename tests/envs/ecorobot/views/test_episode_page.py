@@ -12,12 +12,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from evoclaims.envs.ecorobot import page as pages
-from evoclaims.envs.ecorobot.marks import Mark
-from evoclaims.envs.ecorobot.motion import Motion, motion
 from evoclaims.envs.ecorobot.obstacles import Obstacles
-from evoclaims.envs.ecorobot.page import page
 from evoclaims.envs.ecorobot.stones import STONES, SteppingStones
+from evoclaims.envs.ecorobot.views import page as pages
+from evoclaims.envs.ecorobot.views.marks import Mark
+from evoclaims.envs.ecorobot.views.motion import Motion, motion
+from evoclaims.envs.ecorobot.views.page import page
 
 MAZE, RUN = SteppingStones(), Obstacles()
 DATA = re.compile(r'<script type="application/json" id="data">(.*?)</script>', re.DOTALL)

@@ -14,10 +14,10 @@ from evoclaims.core.errors import UnknownNameError, UserError
 from evoclaims.envs.ecorobot.deceptive import DeceptiveMaze
 from evoclaims.envs.ecorobot.locomotion import Locomotion
 from evoclaims.envs.ecorobot.obstacles import Obstacles
-from evoclaims.envs.ecorobot.painting import PATHS, STONE, TARGET, WALL, paint_ground, paint_paths
-from evoclaims.envs.ecorobot.pictures import draw, draw_elites
 from evoclaims.envs.ecorobot.robots import ANT
 from evoclaims.envs.ecorobot.stones import STONES, SteppingStones
+from evoclaims.envs.ecorobot.views.painting import PATHS, STONE, TARGET, WALL, paint_ground, paint_paths
+from evoclaims.envs.ecorobot.views.pictures import draw, draw_elites
 from evoclaims.networks.export import optional
 
 MAZE = SteppingStones()
