@@ -9,6 +9,9 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+import jax
+
+from evoclaims.core.keys import TRAINING, trial_key
 from evoclaims.envs.gates.parity import NParity
 from evoclaims.judging.assertion import Assertion
 from evoclaims.judging.protocol import Protocol
@@ -25,6 +28,7 @@ from evoclaims.suite.report import ClaimReport, broken
 from evoclaims.suite.reproduction import Reproduction, Tier
 from evoclaims.suite.session import Session
 from evoclaims.trials.budget import Budget
+from evoclaims.trials.outcome import named_leaves
 from evoclaims.trials.result import TrialResult, digest
 from evoclaims.trials.spec import Condition, TrialSpec
 from evoclaims.trials.store import Store
@@ -100,6 +104,14 @@ class Laboratory:
             self.store.put(trial, {})
         return made
 
+    def put_genomes(self, values: Iterable[float]) -> None:
+        """Store a trial of NEAT for each value, all with a first genome as their champion."""
+        condition = CONDITIONS["neat", "small"]
+        policy = METHODS["neat"].best(condition.task, METHODS["neat"].init(trial_key(0, TRAINING), condition.task))
+        champion = named_leaves(jax.device_get(policy.parameters))
+        for seed, value in enumerate(values):
+            self.store.put(record(condition, seed, value), champion)
+
     def judge(self, assert_: Judge, tier: str = "full", case: str = "", **texts: str) -> ClaimReport:
         """Judge a claim from the store, as `evoclaims report` does."""
         claim = Claim(**{"id": "T1", "says": "Better is better", "where": "§1.2, Fig. 3", "smoke": "In small", **texts})
@@ -137,6 +149,12 @@ def better_wins(group: Callable[[str], Any]) -> Assertion:
     """Claim that one method is above the other."""
     above: Assertion = group("better").mean_success > group("worse").mean_success
     return above
+
+
+def neat_solves(group: Callable[[str], Any]) -> Assertion:
+    """Claim that NEAT solves the task."""
+    solved: Assertion = group("neat").solves_every_level.in_most_trials()
+    return solved
 
 
 def better_solves(group: Callable[[str], Any]) -> Assertion:

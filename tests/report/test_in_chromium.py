@@ -5,16 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-import jax
 import pytest
 from chromium import NAMES, Chromium, found
-from laboratory import CONDITIONS, SMALL, Laboratory, better_solves, better_wins, record
+from laboratory import Laboratory, better_solves, better_wins
 
-from evoclaims.core.keys import TRAINING, trial_key
-from evoclaims.methods.neat.neat import Neat
 from evoclaims.report.model import Plate
 from evoclaims.report.page import html
-from evoclaims.trials.outcome import named_leaves
 
 PLATE = (
     b'<svg xmlns="http://www.w3.org/2000/svg" width="40" height="30" viewBox="0 0 40 30">'
@@ -45,10 +41,7 @@ def address(tmp_path_factory: pytest.TempPathFactory) -> str:
     lab = Laboratory(folder)
     lab.put("better", [1.0, 1.0, 1.0, 0.8, float("nan"), 1.0])
     lab.put("worse", [0.1, 0.2, 0.3, 0.3, 0.4, 0.5])
-    condition, method = CONDITIONS["neat", "small"], Neat(SMALL)
-    genome = method.best(condition.task, method.init(trial_key(0, TRAINING), condition.task)).parameters
-    for seed in range(6):
-        lab.store.put(record(condition, seed, 1.0), named_leaves(jax.device_get(genome)))
+    lab.put_genomes([1.0] * 6)
 
     def neat_wins(group: Any) -> Any:
         return group("neat").mean_success > group("worse").mean_success

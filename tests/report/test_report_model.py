@@ -6,21 +6,20 @@ import json
 from dataclasses import replace
 from typing import Any
 
-import jax
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from laboratory import CONDITIONS, HERE, SMALL, Laboratory, better_solves, better_wins, record
+from laboratory import CONDITIONS, HERE, Laboratory, better_solves, better_wins, neat_solves, record
 
-from evoclaims.core.keys import TRAINING, trial_key
 from evoclaims.judging.verdict import Outcome
-from evoclaims.methods.neat.neat import Neat
 from evoclaims.report.champion import typical
+from evoclaims.report.gather import gather
 from evoclaims.report.glance import Reader
+from evoclaims.report.model import Champion
 from evoclaims.report.words import Anchors
+from evoclaims.suite import references
 from evoclaims.suite.archive import Archive
 from evoclaims.suite.history import Entry
-from evoclaims.trials.outcome import named_leaves
 
 
 def test_a_section_holds_what_was_claimed_judged_and_looked_at(filled: Laboratory) -> None:
@@ -85,6 +84,14 @@ def test_diverged_trials_stand_apart_and_are_said(lab: Laboratory) -> None:
     assert section.warnings == (
         "2 of 12 trials did not run to their end (2 × diverged; seeds 4, 5). They take the worst rank.",
     )
+
+
+def test_a_diverged_trial_of_an_event_is_no_dot(lab: Laboratory) -> None:
+    lab.put("better", [1.0] * 5)
+    lab.store.put(record(CONDITIONS["better", "small"], 5, 1.0, status="diverged"), {})
+    (strip,) = lab.section(lab.judge(better_solves)).parts[0].strips
+    assert [dot.seed for dot in strip.dots] == [0, 1, 2, 3, 4]
+    assert (strip.apart, strip.n) == (((5, "diverged"),), 6)
 
 
 def test_a_nan_is_an_error_that_shows_which_trial_holds_it(lab: Laboratory) -> None:
@@ -180,33 +187,62 @@ def test_the_history_says_when_rules_changed_and_what_differs_now(filled: Labora
 
 
 def test_the_typical_trial_is_the_lower_median_of_the_finished_ones(lab: Laboratory) -> None:
-    lab.put("better", [0.9, 0.2, 0.6, 0.6, float("nan")])
+    lab.put("better", [0.9, 0.2, 0.6, 0.7, float("nan")])
     lab.store.put(record(CONDITIONS["better", "small"], 5, 0.0, status="diverged"), {})
     ids = [record(CONDITIONS["better", "small"], seed, 0.0).id for seed in range(6)]
-    chosen = typical(Reader(lab.archive).read(ids))
+    trials = Reader(lab.archive).read(ids)
+    chosen = typical(trials)
     assert chosen is not None
     assert (chosen[0].seed, chosen[1]) == (2, "seed 2, the median of 4 by mean success")
+    equal = typical([replace(trial, score=0.5) for trial in reversed(trials)])
+    assert equal is not None
+    assert equal[0].seed == 0
     assert typical(()) is None
 
 
 def test_a_champion_that_is_a_graph_is_drawn_and_others_say_why_not(lab: Laboratory) -> None:
-    condition, method = CONDITIONS["neat", "small"], Neat(SMALL)
-    genome = method.best(condition.task, method.init(trial_key(0, TRAINING), condition.task)).parameters
-    for seed in range(6):
-        lab.store.put(record(condition, seed, 1.0), named_leaves(jax.device_get(genome)))
+    lab.put_genomes([1.0] * 6)
     lab.put("better", [1.0] * 6)
 
-    def solves(method: str) -> Any:
-        return lab.judge(lambda group: group(method).solves_every_level.in_most_trials(), id=method)
-
-    page = lab.page(solves("neat"), solves("better"))
+    page = lab.page(lab.judge(neat_solves, id="neat"), lab.judge(better_solves, id="better"))
     drawn, records = (page.conditions[section.conditions[0]].champion for section in page.sections[::-1])
-    assert drawn.says == "The champion’s network: seed 0, the median of 6 by mean success."
+    assert drawn.says == "The champion: seed 0, the median of 6 by mean success."
     assert drawn.picture.lstrip().startswith(b"<?xml")
     assert (records.picture, "are not in the store" in records.says) == (b"", True)
-    lab.store.champion_path(record(condition, 0, 1.0).id).write_bytes(b"torn")
-    torn = lab.page(solves("neat")).conditions[page.sections[1].conditions[0]].champion
+    lab.store.champion_path(record(CONDITIONS["neat", "small"], 0, 1.0).id).write_bytes(b"torn")
+    torn = lab.page(lab.judge(neat_solves)).conditions[page.sections[1].conditions[0]].champion
     assert (torn.picture, "it is not the champion that the trial's record names" in torn.says) == (b"", True)
+
+
+def test_committed_reference_trials_have_no_champion_to_draw(lab: Laboratory) -> None:
+    made = [record(CONDITIONS["better", "small"], seed, 1.0) for seed in range(6)]
+    references.write(references.path_of(lab.reproduction.references, "full", "better", "small"), made)
+    page = lab.page(lab.judge(better_solves))
+    assert page.sections[0].devices == "6 × cpu"
+    (condition,) = page.conditions.values()
+    assert condition.champion.says == (
+        "The champion’s parameters (seed 0, the median of 6 by mean success) are not in the store: "
+        "records alone are kept here."
+    )
+
+
+def test_the_first_drawing_of_a_champion_that_can_be_made_is_taken(lab: Laboratory) -> None:
+    lab.put_genomes([1.0] * 6)
+    report = lab.judge(neat_solves)
+
+    def champion(*draws: Any) -> Champion:
+        page = gather(lab.reproduction, {"full": [report]}, lab.archive, {}, sentences={}, draws=draws)
+        (condition,) = page.conditions.values()
+        return condition.champion
+
+    def names(condition: Any, result: Any, parameters: Any, title: str) -> bytes:
+        return f"{title}|{result.seed}".encode()
+
+    title = "neat on n_parity, seed 0, the median of 6 by mean success"
+    assert champion(lambda *_: None, names, lambda *_: b"later").picture == f"{title}|0".encode()
+    assert champion(lambda *_: None).says.endswith("is no graph but arrays of weights, of which there is no drawing.")
+    large = champion(lambda *_: bytes(400_001))
+    assert (large.picture, "is too large for this page: 400 kB" in large.says) == (b"", True)
 
 
 @given(st.lists(st.tuples(st.text(), st.text(), st.sampled_from(["full", "smoke"])), max_size=20))

@@ -46,7 +46,7 @@ def test_a_verdict_without_p_comes_back_without_p() -> None:
 
 def test_versions_are_written_once_for_all_verdicts_that_share_them() -> None:
     other = replace(ENTRY, versions={"jax": "0.11.2"})
-    text = dump({("smoke", "G1"): (ENTRY, other), ("full", "G1"): (ENTRY,)})
+    text = dump({("smoke", "G1"): (ENTRY, other), ("full", "G1"): (replace(ENTRY, accepted="2025-12-01"),)})
     assert text.count('jax = "0.10.2"') == 1
     assert text.count('jax = "0.11.2"') == 1
 
@@ -112,6 +112,12 @@ def test_bytes_of_any_kind_are_refused_with_a_sentence_that_steers_no_terminal(d
     with pytest.raises(UserError) as caught:
         parse(data, "a\x1bb")
     assert str(caught.value).isprintable()
+
+
+def test_a_claim_without_any_verdict_is_said_without_steering_the_terminal() -> None:
+    with pytest.raises(UserError) as caught:
+        parse(b'schema = 1\n[verdicts.smoke]\n"G\\u001b1" = []', "x")
+    assert str(caught.value).startswith(r"x holds no accepted verdicts: G\x1b1 (smoke) has no list of verdicts.")
 
 
 def test_a_folder_in_the_files_place_is_said(tmp_path: Path) -> None:

@@ -73,6 +73,11 @@ def _parser() -> argparse.ArgumentParser:
 
     report = add("report", "write a web page and a Markdown file about all claims from the trials at hand; run nothing")
     report.add_argument("--tier", default="all", help="smoke, full or all (default)")
+    report.add_argument(
+        "--trajectories",
+        action="store_true",
+        help="run the champions of robots' tasks once more and draw their ways (minutes)",
+    )
     report.add_argument("--out", metavar="FOLDER", default="report", help="where to (report/)")
 
     champion = add("champion", "replay a stored trial's champion on every level, and draw or export its network")

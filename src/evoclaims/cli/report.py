@@ -6,16 +6,24 @@ import argparse
 from datetime import UTC, datetime
 from importlib import metadata
 from pathlib import Path
+from typing import Any
 
+from evoclaims.cli.outings import run_again
 from evoclaims.cli.project import judge_stored, open_archive, open_project
-from evoclaims.cli.stored import write
+from evoclaims.cli.stored import Stored, write
 from evoclaims.core.errors import UnknownNameError
+from evoclaims.envs.ecorobot.robot_task import RobotTask
+from evoclaims.envs.ecorobot.views import pictures
+from evoclaims.report.champion import network
 from evoclaims.report.gather import gather
 from evoclaims.report.markdown import markdown
 from evoclaims.report.page import html
 from evoclaims.report.plates import plates
 from evoclaims.suite import history, table
+from evoclaims.trials import devices
 from evoclaims.trials.records import printable
+from evoclaims.trials.result import TrialResult
+from evoclaims.trials.spec import Condition
 
 ALL = "all"
 
@@ -26,17 +34,18 @@ def main(options: argparse.Namespace) -> int:
     tiers = list(reproduction.tiers)[::-1]  # the paper's own sentences come first
     if options.tier not in (*tiers, ALL):
         raise UnknownNameError("tier", options.tier, (*tiers, ALL))
-    # Every tier is judged, since the paper's sentence is the statement of the largest.
-    verdicts = {tier: judge_stored(config, options.storage, tier) for tier in tiers}
+    shown = tiers if options.tier == ALL else [options.tier]
+    # The paper's sentence is the statement of the largest tier, so that is judged in any case.
+    verdicts = {tier: judge_stored(config, options.storage, tier) for tier in tiers if tier in (tiers[0], *shown)}
     archive = open_archive(options.storage, reproduction)
-    shown = {tier: reports for tier, reports in verdicts.items() if options.tier in (tier, ALL)}
-    drawn, missing = plates(reproduction, archive, next(iter(shown)))
+    drawn, missing = plates(reproduction, archive, shown[0])
     page = gather(
         reproduction,
-        shown,
+        {tier: verdicts[tier] for tier in shown},
         archive,
         history.load(reproduction.folder / history.FILE),
         sentences={report.name: report.statement for report in verdicts[tiers[0]]},
+        draws=(trajectory, network) if options.trajectories else (network,),
         plates=drawn,
         missing=missing,
         generated=f"Written on {datetime.now(UTC):%Y-%m-%d %H:%M} UTC by evoclaims {metadata.version('evoclaims')}.",
@@ -48,3 +57,12 @@ def main(options: argparse.Namespace) -> int:
     for board in page.boards:
         print(f"claims ({board.tier}): {table.totals(verdicts[board.tier])}")
     return 0
+
+
+def trajectory(condition: Condition, result: TrialResult, parameters: Any, title: str) -> bytes | None:
+    """Draw the ways that a champion on a robot's task takes in its evaluation, run again; None for other tasks."""
+    if not isinstance(condition.task, RobotTask):
+        return None
+    trial = Stored(title, condition, result, parameters, Path())
+    (device, *_) = devices.choose("auto")
+    return pictures.draw(condition.task, run_again(trial, condition.task, device).torsos, title, "svg")

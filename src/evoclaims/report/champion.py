@@ -1,9 +1,9 @@
-"""The champion of a condition's typical trial, and the drawing of its network."""
+"""The champion of a condition's typical trial, and a drawing of its network or of what it does."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, Final
 
 from evoclaims.core.errors import UserError
@@ -12,6 +12,7 @@ from evoclaims.report.glance import Glance
 from evoclaims.report.model import Champion
 from evoclaims.report.words import clean
 from evoclaims.trials import champions
+from evoclaims.trials.result import TrialResult
 from evoclaims.trials.spec import Condition
 from evoclaims.trials.store import Store
 
@@ -19,25 +20,46 @@ LARGEST: Final = 400_000
 """Most bytes of a drawing that a page takes in."""
 
 
-def champion_of(store: Store, condition: Condition, trials: Sequence[Glance]) -> Champion:
-    """Return the champion of the median trial, with its network where it is a graph and its file is in the store."""
+Draw = Callable[[Condition, TrialResult, Any, str], bytes | None]
+"""Draws a champion as SVG: takes condition, record, parameters and a title; None where there is nothing to draw."""
+
+
+def network(condition: Condition, result: TrialResult, parameters: Any, title: str) -> bytes | None:
+    """Draw the network of a champion that is a graph.
+
+    Raises:
+        UserError: when matplotlib or networkx is not installed.
+    """
+    panels = network_panels(condition, parameters)
+    return None if panels is None else picture.draw(panels, title, "svg")
+
+
+def champion_of(store: Store, condition: Condition, trials: Sequence[Glance], draws: Sequence[Draw]) -> Champion:
+    """Return the champion of the median trial, with the first drawing that can be made of it.
+
+    Args:
+        store: holds its parameters, or does not.
+        condition: the trials'.
+        trials: of one condition.
+        draws: ways of drawing, in the order in which they are tried.
+    """
     chosen = typical(trials)
     if chosen is None:
         return Champion("No trial has run to its end, so there is no champion to show.")
     trial, which = chosen
     try:
         result = store.get(trial.trial)
-        if result is None or not result.champion or not store.champion_file(result).exists():
+        if result is None or not store.champion_file(result).exists():
             return Champion(f"The champion’s parameters ({which}) are not in the store: records alone are kept here.")
-        panels = network_panels(condition, champions.load(store, condition, result))
-        if panels is None:
-            return Champion(f"The champion ({which}) is no graph but arrays of weights, of which there is no drawing.")
-        drawn = picture.draw(panels, f"{condition.label}, {which}", "svg")
+        parameters, title = champions.load(store, condition, result), f"{condition.label}, {which}"
+        drawn = next((made for draw in draws if (made := draw(condition, result, parameters, title))), None)
     except UserError as error:
         return Champion(f"The champion ({which}) cannot be drawn: {clean(error)}")
+    if drawn is None:
+        return Champion(f"The champion ({which}) is no graph but arrays of weights, of which there is no drawing.")
     if len(drawn) > LARGEST:
         return Champion(f"The champion’s drawing ({which}) is too large for this page: {len(drawn) // 1000} kB.")
-    return Champion(f"The champion’s network: {which}.", drawn)
+    return Champion(f"The champion: {which}.", drawn)
 
 
 def typical(trials: Sequence[Glance]) -> tuple[Glance, str] | None:

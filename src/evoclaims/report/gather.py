@@ -10,7 +10,7 @@ from evoclaims.core.errors import UserError
 from evoclaims.judging.protocol import Protocol
 from evoclaims.judging.verdict import Outcome
 from evoclaims.report import curves, origin, past
-from evoclaims.report.champion import champion_of
+from evoclaims.report.champion import Draw, champion_of, network
 from evoclaims.report.evidence import Part, judged_part, unjudged_part
 from evoclaims.report.glance import Glance, Reader
 from evoclaims.report.model import Board, Champion, Conditions, Look, Page, Plate, Section
@@ -31,6 +31,7 @@ def gather(
     history: History,
     *,
     sentences: Mapping[str, str],
+    draws: Sequence[Draw] = (network,),
     plates: Sequence[Plate] = (),
     missing: Sequence[str] = (),
     generated: str = "",
@@ -43,11 +44,12 @@ def gather(
         archive: where trials are read; each is read once.
         history: accepted verdicts.
         sentences: the paper's own sentences by claim, such as "G1[n_parity]".
+        draws: ways of drawing a champion, in the order in which they are tried.
         plates: figures of the paper.
         missing: sentences about figures that are not among them.
         generated: when, and by which version.
     """
-    gathered = _Gathering(reproduction, archive, history, sentences)
+    gathered = _Gathering(reproduction, archive, history, sentences, draws)
     boards = tuple(
         Board(tier, tuple(gathered.section(report) for report in sorted(reports, key=_order)))
         for tier, reports in verdicts.items()
@@ -92,17 +94,22 @@ class _Gathering:
     """What is shared by the sections of a report while it is made."""
 
     def __init__(
-        self, reproduction: Reproduction, archive: Archive, history: History, sentences: Mapping[str, str]
+        self,
+        reproduction: Reproduction,
+        archive: Archive,
+        history: History,
+        sentences: Mapping[str, str],
+        draws: Sequence[Draw],
     ) -> None:
         self._reproduction, self._archive, self._history = reproduction, archive, history
-        self._sentences, self._anchors = sentences, Anchors()
+        self._sentences, self._draws, self._anchors = sentences, draws, Anchors()
         self.reader = Reader(archive)
         self.conditions: dict[str, Conditions] = {}
 
     def section(self, report: ClaimReport) -> Section:
         """Return one claim's section."""
         verdict = report.verdict or {}
-        read = {_label(source): Reader(self._archive).read(source["trials"]) for source in report.sources}
+        read = {_label(source): self.reader.read(source["trials"]) for source in report.sources}
         every = [trial for trials in read.values() for trial in trials]
         made = origin.grouped(trial.origin for trial in every)
         sentence = clean(self._sentences.get(report.name, ""))
@@ -160,7 +167,7 @@ class _Gathering:
             condition = self._reproduction.tier(tier).condition(source["method"], source["task"])
         except UserError as error:
             return Champion(clean(error))
-        return champion_of(self._archive.store, condition, trials)
+        return champion_of(self._archive.store, condition, trials, self._draws)
 
 
 def _label(source: Mapping[str, Any]) -> str:

@@ -23,6 +23,9 @@ MOST_DOTS: Final = 200
 MOST: Final = 1e300
 """The largest number that an axis shows, so that differences stay finite."""
 
+LEAST: Final = 1e-300
+"""The smallest difference that ticks tell apart: below, floats run out of digits."""
+
 DOT, BLOCK = 7.0, 44.0
 """Room for a dot, and the widest block of near values, which the edges have room for."""
 
@@ -143,7 +146,7 @@ def curve_symbol(panel: CurvePanel, name: str) -> Markup:
 
 def ticks(low: float, high: float, most: int = 5) -> list[float]:
     """Return at most `most` + 1 round values from `low` to `high`."""
-    if not high > low:
+    if high - low < LEAST:
         return [low]
     rough = (high - low) / most
     power = 10.0 ** math.floor(math.log10(rough))
@@ -204,8 +207,8 @@ def _block(total: float, count: int) -> tuple[float, float, float, int]:
         count: of the dots.
     """
     room = min(DOT, math.sqrt((HEIGHT - 12) * BLOCK / count))
-    rows = max(int((HEIGHT - 12) / room), 1)
-    width = math.ceil(count / rows) * room
+    columns = math.ceil(count / max(int((HEIGHT - 9) / room), 1))
+    rows, width = math.ceil(count / columns), columns * room
     centre = total / count
     return centre - width / 2, centre + width / 2 + room / 2, room, rows
 

@@ -47,7 +47,7 @@ def accept(history: History, reports: Sequence[ClaimReport], archive: Archive, t
         key = key_of(report)
         name = f"{key[1]} ({key[0]})"
         past = history.get(key, ())
-        if report.outcome in UNDECIDED or report.verdict is None:
+        if report.outcome in UNDECIDED:
             kept = f"it stays {past[-1].outcome}, accepted on {past[-1].accepted}" if past else "nothing is accepted"
             left.append(f"{name} is {report.outcome} now ({printable(report.reason)}): {kept}")
             continue

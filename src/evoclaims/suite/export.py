@@ -148,10 +148,16 @@ def _nested(value: Any) -> bool:
 def _uniform(values: list[Any]) -> list[Any]:
     """Return a column of one type: as it is, numbers as floats where some are, anything else mixed as text."""
     kinds = {type(value) for value in values if value is not None}
-    if kinds <= {bool} or kinds == {int} or kinds == {str}:
+    if kinds <= {bool} or kinds == {int}:
         return values
     if kinds <= {int, float}:
         return [None if value is None else float(value) for value in values]
     if kinds == {list} and all(isinstance(x, int | float) for value in values for x in value or ()):
         return [None if value is None else [float(x) for x in value] for value in values]
-    return [value if value is None or isinstance(value, str) else json.dumps(as_plain(value)) for value in values]
+    return [None if value is None else _text(value) for value in values]
+
+
+def _text(value: Any) -> str:
+    """Return a value as text that a file can hold: stray surrogates are escaped."""
+    text = value if isinstance(value, str) else json.dumps(as_plain(value))
+    return text.encode("utf-8", errors="backslashreplace").decode()
