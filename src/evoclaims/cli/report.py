@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
 from datetime import UTC, datetime
 from importlib import metadata
 from pathlib import Path
@@ -20,6 +21,10 @@ from evoclaims.report.markdown import markdown
 from evoclaims.report.page import html
 from evoclaims.report.plates import plates
 from evoclaims.suite import history, table
+from evoclaims.suite.archive import Archive
+from evoclaims.suite.config import SuiteConfig, load_reproduction
+from evoclaims.suite.report import ClaimReport
+from evoclaims.suite.robustness import Robustness, matrix
 from evoclaims.trials import devices
 from evoclaims.trials.records import printable
 from evoclaims.trials.result import TrialResult
@@ -38,6 +43,7 @@ def main(options: argparse.Namespace) -> int:
     # The paper's sentence is the statement of the largest tier, so that is judged in any case.
     verdicts = {tier: judge_stored(config, options.storage, tier) for tier in tiers if tier in (tiers[0], *shown)}
     archive = open_archive(options.storage, reproduction)
+    robustness = [row for tier in shown for row in _robustness(config, options.storage, tier, verdicts[tier], archive)]
     drawn, missing = plates(reproduction, archive, shown[0])
     page = gather(
         reproduction,
@@ -48,6 +54,7 @@ def main(options: argparse.Namespace) -> int:
         draws=(trajectory, network) if options.trajectories else (network,),
         plates=drawn,
         missing=missing,
+        robustness=robustness,
         generated=f"Written on {datetime.now(UTC):%Y-%m-%d %H:%M} UTC by evoclaims {metadata.version('evoclaims')}.",
     )
     folder = Path(options.out)
@@ -57,6 +64,20 @@ def main(options: argparse.Namespace) -> int:
     for board in page.boards:
         print(f"claims ({board.tier}): {table.totals(verdicts[board.tier])}")
     return 0
+
+
+def _robustness(
+    config: SuiteConfig, storage: str, tier: str, plain: Sequence[ClaimReport], archive: Archive
+) -> tuple[Robustness, ...]:
+    """Judge a tier's claims under each variant that has run."""
+    reproduction = load_reproduction(config)
+    seeds = reproduction.tier(tier).protocol.seeds(1)
+    tried = [
+        name
+        for name, variant in reproduction.variants.items()
+        if any(archive.trials(condition, seeds)[0] for condition in variant.conditions.get(tier, {}).values())
+    ]
+    return matrix(plain, {name: judge_stored(config, storage, tier, name) for name in tried})
 
 
 def trajectory(condition: Condition, result: TrialResult, parameters: Any, title: str) -> bytes | None:

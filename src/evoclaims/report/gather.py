@@ -19,6 +19,7 @@ from evoclaims.suite.archive import Archive
 from evoclaims.suite.history import History, key_of
 from evoclaims.suite.report import ClaimReport
 from evoclaims.suite.reproduction import Reproduction
+from evoclaims.suite.robustness import Robustness
 
 Verdicts = Mapping[str, Sequence[ClaimReport]]
 """Reports by tier, in the order in which tiers are shown."""
@@ -34,6 +35,7 @@ def gather(
     draws: Sequence[Draw] = (network,),
     plates: Sequence[Plate] = (),
     missing: Sequence[str] = (),
+    robustness: Sequence[Robustness] = (),
     generated: str = "",
 ) -> Page:
     """Return the data of a whole report.
@@ -47,6 +49,7 @@ def gather(
         draws: ways of drawing a champion, in the order in which they are tried.
         plates: figures of the paper.
         missing: sentences about figures that are not among them.
+        robustness: how claims end under variants of the protocol.
         generated: when, and by which version.
     """
     gathered = _Gathering(reproduction, archive, history, sentences, draws)
@@ -62,6 +65,8 @@ def gather(
         notices=tuple(_notices(boards, gathered.reader)),
         plates=tuple(plates),
         missing=tuple(missing),
+        variants={name: clean(variant.says) for name, variant in reproduction.variants.items()},
+        robustness=tuple(robustness),
         generated=generated,
     )
 

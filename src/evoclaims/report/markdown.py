@@ -26,6 +26,8 @@ def markdown(page: Page) -> str:
         if board.sections:
             blocks += [f"## Claims at the {literal(board.tier)} tier", _overview(board)]
             blocks += [block for section in board.sections for block in _section(section, page)]
+    if page.robustness:
+        blocks += ["## Which conclusions hang on a detail?", _details(page), _robustness(page)]
     return "\n\n".join(block for block in blocks if block) + "\n"
 
 
@@ -48,6 +50,32 @@ def _scoreboard(page: Page) -> str:
     return _table(
         ("tier", *map(str, Outcome), "looked into and accepted"),
         ((literal(b.tier), *(str(b.count(outcome)) for outcome in Outcome), str(b.accepted)) for b in boards),
+    )
+
+
+def _details(page: Page) -> str:
+    """List the variants."""
+    return "\n".join(f"* {literal(name)}: {literal(says)}" for name, says in page.tried.items())
+
+
+def _robustness(page: Page) -> str:
+    """Return one line a claim, and a column a variant."""
+    return _table(
+        ("claim", "tier", "the protocol", *map(literal, page.tried)),
+        (
+            (
+                literal(row.claim),
+                literal(row.tier),
+                literal(row.plain),
+                *(
+                    f"**{literal(row.outcomes[name])}**"
+                    if name in row.hangs_on
+                    else literal(row.outcomes.get(name, "–"))
+                    for name in page.tried
+                ),
+            )
+            for row in page.robustness
+        ),
     )
 
 

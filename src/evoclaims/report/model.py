@@ -10,6 +10,7 @@ from evoclaims.report.curves import CurvePanel
 from evoclaims.report.evidence import Part
 from evoclaims.report.origin import Made
 from evoclaims.report.words import counted, place_key
+from evoclaims.suite.robustness import Robustness
 
 
 @dataclass(frozen=True)
@@ -193,6 +194,8 @@ class Page:
         notices: what a reader should know about the whole.
         plates: figures of the paper.
         missing: sentences about figures that are not among them.
+        variants: of the protocol, by name: what differs.
+        robustness: claims that were judged under a variant too.
         generated: when, and by which version; free text.
     """
 
@@ -203,7 +206,15 @@ class Page:
     notices: tuple[str, ...] = ()
     plates: tuple[Plate, ...] = ()
     missing: tuple[str, ...] = ()
+    variants: Mapping[str, str] = field(default_factory=dict)
+    robustness: tuple[Robustness, ...] = ()
     generated: str = ""
+
+    @property
+    def tried(self) -> Mapping[str, str]:
+        """Variants that some claim was judged under."""
+        names = {name for row in self.robustness for name in row.outcomes}
+        return {name: says for name, says in self.variants.items() if name in names}
 
     @property
     def sections(self) -> Sequence[Section]:

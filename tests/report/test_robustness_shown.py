@@ -1,0 +1,42 @@
+"""Claims against variants of the protocol, in the page and in Markdown."""
+
+from __future__ import annotations
+
+from evoclaims.judging.verdict import Outcome
+from evoclaims.report.markdown import markdown
+from evoclaims.report.model import Page
+from evoclaims.report.page import html
+from evoclaims.suite.robustness import Robustness
+
+ROW = Robustness("G1[<b>]", "smoke", Outcome.REFUTED, {"network": Outcome.SUPPORTED, "rows": Outcome.REFUTED})
+OTHER = Robustness("G2", "smoke", Outcome.SUPPORTED, {"rows": Outcome.SUPPORTED})
+PAGE = Page(
+    title="A Paper",
+    name="paper",
+    boards=(),
+    variants={"network": "another <network>", "rows": "other rows", "never": "never run"},
+    robustness=(ROW, OTHER),
+)
+
+
+def test_the_page_sets_off_what_hangs_on_a_detail() -> None:
+    text = html(PAGE)
+    assert "<b>supported</b>" in text
+    assert "<b>refuted</b>" not in text
+    assert "another &lt;network&gt;" in text
+    assert "G1[&lt;b&gt;]" in text
+    assert "never run" not in text
+
+
+def test_markdown_sets_off_what_hangs_on_a_detail() -> None:
+    lines = markdown(PAGE).splitlines()
+    assert "| claim | tier | the protocol | network | rows |" in lines
+    assert r"| G1\[&lt;b&gt;\] | smoke | refuted | **supported** | refuted |" in lines
+    assert "| G2 | smoke | supported | – | supported |" in lines
+    assert "* network: another &lt;network&gt;" in lines
+
+
+def test_without_variants_nothing_is_said_of_them() -> None:
+    bare = Page(title="A Paper", name="paper", boards=())
+    assert "hang on a detail" not in html(bare)
+    assert "hang on a detail" not in markdown(bare)
