@@ -151,6 +151,7 @@ class Project:
 
     def __init__(self, pytester: pytest.Pytester, store: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setenv("COLUMNS", "160")  # so that no line of interest is wrapped
+        monkeypatch.delenv("GITHUB_STEP_SUMMARY", raising=False)  # these verdicts are for no page
         self.pytester = pytester
         self.path = pytester.path
         self.store = store

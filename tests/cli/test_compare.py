@@ -130,6 +130,20 @@ def test_new_trials_that_drifted_from_the_references_are_said(evoclaims: Evoclai
     assert "trials of the new side alone: smoke/wrong-parity" in out
 
 
+def test_verdicts_of_now_come_from_reference_trials_where_the_store_has_none(
+    accepted: Evoclaims, project: Any, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for name, method in (("right", "hand_built"), ("wrong", "hand_built_negated")):
+        trials = [t for t in Store(project.store).results([]) if t.spec["method"]["name"] == method]
+        smoke = [trial for trial in trials if trial.spec["budget"]["generations"] == 1 and trial.seed < 10]
+        references.write(references.path_of(Path("reference"), "smoke", name, "parity"), smoke)
+    capsys.readouterr()
+    assert main(["compare", "--storage=empty", "--tier=smoke"]) == 0
+    out = capsys.readouterr().out
+    assert "verdicts: 2 the same\n" in out
+    assert "trials of the old side alone: smoke/right-parity, smoke/wrong-parity\n" in out
+
+
 def test_a_revisions_accepted_verdicts_are_compared_with_those_of_the_working_tree(
     accepted: Evoclaims, git: Callable[..., None], project: Any
 ) -> None:

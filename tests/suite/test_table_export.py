@@ -15,7 +15,7 @@ import pandas
 import pandas.core.arrays.arrow.extension_types  # registers types, once: pytester forgets what tests import
 import pyarrow.parquet
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from evoclaims.core.errors import UserError
@@ -122,6 +122,7 @@ MIXED = st.one_of(
 )
 
 
+@example([{"a": "\ud800"}, {"b.c": "x"}])
 @given(st.lists(st.dictionaries(st.sampled_from(["a", "b.c", "b.d"]), MIXED), min_size=1, max_size=4))
 def test_whatever_a_record_holds_every_form_can_be_written(rows: list[dict[str, Any]]) -> None:
     for form, write in FORMS.items():

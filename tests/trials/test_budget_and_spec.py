@@ -69,7 +69,7 @@ def test_a_condition_counts_the_environment_steps_of_whole_steps() -> None:
 
 @pytest.mark.parametrize("progression", ["curiculum", "", "DIRECT"])
 def test_an_unknown_progression_is_a_sentence_with_the_known_ones(progression: Any) -> None:
-    with pytest.raises(UserError, match=r"There is no progression named .*Known: curriculum, direct\."):
+    with pytest.raises(UserError, match=r"There is no progression named .*Known: curriculum, direct, whole_budget\."):
         Condition(METHOD, TASK, progression, BUDGET)
 
 

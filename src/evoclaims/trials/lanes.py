@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Final
 
 import jax
 import jax.numpy as jnp
@@ -21,6 +21,11 @@ from evoclaims.trials.program import Program, Report, Score, TrialState, over_tr
 from evoclaims.trials.spec import Condition
 
 AXIS = "trials"
+
+SHORT: Final = 100_000
+"""Environment steps of a trial up to which, on a CPU, compiling fast is worth more than running fast."""
+
+FAST_TO_COMPILE: Final = {"xla_backend_optimization_level": 1, "xla_llvm_disable_expensive_passes": True}
 
 
 def width_for(active: int, devices: int, full: int) -> int:
@@ -95,7 +100,8 @@ class Lanes:
         idle = np.array([seed is None for seed in seeds])
         began = time.perf_counter()
         with self._settings():
-            compiled = self._spread(self._program.start, width).lower(*self.place((known, idle), width)).compile()
+            lowered = self._spread(self._program.start, width).lower(*self.place((known, idle), width))
+            compiled = lowered.compile(self._compiler_options)
         self.seconds += time.perf_counter() - began
         state: TrialState = compiled(*self.place((known, idle), width))
         return state
@@ -157,6 +163,12 @@ class Lanes:
         spread = jax.shard_map(laid_out, mesh=self._mesh(width), in_specs=axis, out_specs=axis, check_vma=False)
         return jax.jit(spread, donate_argnums=(0,) if donate else ())
 
+    @property
+    def _compiler_options(self) -> dict[str, Any] | None:
+        """How to compile; it depends on nothing but the condition and the kind of device, so that bits do not."""
+        short = self.layout == "loop" and self.condition.environment_steps <= SHORT
+        return dict(FAST_TO_COMPILE) if short else None
+
     def _compile(self, width: int) -> Compiled:
         """Compile what runs again and again, ahead of time, so that compile time and run time are told apart."""
         sharding = self._sharding(width)
@@ -174,5 +186,5 @@ class Lanes:
             )
             # XLA compiles without holding the interpreter, so that two programs take the time of one.
             with ThreadPoolExecutor() as pool:
-                advance, score = pool.map(lambda program: program.compile(), lowered)
+                advance, score = pool.map(lambda program: program.compile(self._compiler_options), lowered)
         return Compiled(advance=advance, score=score, shapes=shapes)
