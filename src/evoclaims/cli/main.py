@@ -57,6 +57,7 @@ def _parser() -> argparse.ArgumentParser:
     plan = add("plan", "say what a tier would run, what it costs here, and what its verdicts can show")
     tier(plan)
     device(plan)
+    plan.add_argument("--like", metavar="KIND", help="times as of trials made on such a device, such as 'NVIDIA H200'")
     plan.add_argument("--measure", action="store_true", help="time a few steps of conditions never run here")
 
     run = add("run", "run conditions without judging them; or what a variant of the protocol changes, and judge that")

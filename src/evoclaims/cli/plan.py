@@ -10,6 +10,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from evoclaims.cli.project import judge_stored, open_project, open_store
+from evoclaims.core.errors import UserError
 from evoclaims.suite.cost import Pace, known_pace, measured_pace
 from evoclaims.suite.live import duration
 from evoclaims.suite.report import ClaimReport
@@ -24,16 +25,22 @@ def main(options: argparse.Namespace) -> int:
     config, reproduction = open_project()
     tier, store = reproduction.tier(options.tier), open_store(options.storage)
     chosen = devices.choose(options.device)
+    kind = options.like or chosen[0].device_kind
     reports = judge_stored(config, options.storage, options.tier)
     used = sorted({(source["method"], source["task"]) for report in reports for source in report.sources})
 
     def pace(condition: Condition, method: str, task: str) -> Pace | None:
-        known = known_pace(condition, store, reproduction.references, options.tier, method, task, chosen)
+        known = known_pace(condition, store, reproduction.references, options.tier, method, task, kind)
         return measured_pace(condition, chosen) if known is None and options.measure else known
 
     paces = {names: pace(tier.condition(*names), *names) for names in used}
+    if options.like and not any(paces.values()):
+        raise UserError(
+            f"No trial of the {options.tier} tier at hand was made on {options.like!r}, as records name devices."
+        )
     console = Console()
-    console.print(f"Conditions of the {options.tier} tier, on {len(chosen)} × {chosen[0].device_kind}")
+    where = f"as they took on one {kind}" if options.like else f"on {len(chosen)} × {kind}"
+    console.print(escape(f"Conditions of the {options.tier} tier, {where}"))
     console.print(_conditions(tier, store, used, paces))
     console.print(f"\nClaims: the smallest p that the protocol allows (n trials a side, α {tier.protocol.alpha:g})")
     console.print(_claims(reports))

@@ -12,7 +12,7 @@ import jax
 import numpy as np
 
 from evoclaims.suite import references
-from evoclaims.trials.devices import layout_for
+from evoclaims.trials.devices import layout_on
 from evoclaims.trials.lanes import Lanes
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.spec import Condition, TrialSpec
@@ -47,14 +47,13 @@ def known_pace(
     tier: str,
     method: str,
     task: str,
-    devices: Sequence[jax.Device],
+    kind: str,
 ) -> Pace | None:
     """Return the pace of stored or reference trials of this condition on this kind of device; None without any."""
     stored = (store.get(TrialSpec(condition, seed).id) for seed in range(SEEDS_LOOKED_AT))
     trials = [trial for trial in stored if trial is not None]
     committed = references.load(references.path_of(folder, tier, method, task))
     trials += [trial for trial in committed if trial.condition == condition.id]
-    kind = devices[0].device_kind
     batches: dict[str, list[TrialResult]] = defaultdict(list)
     for trial in trials:
         if trial.provenance.get("device", {}).get("kind") == kind:
@@ -62,7 +61,7 @@ def known_pace(
     if not batches:
         return None
     batch = max(batches.values(), key=len)
-    layout = layout_for(list(devices))
+    layout = layout_on(str(batch[0].provenance["device"]["platform"]))
     steps = [trial.metrics["steps"] for trial in batch]
     seconds = max(float(trial.timing["run"]) for trial in batch)
     work = sum(steps) if layout == "loop" else max(steps)

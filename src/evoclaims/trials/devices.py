@@ -79,4 +79,9 @@ def choose(name: str) -> list[jax.Device]:
 
 def layout_for(devices: list[jax.Device]) -> str:
     """Return how trials are laid out on these devices (see `program.over_trials`)."""
-    return "loop" if devices[0].platform == "cpu" else "vector"
+    return layout_on(devices[0].platform)
+
+
+def layout_on(platform: str) -> str:
+    """Return how trials are laid out on devices of a platform, such as "cpu"."""
+    return "loop" if platform == "cpu" else "vector"
