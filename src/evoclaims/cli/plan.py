@@ -35,9 +35,7 @@ def main(options: argparse.Namespace) -> int:
 
     paces = {names: pace(tier.condition(*names), *names) for names in used}
     if options.like and not any(paces.values()):
-        raise UserError(
-            f"No trial of the {options.tier} tier at hand was made on {options.like!r}, as records name devices."
-        )
+        raise UserError(f"No trial of the {options.tier} tier at hand was made on a device called {options.like!r}.")
     console = Console()
     where = f"as they took on one {kind}" if options.like else f"on {len(chosen)} × {kind}"
     console.print(escape(f"Conditions of the {options.tier} tier, {where}"))
