@@ -70,5 +70,8 @@ def test_the_command_runs_what_a_variant_changes_and_says_what_hangs_on_it(
     assert "traded: The right network is wrong" in shown
     assert "first: supported -> refuted" in shown
     assert "second" not in shown
+    assert main(["reference", "--variant", "traded"]) == 0
+    written = project.path / "reference" / "variants" / "traded" / "smoke"
+    assert [path.name for path in written.iterdir()] == ["right-parity.jsonl"]
     assert main(["run", "wrong", "--variant", "traded"]) == 2
     assert "changes none of these conditions" in capsys.readouterr().err

@@ -122,6 +122,7 @@ def _parser() -> argparse.ArgumentParser:
 
     reference = add("reference", "write the stored trials of a tier as the committed reference trials")
     tier(reference)
+    reference.add_argument("--variant", metavar="NAME", default="", help="those that only this variant has")
 
     accept = add("accept", "write the verdicts of now into verdicts.toml, as accepted; 1 when that changed the file")
     accept.add_argument("--tier", default="all", help="smoke, full or all (default)")
