@@ -57,6 +57,15 @@ def test_success_is_told_only_by_the_steps_that_test_for_it_and_is_exactly_1_wit
     assert {float(progress.fitness) for progress in reports} == {0.0}
 
 
+def test_without_tests_no_success_is_told_and_the_fitness_is_what_training_paid() -> None:
+    paying = Probe("always_paid", cases=((((0.0,), None),),), cases_at_level=(1,))
+    bench = Workbench(replace(SMALL, level_test=LevelTest(every=0)), paying)
+    _, reports = bench.run(3)
+    assert [float(progress.success) for progress in reports] == [0.0, 0.0, 0.0]
+    paid = [float(progress.metrics["training_reward"]) * paying.horizon for progress in reports]
+    assert [float(progress.fitness) for progress in reports] == pytest.approx(paid)
+
+
 def test_the_published_test_asks_the_stochastic_policy_and_forgives_no_error() -> None:
     sampled = Workbench(replace(SMALL, level_test=LevelTest(sampled_episodes=128)), CONSTANT)
     told = [float(progress.success) for progress in sampled.run(5)[1]]
@@ -84,9 +93,9 @@ def test_impossible_sizes_are_one_sentence(wrong: dict[str, Any], sentence: str)
         replace(SMALL, **wrong)
 
 
-@pytest.mark.parametrize("wrong", [{"every": 0}, {"sampled_episodes": -1}])
+@pytest.mark.parametrize("wrong", [{"every": -1}, {"sampled_episodes": -1}])
 def test_an_impossible_level_test_is_one_sentence(wrong: dict[str, Any]) -> None:
-    with pytest.raises(UserError, match="held every 1 or more training steps over 0 or more sampled episodes"):
+    with pytest.raises(UserError, match="held every 0 or more training steps over 0 or more sampled episodes"):
         LevelTest(**wrong)
 
 
