@@ -22,8 +22,9 @@ from evoclaims.report.page import html
 from evoclaims.report.plates import plates
 from evoclaims.suite import history, table
 from evoclaims.suite.archive import Archive
-from evoclaims.suite.config import SuiteConfig, load_reproduction
+from evoclaims.suite.config import SuiteConfig
 from evoclaims.suite.report import ClaimReport
+from evoclaims.suite.reproduction import Reproduction
 from evoclaims.suite.robustness import Robustness, matrix
 from evoclaims.trials import devices
 from evoclaims.trials.records import printable
@@ -43,7 +44,11 @@ def main(options: argparse.Namespace) -> int:
     # The paper's sentence is the statement of the largest tier, so that is judged in any case.
     verdicts = {tier: judge_stored(config, options.storage, tier) for tier in tiers if tier in (tiers[0], *shown)}
     archive = open_archive(options.storage, reproduction)
-    robustness = [row for tier in shown for row in _robustness(config, options.storage, tier, verdicts[tier], archive)]
+    robustness = [
+        row
+        for tier in shown
+        for row in _robustness(config, reproduction, options.storage, tier, verdicts[tier], archive)
+    ]
     drawn, missing = plates(reproduction, archive, shown[0])
     page = gather(
         reproduction,
@@ -67,10 +72,14 @@ def main(options: argparse.Namespace) -> int:
 
 
 def _robustness(
-    config: SuiteConfig, storage: str, tier: str, plain: Sequence[ClaimReport], archive: Archive
+    config: SuiteConfig,
+    reproduction: Reproduction,
+    storage: str,
+    tier: str,
+    plain: Sequence[ClaimReport],
+    archive: Archive,
 ) -> tuple[Robustness, ...]:
     """Judge a tier's claims under each variant that has run."""
-    reproduction = load_reproduction(config)
     seeds = reproduction.tier(tier).protocol.seeds(1)
     tried = [
         name
