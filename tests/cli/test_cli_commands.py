@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from evoclaims.cli import main
+from evoclaims.judging.protocol import SEQUENTIAL
 from evoclaims.suite import references
+from evoclaims.suite.reproduction import Reproduction
 from evoclaims.trials.store import Store
 
 Evoclaims = Callable[..., tuple[int, str, str]]
@@ -251,3 +254,24 @@ def test_reference_commits_the_trials_of_every_condition_that_has_enough(evoclai
     assert "left alone: wrong on parity: 9 of 10 trials are stored" in out
     assert [trial.seed for trial in references.load(path)] == list(range(10))
     assert not references.path_of(Path.cwd() / "reference", "smoke", "wrong", "parity").exists()
+
+
+def test_reference_takes_the_trials_of_a_look_and_never_fewer_than_are_committed(
+    evoclaims: Evoclaims, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    plain = Reproduction.tier
+    monkeypatch.setattr(Reproduction, "tier", lambda self, *names: replace(plain(self, *names), protocol=SEQUENTIAL))
+    evoclaims("run", "right", "--trials", "6")
+    evoclaims("run", "wrong", "--trials", "4")
+    status, out, _ = evoclaims("reference")
+    path = references.path_of(Path.cwd() / "reference", "smoke", "right", "parity")
+    assert status == 0
+    assert f"wrote {path}: 5 trials" in out
+    assert "left alone: wrong on parity: 4 of 5 trials are stored" in out
+    evoclaims("run", "right")
+    assert f"wrote {path}: 10 trials" in evoclaims("reference")[1]
+    evoclaims("run", "right", "--trials", "6", "--storage", "other")
+    status, out, err = evoclaims("reference", "--storage", "other")
+    assert "left alone: right on parity: 6 of 10 trials are stored" in out
+    assert (status, "No condition of the smoke tier has 5 stored trials" in err) == (2, True)
+    assert len(references.load(path)) == 10
