@@ -92,9 +92,7 @@ def _targets(task: SteppingStones) -> NDArray[np.float32]:
     points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
     gap = np.full(points.shape[:2], np.inf)
     for box in task.boxes:
-        local = (points - np.array(box.centre)) @ box.rotation[:2, :2]
-        outside = np.maximum(np.abs(local) - np.array(box.half_size), 0.0)
-        gap = np.minimum(gap, np.hypot(outside[..., 0], outside[..., 1]))
+        gap = np.minimum(gap, box.distance(points))
     # Points too near to walls are left by the cheapest way, but never passed.
     shape, flat = gap.shape, points.reshape(-1, 2)
     price = np.where(gap < task.robot.torso_radius + CLEARANCE, 1e3, 1.0).ravel()

@@ -13,9 +13,10 @@ from plain_mujoco import Record, chained, quickly_compiled, record
 
 from evoclaims.core.foreign import implicit_promotions
 from evoclaims.envs.ecorobot import physics, stones
+from evoclaims.envs.ecorobot.boxes import Box
 from evoclaims.envs.ecorobot.physics import Body
 from evoclaims.envs.ecorobot.robots import ANT, HALF_CHEETAH, HOPPER, HUMANOID, SIMPLE_ROB, WALKER2D, Robot
-from evoclaims.envs.ecorobot.scene import Box, Scene, mjx, on_device, scene
+from evoclaims.envs.ecorobot.scene import Scene, mjx, scene
 
 # Their numbers are sums of powers of two, so that they are the same in float32 (where boxes take turns) and float64.
 ROW = tuple(Box((x, 0.0), (0.25, 3.0), bottom=-0.75, top=0.25) for x in (9.0, 11.0, 13.0))
@@ -69,16 +70,17 @@ def test_a_frame_in_float32_is_mujocos_but_for_rounding() -> None:
 def test_a_frame_on_obstacles_is_that_of_mjx_though_only_the_two_nearest_are_simulated() -> None:
     """Where a capsule lies on a box's edge, MJX finds other points of contact than MuJoCo in C; elsewhere the same."""
     with jax.enable_x64(True):
-        every, near = Scene(HALF_CHEETAH, ROW), Scene(HALF_CHEETAH, ROW, near=2)
-        made = chained(record(every, 40, (x, 0.25), seed) for seed, x in enumerate((8.6, 10.0, 11.2, 12.1, 13.4, 13.9)))
+        world = Scene(HALF_CHEETAH, ROW)
+        assert world.near == 2
+        every, blank = mjx.put_model(world.whole, impl="jax"), mjx.make_data(world.whole, impl="jax")
+        made = chained(record(world, 40, (x, 0.25), seed) for seed, x in enumerate((8.6, 10.0, 11.2, 12.1, 13.4, 13.9)))
         states = [jnp.array(x.copy()) for x in (made.position, made.velocity, made.acceleration, made.control)]
 
         def both(position: jax.Array, velocity: jax.Array, acceleration: jax.Array, control: jax.Array) -> Any:
-            ours = physics._frame(near, Body(position=position, velocity=velocity, acceleration=acceleration), control)
+            ours = physics._frame(world, Body(position=position, velocity=velocity, acceleration=acceleration), control)
             with implicit_promotions():
-                model = on_device(every.mjx)
-                model = model.replace(opt=model.opt.replace(ls_iterations=50, ls_tolerance=jnp.asarray(1e-10)))
-                data = on_device(every.blank).replace(qpos=position, qvel=velocity, ctrl=control)
+                model = every.replace(opt=every.opt.replace(ls_iterations=50, ls_tolerance=jnp.asarray(1e-10)))
+                data = blank.replace(qpos=position, qvel=velocity, ctrl=control)
                 return ours, mjx.step(model, data.replace(qacc_warmstart=acceleration))
 
         ours, theirs = quickly_compiled(jax.vmap(both))(*states)

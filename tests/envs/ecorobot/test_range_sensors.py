@@ -12,9 +12,10 @@ import numpy as np
 import pytest
 
 from evoclaims.envs.ecorobot import deceptive, stones
+from evoclaims.envs.ecorobot.boxes import Box
 from evoclaims.envs.ecorobot.pose import Pose
 from evoclaims.envs.ecorobot.robots import ANT, SIMPLE_ROB, Robot
-from evoclaims.envs.ecorobot.scene import WORLD_GROUP, Box, Scene, scene
+from evoclaims.envs.ecorobot.scene import WORLD_GROUP, Scene, scene
 from evoclaims.envs.ecorobot.sensors import ARENA, PieSlices, Rangefinders, distances
 
 ANGLES = np.linspace(-180.0, 150.0, 12)

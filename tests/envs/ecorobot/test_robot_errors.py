@@ -11,11 +11,12 @@ from typing import Any
 import pytest
 
 from evoclaims.core.errors import UserError
+from evoclaims.envs.ecorobot.boxes import Box
 from evoclaims.envs.ecorobot.deceptive import DeceptiveMaze
 from evoclaims.envs.ecorobot.locomotion import Locomotion
 from evoclaims.envs.ecorobot.obstacles import Obstacles
 from evoclaims.envs.ecorobot.robots import ROBOTS, SIMPLE_ROB
-from evoclaims.envs.ecorobot.scene import Box, Scene
+from evoclaims.envs.ecorobot.scene import Scene
 from evoclaims.envs.ecorobot.sensors import PieSlices, Rangefinders
 from evoclaims.envs.ecorobot.stones import SteppingStones
 
@@ -62,14 +63,6 @@ def test_episodes_and_their_steps_are_at_least_1(kind: Any, numbers: dict[str, i
 def test_a_box_has_a_volume(numbers: dict[str, Any]) -> None:
     with pytest.raises(UserError, match="A box has finite numbers, half-sizes above 0"):
         Box(**{"centre": (0.0, 0.0), "half_size": (1.0, 1.0), **numbers})
-
-
-@pytest.mark.parametrize("other", [Box((3.0, 0.0), (1.0, 2.0)), Box((3.0, 0.0), (1.0, 1.0), angle=10.0)])
-def test_boxes_that_take_turns_are_alike(other: Box) -> None:
-    boxes = (Box((0.0, 0.0), (1.0, 1.0)), other)
-    Scene(SIMPLE_ROB, boxes)
-    with pytest.raises(UserError, match=r"take turns \(near > 0\) must have one size and one angle"):
-        Scene(SIMPLE_ROB, boxes, near=1)
 
 
 @pytest.mark.parametrize("sensor", [Rangefinders, PieSlices])

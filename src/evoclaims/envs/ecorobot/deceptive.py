@@ -11,10 +11,10 @@ from jaxtyping import Array, Bool, Float
 from evoclaims.core.errors import UnknownNameError
 from evoclaims.core.pytree import pytree
 from evoclaims.envs.ecorobot import stones
+from evoclaims.envs.ecorobot.boxes import Box
 from evoclaims.envs.ecorobot.maze import Area, Maze
 from evoclaims.envs.ecorobot.pose import Pose
 from evoclaims.envs.ecorobot.robot_task import Outing, Ruling
-from evoclaims.envs.ecorobot.scene import Box
 
 Difficulty = Literal["easy", "difficult"]
 

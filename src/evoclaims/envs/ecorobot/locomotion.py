@@ -8,10 +8,10 @@ from typing import Any, ClassVar
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
+from evoclaims.envs.ecorobot.boxes import Box
 from evoclaims.envs.ecorobot.pose import Pose
 from evoclaims.envs.ecorobot.robot_task import RobotTask, Ruling
 from evoclaims.envs.ecorobot.robots import HALF_CHEETAH, Robot
-from evoclaims.envs.ecorobot.scene import Box
 
 
 def forward(

@@ -13,8 +13,8 @@ import numpy as np
 from jaxtyping import Array, Bool, Float
 from numpy.typing import NDArray
 
+from evoclaims.envs.ecorobot.boxes import Box
 from evoclaims.envs.ecorobot.robot_task import RobotTask
-from evoclaims.envs.ecorobot.scene import Box
 from evoclaims.envs.ecorobot.sensors import Rangefinders, Sensor
 
 Area = tuple[tuple[float, float], tuple[float, float]]
@@ -74,9 +74,7 @@ def _reachable(
     points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
     free = np.ones(points.shape[:2], bool)
     for box in boxes:
-        local = (points - np.array(box.centre)) @ box.rotation[:2, :2]
-        outside = np.maximum(np.abs(local) - np.array(box.half_size), 0.0)
-        free &= np.hypot(outside[..., 0], outside[..., 1]) >= radius
+        free &= box.distance(points) >= radius
     first = tuple(int(np.argmin(np.abs(axis - at))) for axis, at in zip(axes, start, strict=True))
     flooded, edge = np.zeros_like(free), [first]
     flooded[first] = True

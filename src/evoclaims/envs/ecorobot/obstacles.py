@@ -11,11 +11,11 @@ from jaxtyping import Array, Float
 
 from evoclaims.core.errors import UnknownNameError
 from evoclaims.core.pytree import pytree
+from evoclaims.envs.ecorobot.boxes import Box
 from evoclaims.envs.ecorobot.locomotion import forward
 from evoclaims.envs.ecorobot.pose import Pose
 from evoclaims.envs.ecorobot.robot_task import Outing, RobotTask, Ruling
 from evoclaims.envs.ecorobot.robots import HALF_CHEETAH, Robot
-from evoclaims.envs.ecorobot.scene import Box
 
 Heights = Literal["hierarchical", "medium", "high"]
 
@@ -69,11 +69,6 @@ class Obstacles(RobotTask):
             Box((x, 0.0), (HALF_THICKNESS, 3.0), bottom=top - DEPTH, top=top)
             for x, top in zip(PLACES, self.tops, strict=True)
         )
-
-    @property
-    def near(self) -> int:
-        """Obstacles stand 2 m apart, and no robot is longer than that."""
-        return 2
 
     def memory(self, pose: Pose) -> Run:
         """Start where the torso is."""

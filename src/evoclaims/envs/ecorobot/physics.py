@@ -7,12 +7,14 @@ from typing import Final
 
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Bool, Float
+import numpy as np
+from jaxtyping import Array, Bool, Float, Int
 
 from evoclaims.core.foreign import implicit_promotions
 from evoclaims.core.pytree import pytree
 from evoclaims.envs.ecorobot.constraints import constrained_acceleration
-from evoclaims.envs.ecorobot.scene import Scene, mjx, on_device
+from evoclaims.envs.ecorobot.pose import torso
+from evoclaims.envs.ecorobot.scene import Scene, box_geoms, mjx, on_device
 
 LARGEST: Final = 1e10
 """What MuJoCo takes for a number beyond reason (mjMAXVAL)."""
@@ -63,8 +65,10 @@ def _frame(scene: Scene, body: Body, control: Float[Array, " nu"]) -> Body:
     """Simulate one time step, as `mjx.step` does with semi-implicit Euler integration."""
     with implicit_promotions():
         model = on_device(scene.mjx)
-        if scene.near:
-            model = model.replace(geom_pos=model.geom_pos.at[jnp.array(scene.turning)].set(_nearest(scene, body)))
+        if scene.turns:
+            nearest, geoms = _nearest(scene, body), box_geoms(scene.model)
+            theirs = {name: jnp.asarray(array)[nearest] for name, array in scene.turns.items()}
+            model = model.replace(**{name: getattr(model, name).at[geoms].set(new) for name, new in theirs.items()})
         data = on_device(scene.blank).replace(qpos=body.position, qvel=body.velocity, ctrl=control)
         data = mjx.kinematics(model, data)
         data = mjx.com_pos(model, data)
@@ -83,8 +87,11 @@ def _frame(scene: Scene, body: Body, control: Float[Array, " nu"]) -> Body:
     return Body(position=data.qpos, velocity=data.qvel, acceleration=acceleration)
 
 
-def _nearest(scene: Scene, body: Body) -> Float[Array, "near 3"]:
-    """Return the places of the boxes that are nearest to the torso along x."""
-    places = jnp.asarray(scene.places)
-    away = jnp.abs(places[:, 0] - body.position[0])
-    return places[jax.lax.top_k(-away, scene.near)[1]]
+def _nearest(scene: Scene, body: Body) -> Int[Array, " near"]:
+    """Return which boxes are nearest to the torso's centre, seen from above."""
+    axes = jnp.asarray(np.stack([box.rotation[:2, :2] for box in scene.boxes]), jnp.float32)
+    sizes = jnp.asarray(np.stack([box.half_size for box in scene.boxes]), jnp.float32)
+    away = torso(scene, body.position).place[:2][None] - jnp.asarray(scene.places[:, :2])
+    local = jnp.sum(away[:, :, None] * axes, axis=1)
+    outside = jnp.maximum(jnp.abs(local) - sizes, 0.0)
+    return jax.lax.top_k(-jnp.sum(outside**2, axis=1), scene.near)[1]

@@ -17,10 +17,11 @@ from evoclaims.core.keys import streams
 from evoclaims.core.pytree import pytree, select, strong
 from evoclaims.envs.base import Episode, PolicyFn, TaskState
 from evoclaims.envs.ecorobot import physics
+from evoclaims.envs.ecorobot.boxes import Box
 from evoclaims.envs.ecorobot.physics import Body
 from evoclaims.envs.ecorobot.pose import Pose, torso
 from evoclaims.envs.ecorobot.robots import SIMPLE_ROB, Robot
-from evoclaims.envs.ecorobot.scene import Box, Scene, scene
+from evoclaims.envs.ecorobot.scene import Scene, scene
 from evoclaims.envs.ecorobot.sensors import Sensor
 
 
@@ -99,11 +100,6 @@ class RobotTask(ABC):
         """Judge one step."""
 
     @property
-    def near(self) -> int:
-        """How many boxes can be touched at a time; 0 for all (see `Scene`)."""
-        return 0
-
-    @property
     def start(self) -> tuple[float, float] | None:
         """Where the torso starts, exactly; None for where the robot's own noise puts it."""
         return None
@@ -157,7 +153,7 @@ class RobotTask(ABC):
     @property
     def scene(self) -> Scene:
         """The robot among the boxes."""
-        return scene(self.robot, self.boxes, self.near)
+        return scene(self.robot, self.boxes)
 
     def reset(self, key: PRNGKeyArray, level: Int[Array, ""]) -> TaskState:
         """Put the robot at the start, as Brax does: with a little noise on positions and velocities."""

@@ -16,6 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evoclaims.core.errors import UserError
+from evoclaims.envs.ecorobot.boxes import Box
+from evoclaims.envs.ecorobot.crowding import touched_at_once
 from evoclaims.envs.ecorobot.robots import Robot
 
 # MJX prints two lines when NVIDIA's warp is not installed; nothing here uses warp.
@@ -24,48 +26,8 @@ with contextlib.redirect_stdout(io.StringIO()):
 
 WORLD_GROUP: Final = 1
 """The geom group of what the scene adds; sensors look at it."""
-
-
-@dataclass(frozen=True)
-class Box:
-    """A box that stands in the world: a wall, or an obstacle.
-
-    Attributes:
-        centre: x and y, m.
-        half_size: along its axis and across, m.
-        angle: of its axis, counterclockwise from +x, degrees.
-        bottom, top: z, m.
-    """
-
-    centre: tuple[float, float]
-    half_size: tuple[float, float]
-    angle: float = 0.0
-    bottom: float = -0.7
-    top: float = 0.7
-
-    def __post_init__(self) -> None:
-        """Check that it has a volume."""
-        numbers = (*self.centre, *self.half_size, self.angle, self.bottom, self.top)
-        if not all(map(math.isfinite, numbers)) or min(self.half_size) <= 0 or self.bottom >= self.top:
-            raise UserError(
-                f"A box has finite numbers, half-sizes above 0 and its bottom below its top, unlike {self}."
-            )
-
-    @property
-    def place(self) -> tuple[float, float, float]:
-        """Its centre in space, m."""
-        return (*self.centre, (self.bottom + self.top) / 2)
-
-    @property
-    def size(self) -> tuple[float, float, float]:
-        """Half-sizes along its axis, across, and up, m."""
-        return (*self.half_size, (self.top - self.bottom) / 2)
-
-    @property
-    def rotation(self) -> NDArray[np.float64]:
-        """Its axes as columns, shape [3, 3]."""
-        cosine, sine = math.cos(math.radians(self.angle)), math.sin(math.radians(self.angle))
-        return np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
+GEOMS: Final = ("geom_pos", "geom_size", "geom_quat")
+"""MuJoCo's arrays in which boxes may differ."""
 
 
 @dataclass(frozen=True)
@@ -75,18 +37,13 @@ class Scene:
     Attributes:
         robot: who acts.
         boxes: what stands in the world.
-        near: how many boxes the robot can touch at a time; 0 for all. Of more boxes, those nearest to the torso along x
-            are put in their place before every step (`physics`): a row of obstacles costs no more than two of them.
+
+    Only as many boxes are simulated as the robot can touch at a time: before every step those nearest to the torso take
+    their place (`physics`). A row of fifteen obstacles costs no more than two of them, and a maze's walls than three.
     """
 
     robot: Robot
     boxes: tuple[Box, ...] = ()
-    near: int = 0
-
-    def __post_init__(self) -> None:
-        """Check that boxes that take turns differ in nothing but their place."""
-        if self.near and len({(box.size, box.angle) for box in self.boxes}) > 1:
-            raise UserError("Boxes that take turns (near > 0) must have one size and one angle.")
 
     @cached_property
     def whole(self) -> mujoco.MjModel:
@@ -94,9 +51,14 @@ class Scene:
         return _compiled(self.robot, self.boxes)
 
     @cached_property
+    def near(self) -> int:
+        """How many boxes are simulated."""
+        return touched_at_once(_compiled(self.robot, ()), self.boxes)
+
+    @cached_property
     def model(self) -> mujoco.MjModel:
-        """The model that is simulated: with all boxes, or with those that take turns."""
-        return _compiled(self.robot, self.boxes[: self.near] if self.near else self.boxes)
+        """The model that is simulated."""
+        return _compiled(self.robot, self.boxes[: self.near])
 
     @cached_property
     def mjx(self) -> Any:
@@ -121,11 +83,13 @@ class Scene:
         """Simulated time of one environment step."""
         return float(self.model.opt.timestep) * self.robot.frames
 
-    @property
-    def turning(self) -> list[int]:
-        """Indices of the geoms that stand for the boxes nearby."""
-        ours = (self.model.geom_bodyid == 0) & (self.model.geom_group == WORLD_GROUP)
-        return [int(i) for i in np.flatnonzero(ours)] if self.near else []
+    @cached_property
+    def turns(self) -> dict[str, NDArray[np.float64]]:
+        """What tells boxes that take turns apart: MuJoCo's arrays of their geoms, shape [boxes, …]; else nothing."""
+        if self.near == len(self.boxes):
+            return {}
+        arrays = {name: getattr(self.whole, name)[box_geoms(self.whole)] for name in GEOMS}
+        return {name: array for name, array in arrays.items() if np.ptp(array, axis=0).any()}
 
     @property
     def places(self) -> NDArray[np.float32]:
@@ -134,9 +98,14 @@ class Scene:
 
 
 @lru_cache(maxsize=64)
-def scene(robot: Robot, boxes: tuple[Box, ...] = (), near: int = 0) -> Scene:
+def scene(robot: Robot, boxes: tuple[Box, ...] = ()) -> Scene:
     """Return the scene, compiled at most once in a process."""
-    return Scene(robot, boxes, near)
+    return Scene(robot, boxes)
+
+
+def box_geoms(model: mujoco.MjModel) -> NDArray[np.int64]:
+    """Return the indices of the geoms that are boxes of the scene, in their order."""
+    return np.flatnonzero((model.geom_bodyid == 0) & (model.geom_group == WORLD_GROUP))
 
 
 @lru_cache(maxsize=64)

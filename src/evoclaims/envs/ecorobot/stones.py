@@ -9,10 +9,10 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int
 
 from evoclaims.core.pytree import pytree
+from evoclaims.envs.ecorobot.boxes import Box
 from evoclaims.envs.ecorobot.maze import Area, Maze
 from evoclaims.envs.ecorobot.pose import Pose
 from evoclaims.envs.ecorobot.robot_task import Outing, Ruling
-from evoclaims.envs.ecorobot.scene import Box
 from evoclaims.envs.ecorobot.sensors import ARENA
 
 WALLS: Final = (

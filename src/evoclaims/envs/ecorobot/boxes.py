@@ -1,0 +1,65 @@
+"""Boxes: the walls and obstacles of which worlds are built."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from evoclaims.core.errors import UserError
+
+
+@dataclass(frozen=True)
+class Box:
+    """A box that stands in the world: a wall, or an obstacle.
+
+    Attributes:
+        centre: x and y, m.
+        half_size: along its axis and across, m.
+        angle: of its axis, counterclockwise from +x, degrees.
+        bottom, top: z, m.
+    """
+
+    centre: tuple[float, float]
+    half_size: tuple[float, float]
+    angle: float = 0.0
+    bottom: float = -0.7
+    top: float = 0.7
+
+    def __post_init__(self) -> None:
+        """Check that it has a volume."""
+        numbers = (*self.centre, *self.half_size, self.angle, self.bottom, self.top)
+        if not all(map(math.isfinite, numbers)) or min(self.half_size) <= 0 or self.bottom >= self.top:
+            raise UserError(
+                f"A box has finite numbers, half-sizes above 0 and its bottom below its top, unlike {self}."
+            )
+
+    @property
+    def place(self) -> tuple[float, float, float]:
+        """Its centre in space, m."""
+        return (*self.centre, (self.bottom + self.top) / 2)
+
+    @property
+    def size(self) -> tuple[float, float, float]:
+        """Half-sizes along its axis, across, and up, m."""
+        return (*self.half_size, (self.top - self.bottom) / 2)
+
+    @property
+    def rotation(self) -> NDArray[np.float64]:
+        """Its axes as columns, shape [3, 3]."""
+        cosine, sine = math.cos(math.radians(self.angle)), math.sin(math.radians(self.angle))
+        return np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
+
+    @property
+    def corners(self) -> NDArray[np.float64]:
+        """Its corners seen from above, shape [4, 2], m."""
+        signs = np.array([(1, 1), (1, -1), (-1, 1), (-1, -1)])
+        return np.array(self.centre) + (signs * self.half_size) @ self.rotation[:2, :2].T
+
+    def distance(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return how far points on the ground, shape [..., 2], are from it, seen from above, m; 0 inside."""
+        local = (points - np.array(self.centre)) @ self.rotation[:2, :2]
+        outside = np.maximum(np.abs(local) - np.array(self.half_size), 0.0)
+        return np.hypot(outside[..., 0], outside[..., 1])
