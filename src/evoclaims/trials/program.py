@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import jax
@@ -79,16 +80,13 @@ class Program:
     def start(self, seed: Int[Array, ""], idle: Bool[Array, ""]) -> TrialState:
         """Build the state of a trial that has not taken a step."""
         method, task = self.condition.method, self.condition.task
-        init_key, probe_key = streams(trial_key(seed, TRAINING), "init", "probe")
-        state = strong(method.init(init_key, task))
-        ascent = curriculum.start(task.levels, self.condition.progression)
-        progress = jax.eval_shape(lambda: method.step(probe_key, task, ascent.level, state)[1])
+        init_key = streams(trial_key(seed, TRAINING), "init")[0]
         return TrialState(
             seed=seed,
-            method=state,
-            ascent=ascent,
+            method=strong(method.init(init_key, task)),
+            ascent=curriculum.start(task.levels, self.condition.progression),
             steps=jnp.zeros((), jnp.int32),
-            last=jax.tree.map(lambda leaf: jnp.zeros(leaf.shape, leaf.dtype), progress),
+            last=jax.tree.map(lambda leaf: jnp.zeros(leaf.shape, leaf.dtype), self._progress),
             diverged=jnp.zeros((), bool),
             idle=idle,
         )
@@ -133,6 +131,19 @@ class Program:
         policy = self.condition.method.best(task, trial.method)
         final = score_every_level(task, policy, trial_key(trial.seed, EVALUATION))
         return Score(final=final, parameters=policy.parameters, solved_at=trial.ascent.solved_at)
+
+    @cached_property
+    def _progress(self) -> Progress:
+        """The shapes of what a step reports; tracing one takes seconds, so that it is done once."""
+        method, task = self.condition.method, self.condition.task
+
+        def report(seed: Int[Array, ""], level: Int[Array, ""]) -> Progress:
+            key = trial_key(seed, TRAINING)
+            return method.step(key, task, level, strong(method.init(key, task)))[1]
+
+        number = jax.ShapeDtypeStruct((), jnp.int32)
+        shapes: Progress = jax.eval_shape(report, number, number)
+        return shapes
 
     def _ended(self, trial: TrialState) -> Bool[Array, ""]:
         """Whether no further step will be taken."""

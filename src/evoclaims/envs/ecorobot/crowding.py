@@ -11,7 +11,8 @@ import numpy as np
 from evoclaims.envs.ecorobot.boxes import Box
 
 SPACING: Final = 0.05
-"""Of the grid over which boxes within reach are counted, m."""
+"""Of the grid over which boxes within reach are counted, m; a world of more than `LINES` of them has a coarser one."""
+LINES: Final = 500
 
 
 def reach(model: mujoco.MjModel) -> float:
@@ -22,17 +23,24 @@ def reach(model: mujoco.MjModel) -> float:
     Args:
         model: the robot alone; its first body is the torso.
     """
-    furthest = np.zeros(model.nbody)
+    # Of each body: a point of it about which it turns, and how far from the torso's centre that can come.
+    pivots, furthest = np.zeros((model.nbody, 3)), np.zeros(model.nbody)
     for body in range(2, model.nbody):
-        joints = range(model.body_jntadr[body], model.body_jntadr[body] + model.body_jntnum[body])
-        slides = any(model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_SLIDE for joint in joints)
-        # A hinge beside its body's origin moves the origin, by no more than twice the distance.
-        off = sum(2 * float(np.linalg.norm(model.jnt_pos[joint])) for joint in joints)
-        length = np.inf if slides else float(np.linalg.norm(model.body_pos[body])) + off
-        furthest[body] = furthest[model.body_parentid[body]] + length
+        first, parent = model.body_jntadr[body], model.body_parentid[body]
+        joints = slice(first, first + model.body_jntnum[body]) if model.body_jntnum[body] else slice(0)
+        kinds, anchors = model.jnt_type[joints], model.jnt_pos[joints]
+        anchors = anchors if len(anchors) else np.zeros((1, 3))
+        start = np.zeros(3)
+        mujoco.mju_rotVecQuat(start, anchors[0], model.body_quat[body])
+        arm = np.linalg.norm(model.body_pos[body] + start - pivots[parent])
+        arm += np.sum(np.linalg.norm(np.diff(anchors, axis=0), axis=1))
+        slides = mujoco.mjtJoint.mjJNT_SLIDE in kinds
+        furthest[body] = furthest[parent] + (np.inf if slides else arm)
+        pivots[body] = anchors[-1]
     touching = np.flatnonzero((model.geom_bodyid > 0) & (model.geom_contype & 1 > 0))
-    middles = furthest[model.geom_bodyid[touching]] + np.linalg.norm(model.geom_pos[touching], axis=1)
-    return float(np.max(middles + model.geom_rbound[touching], initial=0.0))
+    bodies = model.geom_bodyid[touching]
+    arms = np.linalg.norm(model.geom_pos[touching] - pivots[bodies], axis=1) + model.geom_rbound[touching]
+    return float(np.max(furthest[bodies] + arms, initial=0.0))
 
 
 def touched_at_once(model: mujoco.MjModel, boxes: Sequence[Box]) -> int:
@@ -40,13 +48,13 @@ def touched_at_once(model: mujoco.MjModel, boxes: Sequence[Box]) -> int:
 
     It is the most boxes within its reach, seen from above.
     """
-    within = reach(model) + SPACING / np.sqrt(2)  # no place is further than this from a point of the grid
-    if not boxes or not np.isfinite(within):
+    arm = reach(model)
+    if not boxes or not np.isfinite(arm):
         return len(boxes)
     corners = np.concatenate([box.corners for box in boxes])
-    axes = [
-        np.arange(low - within, high + within + SPACING, SPACING)
-        for low, high in zip(corners.min(axis=0), corners.max(axis=0), strict=True)
-    ]
+    low, high = corners.min(axis=0) - arm, corners.max(axis=0) + arm
+    spacing = max(SPACING, float(np.max(high - low)) / LINES)
+    within = arm + spacing / np.sqrt(2)  # no place is further than this from a point of the grid
+    axes = [np.arange(start, end + spacing, spacing) for start, end in zip(low, high, strict=True)]
     points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
     return int(np.max(np.sum([box.distance(points) <= within for box in boxes], axis=0)))

@@ -1,0 +1,105 @@
+"""How many boxes a robot can touch at a time: never too few, wherever it is and however it stretches."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from evoclaims.envs.ecorobot import deceptive, stones
+from evoclaims.envs.ecorobot.boxes import Box
+from evoclaims.envs.ecorobot.crowding import reach, touched_at_once
+from evoclaims.envs.ecorobot.obstacles import Obstacles
+from evoclaims.envs.ecorobot.robots import ANT, HALF_CHEETAH, ROBOTS, SIMPLE_ROB, Robot
+from evoclaims.envs.ecorobot.scene import Scene
+
+ALONE = Scene(SIMPLE_ROB).model
+
+
+def test_a_box_is_as_far_as_its_nearest_side_or_corner() -> None:
+    points = np.array([(2.0, 3.0), (5.0, 3.0), (2.0, 0.0), (6.0, 8.0), (2.9, 4.9)])
+    np.testing.assert_allclose(Box((2.0, 3.0), (1.0, 2.0)).distance(points), [0.0, 2.0, 1.0, math.hypot(3.0, 3.0), 0.0])
+    across = Box((2.0, 3.0), (2.0, 1.0), angle=90.0)
+    np.testing.assert_allclose(across.distance(points), [0.0, 2.0, 1.0, math.hypot(3.0, 3.0), 0.0], atol=1e-12)
+    assert sorted(map(tuple, across.corners.round(12).tolist())) == [(1.0, 1.0), (1.0, 5.0), (3.0, 1.0), (3.0, 5.0)]
+
+
+@pytest.mark.parametrize("robot", ROBOTS.values(), ids=lambda robot: robot.name)
+def test_no_posture_reaches_further_than_the_bound(robot: Robot) -> None:
+    model, random = Scene(robot).model, np.random.default_rng(0)
+    data, bound = mujoco.MjData(model), reach(model)
+    touching = np.flatnonzero((model.geom_bodyid > 0) & (model.geom_contype & 1 > 0))
+    furthest = 0.0
+    for _ in range(2_000):
+        data.qpos[:] = random.uniform(-math.pi, math.pi, model.nq)
+        mujoco.mj_kinematics(model, data)
+        apart = np.linalg.norm(data.geom_xpos[touching] - data.xpos[1], axis=1) + model.geom_rbound[touching]
+        furthest = max(furthest, float(apart.max()))
+    assert furthest <= bound + 1e-9
+    assert furthest > 0.75 * bound  # which is not idle
+
+
+def test_the_paper_s_worlds_need_few_of_their_boxes() -> None:
+    near = {
+        (robot.name, kind): touched_at_once(Scene(robot).model, boxes)
+        for robot in (SIMPLE_ROB, ANT)
+        for kind, boxes in (("stones", stones.WALLS), ("easy", deceptive.EASY.walls))
+    }
+    assert near == {("simple_rob", "stones"): 3, ("simple_rob", "easy"): 2, ("ant", "stones"): 4, ("ant", "easy"): 2}
+    assert Obstacles().scene.near == 2
+
+
+coordinates = st.floats(-5.0, 5.0)
+worlds = st.lists(
+    st.builds(
+        Box,
+        st.tuples(coordinates, coordinates),
+        st.tuples(st.floats(0.05, 3.0), st.floats(0.05, 3.0)),
+        angle=st.floats(-180.0, 180.0),
+    ),
+    min_size=1,
+    max_size=6,
+)
+
+
+@given(worlds, st.integers(0, 2**32 - 1))
+def test_nowhere_are_more_boxes_within_reach_than_are_simulated(boxes: list[Box], seed: int) -> None:
+    random = np.random.default_rng(seed)
+    # Points everywhere, and points just within reach of a corner, where boxes meet.
+    corners = np.concatenate([box.corners for box in boxes])
+    points = np.concatenate(
+        [random.uniform(-9, 9, (500, 2)), corners + 0.19 * random.uniform(-0.7, 0.7, corners.shape)]
+    )
+    touched = np.sum([box.distance(points) <= reach(ALONE) for box in boxes], axis=0)
+    assert np.max(touched) <= touched_at_once(ALONE, boxes) <= len(boxes)
+
+
+def test_a_robot_with_a_limb_on_a_slide_may_touch_all(tmp_path: Path) -> None:
+    file = tmp_path / "crane.xml"
+    file.write_text(
+        '<mujoco><worldbody><body pos="0 0 1"><freejoint/><geom size="0.1"/><body><joint type="slide" axis="1 0 0"/>'
+        '<geom size="0.1"/></body></body></worldbody></mujoco>'
+    )
+    model = mujoco.MjModel.from_xml_path(str(file))
+    assert reach(model) == math.inf
+    assert touched_at_once(model, stones.WALLS) == len(stones.WALLS)
+
+
+def test_boxes_do_not_take_turns_where_all_can_be_touched_or_there_are_none() -> None:
+    corner = (Box((0.0, 0.0), (1.0, 0.1)), Box((0.0, 0.0), (1.0, 0.1), angle=90.0))
+    assert Scene(SIMPLE_ROB, corner).turns == {}
+    assert Scene(SIMPLE_ROB, corner).model.ngeom == Scene(SIMPLE_ROB, corner).whole.ngeom
+    assert Scene(SIMPLE_ROB).turns == {}
+
+
+def test_boxes_that_are_alike_differ_in_their_place_alone() -> None:
+    apart = [Box((3.0 * i, 0.0), (0.2, 3.0)) for i in range(4)]
+    assert list(Scene(HALF_CHEETAH, tuple(apart)).turns) == ["geom_pos"]
+    apart[3] = replace(apart[3], angle=20.0)
+    assert set(Scene(HALF_CHEETAH, tuple(apart)).turns) == {"geom_pos", "geom_quat"}
