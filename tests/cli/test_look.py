@@ -22,7 +22,7 @@ from evoclaims.cli.stored import load
 from evoclaims.core.canonical import content_hash
 from evoclaims.envs.ecorobot import physics
 from evoclaims.envs.ecorobot.physics import Body
-from evoclaims.envs.ecorobot.scene import Scene
+from evoclaims.envs.ecorobot.scene import Places, Scene
 from evoclaims.networks.export import optional
 from evoclaims.suite.config import load_config, load_reproduction
 from evoclaims.trials.store import Store
@@ -65,7 +65,7 @@ Evoclaims = Callable[..., tuple[int, str, str]]
 def _gliding() -> Iterator[None]:
     """Let robots go where their actions point: pictures are looked at here, and not physics."""
 
-    def glide(scene: Scene, body: Body, control: jax.Array) -> Body:
+    def glide(scene: Scene, body: Body, control: jax.Array, places: Places) -> Body:
         return replace(body, position=body.position.at[:2].add(0.1 * control[:2]))
 
     with pytest.MonkeyPatch.context() as patch:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import field
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int, PRNGKeyArray
@@ -104,3 +104,18 @@ class Task(Protocol):
 
     def examine(self, policy: PolicyFn, key: PRNGKeyArray, level: Int[Array, ""]) -> Episode:
         """Score `policy` on `level`: the test that decides level-ups and final results, the same for every method."""
+
+
+@runtime_checkable
+class Numbered(Protocol):
+    """A task with numbers that programs take as data, and do not embed.
+
+    Conditions that differ in nothing else share their compiled programs: obstacles of three heights compile once.
+    """
+
+    @property
+    def numbers(self) -> Any:
+        """The numbers: a tree of arrays."""
+
+    def with_numbers(self, numbers: Any) -> Task:
+        """Return the task with these numbers, which may be traced, in the place of its own."""

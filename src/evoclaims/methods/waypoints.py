@@ -19,6 +19,8 @@ from scipy.sparse.csgraph import dijkstra
 
 from evoclaims.core.errors import UserError
 from evoclaims.envs.base import Task
+from evoclaims.envs.ecorobot.boxes import Box
+from evoclaims.envs.ecorobot.maze import Area
 from evoclaims.envs.ecorobot.robots import SIMPLE_ROB
 from evoclaims.envs.ecorobot.stones import STONES, SteppingStones
 from evoclaims.methods.base import Policy, Progress
@@ -78,7 +80,9 @@ class Waypoints:
             east, north = self.gain * (wanted - velocity) / 20.0  # the motors' gear
             return jnp.maximum(jnp.stack([north, east, -east, -north]), 0.0)
 
-        return Policy(parameters=jnp.asarray(_targets(task)), function=function)
+        return Policy(
+            parameters=jnp.asarray(_targets(task.boxes, task.area, task.robot.torso_radius)), function=function
+        )
 
     def cost(self, task: Task) -> int:
         """Return the environment steps of one step: none are made, but a trial's length is counted in them."""
@@ -86,16 +90,16 @@ class Waypoints:
 
 
 @lru_cache(maxsize=4)
-def _targets(task: SteppingStones) -> NDArray[np.float32]:
+def _targets(boxes: tuple[Box, ...], area: Area, radius: float) -> NDArray[np.float32]:
     """Return where to steer from each point of a grid, to each stone: shape [stones, points x, points y, 2], m."""
-    axes = [np.arange(round((high - low) / GRID) + 1) * GRID + low for low, high in task.area]
+    axes = [np.arange(round((high - low) / GRID) + 1) * GRID + low for low, high in area]
     points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
     gap = np.full(points.shape[:2], np.inf)
-    for box in task.boxes:
+    for box in boxes:
         gap = np.minimum(gap, box.distance(points))
     # Points too near to walls are left by the cheapest way, but never passed.
     shape, flat = gap.shape, points.reshape(-1, 2)
-    price = np.where(gap < task.robot.torso_radius + CLEARANCE, 1e3, 1.0).ravel()
+    price = np.where(gap < radius + CLEARANCE, 1e3, 1.0).ravel()
     index = np.arange(price.size).reshape(shape)
     ends: list[NDArray[np.int64]] = []
     for here, there in (

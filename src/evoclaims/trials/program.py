@@ -13,7 +13,7 @@ from jaxtyping import Array, Bool, Float, Int
 
 from evoclaims.core.keys import EVALUATION, TRAINING, streams, trial_key
 from evoclaims.core.pytree import pytree, strong
-from evoclaims.envs.base import Episode
+from evoclaims.envs.base import Episode, Numbered, Task
 from evoclaims.methods.base import Progress
 from evoclaims.trials import curriculum
 from evoclaims.trials.rollout import score_every_level
@@ -32,6 +32,7 @@ class TrialState:
         last: what the last step reported.
         diverged: whether a number has stopped being finite.
         idle: True for a lane that only fills the batch.
+        numbers: the task's, if it has any (`Numbered`).
     """
 
     seed: Int[Array, ""]
@@ -41,6 +42,7 @@ class TrialState:
     last: Progress
     diverged: Bool[Array, ""]
     idle: Bool[Array, ""]
+    numbers: Any
 
 
 @pytree
@@ -89,11 +91,12 @@ class Program:
             last=jax.tree.map(lambda leaf: jnp.zeros(leaf.shape, leaf.dtype), self._progress),
             diverged=jnp.zeros((), bool),
             idle=idle,
+            numbers=jax.tree.map(jnp.asarray, task.numbers) if isinstance(task, Numbered) else (),
         )
 
     def advance(self, trial: TrialState, until: Int[Array, ""]) -> tuple[TrialState, Report]:
         """Take steps until the trial has ended or has taken `until` of them."""
-        method, task = self.condition.method, self.condition.task
+        method, task = self.condition.method, self._task(trial)
         training_key = streams(trial_key(trial.seed, TRAINING), "step")[0]
 
         def running(trial: TrialState) -> Bool[Array, ""]:
@@ -112,6 +115,7 @@ class Program:
                 last=strong(progress),
                 diverged=~healthy,
                 idle=trial.idle,
+                numbers=trial.numbers,
             )
 
         trial = jax.lax.while_loop(running, step, trial)
@@ -127,7 +131,7 @@ class Program:
 
     def score(self, trial: TrialState) -> Score:
         """Judge the trial's champion on every level, with keys that training never sees."""
-        task = self.condition.task
+        task = self._task(trial)
         policy = self.condition.method.best(task, trial.method)
         final = score_every_level(task, policy, trial_key(trial.seed, EVALUATION))
         return Score(final=final, parameters=policy.parameters, solved_at=trial.ascent.solved_at)
@@ -144,6 +148,11 @@ class Program:
         number = jax.ShapeDtypeStruct((), jnp.int32)
         shapes: Progress = jax.eval_shape(report, number, number)
         return shapes
+
+    def _task(self, trial: TrialState) -> Task:
+        """Return the task, its numbers taken from the trial."""
+        task = self.condition.task
+        return task.with_numbers(trial.numbers) if isinstance(task, Numbered) else task
 
     def _ended(self, trial: TrialState) -> Bool[Array, ""]:
         """Whether no further step will be taken."""

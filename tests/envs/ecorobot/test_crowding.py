@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from pathlib import Path
 
 import mujoco
 import numpy as np
@@ -80,13 +79,17 @@ def test_nowhere_are_more_boxes_within_reach_than_are_simulated(boxes: list[Box]
     assert np.max(touched) <= touched_at_once(ALONE, boxes) <= len(boxes)
 
 
-def test_a_robot_with_a_limb_on_a_slide_may_touch_all(tmp_path: Path) -> None:
-    file = tmp_path / "crane.xml"
-    file.write_text(
-        '<mujoco><worldbody><body pos="0 0 1"><freejoint/><geom size="0.1"/><body><joint type="slide" axis="1 0 0"/>'
-        '<geom size="0.1"/></body></body></worldbody></mujoco>'
-    )
-    model = mujoco.MjModel.from_xml_path(str(file))
+@pytest.mark.parametrize(
+    "more",
+    [
+        '<body><joint type="slide" axis="1 0 0"/><geom size="0.1"/></body></body>',
+        '</body><body pos="1 0 1"><freejoint/><geom size="0.1"/></body>',
+    ],
+    ids=["a limb on a slide", "a body apart"],
+)
+def test_what_has_no_bound_may_touch_all(more: str) -> None:
+    torso = '<body pos="0 0 1"><freejoint/><geom size="0.1"/>'
+    model = mujoco.MjModel.from_xml_string(f"<mujoco><worldbody>{torso}{more}</worldbody></mujoco>")
     assert reach(model) == math.inf
     assert touched_at_once(model, stones.WALLS) == len(stones.WALLS)
 

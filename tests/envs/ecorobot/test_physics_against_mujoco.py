@@ -29,7 +29,7 @@ def _frames(world: Scene, made: Record, dtype: Any = jnp.float64) -> Body:
 
     def frame(position: jax.Array, velocity: jax.Array, acceleration: jax.Array, control: jax.Array) -> Body:
         body = Body(position=position, velocity=velocity, acceleration=acceleration)
-        return physics._frame(world, body, control)
+        return physics._frame(world, body, control, world.turns)
 
     body: Body = quickly_compiled(jax.vmap(frame))(*states)
     assert body.position.dtype == dtype
@@ -77,7 +77,8 @@ def test_a_frame_on_obstacles_is_that_of_mjx_though_only_the_two_nearest_are_sim
         states = [jnp.array(x.copy()) for x in (made.position, made.velocity, made.acceleration, made.control)]
 
         def both(position: jax.Array, velocity: jax.Array, acceleration: jax.Array, control: jax.Array) -> Any:
-            ours = physics._frame(world, Body(position=position, velocity=velocity, acceleration=acceleration), control)
+            body = Body(position=position, velocity=velocity, acceleration=acceleration)
+            ours = physics._frame(world, body, control, world.turns)
             with implicit_promotions():
                 model = every.replace(opt=every.opt.replace(ls_iterations=50, ls_tolerance=jnp.asarray(1e-10)))
                 data = blank.replace(qpos=position, qvel=velocity, ctrl=control)
@@ -106,7 +107,7 @@ def test_four_hundred_frames_along_walls_stay_with_mujoco() -> None:
         way.append(data.qpos.copy())
 
     def act(body: Body, push: jax.Array) -> tuple[Body, jax.Array]:
-        body = physics.act(world, body, push)
+        body = physics.act(world, body, push, world.turns)
         return body, body.position
 
     start = physics.resting(jnp.asarray([*stones.START, 0.0], jnp.float32), jnp.zeros(3))

@@ -21,7 +21,7 @@ from evoclaims.envs.ecorobot.physics import Body
 from evoclaims.envs.ecorobot.pose import torso
 from evoclaims.envs.ecorobot.robot_task import Outing
 from evoclaims.envs.ecorobot.robots import ANT, HOPPER, SIMPLE_ROB, Robot
-from evoclaims.envs.ecorobot.scene import Scene
+from evoclaims.envs.ecorobot.scene import Places, Scene
 from evoclaims.envs.ecorobot.stones import STONES, Progress, SteppingStones
 
 LEVEL = jnp.zeros((), jnp.int32)
@@ -33,7 +33,7 @@ MASS = 5 * 4 / 3 * math.pi * 0.2**3 + 1.0  # kg: density 5 kg/m³, and the joint
 def gliding() -> Iterator[None]:
     """Let robots keep their velocity, whatever they do and touch: here rules and ends matter, and not physics."""
 
-    def glide(scene: Scene, body: Body, control: jax.Array) -> Body:
+    def glide(scene: Scene, body: Body, control: jax.Array, places: Places) -> Body:
         moved = jnp.zeros_like(body.position).at[:2].set(0.05 * body.velocity[:2])
         return replace(body, position=body.position + moved)
 

@@ -37,7 +37,7 @@ def test_a_thousand_robots_at_full_force_run_into_walls_and_never_through_one() 
     pushes = (random.random((STEPS // KEPT, ROBOTS, 4)) < 0.5).astype(np.float32).repeat(KEPT, axis=0)
 
     def move(bodies: Body, controls: jax.Array) -> tuple[Body, tuple[jax.Array, jax.Array]]:
-        after = jax.vmap(lambda body, control: physics.act(TASK.scene, body, control))(bodies, controls)
+        after = jax.vmap(lambda body, control: physics.act(TASK.scene, body, control, TASK.numbers))(bodies, controls)
         return after, (after.position, after.velocity)
 
     at = jnp.asarray(np.pad(starts, ((0, 0), (0, 1))), jnp.float32)

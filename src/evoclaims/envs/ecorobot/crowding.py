@@ -18,7 +18,7 @@ LINES: Final = 500
 def reach(model: mujoco.MjModel) -> float:
     """Return a bound on how far from the torso's centre a robot can touch a box, m, whatever its posture.
 
-    Limbs are taken as stretched out straight. A limb on a slide has no bound: infinity.
+    Limbs are taken as stretched out straight. A limb on a slide has no bound, nor has a body apart: infinity.
 
     Args:
         model: the robot alone; its first body is the torso.
@@ -34,8 +34,8 @@ def reach(model: mujoco.MjModel) -> float:
         mujoco.mju_rotVecQuat(start, anchors[0], model.body_quat[body])
         arm = np.linalg.norm(model.body_pos[body] + start - pivots[parent])
         arm += np.sum(np.linalg.norm(np.diff(anchors, axis=0), axis=1))
-        slides = mujoco.mjtJoint.mjJNT_SLIDE in kinds
-        furthest[body] = furthest[parent] + (np.inf if slides else arm)
+        unbound = parent == 0 or mujoco.mjtJoint.mjJNT_SLIDE in kinds
+        furthest[body] = furthest[parent] + (np.inf if unbound else arm)
         pivots[body] = anchors[-1]
     touching = np.flatnonzero((model.geom_bodyid > 0) & (model.geom_contype & 1 > 0))
     bodies = model.geom_bodyid[touching]

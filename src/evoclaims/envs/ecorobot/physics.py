@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import Final
+from typing import Any, Final
 
 import jax
 import jax.numpy as jnp
-import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
 from evoclaims.core.foreign import implicit_promotions
 from evoclaims.core.pytree import pytree
 from evoclaims.envs.ecorobot.constraints import constrained_acceleration
 from evoclaims.envs.ecorobot.pose import torso
-from evoclaims.envs.ecorobot.scene import Scene, box_geoms, mjx, on_device
+from evoclaims.envs.ecorobot.scene import GEOMS, Places, Scene, box_geoms, mjx, on_device
 
 LARGEST: Final = 1e10
 """What MuJoCo takes for a number beyond reason (mjMAXVAL)."""
@@ -40,11 +39,11 @@ def resting(position: Float[Array, " nq"], velocity: Float[Array, " nv"]) -> Bod
     return Body(position=position, velocity=velocity, acceleration=jnp.zeros_like(velocity))
 
 
-def act(scene: Scene, body: Body, control: Float[Array, " nu"]) -> Body:
-    """Hold the motors at `control` for one environment step."""
+def act(scene: Scene, body: Body, control: Float[Array, " nu"], places: Places) -> Body:
+    """Hold the motors at `control` for one environment step; `places` as of `Scene.turns`."""
 
     def frame(body: Body, _: None) -> tuple[Body, None]:
-        return _frame(scene, body, control), None
+        return _frame(scene, body, control, places), None
 
     return jax.lax.scan(frame, body, None, length=scene.robot.frames)[0]
 
@@ -61,13 +60,14 @@ def is_stable(body: Body) -> Bool[Array, ""]:
 
 # MJX takes a second to trace; with a jit of its own this is traced once for each scene, and not for each use.
 @partial(jax.jit, static_argnums=0)
-def _frame(scene: Scene, body: Body, control: Float[Array, " nu"]) -> Body:
+def _frame(scene: Scene, body: Body, control: Float[Array, " nu"], places: Places) -> Body:
     """Simulate one time step, as `mjx.step` does with semi-implicit Euler integration."""
     with implicit_promotions():
         model = on_device(scene.mjx)
-        if scene.turns:
-            nearest, geoms = _nearest(scene, body), box_geoms(scene.model)
-            theirs = {name: jnp.asarray(array)[nearest] for name, array in scene.turns.items()}
+        if places:
+            geoms = box_geoms(scene.model)
+            nearest = _nearest(scene, model, body, places)
+            theirs = {name: jnp.asarray(array)[nearest] for name, array in places.items()}
             model = model.replace(**{name: getattr(model, name).at[geoms].set(new) for name, new in theirs.items()})
         data = on_device(scene.blank).replace(qpos=body.position, qvel=body.velocity, ctrl=control)
         data = mjx.kinematics(model, data)
@@ -87,11 +87,13 @@ def _frame(scene: Scene, body: Body, control: Float[Array, " nu"]) -> Body:
     return Body(position=data.qpos, velocity=data.qvel, acceleration=acceleration)
 
 
-def _nearest(scene: Scene, body: Body) -> Int[Array, " near"]:
+def _nearest(scene: Scene, model: Any, body: Body, places: Places) -> Int[Array, " near"]:
     """Return which boxes are nearest to the torso's centre, seen from above."""
-    axes = jnp.asarray(np.stack([box.rotation[:2, :2] for box in scene.boxes]), jnp.float32)
-    sizes = jnp.asarray(np.stack([box.half_size for box in scene.boxes]), jnp.float32)
-    away = torso(scene, body.position).place[:2][None] - jnp.asarray(scene.places[:, :2])
-    local = jnp.sum(away[:, :, None] * axes, axis=1)
-    outside = jnp.maximum(jnp.abs(local) - sizes, 0.0)
+    alike = {name: getattr(model, name)[box_geoms(scene.model)[:1]] for name in GEOMS if name not in places}
+    centre, size, quaternion = (jnp.asarray({**alike, **places}[name]) for name in GEOMS)
+    w, z = quaternion[:, 0], quaternion[:, 3]  # boxes are turned about the vertical alone
+    cosine, sine = 1.0 - 2.0 * z * z, 2.0 * w * z
+    x, y = (torso(scene, body.position).place[:2][None] - centre[:, :2]).T
+    local = jnp.stack([cosine * x + sine * y, cosine * y - sine * x], axis=1)
+    outside = jnp.maximum(jnp.abs(local) - size[:, :2], 0.0)
     return jax.lax.top_k(-jnp.sum(outside**2, axis=1), scene.near)[1]

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from dataclasses import dataclass
+from copy import copy
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
@@ -21,7 +22,7 @@ from evoclaims.envs.ecorobot.boxes import Box
 from evoclaims.envs.ecorobot.physics import Body
 from evoclaims.envs.ecorobot.pose import Pose, torso
 from evoclaims.envs.ecorobot.robots import SIMPLE_ROB, Robot
-from evoclaims.envs.ecorobot.scene import Scene, scene
+from evoclaims.envs.ecorobot.scene import Places, Scene, scene
 from evoclaims.envs.ecorobot.sensors import Sensor
 
 
@@ -70,12 +71,14 @@ class RobotTask(ABC):
         sensor: what it perceives of the boxes; None for nothing.
         episode_steps: environment steps after which an episode is truncated.
         examined_episodes: episodes, from different starts, over which an examination averages.
+        places: where the boxes stand, if a program takes it as data; None for where the task puts them.
     """
 
     robot: Robot = SIMPLE_ROB
     sensor: Sensor | None = None
     episode_steps: int = 1000
     examined_episodes: int = 10
+    places: Places | None = field(default=None, compare=False, repr=False, kw_only=True, metadata={"canonical": False})
 
     def __post_init__(self) -> None:
         """Check the counts."""
@@ -155,6 +158,18 @@ class RobotTask(ABC):
         """The robot among the boxes."""
         return scene(self.robot, self.boxes)
 
+    @property
+    def numbers(self) -> Places:
+        """Where the boxes stand: what programs take as data."""
+        return self.scene.turns if self.places is None else self.places
+
+    def with_numbers(self, numbers: Places) -> RobotTask:
+        """Return the task with its boxes elsewhere."""
+        # Not `replace`: what has been worked out of the task (`observation_size`) holds for its copy.
+        moved = copy(self)
+        object.__setattr__(moved, "places", numbers)
+        return moved
+
     def reset(self, key: PRNGKeyArray, level: Int[Array, ""]) -> TaskState:
         """Put the robot at the start, as Brax does: with a little noise on positions and velocities."""
         position_key, velocity_key = streams(key, "position", "velocity")
@@ -192,7 +207,7 @@ class RobotTask(ABC):
         if self.robot.scales_actions:
             low, high = jnp.asarray(self.scene.model.actuator_ctrlrange, jnp.float32).T
             control = low + (action + 1.0) * (high - low) / 2.0
-        body = physics.act(self.scene, outing.body, control)
+        body = physics.act(self.scene, outing.body, control, self.numbers)
         stable = physics.is_stable(body)
         body = select(stable, body, outing.body)
         pose = torso(self.scene, body.position)

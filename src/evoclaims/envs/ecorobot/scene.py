@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import io
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import Any, Final
@@ -26,6 +27,8 @@ with contextlib.redirect_stdout(io.StringIO()):
 
 WORLD_GROUP: Final = 1
 """The geom group of what the scene adds; sensors look at it."""
+Places = Mapping[str, Any]
+"""What tells boxes apart: arrays of MuJoCo's model by their names, each [boxes, …]."""
 GEOMS: Final = ("geom_pos", "geom_size", "geom_quat")
 """MuJoCo's arrays in which boxes may differ."""
 
@@ -64,7 +67,13 @@ class Scene:
     def mjx(self) -> Any:
         """The model that is simulated, as MJX takes it; its arrays are on the host, so that programs embed them."""
         with jax.ensure_compile_time_eval():
-            return jax.device_get(mjx.put_model(self.model, impl="jax"))
+            model = jax.device_get(mjx.put_model(self.model, impl="jax"))
+        # Nothing is left of the boxes that happen to stand first, or programs would differ by them.
+        geoms = box_geoms(self.model)
+        blank = {name: np.array(getattr(model, name)) for name in self.turns}
+        for array in blank.values():
+            array[geoms] = 0.0
+        return model.replace(**blank)
 
     @cached_property
     def blank(self) -> Any:
@@ -84,7 +93,7 @@ class Scene:
         return float(self.model.opt.timestep) * self.robot.frames
 
     @cached_property
-    def turns(self) -> dict[str, NDArray[np.float64]]:
+    def turns(self) -> Places:
         """What tells boxes that take turns apart: MuJoCo's arrays of their geoms, shape [boxes, …]; else nothing."""
         if self.near == len(self.boxes):
             return {}
