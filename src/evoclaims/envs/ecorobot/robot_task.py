@@ -165,8 +165,7 @@ class RobotTask(ABC):
 
     def with_numbers(self, numbers: Places) -> RobotTask:
         """Return the task with its boxes elsewhere."""
-        # Not `replace`: what has been worked out of the task (`observation_size`) holds for its copy.
-        moved = copy(self)
+        moved = copy(self)  # unlike `replace`, it keeps what has been worked out (`observation_size`)
         object.__setattr__(moved, "places", numbers)
         return moved
 
@@ -238,9 +237,8 @@ class RobotTask(ABC):
     def examine(self, policy: PolicyFn, key: PRNGKeyArray, level: Int[Array, ""]) -> Episode:
         """Run `examined_episodes` from different starts and average; success is the share that reached the goal."""
         keys = jax.random.split(key, self.examined_episodes)
-        episodes = jax.vmap(lambda k: self._play(policy, k, level, follow=True))(keys)
-        averaged: Episode = jax.tree.map(lambda leaf: jnp.mean(leaf), episodes)
-        return averaged
+        episodes: Episode = jax.vmap(lambda k: self._play(policy, k, level, follow=True))(keys)
+        return jax.tree.map(jnp.mean, episodes)
 
     def trajectory(self, policy: PolicyFn, key: PRNGKeyArray) -> tuple[Outing, Bool[Array, " steps"]]:
         """Return every state of one episode, leaves [steps, …], and which belong to it: for pictures."""

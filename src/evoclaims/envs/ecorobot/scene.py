@@ -101,7 +101,7 @@ class Scene:
         return {name: array for name, array in arrays.items() if np.ptp(array, axis=0).any()}
 
     @property
-    def places(self) -> NDArray[np.float32]:
+    def centres(self) -> NDArray[np.float32]:
         """Centres of all boxes, shape [boxes, 3], m."""
         return np.array([box.place for box in self.boxes], np.float32).reshape(-1, 3)
 

@@ -105,7 +105,7 @@ def distances(scene: Scene, pose: Pose, angles: np.ndarray) -> Float[Array, " ra
     axes = jnp.asarray(np.stack([box.rotation for box in scene.boxes]), jnp.float32)
     sizes = jnp.asarray(np.stack([box.size for box in scene.boxes]), jnp.float32)
     # In each box's own frame (slab method, Kay and Kajiya 1986): rays × boxes × axes.
-    local_origins = jnp.einsum("rbi,bij->rbj", origins[:, None] - jnp.asarray(scene.places)[None], axes)
+    local_origins = jnp.einsum("rbi,bij->rbj", origins[:, None] - jnp.asarray(scene.centres)[None], axes)
     local_directions = jnp.einsum("ri,bij->rbj", directions, axes)
     steep = jnp.where(jnp.abs(local_directions) < 1e-9, 1e-9, local_directions)
     one, other = (-sizes[None] - local_origins) / steep, (sizes[None] - local_origins) / steep
