@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from evoclaims.core.keys import trial_key
-from evoclaims.envs.ecorobot.obstacles import Obstacles
+from evoclaims.envs.ecorobot.obstacles import Heights, Obstacles
 from evoclaims.envs.ecorobot.stones import SteppingStones
 from evoclaims.methods.random_policy import RandomPolicy
 from evoclaims.networks.mlp import Mlp
@@ -15,6 +15,7 @@ from evoclaims.trials.budget import Budget
 from evoclaims.trials.program import Program, TrialState
 from evoclaims.trials.spec import Condition
 
+HEIGHTS: tuple[Heights, ...] = ("hierarchical", "medium", "high")
 METHOD = RandomPolicy(Mlp((4,)))
 SEED, NOT_IDLE, ONE = jnp.zeros((), jnp.int32), jnp.zeros((), bool), jnp.ones((), jnp.int32)
 
@@ -24,23 +25,24 @@ def _program(task: Obstacles | SteppingStones) -> Program:
     return Program(Condition(METHOD, task, "whole_budget", Budget(generations=1, reports=1)))
 
 
-def _texts(task: Obstacles) -> tuple[str, str]:
-    """Return what the compiler is given: to train, and to judge."""
+def _texts(task: Obstacles) -> list[str]:
+    """Return what the compiler is given: to start, to train, and to judge."""
     program = _program(task)
     trial = jax.eval_shape(program.start, SEED, NOT_IDLE)
-    return jax.jit(program.advance).lower(trial, ONE).as_text(), jax.jit(program.score).lower(trial).as_text()
+    programs = (program.start, (SEED, NOT_IDLE)), (program.advance, (trial, ONE)), (program.score, (trial,))
+    return [jax.jit(function).lower(*arguments).as_text() for function, arguments in programs]
 
 
 def test_obstacles_of_all_heights_are_one_program() -> None:
-    low, medium, high = (Obstacles(episode_steps=3, heights=h) for h in ("hierarchical", "medium", "high"))
-    assert _texts(low) == _texts(medium) == _texts(high)
-    assert _texts(low) != _texts(Obstacles(episode_steps=4))
+    starts, trainings, judgements = zip(*(_texts(Obstacles(heights=heights)) for heights in HEIGHTS), strict=True)
+    assert len(set(starts)) == 3
+    assert len(set(trainings)) == len(set(judgements)) == 1
 
 
 def test_a_trial_carries_the_heights_of_its_obstacles() -> None:
     heights = [
         np.asarray(_program(Obstacles(heights=h)).start(SEED, NOT_IDLE).numbers["geom_pos"])[:, 2] + 0.5
-        for h in ("hierarchical", "medium", "high")
+        for h in HEIGHTS
     ]
     np.testing.assert_allclose(heights[0], np.repeat([0.1, 0.2, 0.3], 5), atol=1e-6)
     np.testing.assert_allclose(heights[1:], [[0.2] * 15, [0.3] * 15], atol=1e-6)
