@@ -27,9 +27,10 @@ def reach(model: mujoco.MjModel) -> float:
     pivots, furthest = np.zeros((model.nbody, 3)), np.zeros(model.nbody)
     for body in range(2, model.nbody):
         first, parent = model.body_jntadr[body], model.body_parentid[body]
-        joints = slice(first, first + model.body_jntnum[body]) if model.body_jntnum[body] else slice(0)
+        joints = slice(first, first + model.body_jntnum[body])
         kinds, anchors = model.jnt_type[joints], model.jnt_pos[joints]
-        anchors = anchors if len(anchors) else np.zeros((1, 3))
+        if not len(anchors):  # welded to its parent
+            anchors = np.zeros((1, 3))
         start = np.zeros(3)
         mujoco.mju_rotVecQuat(start, anchors[0], model.body_quat[body])
         arm = np.linalg.norm(model.body_pos[body] + start - pivots[parent])

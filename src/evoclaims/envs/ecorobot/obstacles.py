@@ -23,7 +23,7 @@ PLACES: Final = (9.0, 11.0, 13.0, 15.0, 17.0, 23.0, 25.0, 27.0, 29.0, 31.0, 43.0
 """x of the obstacles, m."""
 HALF_THICKNESS: Final = 0.2
 DEPTH: Final = 1.0
-"""How far obstacles reach below their top, m: one size for all, so that two boxes can stand for fifteen."""
+"""How far obstacles reach below their top, m: one size for all, so that they differ in their places alone."""
 
 
 @pytree

@@ -42,7 +42,7 @@ class Scene:
         boxes: what stands in the world.
 
     Only as many boxes are simulated as the robot can touch at a time: before every step those nearest to the torso take
-    their place (`physics`). A row of fifteen obstacles costs no more than two of them, and a maze's walls than three.
+    their place (`physics`). A row of fifteen obstacles costs no more than two of them.
     """
 
     robot: Robot
