@@ -1,11 +1,15 @@
-"""The full tier, which no CI runs: its conditions at least begin and trace a step."""
+"""The full tier, which no CI runs: its conditions at least begin and trace a step of several trials at once."""
 
 from __future__ import annotations
 
+from typing import Any
+
 import jax
+import jax.numpy as jnp
 import pytest
 
 from evoclaims.core.errors import UserError
+from evoclaims.envs.base import Numbered
 from evoclaims.trials.spec import Condition
 from reproductions.nisioti2025 import REPRODUCTION
 
@@ -15,12 +19,20 @@ KINDS = {(type(c.method), type(c.task), getattr(c.task, "robot", None)): names f
 
 
 @pytest.mark.parametrize("condition", [pytest.param(CONDITIONS[n], id="-".join(n)) for n in KINDS.values()])
-def test_a_condition_of_the_full_tier_traces_a_step(condition: Condition) -> None:
-    key, method, task = jax.random.key(0), condition.method, condition.task
+def test_a_condition_of_the_full_tier_traces_a_step_of_two_trials(condition: Condition) -> None:
+    method, task = condition.method, condition.task
+    keys = jax.random.split(jax.random.key(0), 2)
     try:
-        state = jax.eval_shape(lambda: method.init(key, task))
+        state = jax.eval_shape(jax.vmap(lambda key: method.init(key, task)), keys)
     except UserError as error:  # an optional library
         pytest.skip(str(error))
-    following, progress = jax.eval_shape(lambda state: method.step(key, task, 0, state), state)
+    # On an accelerator trials are a batch, each with the numbers of its task (`Program`).
+    numbers = jax.tree.map(lambda x: jnp.stack([x, x]), task.numbers) if isinstance(task, Numbered) else ()
+
+    def step(key: Any, numbers: Any, state: Any) -> Any:
+        own = task.with_numbers(numbers) if isinstance(task, Numbered) else task
+        return method.step(key, own, jnp.int32(0), state)
+
+    following, progress = jax.eval_shape(jax.vmap(step), keys, numbers, state)
     assert jax.tree.structure(following) == jax.tree.structure(state)
-    assert progress.fitness.shape == ()
+    assert progress.fitness.shape == (2,)

@@ -54,6 +54,19 @@ def test_a_batch_of_batches_runs_one_branch() -> None:
     np.testing.assert_array_equal(result["sum"], np.arange(4.0).reshape(2, 2) + 10)
 
 
+def test_branches_may_close_over_batched_values() -> None:
+    def scaled(index: Any, scale: Any, x: Any) -> Any:
+        return switch_together(index, [lambda x: x + scale, lambda x: x * scale], x)
+
+    x = jnp.arange(3.0)
+    batch = jax.jit(jax.vmap(scaled, (0, 0, None)))(_choices(0, 1), jnp.array([2.0, 3.0]), x)
+    np.testing.assert_array_equal(batch, [x * 2, x * 3])
+    batches = jax.jit(jax.vmap(jax.vmap(scaled, (0, None, None)), (0, 0, None)))(
+        jnp.array([[0, 1], [0, 0]], jnp.int32), jnp.array([2.0, 3.0]), x
+    )
+    np.testing.assert_array_equal(batches, [[x * 2] * 2, [x * 3] * 2])
+
+
 def test_random_keys_and_loops_pass_through() -> None:
     def draw(size: int) -> Any:
         return lambda key: jnp.sum(jax.random.uniform(key, (size,))[:2])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any
 
 import jax
@@ -15,8 +16,21 @@ def switch_together(index: Int[Array, ""], branches: Sequence[Callable[..., Any]
     """Run `branches[index]` on the operands; a batch runs, as one, the branch of its largest index.
 
     An ordinary switch under vmap runs every branch. This one is for branches that differ in what they can hold and not
-    in what they compute, in growing order; they must not close over traced values.
+    in what they compute, in growing order. Of traced values they may close over floating-point ones.
     """
+    # A function with a rule of its own for batches sees as batched only what it takes as an argument.
+    converted = [jax.closure_convert(branch, *operands) for branch in branches]
+    closed = [partial(_apply, convert, place) for place, (convert, _) in enumerate(converted)]
+    return _switch(index, closed, [values for _, values in converted], *operands)
+
+
+def _apply(function: Callable[..., Any], place: int, closed_over: Sequence[Any], *operands: Any) -> Any:
+    """Call the branch at `place`."""
+    return function(*operands, *closed_over[place])
+
+
+def _switch(index: Int[Array, ""], branches: Sequence[Callable[..., Any]], *operands: Any) -> Any:
+    """Do the same with branches that close over nothing traced."""
 
     @custom_vmap
     def choose(index: Array, *operands: Any) -> Any:
@@ -26,7 +40,7 @@ def switch_together(index: Int[Array, ""], branches: Sequence[Callable[..., Any]
     def together(size: int, batched: Any, index: Array, *operands: Any) -> tuple[Any, Any]:
         axes = tuple(jax.tree.map(lambda leaf: 0 if leaf else None, batched[1:]))
         batches = [jax.vmap(branch, in_axes=axes, axis_size=size) for branch in branches]
-        result = switch_together(jnp.max(index), batches, *operands)
+        result = _switch(jnp.max(index), batches, *operands)
         return result, jax.tree.map(lambda _: True, result)
 
     return choose(index, *operands)
