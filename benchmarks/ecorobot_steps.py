@@ -2,7 +2,9 @@
 
 `python benchmarks/ecorobot_steps.py` on CPU cores; `--environments 32768` on a GPU. A plain port carries all of MJX's
 data from step to step and simulates all boxes; ours carries positions, velocities and accelerations (see
-`evoclaims.envs.ecorobot.physics`). Counted are environment steps: ours with sensors and rewards, the others without.
+`evoclaims.envs.ecorobot.physics`), and on a GPU makes a step in one kernel (`evoclaims.core.kernels.one_kernel`); there
+the same step in XLA's kernels is a case of its own. Counted are environment steps: ours with sensors and rewards, the
+others without.
 """
 
 from __future__ import annotations
@@ -33,6 +35,7 @@ from evoclaims.envs.ecorobot.scene import mjx, on_device
 from evoclaims.envs.ecorobot.stones import SteppingStones
 from evoclaims.trials.devices import MATMUL_PRECISION, configure, usable_cores
 
+Step = Callable[[TaskState, Any], TaskState]
 TASKS: dict[str, RobotTask] = {
     "stones": SteppingStones(),
     "obstacles": Obstacles(),
@@ -41,7 +44,7 @@ TASKS: dict[str, RobotTask] = {
 }
 
 
-def ours(task: RobotTask, environments: int, steps: int) -> Callable[[], Any]:
+def ours(task: RobotTask, make_step: Step, environments: int, steps: int) -> Callable[[], Any]:
     """Return a function that makes `steps` steps in every environment, under random actions held for ten steps."""
     keys = jax.random.split(jax.random.key(0), environments)
     level = jnp.zeros((), jnp.int32)
@@ -50,7 +53,7 @@ def ours(task: RobotTask, environments: int, steps: int) -> Callable[[], Any]:
     def step(carry: tuple[TaskState, Any], index: Any) -> tuple[tuple[TaskState, Any], None]:
         state, total = carry
         action = _actions(index, total.shape[0], task.action_size)
-        state = jax.vmap(task.step)(state, action)
+        state = jax.vmap(make_step)(state, action)
         return (state, total + state.reward + jnp.sum(state.observation, axis=1)), None
 
     def run(state: TaskState) -> Any:
@@ -101,6 +104,23 @@ def c_mujoco(task: RobotTask, steps: int) -> float:
     return cores * steps / (time.perf_counter() - began)
 
 
+def report_difference(task: RobotTask) -> None:
+    """Print how far the kernel's observations are from those of XLA's kernels, each a step from the same state."""
+    step, plain_step = (jax.jit(jax.vmap(f)) for f in (task.step, task.plain_step))
+    state = jax.vmap(task.reset, (0, None))(jax.random.split(jax.random.key(0), 1024), jnp.zeros((), jnp.int32))
+    differences = []
+    for index in range(50):
+        action = _actions(jnp.asarray(index), 1024, task.action_size)
+        one, other = step(state, action), plain_step(state, action)
+        differences.append(np.abs(np.asarray(one.observation - other.observation)).max(axis=1))
+        state = other
+    median, most, largest = np.quantile(differences, (0.5, 0.99, 1.0))
+    print(
+        f"    one kernel and XLA's differ by {median:.1e} (median), {most:.1e} (99%), {largest:.1e} (largest)",
+        flush=True,
+    )
+
+
 def _actions(index: Any, environments: int, size: int) -> Any:
     """Draw actions in [-1, 1], the same ones for ten steps."""
     return jax.random.uniform(jax.random.key(index // 10), (environments, size), minval=-1.0, maxval=1.0)
@@ -143,7 +163,10 @@ def main() -> None:
             task = replace(TASKS[name], episode_steps=10**6)
             for environments in options.environments:
                 print(f"{name}, {environments} environments", flush=True)
-                runs = {"ours": ours(task, environments, options.steps)}
+                runs = {"ours": ours(task, task.step, environments, options.steps)}
+                if not on_cpu:
+                    report_difference(task)
+                    runs["ours, in XLA's kernels"] = ours(task, task.plain_step, environments, options.steps)
                 if not options.no_plain:
                     runs["plain mjx.step"] = plain(task, environments, options.steps)
                 rates: dict[str, list[float]] = {}

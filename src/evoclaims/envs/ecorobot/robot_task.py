@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from copy import copy
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any
 
 import jax
@@ -14,6 +14,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int, PRNGKeyArray
 
 from evoclaims.core.errors import UserError
+from evoclaims.core.kernels.one_kernel import one_kernel
 from evoclaims.core.keys import streams
 from evoclaims.core.pytree import pytree, select, strong
 from evoclaims.envs.base import Episode, PolicyFn, TaskState
@@ -163,8 +164,8 @@ class RobotTask(ABC):
         """Where the boxes stand: what programs take as data."""
         return self.scene.turns if self.places is None else self.places
 
-    def with_numbers(self, numbers: Places) -> RobotTask:
-        """Return the task with its boxes elsewhere."""
+    def with_numbers(self, numbers: Places | None) -> RobotTask:
+        """Return the task with its boxes elsewhere, or where it puts them."""
         moved = copy(self)  # unlike `replace`, it keeps what has been worked out (`observation_size`)
         object.__setattr__(moved, "places", numbers)
         return moved
@@ -197,6 +198,11 @@ class RobotTask(ABC):
         )
 
     def step(self, state: TaskState, action: Float[Array, " action"]) -> TaskState:
+        """Act for `robot.frames` simulation steps: `plain_step`, on an NVIDIA GPU in one kernel (`one_kernel`)."""
+        following: TaskState = _kernel(self.with_numbers(None))(state, action, self.numbers)
+        return following
+
+    def plain_step(self, state: TaskState, action: Float[Array, " action"]) -> TaskState:
         """Act for `robot.frames` simulation steps.
 
         A step in which the simulation bursts (`physics.is_stable`) did not happen: it pays nothing, and all ends there.
@@ -293,6 +299,12 @@ class RobotTask(ABC):
         if self.sensor is not None:
             parts.insert(2, self.sensor.read(self.scene, outing.pose))
         return jnp.concatenate(parts)
+
+
+@lru_cache(maxsize=64)
+def _kernel(task: RobotTask) -> Callable[[TaskState, Array, Places], TaskState]:
+    """Return a task's step, its boxes' places as an argument."""
+    return one_kernel(lambda state, action, places: task.with_numbers(places).plain_step(state, action))
 
 
 def _uniform(key: PRNGKeyArray, shape: tuple[int, ...]) -> Array:

@@ -1,0 +1,157 @@
+"""Scalar expressions: what a function computes, number by number.
+
+A number is known (a NumPy scalar) or an expression of inputs. The same operation on the same operands is one object.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+
+Number = Any
+"""A NumPy scalar, or an `Expression`."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Expression:
+    """A number that is not known yet.
+
+    Attributes:
+        dtype: float32, int32 or bool.
+    """
+
+    dtype: np.dtype[Any]
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Input(Expression):
+    """The number at a place of an array that the function takes."""
+
+    array: int
+    place: int
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Operation(Expression):
+    """A simple operation on numbers: one of `KNOWN`, or "cast"."""
+
+    name: str
+    operands: tuple[Number, ...]
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Carried(Expression):
+    """A number that a loop hands from round to round."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Loop:
+    """A fixed number of rounds.
+
+    Attributes:
+        rounds: how many.
+        carried: what each round starts with.
+        start: what the first one starts with.
+        results: what each round hands on.
+        taken: what the rounds use of what is outside.
+    """
+
+    rounds: int
+    carried: tuple[Carried, ...]
+    start: tuple[Number, ...]
+    results: tuple[Number, ...]
+    taken: tuple[Expression, ...]
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Outcome(Expression):
+    """What the last round of a loop handed on at a place."""
+
+    loop: Loop
+    place: int
+
+
+def is_known(number: Number) -> bool:
+    """Whether it is a number and not an expression."""
+    return not isinstance(number, Expression)
+
+
+def loop(rounds: int, carried: Sequence[Carried], start: Sequence[Number], results: Sequence[Number]) -> Loop:
+    """Return a loop."""
+    inside: set[int] = {id(c) for c in carried}
+    taken: dict[int, Expression] = {}
+    for expression in in_order(results):
+        if any(id(p) in inside for p in _parents(expression)):
+            inside.add(id(expression))
+            taken.update((id(p), p) for p in _parents(expression) if id(p) not in inside)
+    taken.update((id(r), r) for r in results if not is_known(r) and id(r) not in inside)
+    return Loop(rounds, tuple(carried), tuple(start), tuple(results), tuple(taken.values()))
+
+
+def in_order(numbers: Iterable[Number]) -> list[Expression]:
+    """Return these and all that they are made of, each after what it is made of; not what loops make inside."""
+    made: set[int] = set()
+    order: list[Expression] = []
+    waiting = [n for n in numbers if not is_known(n)][::-1]
+    while waiting:
+        expression = waiting[-1]
+        missing = [p for p in _parents(expression) if id(p) not in made] if id(expression) not in made else []
+        if missing:
+            waiting.extend(reversed(missing))
+            continue
+        waiting.pop()
+        if id(expression) not in made:
+            made.add(id(expression))
+            order.append(expression)
+    return order
+
+
+def _parents(expression: Expression) -> list[Expression]:
+    """Return what it is made of."""
+    match expression:
+        case Operation(operands=operands):
+            return [o for o in operands if not is_known(o)]
+        case Outcome(loop=around):
+            return [*(s for s in around.start if not is_known(s)), *around.taken]
+    return []
+
+
+def _quotient(a: Any, b: Any) -> Any:
+    """Divide; integers towards zero."""
+    return np.divide(a, b) if a.dtype.kind == "f" else a.dtype.type(np.trunc(np.divide(a, b)))
+
+
+KNOWN: Final[dict[str, Callable[..., Any]]] = {
+    "abs": np.abs,
+    "add": np.add,
+    "and": np.bitwise_and,
+    "ceil": np.ceil,
+    "div": _quotient,
+    "eq": np.equal,
+    "floor": np.floor,
+    "ge": np.greater_equal,
+    "gt": np.greater,
+    "le": np.less_equal,
+    "lt": np.less,
+    "max": np.maximum,
+    "min": np.minimum,
+    "mul": np.multiply,
+    "ne": np.not_equal,
+    "neg": np.negative,
+    "not": np.invert,
+    "or": np.bitwise_or,
+    "rem": np.fmod,
+    "round": np.rint,
+    "select": np.where,
+    "sqrt": np.sqrt,
+    "sub": np.subtract,
+    "trunc": np.trunc,
+    "xor": np.bitwise_xor,
+}
+"""The simple operations, on numbers that are known; names are jax's where jax has the operation. "select" chooses its
+second operand where the first is true."""
+COMPARISONS: Final = frozenset({"eq", "ge", "gt", "le", "lt", "ne"})
+"""Operations whose result is a bool."""

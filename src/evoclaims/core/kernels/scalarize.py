@@ -1,0 +1,35 @@
+"""A function's jaxpr as scalar expressions: one for every number of every array it makes.
+
+Moving numbers about (slices, transpositions, indexing) costs nothing, and what is known while tracing is worked out.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import jax
+import numpy as np
+
+from evoclaims.core.kernels import arithmetic, indexing  # noqa: F401  (they register what primitives do)
+from evoclaims.core.kernels.expressions import Input
+from evoclaims.core.kernels.interpreter import Numbers, Scalars, listed
+
+
+def scalarize(function: Callable[..., Any], *arguments: Any) -> tuple[list[Numbers], Any]:
+    """Return expressions for every result of `function`, and the results' shapes as `jax.eval_shape` gives them.
+
+    Args:
+        function: of trees of small arrays.
+        arguments: shapes (`jax.ShapeDtypeStruct`); the i-th array of them is array i of `Input`.
+
+    Raises:
+        Unsupported: for a primitive, or a use of one, that has no scalar expression here.
+    """
+    jaxpr, shape = jax.make_jaxpr(function, return_shape=True)(*arguments)
+    inputs = [
+        listed([Input(np.dtype(leaf.dtype), array, place) for place in range(math.prod(leaf.shape))], leaf.shape)
+        for array, leaf in enumerate(jax.tree.leaves(arguments))
+    ]
+    return Scalars().run(jaxpr, inputs), shape
