@@ -2,7 +2,7 @@
 
 import pytest
 
-from evoclaims import claim
+from evoclaims import Outcome, claim, expected
 
 
 @claim(
@@ -35,6 +35,11 @@ def test_the_ant_is_far_below_the_simplest_robot(trials, verdict, claim_tier):
     "target",
     where="§5.2.3, Fig. 10",
     smoke="In 8 generations of episodes too short to get there HyperNEAT does not reach the target",
+)
+@expected(
+    Outcome.REFUTED,
+    tier="full",
+    because="eight trials of ten stay in the local optimum, 0.9 m from the target; two reach it in six episodes of ten",
 )
 def test_hyperneat_escapes_the_local_optimum(trials, verdict, claim_tier):
     hyperneat = trials("hyperneat", on="deceptive_maze_easy")
@@ -70,6 +75,11 @@ def test_the_ant_does_not_escape(trials, verdict):
     says="MAP-Elites finds the target of the classical deceptive task, where HyperNEAT fails",
     where="§5.2.1, §5.2.3, Figs. 6 and 10",
     smoke="In 8 generations HyperNEAT does not reach the target of the difficult deceptive maze",
+)
+@expected(
+    Outcome.REFUTED,
+    tier="full",
+    because="HyperNEAT fails, but MAP-Elites, too, has found the target in three trials of ten only (see S7)",
 )
 def test_hyperneat_fails_in_the_difficult_maze(trials, verdict, claim_tier):
     hyperneat = trials("hyperneat", on="deceptive_maze_difficult")

@@ -112,6 +112,11 @@ def test_map_elites_explores_the_maze(trials, verdict, claim_tier):
     where="§5.2.1, Fig. 6",
     smoke="After 8 iterations MAP-Elites has not found the target, and covers the maze with stones and without alike",
 )
+@expected(
+    Outcome.REFUTED,
+    tier="full",
+    because="100,000 policies fill 58 to 88% of the cells that can be reached, and in three trials of ten the target's",
+)
 def test_map_elites_finds_the_target_without_stones(trials, verdict, claim_tier):
     plain = trials("map_elites", on="deceptive_maze_difficult")
     stones = trials("map_elites", on="stones")
