@@ -19,6 +19,7 @@ X = np.random.default_rng(0).normal(size=(37, 4)).astype(np.float32)  # the seco
 Y = np.random.default_rng(1).normal(size=(37, 4)).astype(np.float32)
 I = np.random.default_rng(2).integers(-9, 9, (37, 4)).astype(np.int32)
 B = X > 0.3
+KEY = jax.random.key(0)
 SYMMETRIC = jnp.eye(4) * 3.0
 TABLE = jnp.asarray(np.arange(20, dtype=np.float32).reshape(5, 4) ** 2)
 
@@ -145,8 +146,15 @@ def test_alone_and_in_loops_it_is_the_function_too() -> None:
 @pytest.mark.usefixtures("gpu")
 @pytest.mark.parametrize(
     "function",
-    [jnp.exp, lambda x: x.at[jnp.int32(x[0]) % 4].set(0.0), lambda x: jax.lax.scan(lambda c, r: (c + r, c), 0.0, x)],
-    ids=["a function without an expression", "writing at a computed place", "a loop over rows"],
+    [
+        jnp.exp,
+        lambda x: x.at[jnp.int32(x[0]) % 4].set(0.0),
+        lambda x: jax.lax.scan(lambda c, r: (c + r, c), 0.0, x),
+        lambda x: x.astype(jnp.float16),
+        lambda x: x + jax.random.uniform(jax.random.key(0)),
+        lambda x: x + jax.random.uniform(KEY),
+    ],
+    ids=["exponentials", "writing at a computed place", "a loop over rows", "halves", "random numbers", "a random key"],
 )
 def test_what_cannot_be_a_kernel_runs_as_it_is(function: Callable[..., Any]) -> None:
     calls = []

@@ -17,6 +17,7 @@ from evoclaims.core.kernels.unsupported import Unsupported
 
 Numbers = NDArray[Any]
 """An array of objects, each a `Number`."""
+DTYPES: Final = (np.dtype(np.float32), np.dtype(np.int32), np.dtype(bool))
 PRIMITIVES: Final[dict[str, Callable[..., Sequence[Numbers]]]] = {}
 """By jax's names. Elementwise operations are in `KNOWN` and `ELEMENTARY` instead."""
 CALLS: Final = {
@@ -58,6 +59,17 @@ def listed(numbers: Sequence[Number], shape: Sequence[int]) -> Numbers:
     return array.reshape(shape)
 
 
+def check(dtype: Any) -> np.dtype[Any]:
+    """Return a dtype as NumPy has it.
+
+    Raises:
+        Unsupported: when it is not one that expressions may have.
+    """
+    if dtype not in DTYPES:
+        raise Unsupported(f"numbers of {dtype}")
+    return np.dtype(dtype)
+
+
 class Scalars:
     """Interprets jaxprs."""
 
@@ -68,7 +80,11 @@ class Scalars:
     def run(self, closed: Any, operands: Sequence[Numbers]) -> list[Numbers]:
         """Return the results of a closed jaxpr."""
         jaxpr = closed.jaxpr
-        values: dict[Any, Numbers] = dict(zip(jaxpr.constvars, map(known, closed.consts), strict=True))
+        try:
+            constants = [known(c) for c in closed.consts]
+        except TypeError as error:  # a random key, or a value that is being traced
+            raise Unsupported("a constant that is not known") from error
+        values: dict[Any, Numbers] = dict(zip(jaxpr.constvars, constants, strict=True))
         values.update(zip(jaxpr.invars, operands, strict=True))
 
         def read(variable: Any) -> Numbers:
@@ -79,6 +95,9 @@ class Scalars:
 
         for equation in jaxpr.eqns:
             results = self._apply(equation, [read(v) for v in equation.invars])
+            for variable, result in zip(equation.outvars, results, strict=True):
+                if not all(map(ex.is_known, result.flat)):
+                    check(variable.aval.dtype)
             values.update(zip(equation.outvars, results, strict=True))
         return [read(v) for v in jaxpr.outvars]
 

@@ -10,11 +10,10 @@ from collections.abc import Callable
 from typing import Any
 
 import jax
-import numpy as np
 
 from evoclaims.core.kernels import arithmetic, indexing  # noqa: F401  (they register what primitives do)
 from evoclaims.core.kernels.expressions import Input
-from evoclaims.core.kernels.interpreter import Numbers, Scalars, listed
+from evoclaims.core.kernels.interpreter import Numbers, Scalars, check, listed
 
 
 def scalarize(function: Callable[..., Any], *arguments: Any) -> tuple[list[Numbers], Any]:
@@ -25,11 +24,11 @@ def scalarize(function: Callable[..., Any], *arguments: Any) -> tuple[list[Numbe
         arguments: shapes (`jax.ShapeDtypeStruct`); the i-th array of them is array i of `Input`.
 
     Raises:
-        Unsupported: for a primitive, or a use of one, that has no scalar expression here.
+        Unsupported: for a primitive, a use of one, or a dtype that has no scalar expression here.
     """
     jaxpr, shape = jax.make_jaxpr(function, return_shape=True)(*arguments)
     inputs = [
-        listed([Input(np.dtype(leaf.dtype), array, place) for place in range(math.prod(leaf.shape))], leaf.shape)
+        listed([Input(check(leaf.dtype), array, place) for place in range(math.prod(leaf.shape))], leaf.shape)
         for array, leaf in enumerate(jax.tree.leaves(arguments))
     ]
     return Scalars().run(jaxpr, inputs), shape

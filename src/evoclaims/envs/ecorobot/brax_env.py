@@ -21,7 +21,8 @@ class BraxEnv(Env):  # type: ignore[misc]
     """A task in Brax's API: pure `reset` and `step`, one environment; vmap it, or use Brax's wrappers.
 
     `State.pipeline_state` is the task's own state. `done` says that the task has ended; episodes are truncated by
-    Brax's `EpisodeWrapper`, whose `episode_length` is `task.horizon`.
+    Brax's `EpisodeWrapper`, whose `episode_length` is `task.horizon`. On an NVIDIA GPU a step is one kernel,
+    through which no gradient flows; `task.plain_step` is for those.
     """
 
     def __init__(self, task: RobotTask) -> None:
