@@ -13,8 +13,24 @@ import pytest
 from numpy.typing import NDArray
 
 from evoclaims.core.kernels import one_kernel
+from evoclaims.envs.ecorobot import robot_task
 
 INSTRUCTION = re.compile(r"(?:@(?P<when>%\w+) )?(?P<code>[\w.]+)(?: (?P<operands>.*))?")
+# fmt: off
+CODES = frozenset({
+    "abs.f32", "abs.s32", "add.f32", "add.s32", "and.b32", "and.pred", "cvt.rmi.f32.f32", "cvt.rn.f32.s32",
+    "cvt.rni.f32.f32", "cvt.rpi.f32.f32", "cvt.rzi.s32.f32", "cvta.to.global.u64", "div.rn.f32", "div.s32",
+    "div.u32", "ld.global.f32", "ld.global.s32", "ld.global.u8", "ld.param.u64", "mad.lo.u32", "mad.wide.u32",
+    "max.NaN.f32", "max.s32", "min.NaN.f32", "min.s32", "mov.f32", "mov.pred", "mov.s32", "mov.u32", "mul.f32",
+    "mul.lo.s32", "neg.f32", "neg.s32", "not.b32", "not.pred", "or.b32", "or.pred", "rem.s32", "selp.f32",
+    "selp.s32", "setp.eq.f32", "setp.eq.s32", "setp.ge.f32", "setp.ge.s32", "setp.ge.u32", "setp.gt.f32",
+    "setp.gt.s32", "setp.le.f32", "setp.le.s32", "setp.lt.f32", "setp.lt.s32", "setp.ne.s32", "setp.neu.f32",
+    "sqrt.rn.f32", "sub.f32", "sub.s32", "xor.b32", "xor.pred",
+})
+# fmt: on
+"""The instructions that there are (PTX ISA 7.1), of those that kernels use."""
+WRITES = {"f32": "f", "s32": "r", "b32": "r", "pred": "pn"}
+"""First letters of the registers that instructions of a type write; %none is a predicate, too."""
 BINARY = {
     "add": np.add,
     "and": np.bitwise_and,
@@ -40,8 +56,8 @@ def execute(ptx: str, operands: Sequence[NDArray[Any]], results: Sequence[NDArra
     """Run a kernel of as many threads as the results have rows, and write into `results`.
 
     Raises:
-        AssertionError: when the text is not what an assembler takes: an instruction unknown, a register or a parameter
-            undeclared, a row out of an array's bounds.
+        AssertionError: when an instruction is unknown, a register undeclared or of another kind, or a row out of an
+            array's bounds.
     """
     header, body = ptx.split("\n{\n")
     parameters = dict(zip(re.findall(r"\.param \.u64 (\w+)", header), [*operands, *results], strict=True))
@@ -58,7 +74,8 @@ def execute(ptx: str, operands: Sequence[NDArray[Any]], results: Sequence[NDArra
 @pytest.fixture
 def gpu(monkeypatch: pytest.MonkeyPatch) -> None:
     """Have kernels run on this machine."""
-    monkeypatch.setattr(one_kernel, "_has_gpu", lambda: True)
+    for module in (one_kernel, robot_task):
+        monkeypatch.setattr(module, "has_gpu", lambda: True)
     monkeypatch.setattr(jax.lax, "platform_dependent", lambda *operands, cuda, default: cuda(*operands))
     monkeypatch.setattr(jax.ffi, "ffi_call", ffi_call)
 
@@ -115,6 +132,9 @@ class _Machine:
             self._store(operands[0], self._value(operands[1], code[-1]))
             return None
         assert operands[0] in self.declared, operands[0]
+        assert match["code"] in CODES, f"no instruction: {match['code']}"
+        kind = "pred" if code[0] == "setp" else code[2 if code[0] == "cvt" else -1].replace("u8", "s32")
+        assert operands[0][1] in WRITES.get(kind, operands[0]), f"{line} writes another kind of register"
         with np.errstate(all="ignore"):
             self.registers[operands[0]] = self._compute(code, operands[1:])
         return None
@@ -163,7 +183,8 @@ class _Machine:
             case ["cvt", "rn", "f32", "s32"]:
                 return self._value(operands[0], "s32").astype(np.float32)
             case ["cvt", "rzi", "s32", "f32"]:
-                return np.trunc(self._value(operands[0], "f32")).astype(np.int32)
+                value = np.nan_to_num(self._value(operands[0], "f32").astype(np.float64), nan=0.0)
+                return np.clip(np.trunc(value), -(2.0**31), 2.0**31 - 1).astype(np.int32)
             case ["cvt", rounding, "f32", "f32"]:
                 return ROUNDED[rounding](self._value(operands[0], "f32"))
             case ["div", "rn", "f32"]:

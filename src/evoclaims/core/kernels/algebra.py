@@ -8,7 +8,8 @@ from typing import Any, Final
 
 import numpy as np
 
-from evoclaims.core.kernels.expressions import COMPARISONS, KNOWN, Carried, Expression, Number, Operation, is_known
+from evoclaims.core.kernels.expressions import COMPARISONS, KNOWN, Expression, Number, Operation, is_known
+from evoclaims.core.kernels.unsupported import Unsupported
 
 Rule = Callable[..., Number | None]
 COMMUTATIVE: Final = frozenset({"add", "and", "eq", "max", "min", "mul", "ne", "or", "xor"})
@@ -24,7 +25,8 @@ class Algebra:
     def apply(self, name: str, *operands: Number) -> Number:
         """Return an operation on numbers of one dtype (but for the condition of "select").
 
-        As in a compiler that may ignore NaN and infinity: 0 times anything is 0.
+        As in a compiler that may ignore NaN, infinity and the sign of 0: 0 times anything is 0, and so are 0 divided by
+        anything and anything less itself.
         """
         if all(map(is_known, operands)):
             with np.errstate(all="ignore"):
@@ -41,14 +43,10 @@ class Algebra:
         if number.dtype == dtype:
             return number
         if is_known(number):
-            return dtype.type(number)
+            return _converted(number, dtype)
         if dtype.kind == "b":
             return self.apply("ne", number, number.dtype.type(0))
         return self._shared("cast", (number,), dtype)
-
-    def carried(self, dtype: Any) -> Carried:
-        """Return a new number for a loop to carry."""
-        return Carried(np.dtype(dtype))
 
     def _shared(self, name: str, operands: tuple[Number, ...], dtype: np.dtype[Any]) -> Operation:
         """Return the one object for an operation on these operands."""
@@ -57,6 +55,14 @@ class Algebra:
         if key not in self._made:  # it keeps its operands alive, whose ids are in the key
             self._made[key] = Operation(dtype, name, operands)
         return self._made[key]
+
+
+def _converted(number: Any, dtype: np.dtype[Any]) -> Any:
+    """Return a known number as another dtype; as in XLA, integers do not overflow, and NaN is 0."""
+    if dtype.kind == "i" and number.dtype.kind == "f":
+        limits = np.iinfo(dtype)
+        return dtype.type(0 if np.isnan(number) else int(min(max(float(number), limits.min), limits.max)))
+    return dtype.type(number)
 
 
 def _is(number: Number, value: float) -> bool:
@@ -88,12 +94,27 @@ def _mul(algebra: Algebra, a: Number, b: Number) -> Number | None:
 
 
 def _div(algebra: Algebra, a: Number, b: Number) -> Number | None:
-    if _is(b, 1):
+    if b.dtype.kind == "i":
+        return _check_divisor(b) if not _is(b, 1) else a
+    if _is(b, 1) or _is(a, 0):
         return a
-    if _is(a, 0):
-        return a
-    exact = is_known(b) and b.dtype.kind == "f" and abs(math.frexp(float(b))[0]) == 0.5
-    return algebra.apply("mul", a, b.dtype.type(1) / b) if exact else None  # a power of two
+    if (
+        is_known(b) and abs(math.frexp(float(b))[0]) == 0.5 and abs(b) > 1e-30
+    ):  # a power of two: its reciprocal is exact
+        return algebra.apply("mul", a, b.dtype.type(1) / b)
+    return None
+
+
+def _rem(algebra: Algebra, a: Number, b: Number) -> Number | None:
+    if b.dtype.kind == "f":
+        raise Unsupported("a remainder of floats")
+    return _check_divisor(b)
+
+
+def _check_divisor(divisor: Number) -> None:
+    """Check that integers are divided by what is known not to be 0, where GPUs do as they please."""
+    if not is_known(divisor) or divisor == 0:
+        raise Unsupported("a division by an integer that may be 0")
 
 
 def _neg(algebra: Algebra, a: Number) -> Number | None:
@@ -125,7 +146,7 @@ def _not(algebra: Algebra, a: Expression) -> Number | None:
 def _select(algebra: Algebra, condition: Number, yes: Number, no: Number) -> Number | None:
     if is_known(condition):
         return yes if condition else no
-    if yes is no or (is_known(yes) and is_known(no) and yes == no):
+    if yes is no or (is_known(yes) and is_known(no) and yes.tobytes() == no.tobytes()):
         return yes
     if yes.dtype == bool:  # no selecting among conditions: GPUs have no instruction for it
         other = algebra.apply("and", algebra.apply("not", condition), no)
@@ -143,6 +164,7 @@ RULES: Final[dict[str, Rule]] = {
     "neg": _neg,
     "not": _not,
     "or": _or,
+    "rem": _rem,
     "select": _select,
     "sub": _sub,
 }

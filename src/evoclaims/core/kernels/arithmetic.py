@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from typing import Any, Final
 
 import numpy as np
+from jax.lax import RoundingMethod
 
 from evoclaims.core.kernels import expressions as ex
 from evoclaims.core.kernels.elementary import power
@@ -36,7 +37,22 @@ def _convert_element_type(s: Scalars, equation: Any, x: Numbers) -> Sequence[Num
     return [s.each(lambda n: s.algebra.cast(n, equation.params["new_dtype"]), x)]
 
 
-IDENTITIES: Final = {"add": 0.0, "and": True, "max": -np.inf, "min": np.inf, "mul": 1.0, "or": False}
+IDENTITIES: Final = {
+    "add": lambda dtype: 0,
+    "and": lambda dtype: -1,
+    "max": lambda dtype: -np.inf if dtype.kind == "f" else np.iinfo(dtype).min,
+    "min": lambda dtype: np.inf if dtype.kind == "f" else np.iinfo(dtype).max,
+    "mul": lambda dtype: 1,
+    "or": lambda dtype: 0,
+}
+"""What operations make of no numbers."""
+
+
+@primitive("round")
+def _round(s: Scalars, equation: Any, x: Numbers) -> Sequence[Numbers]:
+    if equation.params["rounding_method"] != RoundingMethod.TO_NEAREST_EVEN:
+        raise Unsupported("rounding halves away from zero")
+    return [s.elementwise("rint", x)]
 
 
 @primitive("reduce_and", "reduce_max", "reduce_min", "reduce_or", "reduce_sum", "reduce_prod")
@@ -46,7 +62,7 @@ def _reduce(s: Scalars, equation: Any, x: Numbers) -> Sequence[Numbers]:
     axes = tuple(equation.params["axes"])
     summed = math.prod(x.shape[a] for a in axes)
     if not summed:
-        return [filled(aval.shape, np.dtype(aval.dtype).type(IDENTITIES[name]))]
+        return [filled(aval.shape, aval.dtype.type(IDENTITIES[name](aval.dtype)))]
     rows = np.moveaxis(x, axes, range(len(axes))).reshape(summed, -1).T
     return [listed([s.fold(name, list(row)) for row in rows], aval.shape)]
 
@@ -125,9 +141,11 @@ def _scan(s: Scalars, equation: Any, *operands: Numbers) -> Sequence[Numbers]:
     fresh = len(equation.outvars)
     if [o.shape for o in operands] != shapes or [v.aval for v in equation.outvars] != inner.out_avals:
         raise Unsupported("a scan over rows")
+    if not rounds:
+        return operands[len(operands) - fresh :]
     constants, start = operands[: len(operands) - fresh], operands[len(operands) - fresh :]
     carried = [
-        listed([s.algebra.carried(v.aval.dtype) for _ in x.flat], x.shape)
+        listed([ex.Carried(np.dtype(v.aval.dtype)) for _ in x.flat], x.shape)
         for v, x in zip(equation.outvars, start, strict=True)
     ]
     results = s.run(inner, [*constants, *carried])

@@ -56,7 +56,8 @@ class Loop:
         carried: what each round starts with.
         start: what the first one starts with.
         results: what each round hands on.
-        taken: what the rounds use of what is outside.
+        taken: what the rounds use of what is outside, so that it is computed once before them, and that a loop around
+            this one knows of it.
     """
 
     rounds: int
@@ -120,8 +121,15 @@ def _parents(expression: Expression) -> list[Expression]:
 
 
 def _quotient(a: Any, b: Any) -> Any:
-    """Divide; integers towards zero."""
-    return np.divide(a, b) if a.dtype.kind == "f" else a.dtype.type(np.trunc(np.divide(a, b)))
+    """Divide; integers towards zero, and by 0 as XLA does."""
+    if a.dtype.kind == "f":
+        return np.divide(a, b)
+    return a.dtype.type(np.trunc(np.divide(a, b, dtype=np.float64))) if b else a.dtype.type(-1)
+
+
+def _remainder(a: Any, b: Any) -> Any:
+    """Return what is left of a, with its sign; of a division by 0, as in XLA, all."""
+    return np.fmod(a, b) if a.dtype.kind == "f" or b else a
 
 
 KNOWN: Final[dict[str, Callable[..., Any]]] = {
@@ -143,15 +151,14 @@ KNOWN: Final[dict[str, Callable[..., Any]]] = {
     "neg": np.negative,
     "not": np.invert,
     "or": np.bitwise_or,
-    "rem": np.fmod,
-    "round": np.rint,
+    "rem": _remainder,
+    "rint": np.rint,
     "select": np.where,
     "sqrt": np.sqrt,
     "sub": np.subtract,
-    "trunc": np.trunc,
     "xor": np.bitwise_xor,
 }
-"""The simple operations, on numbers that are known; names are jax's where jax has the operation. "select" chooses its
-second operand where the first is true."""
+"""The simple operations, on numbers that are known. "select" chooses its second operand where the first is true; "rint"
+rounds halves to even; the others are jax's of the same name."""
 COMPARISONS: Final = frozenset({"eq", "ge", "gt", "le", "lt", "ne"})
 """Operations whose result is a bool."""

@@ -6,21 +6,22 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from jax.lax import GatherScatterMode
 
 from evoclaims.core.kernels.expressions import Number, is_known
-from evoclaims.core.kernels.interpreter import Numbers, Scalars, filled, known, primitive
+from evoclaims.core.kernels.interpreter import Numbers, Scalars, filled, known, listed, primitive
 from evoclaims.core.kernels.unsupported import Unsupported
 
 Place = tuple[int, Number, int]
 """Along which dimension a window begins where, and the last place where it may."""
 
 
-@primitive("copy", "copy_p", "stop_gradient", "optimization_barrier", "pvary")
+@primitive("copy", "stop_gradient", "optimization_barrier", "pvary")
 def _as_it_is(s: Scalars, equation: Any, *operands: Numbers) -> Sequence[Numbers]:
     return operands
 
 
-@primitive("reshape", "squeeze", "expand_dims")
+@primitive("reshape", "squeeze")
 def _reshape(s: Scalars, equation: Any, x: Numbers) -> Sequence[Numbers]:
     return [x.reshape(equation.outvars[0].aval.shape)]
 
@@ -116,9 +117,7 @@ def _argmax(s: Scalars, equation: Any, x: Numbers) -> Sequence[Numbers]:
         return place
 
     rows = np.moveaxis(x, axis, -1).reshape(-1, x.shape[axis])
-    result = filled((len(rows),), None)
-    result[:] = [first(list(row)) for row in rows]
-    return [result.reshape(aval.shape)]
+    return [listed([first(list(row)) for row in rows], aval.shape)]
 
 
 @primitive("top_k")
@@ -126,7 +125,7 @@ def _top_k(s: Scalars, equation: Any, x: Numbers) -> Sequence[Numbers]:
     if equation.params.get("axis", -1) not in (-1, x.ndim - 1):
         raise Unsupported("the largest along another dimension than the last")
     places = np.broadcast_to(known(np.arange(x.shape[-1], dtype=np.int32)), x.shape)
-    return _sorted(s, s.elementwise("neg", x), [x, places], equation.params["k"])
+    return _sorted(s, "ge", x, [x, places], equation.params["k"])
 
 
 @primitive("sort")
@@ -134,19 +133,22 @@ def _sort(s: Scalars, equation: Any, *operands: Numbers) -> Sequence[Numbers]:
     if equation.params["num_keys"] != 1:
         raise Unsupported("a sort by several keys")
     last = [np.moveaxis(x, equation.params["dimension"], -1) for x in operands]
-    result = _sorted(s, last[0], last, last[0].shape[-1])
+    result = _sorted(s, "le", last[0], last, last[0].shape[-1])
     return [np.moveaxis(x, -1, equation.params["dimension"]) for x in result]
 
 
-def _sorted(s: Scalars, keys: Numbers, columns: Sequence[Numbers], count: int) -> list[Numbers]:
-    """Return each column's numbers in the order of the rows' smallest `count` keys; equal ones keep their order."""
+def _sorted(s: Scalars, before: str, keys: Numbers, columns: Sequence[Numbers], count: int) -> list[Numbers]:
+    """Return each column's first `count` numbers in the order of keys ("le": the smallest first; "ge": the largest).
+
+    Equal ones keep their order. There is no order with NaN among the keys.
+    """
     size = keys.shape[-1]
     results = [np.empty((*keys.shape[:-1], count), object) for _ in columns]
     for at in np.ndindex(*keys.shape[:-1]):
         rank: list[Number] = [np.int32(0)] * size
         for later in range(size):
             for earlier in range(later):
-                keep = s.algebra.apply("le", keys[at][earlier], keys[at][later])
+                keep = s.algebra.apply(before, keys[at][earlier], keys[at][later])
                 rank[later] = s.algebra.apply("add", rank[later], s.algebra.cast(keep, np.int32))
                 swap = s.algebra.cast(s.algebra.apply("not", keep), np.int32)
                 rank[earlier] = s.algebra.apply("add", rank[earlier], swap)
@@ -175,9 +177,9 @@ def _gather(s: Scalars, equation: Any, x: Numbers, indices: Numbers) -> Sequence
     p, aval = equation.params, equation.outvars[0].aval
     numbers, sizes = p["dimension_numbers"], p["slice_sizes"]
     fill = None
-    if "FILL" in str(p["mode"]):
+    if p["mode"] == GatherScatterMode.FILL_OR_DROP:
         given = p["fill_value"]
-        fill = known(np.asarray(np.nan if aval.dtype.kind == "f" else 0 if given is None else given, aval.dtype))[()]
+        fill = known(np.asarray(np.nan if given is None else given, aval.dtype))[()]
     batch = [d for d in range(len(aval.shape)) if d not in numbers.offset_dims]
     dropped = (*numbers.collapsed_slice_dims, *numbers.operand_batching_dims)
     window = [d for d in range(x.ndim) if d not in dropped]
@@ -197,7 +199,7 @@ def _gather(s: Scalars, equation: Any, x: Numbers, indices: Numbers) -> Sequence
 def _read(s: Scalars, x: Numbers, at: list[int], places: Sequence[Place], fill: Number | None = None) -> Number:
     """Return a number of a window: known places are looked up, others are selected among all that are possible.
 
-    Places out of bounds give `fill` if they are known and there is one, else those nearest to them.
+    A window out of bounds gives `fill` if there is one, and else is moved to the nearest place where it is not.
     """
     if not places:
         return x[tuple(at)]
@@ -215,21 +217,30 @@ def _read(s: Scalars, x: Numbers, at: list[int], places: Sequence[Place], fill: 
     for place in reversed(range(last)):
         here = s.algebra.apply("eq" if place else "le", start, start.dtype.type(place))
         value = s.algebra.apply("select", here, begin(place), value)
-    return value
+    if fill is None:
+        return value
+    low, high = start.dtype.type(0), start.dtype.type(last)
+    inside = s.algebra.apply("and", s.algebra.apply("ge", start, low), s.algebra.apply("le", start, high))
+    return s.algebra.apply("select", inside, value, fill)
 
 
-@primitive("scatter", "scatter-add", "scatter-mul", "scatter_add", "scatter_mul")
+@primitive("scatter", "scatter-add", "scatter-mul")
 def _scatter(s: Scalars, equation: Any, x: Numbers, indices: Numbers, updates: Numbers) -> Sequence[Numbers]:
-    """Write at known places; those out of bounds are dropped."""
-    combine = equation.primitive.name.removeprefix("scatter").strip("-_")
-    numbers = equation.params["dimension_numbers"]
+    """Write windows at known places; one that is out of bounds is left out, or moved if the mode says so."""
+    combine = equation.primitive.name.removeprefix("scatter").removeprefix("-")
+    p = equation.params
+    numbers = p["dimension_numbers"]
+    if not combine and p["update_jaxpr"] is not None:
+        raise Unsupported("applying a function at places")
     dropped = (*numbers.inserted_window_dims, *numbers.operand_batching_dims)
     window = [d for d in range(x.ndim) if d not in dropped]
     batch = [d for d in range(updates.ndim) if d not in numbers.update_window_dims]
+    size = dict(zip(window, (updates.shape[d] for d in numbers.update_window_dims), strict=True))
     result = x.copy()
     for at in np.ndindex(*updates.shape):
         row = tuple(at[d] for d in batch)
         to = [0] * x.ndim
+        inside = True
         for d, of_update in zip(window, numbers.update_window_dims, strict=True):
             to[d] = at[of_update]
         for d, of_indices in zip(numbers.operand_batching_dims, numbers.scatter_indices_batching_dims, strict=True):
@@ -237,8 +248,10 @@ def _scatter(s: Scalars, equation: Any, x: Numbers, indices: Numbers, updates: N
         for k, d in enumerate(numbers.scatter_dims_to_operand_dims):
             if not is_known(indices[(*row, k)]):
                 raise Unsupported("writing at places that are computed")
-            to[d] += int(indices[(*row, k)])
-        if all(0 <= i < size for i, size in zip(to, x.shape, strict=True)):
+            start, last = int(indices[(*row, k)]), x.shape[d] - size.get(d, 1)
+            inside &= 0 <= start <= last
+            to[d] += min(max(start, 0), last)
+        if inside or p["mode"] != GatherScatterMode.FILL_OR_DROP:
             place = tuple(to)
             result[place] = s.algebra.apply(combine, result[place], updates[at]) if combine else updates[at]
     return [result]

@@ -26,7 +26,6 @@ CALLS: Final = {
     "custom_vjp_call": "call_jaxpr",
     "custom_vmap_call": "call",
     "jit": "jaxpr",
-    "pjit": "jaxpr",
 }
 """Primitives that call a function, and the parameter that holds it."""
 
@@ -105,6 +104,8 @@ class Scalars:
         """Return the results of one equation."""
         name = equation.primitive.name
         if name in ELEMENTARY:
+            for variable in equation.invars:
+                check(variable.aval.dtype)
             return [self.each(lambda *numbers: ELEMENTARY[name](self.algebra, *numbers), *operands)]
         if name in ex.KNOWN:
             return [self.elementwise(name, *operands)]

@@ -7,6 +7,7 @@ there are. Here one thread computes a robot's whole step in registers.
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Callable, Sequence
 from functools import cache
 from typing import Any, Final
@@ -32,7 +33,8 @@ Shapes = tuple[jax.ShapeDtypeStruct, ...]
 def one_kernel(function: Callable[..., Any]) -> Callable[..., Any]:
     """Return `function`, which on an NVIDIA GPU runs as one kernel, and elsewhere as it is.
 
-    It may be batched, any number of times. Where it cannot be one kernel (`Unsupported`) it runs as it is, too.
+    It may be batched, any number of times (under `jax.shard_map` with `check_vma=False`). Where it cannot be one kernel
+    (`Unsupported`) it runs as it is, and a warning says why.
 
     Args:
         function: of trees of small arrays (float32, int32, bool); pure, and not differentiated.
@@ -43,14 +45,16 @@ def one_kernel(function: Callable[..., Any]) -> Callable[..., Any]:
         """Return the results' expressions and shapes."""
         try:
             results, shape = scalarize(function, *jax.tree.unflatten(treedef, shapes))
-        except Unsupported:
+            ptx.check_results(results)
+        except Unsupported as reason:
+            warnings.warn(f"What could be one GPU kernel is many, and slower, because of {reason}.", stacklevel=3)
             return None
-        return None if ptx.is_too_large(results) else (results, shape)
+        return results, shape
 
     def run(*arguments: Any) -> Any:
-        if not _has_gpu():
-            return function(*arguments)
         leaves, treedef = jax.tree.flatten(arguments)
+        if not leaves or not has_gpu():
+            return function(*arguments)
         leaves = [jnp.asarray(leaf) for leaf in leaves]
         shapes = tuple(jax.ShapeDtypeStruct(leaf.shape, leaf.dtype) for leaf in leaves)
         made = program(treedef, shapes)
@@ -68,7 +72,7 @@ def one_kernel(function: Callable[..., Any]) -> Callable[..., Any]:
 
 
 @cache
-def _has_gpu() -> bool:
+def has_gpu() -> bool:
     """Whether programs may run on an NVIDIA GPU that is new enough."""
     device = jax.devices()[0]
     try:
@@ -126,7 +130,9 @@ def _launch(
 ) -> list[Array]:
     """Call the kernel, with as many threads as the batch has elements."""
     threads = math.prod(batch)
-    some = [i for i, result in enumerate(results) if result.size]
+    some = [i for i, result in enumerate(results) if result.size and threads]
+    if not some:
+        return [jnp.zeros((*batch, *out.shape), out.dtype) for out in outputs]
     written = [results[i] for i in some]
     arrays = {
         i: ptx.Array(math.prod(shapes[i].shape), np.dtype(shapes[i].dtype), math.prod(batch[depths[i] :]))

@@ -21,6 +21,7 @@ from evoclaims.core.kernels.expressions import (
     is_known,
 )
 from evoclaims.core.kernels.interpreter import Numbers
+from evoclaims.core.kernels.unsupported import Unsupported
 
 ENTRY: Final = "kernel"
 HEAD: Final = ".version 7.1\n.target sm_80\n.address_size 64\n"
@@ -29,6 +30,7 @@ LARGEST: Final = 200_000
 CAPABILITY: Final = 8.0
 """The compute capability that the target needs: `max.NaN` and `min.NaN`."""
 COMPARED: Final = {name: f"setp.{name}" for name in ("eq", "ge", "gt", "le", "lt")}
+# The assembler may fuse a product with the sum that it goes into, which is faster and more exact.
 FLOATS: Final = {name: f"{code}.f32" for name, code in COMPARED.items()} | {
     "abs": "abs.f32",
     "add": "add.f32",
@@ -38,13 +40,12 @@ FLOATS: Final = {name: f"{code}.f32" for name, code in COMPARED.items()} | {
     "max": "max.NaN.f32",
     "min": "min.NaN.f32",
     "mul": "mul.f32",
-    "ne": "setp.neu.f32",
+    "ne": "setp.neu.f32",  # true of NaN, of which the other comparisons are false
     "neg": "neg.f32",
-    "round": "cvt.rni.f32.f32",
+    "rint": "cvt.rni.f32.f32",
     "select": "selp.f32",
     "sqrt": "sqrt.rn.f32",
     "sub": "sub.f32",
-    "trunc": "cvt.rzi.f32.f32",
 }
 INTEGERS: Final = {name: f"{code}.s32" for name, code in COMPARED.items()} | {
     "abs": "abs.s32",
@@ -92,9 +93,20 @@ def arrays_read(results: Sequence[Numbers]) -> list[int]:
     return sorted({e.array for e in _everything(_numbers(results)) if isinstance(e, Input)})
 
 
-def is_too_large(results: Sequence[Numbers]) -> bool:
-    """Whether a kernel of these would take minutes to assemble."""
-    return len(_everything(_numbers(results))) > LARGEST
+def check_results(results: Sequence[Numbers]) -> None:
+    """Check that there is an instruction for every operation, and that assembling takes less than a minute or so.
+
+    Raises:
+        Unsupported: when there is none, or there are more than `LARGEST` operations.
+    """
+    everything = _everything(_numbers(results))
+    if len(everything) > LARGEST:
+        raise Unsupported(f"its {len(everything):,} operations ({LARGEST:,} at most)")
+    for operation in everything:
+        if isinstance(operation, Operation):
+            kind, name = operation.operands[-1].dtype.kind, operation.name
+            if name not in ("cast", *INSTRUCTIONS[kind]) and (kind, name) != ("b", "eq"):
+                raise Unsupported(f'"{name}" of {operation.operands[-1].dtype}')
 
 
 def kernel(results: Sequence[Numbers], arrays: dict[int, Array], threads: int, block: int) -> str:
@@ -185,6 +197,8 @@ class _Page:
                     operands = [self.operand(o, registers) for o in expression.operands]
                     place = self.register(expression.dtype)
                     self._operate(expression, place, operands)
+                case _:
+                    raise AssertionError(f"a number of no loop around: {expression}")
             registers[id(expression)] = place
 
     def operand(self, number: Number, registers: dict[int, Any]) -> str:

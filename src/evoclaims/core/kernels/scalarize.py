@@ -27,6 +27,8 @@ def scalarize(function: Callable[..., Any], *arguments: Any) -> tuple[list[Numbe
         Unsupported: for a primitive, a use of one, or a dtype that has no scalar expression here.
     """
     jaxpr, shape = jax.make_jaxpr(function, return_shape=True)(*arguments)
+    for aval in jaxpr.out_avals:
+        check(aval.dtype)
     inputs = [
         listed([Input(check(leaf.dtype), array, place) for place in range(math.prod(leaf.shape))], leaf.shape)
         for array, leaf in enumerate(jax.tree.leaves(arguments))

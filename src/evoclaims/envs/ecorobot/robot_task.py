@@ -14,7 +14,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int, PRNGKeyArray
 
 from evoclaims.core.errors import UserError
-from evoclaims.core.kernels.one_kernel import one_kernel
+from evoclaims.core.kernels.one_kernel import has_gpu, one_kernel
 from evoclaims.core.keys import streams
 from evoclaims.core.pytree import pytree, select, strong
 from evoclaims.envs.base import Episode, PolicyFn, TaskState
@@ -66,6 +66,8 @@ class Ruling:
 @dataclass(frozen=True)
 class RobotTask(ABC):
     """A task of one level. A new one gives its name, its boxes and its `rule`; and `memory`, `measures` where needed.
+
+    Its fields are hashable, and what `rule` reads of them is compared: equal tasks have one kernel.
 
     Attributes:
         robot: who acts.
@@ -199,8 +201,9 @@ class RobotTask(ABC):
 
     def step(self, state: TaskState, action: Float[Array, " action"]) -> TaskState:
         """Act for `robot.frames` simulation steps: `plain_step`, on an NVIDIA GPU in one kernel (`one_kernel`)."""
-        following: TaskState = _kernel(self.with_numbers(None))(state, action, self.numbers)
-        return following
+        if not has_gpu():
+            return self.plain_step(state, action)
+        return _kernel(self.with_numbers(None))(state, action, self.numbers)
 
     def plain_step(self, state: TaskState, action: Float[Array, " action"]) -> TaskState:
         """Act for `robot.frames` simulation steps.
