@@ -95,20 +95,19 @@ def _mul(algebra: Algebra, a: Number, b: Number) -> Number | None:
 
 def _div(algebra: Algebra, a: Number, b: Number) -> Number | None:
     if b.dtype.kind == "i":
-        return _check_divisor(b) if not _is(b, 1) else a
+        _check_divisor(b)
     if _is(b, 1) or _is(a, 0):
         return a
-    if (
-        is_known(b) and abs(math.frexp(float(b))[0]) == 0.5 and abs(b) > 1e-30
-    ):  # a power of two: its reciprocal is exact
-        return algebra.apply("mul", a, b.dtype.type(1) / b)
+    if b.dtype.kind == "f" and is_known(b) and abs(math.frexp(float(b))[0]) == 0.5 and abs(b) > 1e-30:
+        return algebra.apply("mul", a, b.dtype.type(1) / b)  # a power of two, whose reciprocal is exact
     return None
 
 
 def _rem(algebra: Algebra, a: Number, b: Number) -> Number | None:
     if b.dtype.kind == "f":
         raise Unsupported("a remainder of floats")
-    return _check_divisor(b)
+    _check_divisor(b)
+    return None
 
 
 def _check_divisor(divisor: Number) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, Final
 
 import numpy as np
@@ -37,7 +37,7 @@ def _convert_element_type(s: Scalars, equation: Any, x: Numbers) -> Sequence[Num
     return [s.each(lambda n: s.algebra.cast(n, equation.params["new_dtype"]), x)]
 
 
-IDENTITIES: Final = {
+IDENTITIES: Final[dict[str, Callable[[np.dtype[Any]], float]]] = {
     "add": lambda dtype: 0,
     "and": lambda dtype: -1,
     "max": lambda dtype: -np.inf if dtype.kind == "f" else np.iinfo(dtype).min,

@@ -17,7 +17,7 @@ from evoclaims.core.kernels.unsupported import Unsupported
 
 Numbers = NDArray[Any]
 """An array of objects, each a `Number`."""
-DTYPES: Final = (np.dtype(np.float32), np.dtype(np.int32), np.dtype(bool))
+DTYPES: Final[tuple[np.dtype[Any], ...]] = (np.dtype(np.float32), np.dtype(np.int32), np.dtype(bool))
 PRIMITIVES: Final[dict[str, Callable[..., Sequence[Numbers]]]] = {}
 """By jax's names. Elementwise operations are in `KNOWN` and `ELEMENTARY` instead."""
 CALLS: Final = {
@@ -64,9 +64,10 @@ def check(dtype: Any) -> np.dtype[Any]:
     Raises:
         Unsupported: when it is not one that expressions may have.
     """
-    if dtype not in DTYPES:
-        raise Unsupported(f"numbers of {dtype}")
-    return np.dtype(dtype)
+    for known_dtype in DTYPES:
+        if dtype == known_dtype:
+            return known_dtype
+    raise Unsupported(f"numbers of {dtype}")
 
 
 class Scalars:
