@@ -118,7 +118,7 @@ def kernel(results: Sequence[Numbers], arrays: dict[int, Array], threads: int, b
         threads: how many rows there are.
         block: threads in a block.
     """
-    page = _Page(arrays)
+    page = _Page()
     page.write("mov.u32 %row, %ctaid.x", "mov.u32 %in_block, %tid.x", f"mad.lo.u32 %row, %row, {block}, %in_block")
     page.write(f"setp.ge.u32 %none, %row, {threads}", "@%none bra done")
     for parameter, array in arrays.items():
@@ -154,9 +154,8 @@ def _everything(numbers: Iterable[Number]) -> list[Expression]:
 class _Page:
     """Instructions, as they are written down. Every register is written once, but for those that loops carry."""
 
-    def __init__(self, arrays: dict[int, Array]) -> None:
+    def __init__(self) -> None:
         """Begin an empty page."""
-        self.arrays = arrays
         self.lines: list[str] = []
         self.count = dict.fromkeys(TYPES, 0)
         self.labels = 0
