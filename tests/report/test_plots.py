@@ -9,7 +9,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from evoclaims.report.curves import CurvePanel, Line
@@ -104,6 +104,7 @@ def test_any_values_and_names_make_a_sound_drawing(values: list[float], label: s
 
 
 @given(finite, finite)
+@example(-1.7976931348623155e308, -1.7976931348623157e308)
 def test_ticks_are_few_rising_and_within_the_axis(one: float, other: float) -> None:
     low, high = sorted((one / 4, other / 4))
     found = ticks(low, high)

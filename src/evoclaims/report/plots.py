@@ -145,8 +145,8 @@ def curve_symbol(panel: CurvePanel, name: str) -> Markup:
 
 
 def ticks(low: float, high: float, most: int = 5) -> list[float]:
-    """Return at most `most` + 1 round values from `low` to `high`."""
-    if high - low < LEAST:
+    """Return at most `most` + 1 round values from `low` to `high`; one, where they are too near for floats between."""
+    if high - low < max(LEAST, 1e-9 * max(abs(low), abs(high))):
         return [low]
     rough = (high - low) / most
     power = 10.0 ** math.floor(math.log10(rough))
