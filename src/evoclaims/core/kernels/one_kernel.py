@@ -87,7 +87,8 @@ def _batched(alone: Callable[..., list[Array]], results: list[Numbers], shapes: 
     An array with fewer of them than others lacks the innermost.
     """
 
-    def launch(*leaves: Array) -> list[Array]:
+    @custom_vmap
+    def call(*leaves: Array) -> list[Array]:
         depths = [leaf.ndim - len(shape.shape) for leaf, shape in zip(leaves, shapes, strict=True)]
         deepest = max(range(len(leaves)), key=depths.__getitem__)
         batch = leaves[deepest].shape[: depths[deepest]]
@@ -103,10 +104,6 @@ def _batched(alone: Callable[..., list[Array]], results: list[Numbers], shapes: 
 
         made: list[Array] = jax.lax.platform_dependent(*leaves, cuda=as_one_kernel, default=as_it_is)
         return made
-
-    @custom_vmap
-    def call(*leaves: Array) -> list[Array]:
-        return launch(*leaves)
 
     @call.def_vmap
     def batch(size: int, batched: Sequence[bool], *leaves: Array) -> tuple[list[Array], list[bool]]:

@@ -22,7 +22,7 @@ class BraxEnv(Env):  # type: ignore[misc]
 
     `State.pipeline_state` is the task's own state. `done` says that the task has ended; episodes are truncated by
     Brax's `EpisodeWrapper`, whose `episode_length` is `task.horizon`. On an NVIDIA GPU a step is one kernel,
-    through which no gradient flows; `task.plain_step` is for those.
+    which cannot be differentiated; `task.plain_step` can.
     """
 
     def __init__(self, task: RobotTask) -> None:

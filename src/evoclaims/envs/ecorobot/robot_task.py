@@ -201,7 +201,7 @@ class RobotTask(ABC):
 
     def step(self, state: TaskState, action: Float[Array, " action"]) -> TaskState:
         """Act for `robot.frames` simulation steps: `plain_step`, on an NVIDIA GPU in one kernel (`one_kernel`)."""
-        if not has_gpu():
+        if not has_gpu():  # and no task needs to be hashed for its kernel
             return self.plain_step(state, action)
         return _kernel(self.with_numbers(None))(state, action, self.numbers)
 
