@@ -145,9 +145,9 @@ class Side:
         state = self.lanes.start(range(trials), trials)
         self.lanes.programs(trials)
         if case.grown:
-            state = replace(state, method=jax.vmap(place)(state.method))
+            state = tuple(replace(share, method=jax.vmap(place)(share.method)) for share in state)
         state, _ = self.lanes.advance(state, case.warm_up, trials)
-        self.start, self.begin = jax.device_get(state), case.warm_up
+        self.start, self.begin = self.lanes.gather(state), case.warm_up
 
     def rate(self, generations: int) -> float:
         """Return seed-generations per second."""

@@ -32,7 +32,7 @@ def test_a_gpu_that_is_not_there_is_a_sentence_with_the_remedy(monkeypatch: pyte
 
 def test_the_cpu_can_always_be_asked_for() -> None:
     assert {device.platform for device in devices.choose("cpu")} == {"cpu"}
-    assert devices.layout_for(devices.choose("cpu")) == "loop"
+    assert devices.layout_for(devices.choose("cpu")) == "alone"
 
 
 SCRIPT = """
@@ -53,9 +53,8 @@ def _configured(**settings: str) -> tuple[int, str]:
     return count, folder
 
 
-def test_there_is_a_cpu_device_for_every_core_and_a_cache_that_lasts(tmp_path: Path) -> None:
-    cores = devices.usable_cores()
-    assert _configured(XDG_CACHE_HOME=str(tmp_path)) == (cores, str(tmp_path / "evoclaims" / "xla"))
+def test_a_cpu_is_one_device_and_there_is_a_cache_that_lasts(tmp_path: Path) -> None:
+    assert _configured(XDG_CACHE_HOME=str(tmp_path)) == (1, str(tmp_path / "evoclaims" / "xla"))
 
 
 def test_what_a_user_has_decided_stays(tmp_path: Path) -> None:

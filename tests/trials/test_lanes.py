@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections import Counter
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -19,19 +20,11 @@ from evoclaims.trials.runner import run
 from evoclaims.trials.store import Store
 
 
-class _Mesh:
-    """Stands for the mesh of `Lanes`, of which only the number of devices matters here."""
-
-    def __init__(self, size: int) -> None:
-        self.size = size
-
-
 def _lanes(devices: int, layout: str = "vector") -> Lanes:
     """Return lanes over devices that need not exist."""
     lanes = object.__new__(Lanes)
     lanes.devices = [None] * devices  # type: ignore[list-item]
     lanes.layout = layout
-    lanes._mesh = lambda width: _Mesh(max(n for n in range(1, devices + 1) if width % n == 0))  # type: ignore
     return lanes
 
 
@@ -68,7 +61,7 @@ def test_a_batch_uses_no_more_devices_than_it_has_trials(data: st.DataObject, fu
     width = lanes.width(active, full)
     assert width % min(devices, full) == 0
     assert active <= width <= full + min(devices, full) - 1
-    assert _lanes(devices, "loop").width(active, full) == lanes.width(full, full)
+    assert _lanes(devices, "alone").width(active, full) == full
 
 
 @given(st.data(), counts, st.integers(1, 8))
@@ -82,30 +75,17 @@ def test_an_arrangement_places_every_active_lane_once_and_loads_devices_evenly(
     assert len(order) == width
     assert sorted(lane for lane in order if lane is not None) == active
     assert order == lanes.arrangement(active, width)
-    used = lanes._mesh(width).size
+    used = len(lanes._homes(width))
+    assert used == min(devices, full)
     loads = [sum(lane is not None for lane in share) for share in np.array(order, dtype=object).reshape(used, -1)]
     assert max(loads) - min(loads) <= 1
 
 
-@given(st.data(), counts, st.integers(1, 8), st.sampled_from(["loop", "vector"]))
-def test_lanes_that_have_just_been_arranged_are_not_worth_moving_again(
-    data: st.DataObject, full: int, devices: int, layout: str
-) -> None:
-    lanes = _lanes(devices, layout)
-    active = sorted(data.draw(st.sets(st.integers(0, full - 1), min_size=1)))
-    width = lanes.width(len(active), full)
-    order = lanes.arrangement(active, width)
-    placed = [lane for lane, was in enumerate(order) if was is not None]
-    assert not lanes.worth_moving(placed, width, width)
-
-
-def test_lanes_move_into_fewer_lanes_or_off_a_device_that_has_more_to_do() -> None:
-    assert _lanes(1).worth_moving([0, 5], 8, 2)
-    assert not _lanes(1).worth_moving([0, 5], 8, 8)
-    assert _lanes(2, "loop").worth_moving([0, 1], 8, 8)
-    assert not _lanes(2, "loop").worth_moving([0, 7], 8, 8)
-    assert not _lanes(2, "loop").worth_moving([0], 8, 8)
-    assert not _lanes(2, "vector").worth_moving([0, 1], 8, 8)
+@given(counts, st.integers(1, 8))
+def test_on_a_cpu_every_lane_is_a_call_of_its_own_on_one_device(full: int, devices: int) -> None:
+    lanes = _lanes(devices, "alone")
+    assert len(lanes._homes(full)) == full
+    assert lanes.arrangement(range(full), full) == list(range(full))
 
 
 @settings(max_examples=20, deadline=None)
@@ -113,7 +93,7 @@ def test_lanes_move_into_fewer_lanes_or_off_a_device_that_has_more_to_do() -> No
 def test_rearranged_lanes_keep_their_state_and_the_others_go_idle(order: list[int | None]) -> None:
     lanes = Lanes(walk(), jax.devices("cpu")[:1])
     program_state = _started()
-    moved = jax.device_get(lanes.rearrange(program_state, order, len(order)))
+    moved = lanes.gather(lanes.rearrange(lanes.place(program_state, 4), order, len(order)))
     for place, lane in enumerate(order):
         assert moved.idle[place] == (lane is None)
         if lane is not None:
@@ -127,12 +107,12 @@ _cached: list[Any] = []
 def _started() -> Any:
     """Return the state of four trials on the host, started once."""
     if not _cached:
-        _cached.append(jax.device_get(Lanes(walk(), jax.devices("cpu")[:1]).start([3, 1, 4, 2], 4)))
+        _cached.append(Lanes.gather(Lanes(walk(), jax.devices("cpu")[:1]).start([3, 1, 4, 2], 4)))
     return _cached[0]
 
 
-@pytest.mark.parametrize("layout", ["loop", "vector"])
-def test_each_width_is_compiled_once_in_a_run(
+@pytest.mark.parametrize("layout", ["alone", "vector"])
+def test_each_size_of_a_share_is_compiled_once_a_device_in_a_run(
     layout: str,
     tmp_path: Path,
     cpus: list[Any],
@@ -140,29 +120,30 @@ def test_each_width_is_compiled_once_in_a_run(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
     monkeypatch.setattr("evoclaims.trials.lanes.layout_for", lambda devices: layout)
-    widths: Counter[int] = Counter()
-    compile_width = Lanes._compile
+    sizes: Counter[int] = Counter()
+    compile_size = Lanes._compile
 
-    def spy(self: Lanes, width: int) -> Compiled:
-        widths[width] += 1
-        return compile_width(self, width)
+    def spy(self: Lanes, size: int, homes: Sequence[jax.Device]) -> dict[jax.Device, Compiled]:
+        sizes.update({size: len(homes)})
+        return compile_size(self, size, homes)
 
     monkeypatch.setattr(Lanes, "_compile", spy)
     with jax.log_compiles(), caplog.at_level(logging.WARNING, "jax"):
         results = run(walk(chance=0.35, hazard=0.04), range(1, 6), Store(tmp_path), cpus)
-    assert widths == ({6: 1} if layout == "loop" else {6: 1, 2: 1})
+    assert sizes == ({1: 1} if layout == "alone" else {3: 2, 1: 2})  # lanes of a share, on how many devices
     compiled = [r for r in caplog.records if r.getMessage().startswith("Compiling ")]
-    assert len(compiled) == 1 + 2 * len(widths), [r.getMessage() for r in compiled]  # start, then advance and score
+    starts = 1 if layout == "alone" else 2
+    assert len(compiled) == starts + 2 * sizes.total(), [r.getMessage() for r in compiled]
     assert len({result.metrics["steps"] for result in results}) > 1
 
 
 def test_a_chunk_moves_nothing_between_host_and_device(cpus: list[Any]) -> None:
     lanes = Lanes(walk(), cpus)
-    state, bound = lanes.start([0, 1], 2), lanes.place(np.full(2, 5, np.int32), 2)
-    advance = lanes.programs(2).advance
+    (state, _), (bound, _) = lanes.start([0, 1], 2), lanes.place(np.full(2, 5, np.int32), 2)
+    advance = lanes.programs(2)[0].advance
     with jax.transfer_guard("disallow"):
         state, report = advance(state, bound)
-    assert np.asarray(report.steps).tolist() == [5, 5]
+    assert np.asarray(report.steps).tolist() == [5]
     text = advance.as_text()  # type: ignore[attr-defined]
     assert not [word for word in ("callback", "infeed", "outfeed", "send(", "recv(") if word in text]
 
@@ -171,7 +152,7 @@ def test_the_state_given_to_a_chunk_is_donated(cpus: list[Any]) -> None:
     lanes = Lanes(walk(), cpus)
     before = lanes.start([0, 1], 2)
     lanes.advance(before, 1, 2)
-    assert before.method.is_deleted()
+    assert all(share.method.is_deleted() for share in before)
 
 
 def test_a_torn_entry_of_the_compilation_cache_costs_time_and_nothing_else(tmp_path: Path, cpus: list[Any]) -> None:

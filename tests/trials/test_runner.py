@@ -38,7 +38,7 @@ def test_only_the_missing_trials_are_run(store: Store, cpus: list[Any], puts: Co
     assert results[0].timing["batch"] == 2
 
 
-@pytest.mark.parametrize("layout", ["loop", "vector"])
+@pytest.mark.parametrize("layout", ["alone", "vector"])
 def test_a_report_tells_of_the_trials_that_run_whatever_lanes_they_have_moved_to(
     layout: str, store: Store, cpus: list[Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from trial_toys import walk
 
+from evoclaims.trials.lanes import Lanes
 from evoclaims.trials.program import Program, TrialState, over_trials
 
 SEEDS = np.arange(8, dtype=np.int32)
@@ -19,11 +20,13 @@ IDLE = np.arange(8) == 6
 def _advanced(layout: str, chunks: list[int], **toy: Any) -> list[TrialState]:
     """Return the state after each chunk, on the host."""
     program = Program(walk(**toy))
-    state = jax.jit(over_trials(program.start, layout))(SEEDS, IDLE)
-    advance, states = jax.jit(over_trials(program.advance, layout)), []
+    start = jax.jit(over_trials(program.start, layout))
+    advance = jax.jit(over_trials(program.advance, layout))
+    width = 1 if layout == "alone" else len(SEEDS)
+    shares, states = [start(SEEDS[i : i + width], IDLE[i : i + width]) for i in range(0, len(SEEDS), width)], []
     for until in chunks:
-        state, _ = advance(state, jnp.full(len(SEEDS), until, jnp.int32))
-        states.append(jax.device_get(state))
+        shares = [advance(share, jnp.full(width, until, jnp.int32))[0] for share in shares]
+        states.append(Lanes.gather(shares))
     return states
 
 
@@ -31,7 +34,7 @@ def _leaves(state: TrialState, lane: int) -> list[bytes]:
     return [np.asarray(leaf)[lane].tobytes() for leaf in jax.tree.leaves(state)]
 
 
-@pytest.mark.parametrize("layout", ["loop", "vector"])
+@pytest.mark.parametrize("layout", ["alone", "vector"])
 def test_the_state_of_a_trial_that_has_ended_no_longer_changes(layout: str) -> None:
     half, whole = _advanced(layout, [6, 12], chance=0.4, hazard=0.05)
     ended = np.asarray(half.ascent.finished | half.diverged)
@@ -41,7 +44,7 @@ def test_the_state_of_a_trial_that_has_ended_no_longer_changes(layout: str) -> N
         assert same == (bool(ended[lane]) or bool(IDLE[lane]))
 
 
-@pytest.mark.parametrize("layout", ["loop", "vector"])
+@pytest.mark.parametrize("layout", ["alone", "vector"])
 def test_an_idle_lane_takes_no_step(layout: str) -> None:
     (state,) = _advanced(layout, [12], chance=0.1)
     assert state.steps[6] == 0
@@ -49,17 +52,17 @@ def test_an_idle_lane_takes_no_step(layout: str) -> None:
 
 
 def test_chunks_of_any_length_lead_to_the_same_bits() -> None:
-    whole = _advanced("loop", [12], chance=0.1, hazard=0.02)[-1]
-    parts = _advanced("loop", [1, 2, 7, 12], chance=0.1, hazard=0.02)[-1]
+    whole = _advanced("alone", [12], chance=0.1, hazard=0.02)[-1]
+    parts = _advanced("alone", [1, 2, 7, 12], chance=0.1, hazard=0.02)[-1]
     assert [leaf.tobytes() for leaf in jax.tree.leaves(whole)] == [leaf.tobytes() for leaf in jax.tree.leaves(parts)]
 
 
 def test_no_trial_goes_beyond_its_budget() -> None:
-    (state,) = _advanced("loop", [1000], steps=5)
+    (state,) = _advanced("alone", [1000], steps=5)
     assert np.asarray(state.steps)[~IDLE].tolist() == [5] * 7
 
 
 def test_a_step_that_is_not_healthy_solves_nothing() -> None:
-    (state,) = _advanced("loop", [12], hazard=1.0)
+    (state,) = _advanced("alone", [12], hazard=1.0)
     assert np.asarray(state.diverged)[~IDLE].all()
     assert (np.asarray(state.ascent.solved_at) == -1).all()

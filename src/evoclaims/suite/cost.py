@@ -12,7 +12,7 @@ import jax
 import numpy as np
 
 from evoclaims.suite import references
-from evoclaims.trials.devices import layout_on
+from evoclaims.trials.devices import layout_on, usable_cores
 from evoclaims.trials.lanes import Lanes
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.spec import Condition, TrialSpec
@@ -26,7 +26,7 @@ class Pace:
     """How fast a condition runs.
 
     Attributes:
-        per_step: seconds of one step: of one trial where trials run one after the other, else of the whole batch.
+        per_step: seconds of one step: of one trial where each is a call of its own, else of the whole batch.
         compile: seconds of compilation.
         layout: see `program.over_trials`.
     """
@@ -37,7 +37,7 @@ class Pace:
 
     def seconds(self, condition: Condition, trials: int) -> float:
         """Return the time of `trials` trials that spend the whole budget."""
-        return self.compile + self.per_step * condition.steps * (trials if self.layout == "loop" else 1)
+        return self.compile + self.per_step * condition.steps * (trials if self.layout == "alone" else 1)
 
 
 def known_pace(
@@ -64,14 +64,14 @@ def known_pace(
     layout = layout_on(str(batch[0].provenance["device"]["platform"]))
     steps = [trial.metrics["steps"] for trial in batch]
     seconds = max(float(trial.timing["run"]) for trial in batch)
-    work = sum(steps) if layout == "loop" else max(steps)
+    work = sum(steps) if layout == "alone" else max(steps)
     return Pace(seconds / work, max(float(trial.timing["compile"]) for trial in batch), layout)
 
 
 def measured_pace(condition: Condition, devices: Sequence[jax.Device]) -> Pace:
-    """Compile one lane per device and time a few steps."""
+    """Compile, and time a few steps of one trial per core or device."""
     lanes = Lanes(condition, devices)
-    width = len(lanes.devices)
+    width = usable_cores() if lanes.layout == "alone" else len(lanes.devices)
     state = lanes.start(list(range(width)), width)
     state, _ = lanes.advance(state, 1, width)
     until = min(4, condition.steps)
@@ -79,5 +79,5 @@ def measured_pace(condition: Condition, devices: Sequence[jax.Device]) -> Pace:
     _, report = lanes.advance(state, until, width)
     took = time.perf_counter() - began
     steps = max(int(np.max(report.steps)) - 1, 1)
-    share = width if lanes.layout == "loop" else 1
+    share = width if lanes.layout == "alone" else 1
     return Pace(took / steps / share, lanes.seconds, lanes.layout)

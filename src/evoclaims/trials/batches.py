@@ -12,9 +12,8 @@ from evoclaims.core.canonical import content_hash
 from evoclaims.core.provenance import what_fixes_bits
 from evoclaims.trials import checkpoint
 from evoclaims.trials.checkpoint import Header
-from evoclaims.trials.lanes import Lanes
+from evoclaims.trials.lanes import Lanes, Shares
 from evoclaims.trials.outcome import provenance
-from evoclaims.trials.program import TrialState
 from evoclaims.trials.progress import RunProgress, Watcher
 from evoclaims.trials.spec import Condition, TrialSpec
 from evoclaims.trials.store import DamagedFileError, Store
@@ -41,14 +40,14 @@ class Batch:
 
     Attributes:
         header: what a checkpoint says of them.
-        state: their state on the devices (leaves [lanes, …]).
+        state: their state on the devices, share by share.
         stored: seeds in the lanes whose records are there already. An interrupted batch has them where trials ended
             after its last checkpoint and trials run side by side: their bits depend on the number of lanes, so these
             trials run along until they end again, and the batch narrows when it would have without the interruption.
     """
 
     header: Header
-    state: TrialState
+    state: Shares
     stored: frozenset[int] = frozenset()
 
     @property
@@ -98,8 +97,8 @@ def _resumed(run: Run, header: Header) -> Batch:
     held = [seed for seed in header.lanes if seed is not None]
     stored = frozenset(seed for seed in held if run.store.get(TrialSpec(run.condition, seed).id) is not None)
     run.watch(RunProgress(run.condition.label, "resuming", len(held) - len(stored)))
-    state = checkpoint.restore(run.store.checkpoints, header, lanes.programs(width).shapes)
-    if lanes.layout == "loop":
+    state = checkpoint.restore(run.store.checkpoints, header, lanes.shapes(width))
+    if lanes.layout == "alone":
         # A trial's bits are its own: a lane whose trial is stored goes idle, and costs nothing.
         header = replace(header, lanes=[None if seed in stored else seed for seed in header.lanes])
         state = replace(state, idle=state.idle | np.array([seed is None for seed in header.lanes]))

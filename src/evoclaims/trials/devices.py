@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import os
 from contextlib import AbstractContextManager
 from pathlib import Path
@@ -19,10 +18,9 @@ MATMUL_PRECISION: Final = "highest"
 
 
 def configure() -> None:
-    """Prepare jax before its first use: one CPU device per core, and a compilation cache that outlives the process.
+    """Prepare jax before its first use: a compilation cache that outlives the process.
 
-    Does nothing that a user has already decided (JAX_COMPILATION_CACHE_DIR, JAX_NUM_CPU_DEVICES, a device count in
-    XLA_FLAGS, a jax that has already started).
+    A cache that a user has chosen (JAX_COMPILATION_CACHE_DIR) stays.
 
     Raises:
         UserError: when JAX_PLATFORMS names hardware that is not there.
@@ -34,10 +32,6 @@ def configure() -> None:
         config.update("jax_persistent_cache_min_compile_time_secs", 0.2)
         # jax would otherwise evict nothing and warn about nothing; a broken cache must not break a run.
         config.update("jax_raise_persistent_cache_errors", False)
-    forced = "xla_force_host_platform_device_count" in os.environ.get("XLA_FLAGS", "")
-    if not forced and config.jax_num_cpu_devices == -1:
-        with contextlib.suppress(RuntimeError):  # jax has started: its devices stay as they are
-            config.update("jax_num_cpu_devices", usable_cores())
     choose("auto")  # now, before an import that computes something fails with a traceback
 
 
@@ -84,4 +78,4 @@ def layout_for(devices: list[jax.Device]) -> str:
 
 def layout_on(platform: str) -> str:
     """Return how trials are laid out on devices of a platform, such as "cpu"."""
-    return "loop" if platform == "cpu" else "vector"
+    return "alone" if platform == "cpu" else "vector"

@@ -1,4 +1,8 @@
-"""A batch of trials as one compiled program: one lane per trial, spread over devices."""
+"""A batch of trials in compiled programs: a lane per trial, and a program for each device that knows of no other.
+
+No program spans devices, so that nothing has to be partitioned: on a CPU each trial is a call of its own, and as many
+run at a time as there are cores; on accelerators each device runs its share of the lanes side by side.
+"""
 
 from __future__ import annotations
 
@@ -12,20 +16,20 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 import jax
-import jax.numpy as jnp
 import numpy as np
-from jax.sharding import Mesh, NamedSharding, PartitionSpec
+from jax.sharding import SingleDeviceSharding
 
-from evoclaims.trials.devices import MATMUL_PRECISION, layout_for
+from evoclaims.trials.devices import MATMUL_PRECISION, layout_for, usable_cores
 from evoclaims.trials.program import Program, Report, Score, TrialState, over_trials
 from evoclaims.trials.spec import Condition
-
-AXIS = "trials"
 
 SHORT: Final = 100_000
 """Environment steps of a trial up to which, on a CPU, compiling fast is worth more than running fast."""
 
 FAST_TO_COMPILE: Final = {"xla_backend_optimization_level": 1, "xla_llvm_disable_expensive_passes": True}
+
+Shares = tuple[TrialState, ...]
+"""The states of a batch, leaves [lanes of the share]: each share lies on one device, and one call advances it."""
 
 
 def width_for(active: int, devices: int, full: int) -> int:
@@ -43,20 +47,18 @@ def width_for(active: int, devices: int, full: int) -> int:
 
 @dataclass(frozen=True)
 class Compiled:
-    """The programs of a condition for one number of lanes.
+    """The programs of a condition for one share of the lanes.
 
     Attributes:
-        advance, score: compiled; all arguments and results have a leading axis [lanes].
-        shapes: shapes and dtypes of the stacked state.
+        advance, score: compiled; all arguments and results have a leading axis [lanes of the share].
     """
 
     advance: Callable[..., tuple[TrialState, Report]]
     score: Callable[..., Score]
-    shapes: Any
 
 
 class Lanes:
-    """Compiles a condition's programs for given devices, each width at most once.
+    """Compiles a condition's programs for given devices, each size of a share at most once a device, and runs them.
 
     Attributes:
         condition: what is compiled.
@@ -72,80 +74,109 @@ class Lanes:
         self.layout = layout_for(self.devices)
         self.seconds = 0.0
         self._program = Program(condition)
-        self._compiled: dict[int, Compiled] = {}
+        self._compiled: dict[tuple[int, jax.Device], Compiled] = {}
 
     def width(self, active: int, full: int) -> int:
         """Return the number of lanes for `active` of `full` trials.
 
-        In a loop an idle lane costs nothing, so that narrowing would only compile again.
+        Where each trial is a call of its own an idle lane costs nothing, so that there is nothing to gain from fewer.
         """
-        devices = min(len(self.devices), full)
-        return width_for(full if self.layout == "loop" else active, devices, full)
+        return full if self.layout == "alone" else width_for(active, min(len(self.devices), full), full)
 
-    def programs(self, width: int) -> Compiled:
-        """Return the programs for `width` lanes, compiling them the first time."""
-        if width not in self._compiled:
+    def programs(self, width: int) -> list[Compiled]:
+        """Return the programs of each share of `width` lanes, compiling those that have not been."""
+        size, homes = self._size(width), self._homes(width)
+        missing = [home for home in dict.fromkeys(homes) if (size, home) not in self._compiled]
+        if missing:
             began = time.perf_counter()
-            self._compiled[width] = self._compile(width)
+            self._compiled.update({(size, home): made for home, made in self._compile(size, missing).items()})
             self.seconds += time.perf_counter() - began
-        return self._compiled[width]
+        return [self._compiled[size, home] for home in homes]
 
-    def place(self, tree: Any, width: int) -> Any:
-        """Move a tree of host arrays with leading axis [width] onto the devices, lanes spread evenly."""
-        return jax.device_put(tree, self._sharding(width))
+    def shapes(self, width: int) -> Any:
+        """Return shapes and dtypes of the state of `width` lanes, as `gather` gives it."""
+        return self._state(width)
 
-    def start(self, seeds: Sequence[int | None], width: int) -> TrialState:
+    def place(self, tree: Any, width: int) -> tuple[Any, ...]:
+        """Deal a tree of host arrays with leading axis [width] out to the shares, each on its device."""
+        leaves, structure = jax.tree.flatten(tree)
+        size = self._size(width)
+        shares = [[leaf[first : first + size] for leaf in leaves] for first in range(0, width, size)]
+        placed = zip(shares, self._homes(width), strict=True)
+        return tuple(jax.device_put(jax.tree.unflatten(structure, share), home) for share, home in placed)
+
+    @staticmethod
+    def gather(shares: Sequence[Any]) -> Any:
+        """Return as one tree with leading axis [width], on the host, what `place` has dealt out."""
+        return jax.tree.map(lambda *leaves: np.concatenate(leaves), *jax.device_get(list(shares)))
+
+    def start(self, seeds: Sequence[int | None], width: int) -> Shares:
         """Start one trial per lane; None makes an idle lane."""
         known = np.array([0 if seed is None else seed for seed in seeds], np.int32)
         idle = np.array([seed is None for seed in seeds])
+        size, homes = self._size(width), self._homes(width)
         began = time.perf_counter()
         with self._settings():
-            lowered = self._spread(self._program.start, width).lower(*self.place((known, idle), width))
-            compiled = lowered.compile(self._compiler_options)
+            lowered = [self._lowered(self._program.start, home, _seeds(size)) for home in dict.fromkeys(homes)]
+            starts = dict(zip(homes, self._side_by_side(self._finished, lowered), strict=False))
         self.seconds += time.perf_counter() - began
-        state: TrialState = compiled(*self.place((known, idle), width))
-        return state
+        return tuple(starts[home](*share) for home, share in zip(homes, self.place((known, idle), width), strict=True))
 
-    def advance(self, state: TrialState, until: int, width: int) -> tuple[TrialState, Report]:
+    def advance(self, state: Shares, until: int, width: int) -> tuple[Shares, Report]:
         """Take every trial to its end or to `until` steps; `state` is donated. The report is on the host."""
-        bound = self.place(np.full(width, until, np.int32), width)
-        state, report = self.programs(width).advance(state, bound)
-        return state, jax.device_get(report)
 
-    def score(self, state: TrialState, width: int) -> Score:
+        def one(program: Compiled, share: TrialState, bound: Any) -> tuple[TrialState, Report]:
+            share, report = program.advance(share, bound)
+            return share, jax.device_get(report)
+
+        bounds = self.place(np.full(width, until, np.int32), width)
+        advanced = self._side_by_side(one, self.programs(width), state, bounds)
+        return tuple(share for share, _ in advanced), self.gather([report for _, report in advanced])
+
+    def score(self, state: Shares, width: int) -> Score:
         """Judge every lane's champion; the result is on the host."""
-        score: Score = jax.device_get(self.programs(width).score(state))
+        scores = self._side_by_side(
+            lambda program, share: jax.device_get(program.score(share)), self.programs(width), state
+        )
+        score: Score = self.gather(scores)
         return score
 
-    def rearrange(self, state: TrialState, lanes: Sequence[int | None], width: int) -> TrialState:
+    def rearrange(self, state: Shares, lanes: Sequence[int | None], width: int) -> Shares:
         """Build a batch of `width` from the given lanes of `state`, in this order; None makes an idle lane."""
         spare = next(lane for lane in lanes if lane is not None)
         order = np.array([spare if lane is None else lane for lane in lanes])
-        host: TrialState = jax.tree.map(lambda leaf: leaf[order], jax.device_get(state))
+        host: TrialState = jax.tree.map(lambda leaf: leaf[order], self.gather(state))
         idle = np.array([lane is None for lane in lanes])
-        placed: TrialState = self.place(dataclasses.replace(host, idle=host.idle | idle), width)
-        return placed
+        return self.place(dataclasses.replace(host, idle=host.idle | idle), width)
 
     def arrangement(self, active: Sequence[int], width: int) -> list[int | None]:
-        """Deal active lanes out to the devices like cards, so that none works while another has nothing to do."""
-        devices = self._mesh(width).size
-        hands = [list(active[device::devices]) for device in range(devices)]
-        return [lane for hand in hands for lane in [*hand, *[None] * (width // devices - len(hand))]]
+        """Deal active lanes out to the shares like cards, so that none works while another has nothing to do."""
+        size = self._size(width)
+        shares = width // size
+        hands = [list(active[share::shares]) for share in range(shares)]
+        return [lane for hand in hands for lane in [*hand, *[None] * (size - len(hand))]]
 
-    def worth_moving(self, active: Sequence[int], lanes: int, width: int) -> bool:
-        """Whether to move the active ones of `lanes` lanes: into fewer lanes, or off a device that has more to do."""
-        devices = self._mesh(width).size
-        loads = np.bincount(np.array(active) * devices // lanes, minlength=devices)
-        return width < lanes or (self.layout == "loop" and int(loads.max() - loads.min()) > 1)
+    def _size(self, width: int) -> int:
+        """Return the lanes of one share of `width`: one, or all that a device runs side by side."""
+        if self.layout == "alone":
+            return 1
+        return width // max(count for count in range(1, len(self.devices) + 1) if width % count == 0)
 
-    def _mesh(self, width: int) -> Mesh:
-        """Return the mesh that `width` lanes are spread over: as many devices as divide it."""
-        count = max(n for n in range(1, len(self.devices) + 1) if width % n == 0)
-        return Mesh(np.array(self.devices[:count]), (AXIS,))
+    def _homes(self, width: int) -> list[jax.Device]:
+        """Return the device of each share. A CPU's cores are one device: all its trials share the programs."""
+        shares = width // self._size(width)
+        return [self.devices[0]] * shares if self.layout == "alone" else self.devices[:shares]
 
-    def _sharding(self, width: int) -> NamedSharding:
-        """Return the even spread of the leading axis over the mesh."""
-        return NamedSharding(self._mesh(width), PartitionSpec(AXIS))
+    def _side_by_side(self, function: Callable[..., Any], *arguments: Sequence[Any]) -> list[Any]:
+        """Call the function for all shares, on as many threads as there are cores or devices; jax lets go of Python."""
+        threads = usable_cores() if self.layout == "alone" else len(self.devices)
+        with ThreadPoolExecutor(threads) as pool:
+            calls = [pool.submit(function, *each) for each in zip(*arguments, strict=True)]
+            try:
+                return [call.result() for call in calls]
+            except BaseException:  # an interrupt must not wait for trials that have not begun
+                pool.shutdown(wait=False, cancel_futures=True)
+                raise
 
     @staticmethod
     @contextmanager
@@ -156,35 +187,42 @@ class Lanes:
             warnings.filterwarnings("ignore", "Error (reading|writing) persistent compilation cache")
             yield
 
-    def _spread(self, function: Callable[..., Any], width: int, donate: bool = False) -> Any:
-        """Lay a single-trial function out over lanes and devices, ready to be lowered."""
+    def _lowered(self, function: Callable[..., Any], home: jax.Device, arguments: Any, donate: bool = False) -> Any:
+        """Trace a single-trial function for the lanes of a share on a device; `arguments` are shapes and dtypes."""
+        place = SingleDeviceSharding(home)
+        placed = jax.tree.map(lambda leaf: jax.ShapeDtypeStruct(leaf.shape, leaf.dtype, sharding=place), arguments)
         laid_out = over_trials(function, self.layout)
-        axis = PartitionSpec(AXIS)
-        spread = jax.shard_map(laid_out, mesh=self._mesh(width), in_specs=axis, out_specs=axis, check_vma=False)
-        return jax.jit(spread, donate_argnums=(0,) if donate else ())
+        return jax.jit(laid_out, donate_argnums=(0,) if donate else ()).lower(*placed)
 
-    @property
-    def _compiler_options(self) -> dict[str, Any] | None:
-        """How to compile; it depends on nothing but the condition and the kind of device, so that bits do not."""
-        short = self.layout == "loop" and self.condition.environment_steps <= SHORT
-        return dict(FAST_TO_COMPILE) if short else None
+    def _finished(self, lowered: Any) -> Any:
+        """Compile a program; how depends on nothing but the condition and the kind of device, so that bits do not."""
+        short = self.layout == "alone" and self.condition.environment_steps <= SHORT
+        return lowered.compile(FAST_TO_COMPILE if short else None)
 
-    def _compile(self, width: int) -> Compiled:
-        """Compile what runs again and again, ahead of time, so that compile time and run time are told apart."""
-        sharding = self._sharding(width)
-
-        def shape(leaf: Any) -> jax.ShapeDtypeStruct:
-            return jax.ShapeDtypeStruct(leaf.shape, leaf.dtype, sharding=sharding)
-
-        seeds, idle = jax.ShapeDtypeStruct((width,), jnp.int32), jax.ShapeDtypeStruct((width,), jnp.bool_)
+    def _state(self, lanes: int) -> Any:
+        """Return shapes and dtypes of the state of so many lanes."""
         with self._settings():
-            shapes = jax.eval_shape(self._spread(self._program.start, width), seeds, idle)
-            state = jax.tree.map(shape, shapes)
-            lowered = (
-                self._spread(self._program.advance, width, donate=True).lower(state, shape(seeds)),
-                self._spread(self._program.score, width).lower(state),
-            )
+            one = jax.eval_shape(over_trials(self._program.start, self.layout), *_seeds(1))
+        return jax.tree.map(lambda leaf: jax.ShapeDtypeStruct((lanes, *leaf.shape[1:]), leaf.dtype), one)
+
+    def _compile(self, size: int, homes: Sequence[jax.Device]) -> dict[jax.Device, Compiled]:
+        """Compile what runs again and again, ahead of time, so that compile time and run time are told apart."""
+        state, until = self._state(size), _seeds(size)[0]
+        with self._settings():
+            lowered = [
+                program
+                for home in homes
+                for program in (
+                    self._lowered(self._program.advance, home, (state, until), donate=True),
+                    self._lowered(self._program.score, home, (state,)),
+                )
+            ]
             # XLA compiles without holding the interpreter, so that two programs take the time of one.
             with ThreadPoolExecutor() as pool:
-                advance, score = pool.map(lambda program: program.compile(self._compiler_options), lowered)
-        return Compiled(advance=advance, score=score, shapes=shapes)
+                made = list(pool.map(self._finished, lowered))
+        return {home: Compiled(*made[2 * place : 2 * place + 2]) for place, home in enumerate(homes)}
+
+
+def _seeds(lanes: int) -> tuple[jax.ShapeDtypeStruct, jax.ShapeDtypeStruct]:
+    """Return shapes and dtypes of seeds and idle marks, leaves [lanes]."""
+    return jax.ShapeDtypeStruct((lanes,), np.int32), jax.ShapeDtypeStruct((lanes,), np.bool_)

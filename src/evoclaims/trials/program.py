@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import jax
@@ -163,12 +163,15 @@ class Program:
 def over_trials(function: Callable[..., Any], layout: str) -> Callable[..., Any]:
     """Lay a single-trial function out over a leading trial axis of all its arguments.
 
-    "loop" runs the trials one after the other inside one program: on a CPU, whose cores one trial already fills, this
-    costs nothing, gives each trial the same bits whatever the batch, and a trial that has ended costs nothing.
+    "alone" is for one trial at a time, an axis of length one: on a CPU, whose cores other trials fill, this costs
+    nothing, gives each trial the same bits whatever runs beside it, and a trial that has ended costs nothing.
     "vector" runs them side by side: on an accelerator a step's time is mostly launches, which they share.
     """
-    layouts: dict[str, Callable[..., Any]] = {
-        "loop": lambda *arguments: jax.lax.map(lambda one: function(*one), arguments),
-        "vector": jax.vmap(function),
-    }
+    layouts: dict[str, Callable[..., Any]] = {"alone": partial(_alone, function), "vector": jax.vmap(function)}
     return layouts[layout]
+
+
+def _alone(function: Callable[..., Any], *arguments: Any) -> Any:
+    """Call the function with the only trial along the arguments' leading axis, and give its results one."""
+    trial = jax.tree.map(lambda leaf: jnp.squeeze(leaf, 0), arguments)
+    return jax.tree.map(lambda leaf: leaf[None], function(*trial))

@@ -96,7 +96,7 @@ def _finish(run: Run, batch: Batch) -> None:
         now = time.monotonic()
         if batch.owed and now - saved >= run.checkpoint_seconds:
             spent = batch.header.compile_seconds + run.lanes.seconds
-            checkpoint.save(folder, replace(batch.header, compile_seconds=spent), jax.device_get(batch.state))
+            checkpoint.save(folder, replace(batch.header, compile_seconds=spent), run.lanes.gather(batch.state))
             saved = now
         pace = (now - began) / (batch.header.chunks - first_chunk)
         run.watch(_progress(run, reported, report, pace))
@@ -150,10 +150,10 @@ def _tell_of_difference(run: Run, seed: int) -> None:
 
 
 def _rearranged(run: Run, batch: Batch) -> Batch:
-    """Narrow the batch, or deal its lanes out anew, where that makes the rest cheaper."""
+    """Narrow the batch where that makes the rest cheaper."""
     active, full = batch.running, len(batch.header.batch)
     width = run.lanes.width(len(active), full)
-    if not batch.owed or not run.lanes.worth_moving(active, len(batch.header.lanes), width):
+    if not batch.owed or width >= len(batch.header.lanes):
         return batch
     order = run.lanes.arrangement(active, width)
     state = run.lanes.rearrange(batch.state, order, width)

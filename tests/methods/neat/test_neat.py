@@ -57,12 +57,12 @@ def device() -> list[Any]:
 def programs(device: list[Any]) -> Iterator[None]:
     """Let all runs of this file share what has been compiled, whatever the store."""
     kept: dict[tuple[str, int], Any] = {}
-    compile_width = Lanes._compile
+    compile_size = Lanes._compile
 
-    def compiled_once(self: Lanes, width: int) -> Any:
-        if (self.layout, width) not in kept:
-            kept[self.layout, width] = compile_width(self, width)
-        return kept[self.layout, width]
+    def compiled_once(self: Lanes, size: int, homes: Any) -> Any:
+        if (self.layout, size) not in kept:
+            kept[self.layout, size] = compile_size(self, size, homes)
+        return kept[self.layout, size]
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(Lanes, "_compile", compiled_once)
@@ -143,11 +143,11 @@ def test_a_stopped_run_goes_on_to_the_same_bits(
 
 def test_a_chunk_moves_nothing_between_host_and_device(device: list[Any], programs: None) -> None:
     lanes = Lanes(CONDITION, device)
-    state, bound = lanes.start(SEEDS, 2), lanes.place(np.full(2, 4, np.int32), 2)
-    advance = lanes.programs(2).advance
+    (state, _), (bound, _) = lanes.start(SEEDS, 2), lanes.place(np.full(2, 4, np.int32), 2)
+    advance = lanes.programs(2)[0].advance
     with jax.transfer_guard("disallow"):
         _, report = advance(state, bound)
-    assert np.asarray(report.steps).tolist() == [4, 4]
+    assert np.asarray(report.steps).tolist() == [4]
     text = advance.as_text()  # type: ignore[attr-defined]
     assert not [word for word in ("callback", "infeed", "outfeed", "send(", "recv(") if word in text]
 
