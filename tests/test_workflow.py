@@ -53,3 +53,13 @@ def test_every_action_is_held_to_a_major_version() -> None:
     actions = re.findall(r"uses: (\S+)", TEXT)
     assert len(actions) == 5
     assert all(re.fullmatch(r"actions/[a-z-]+@v\d+", action) for action in actions)
+
+
+def test_every_supported_python_is_run_with_constraints_of_its_own() -> None:
+    project = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
+    supported = re.findall(r"Python :: (3\.\d+)", project)
+    (matrix,) = re.findall(r"python: \[(.*)\]", TEXT)
+    assert re.findall(r'"(3\.\d+)"', matrix) == supported
+    assert [
+        path.stem.removeprefix("python") for path in sorted((ROOT / "constraints").glob("python?.??.txt"))
+    ] == supported

@@ -67,7 +67,7 @@ def choose(name: str) -> list[jax.Device]:
         wish = f"the device {name!r}" + (f" with JAX_PLATFORMS={platforms}" if platforms else "")
         raise UserError(
             f"jax {jax.__version__} finds no hardware for {wish}. Install jax for CUDA "
-            '(pip install "jax[cuda13]", Python 3.12) on a machine with a GPU, or ask for the device "cpu".'
+            '(pip install "jax[cuda13]", Python 3.12 or newer) on a machine with a GPU, or ask for the device "cpu".'
         ) from error
 
 
