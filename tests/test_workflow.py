@@ -60,6 +60,5 @@ def test_every_supported_python_is_run_with_constraints_of_its_own() -> None:
     supported = re.findall(r"Python :: (3\.\d+)", project)
     (matrix,) = re.findall(r"python: \[(.*)\]", TEXT)
     assert re.findall(r'"(3\.\d+)"', matrix) == supported
-    assert [
-        path.stem.removeprefix("python") for path in sorted((ROOT / "constraints").glob("python?.??.txt"))
-    ] == supported
+    constraints = (path.stem for path in (ROOT / "constraints").glob("python?.??.txt"))
+    assert sorted(stem.removeprefix("python") for stem in constraints) == supported
