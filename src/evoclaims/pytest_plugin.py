@@ -47,36 +47,37 @@ def pytest_configure(config: pytest.Config) -> None:
     pytest_options.check(config)
 
 
-def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
-    """Run each claim once per tier."""
-    if metafunc.definition.get_closest_marker("claim") is None:
-        return
-    if "claim_tier" not in metafunc.fixturenames:
-        raise pytest.UsageError(
-            f"{metafunc.definition.nodeid} is a claim but takes neither the fixture `trials` nor `verdict`."
-        )
-    metafunc.parametrize("claim_tier", [pytest.param(tier, marks=getattr(pytest.mark, tier)) for tier in TIERS])
+@pytest.hookimpl(wrapper=True, tryfirst=True)
+def pytest_generate_tests(metafunc: pytest.Metafunc) -> Generator[None, object, object]:
+    """Run each claim once per tier, which comes before all other parameters in a test's id."""
+    if metafunc.definition.get_closest_marker("claim") is not None:
+        if "claim_tier" not in metafunc.fixturenames:
+            raise pytest.UsageError(
+                f"{metafunc.definition.nodeid} is a claim but takes neither the fixture `trials` nor `verdict`."
+            )
+        metafunc.parametrize("claim_tier", [pytest.param(tier, marks=getattr(pytest.mark, tier)) for tier in TIERS])
+    return (yield)
 
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Leave out other tiers and claims; the full tier is only kept when it was asked for by name."""
-    claims = {item: item.get_closest_marker("claim").args[0] for item in items if item.get_closest_marker("claim")}  # type: ignore[union-attr]
+    marked = [item for item in items if item.get_closest_marker("claim")]
+    claims: dict[pytest.Item, tuple[str, str]] = {}
     try:
-        wanted = _wanted_claims(config, {claim.id for claim in claims.values()})
+        if marked:
+            from evoclaims.suite.collected import checked
+
+            claims = checked(marked)
+        wanted = _wanted_claims(config, {claim for claim, _ in claims.values()})
     except UserError as error:
         _refuse(config, items, error)
         return
     tiers = _wanted_tiers(config)
-    dropped = [item for item, claim in claims.items() if claim.id not in wanted or tiers.isdisjoint(_tiers_of(item))]
+    dropped = [item for item, (claim, tier) in claims.items() if claim not in wanted or tier not in tiers]
     if dropped:
         config.hook.pytest_deselected(items=dropped)
         items[:] = [item for item in items if item not in set(dropped)]
-
-
-def _tiers_of(item: pytest.Item) -> set[str]:
-    """Return the tier that a claim test runs at."""
-    return {mark.name for mark in item.iter_markers() if mark.name in TIERS}
 
 
 def _wanted_tiers(config: pytest.Config) -> set[str]:
@@ -172,11 +173,12 @@ def trials(request: pytest.FixtureRequest, claim_tier: str) -> Callable[..., Tri
 def verdict(request: pytest.FixtureRequest, claim_tier: str) -> Verdicts:
     """Return `verdict(assertion)`, which judges the claim."""
     from evoclaims.suite.claim import claim_of
+    from evoclaims.suite.collected import case_of
     from evoclaims.suite.session import Verdicts
 
     session, claim = make_session(request.config), claim_of(request.node)
     assert claim is not None  # claim_tier exists for claims alone
-    case = _case(request.node)
+    case = case_of(request.node)
     line = request.config.stash.get(_line, None)
 
     def settle(assertion: Any) -> ClaimReport:
@@ -188,12 +190,6 @@ def verdict(request: pytest.FixtureRequest, claim_tier: str) -> Verdicts:
 
     verdicts = request.node.stash[_verdicts] = Verdicts(settle)
     return verdicts
-
-
-def _case(item: pytest.Item) -> str:
-    """Return a test's parameters without the tier, such as "n_parity"."""
-    callspec = getattr(item, "callspec", None)
-    return "-".join(part for part in callspec.id.split("-") if part not in TIERS) if callspec else ""
 
 
 @pytest.hookimpl(wrapper=True)
@@ -236,16 +232,17 @@ def pytest_runtest_makereport(
 def _claim_report(item: pytest.Item, call: pytest.CallInfo[None]) -> ClaimReport:
     """Return what became of a claim test: its verdict, or the error in the way of one."""
     from evoclaims.suite.claim import claim_of, expectation_of
+    from evoclaims.suite.collected import case_of, tier_of
     from evoclaims.suite.report import broken, expecting, located, save
 
-    claim, tier = claim_of(item), next(iter(_tiers_of(item)))
+    claim, case, tier = claim_of(item), case_of(item), tier_of(item)
     assert claim is not None
     verdicts = item.stash.get(_verdicts, None)
     report = verdicts.report if verdicts else None
     if call.excinfo is not None:
-        report = broken(claim, _case(item), tier, _sentence(call.excinfo))
+        report = broken(claim, case, tier, _sentence(call.excinfo))
     elif report is None:
-        report = broken(claim, _case(item), tier, "the test ended without calling verdict(...), so it judged nothing")
+        report = broken(claim, case, tier, "the test ended without calling verdict(...), so it judged nothing")
     report = replace(report, variant=item.config.getoption("claims_variant"))
     report = expecting(report, expectation_of(item, tier))
     session = item.config.stash.get(_session, None)
@@ -262,12 +259,13 @@ def _claim_report(item: pytest.Item, call: pytest.CallInfo[None]) -> ClaimReport
 def _skipped_report(item: pytest.Item, report: pytest.TestReport) -> ClaimReport:
     """Return what the summary says of a claim whose test was skipped, or failed as an xfail mark expects."""
     from evoclaims.suite.claim import claim_of
+    from evoclaims.suite.collected import case_of, tier_of
     from evoclaims.suite.report import skipped
 
     claim = claim_of(item)
     assert claim is not None
     words = report.longrepr[2] if isinstance(report.longrepr, tuple) else f"xfail: {getattr(report, 'wasxfail', '')}"
-    return skipped(claim, _case(item), next(iter(_tiers_of(item))), words.removeprefix("Skipped: "))
+    return skipped(claim, case_of(item), tier_of(item), words.removeprefix("Skipped: "))
 
 
 def _sentence(excinfo: pytest.ExceptionInfo[BaseException]) -> str:

@@ -97,6 +97,11 @@ def expected(outcome: Outcome | str, *, because: str, tier: str | None = None) -
     return pytest.mark.claim_expect(Expectation(Outcome(outcome), because, tier))
 
 
+def named(claim_id: str, case: str) -> str:
+    """Return what a claim with some parameters is called, such as "G1[n_parity]"; its id alone without any."""
+    return f"{claim_id}[{case}]" if case else claim_id
+
+
 def claim_of(item: pytest.Item) -> Claim | None:
     """Return the claim that a test checks, or None."""
     mark = item.get_closest_marker(CLAIM_MARK)

@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 import json
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from evoclaims.core.canonical import as_plain
+from evoclaims.core.file_names import file_name
 from evoclaims.core.files import write_atomically
 from evoclaims.judging.assertion import Assertion
 from evoclaims.judging.judge import attainability
 from evoclaims.judging.protocol import Protocol
 from evoclaims.judging.verdict import Outcome, Verdict
-from evoclaims.suite.claim import Claim, Expectation
+from evoclaims.suite.claim import Claim, Expectation, named
 from evoclaims.suite.group import TrialGroup
 from evoclaims.trials.spec import TrialSpec
 
@@ -57,7 +57,7 @@ class ClaimReport:
     @property
     def name(self) -> str:
         """Id and parameters, such as "G1[n_parity]"."""
-        return f"{self.claim}[{self.case}]" if self.case else self.claim
+        return named(self.claim, self.case)
 
     @property
     def as_expected(self) -> bool:
@@ -154,9 +154,10 @@ def _unjudged(claim: Claim, case: str, tier: str, outcome: Outcome, reason: str)
 
 def _path(report: ClaimReport, root: Path) -> Path:
     """Return where a report's file lies."""
-    name = re.sub(r"[^A-Za-z0-9_.-]+", "-", report.name).strip("-")
     folder = root / "verdicts" / report.tier
-    return (folder / "variants" / report.variant if report.variant else folder) / f"{name}.json"
+    if report.variant:
+        folder = folder / "variants" / file_name(report.variant)
+    return folder / f"{file_name(report.claim, report.case)}.json"
 
 
 def _source(group: TrialGroup, seeds: Sequence[int]) -> dict[str, Any]:

@@ -1,0 +1,147 @@
+"""A claim test's name is its own: no verdict takes the place of another's."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from evoclaims.cli import main
+from evoclaims.judging.verdict import Outcome
+from evoclaims.suite import history
+
+Sentence = Callable[[pytest.RunResult, str], None]
+
+PAIRS = [("a", "a-smoke"), ("a/b", "a b"), ("日本", "中国"), ("full-a", "a"), ("x" * 300, "x" * 299 + "y")]
+"""Ids of parameters that are easily taken for one another."""
+
+PAIR = """
+@pytest.mark.parametrize("method", [pytest.param("wrong", id={0!r}), pytest.param("right", id={1!r})])
+@says("G1")
+def test_pair(trials, verdict, method):
+    verdict(trials(method, on="parity").solves_every_level.in_most_trials())
+"""
+
+
+@pytest.mark.parametrize("ids", PAIRS)
+@pytest.mark.parametrize("escaped", [True, False])
+def test_claims_whose_parameters_are_called_alike_keep_their_own_verdicts(
+    project: Any, ids: tuple[str, str], escaped: bool
+) -> None:
+    if not escaped:
+        option = "disable_test_id_escaping_and_forfeit_all_rights_to_community_support"
+        with (project.path / "pyproject.toml").open("a") as file:
+            file.write(f"\n{option} = true\n")
+    project.write(PAIR.format(*ids))
+    result = project.run("--claims-json=out.json", own_store=True)
+    assert result.ret == 1
+    reports = json.loads((project.path / "out.json").read_text())["claims"]
+    cases = {report["case"]: report["outcome"] for report in reports}
+    shown = [one.encode("unicode_escape").decode() if escaped else one for one in ids]
+    assert cases == dict(zip(shown, ("refuted", "supported"), strict=True))
+    files = sorted((project.path / ".evoclaims" / "verdicts" / "smoke").iterdir())
+    assert {report["evidence"] for report in reports} == {str(file) for file in files}
+    assert sorted(json.loads(file.read_text())["outcome"] for file in files) == ["refuted", "supported"]
+    assert main(["accept", "--tier=smoke"]) == 1
+    accepted = history.load(project.path / "verdicts.toml")
+    assert sorted(entries[-1].outcome for entries in accepted.values()) == ["refuted", "supported"]
+
+
+def test_a_refutation_is_not_missed_behind_a_parameter_of_nearly_the_same_name(project: Any) -> None:
+    project.write(PAIR.format("a-smoke", "a"))
+    project.run()
+    assert main(["accept", "--tier=smoke", f"--storage={project.store}"]) == 1
+    path = project.path / "verdicts.toml"
+    kept = history.load(path)
+    refuted = ("smoke", "G1[a-smoke]")
+    path.write_text(history.dump({**kept, refuted: (replace(kept[refuted][0], outcome=Outcome.SUPPORTED),)}))
+    result = project.run("--claims-compare-fail=supported->refuted")
+    assert result.ret == 1
+    result.stdout.fnmatch_lines(["REGRESSION G1?a-smoke? (smoke): supported -> refuted"])
+
+
+SAME = "@says('G1')\ndef test_{0}(trials, verdict):\n    verdict(trials('{0}', on='parity').mean_success > 0)\n"
+PARTS = """
+@pytest.mark.parametrize("other", ["c", "b-c"])
+@pytest.mark.parametrize("one", ["a", "a-b"])
+@says("G1")
+def test_parts(trials, verdict, one, other):
+    pass
+"""
+IN_THE_ID = """
+@says("G1[a]")
+def test_first(trials, verdict):
+    pass
+
+@pytest.mark.parametrize("letter", ["a"])
+@says("G1")
+def test_second(trials, verdict, letter):
+    pass
+"""
+
+
+@pytest.mark.parametrize(
+    ("text", "name", "tests"),
+    [
+        (SAME.format("right") + SAME.format("wrong"), "G1", ("test_right[smoke]", "test_wrong[smoke]")),
+        (PARTS, "G1[a-b-c]", ("test_parts[smoke-a-b-c]",)),
+        (IN_THE_ID, "G1[a]", ("test_first[smoke]", "test_second[smoke-a]")),
+    ],
+)
+@pytest.mark.parametrize("workers", [False, True])
+def test_two_claim_tests_of_one_name_are_a_sentence_that_names_both(
+    project: Any, sentence: Sentence, text: str, name: str, tests: tuple[str, ...], workers: bool
+) -> None:
+    project.write(text)
+    result = project.run_apart("-n1") if workers else project.run(own_store=True)
+    assert result.ret == pytest.ExitCode.USAGE_ERROR
+    sentence(result, f"Two claim tests are called {name} at the smoke tier, ")
+    for test in tests:
+        sentence(result, f"claims/test_claims.py::{test}")
+    assert not (project.path / ".evoclaims" / "trials").exists()
+
+
+def test_the_command_line_refuses_two_claims_of_one_name_too(project: Any, capsys: pytest.CaptureFixture[str]) -> None:
+    project.write(IN_THE_ID)
+    for command in ("status", "accept"):
+        assert main([command, "--tier=smoke"]) == 2
+        assert "Two claim tests are called G1[a] at the smoke tier" in capsys.readouterr().err
+    assert not (project.path / "verdicts.toml").exists()
+
+
+CLASS = """
+import unittest
+
+class TestOld(unittest.TestCase):
+    @says("G1")
+    def test_it(self):
+        pass
+"""
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (CLASS, "TestOld::test_it is a claim and cannot be given a tier: write it as a function"),
+        ("@pytest.mark.claim\ndef test_a(trials):\n    pass\n", "has the mark pytest.mark.claim but no claim"),
+    ],
+)
+def test_a_claim_that_would_never_be_judged_is_a_sentence(
+    project: Any, sentence: Sentence, text: str, said: str
+) -> None:
+    project.write(text)
+    result = project.run(own_store=True)
+    assert result.ret == pytest.ExitCode.USAGE_ERROR
+    sentence(result, said)
+
+
+def test_the_tier_comes_first_whoever_else_gives_parameters(project: Any) -> None:
+    project.write("@says('G1')\ndef test_it(trials, verdict, method):\n    pass\n")
+    (project.path / "conftest.py").write_text(
+        "import pytest\n@pytest.hookimpl(tryfirst=True)\ndef pytest_generate_tests(metafunc):\n"
+        "    metafunc.parametrize('method', ['right', 'smoke-wrong'])\n"
+    )
+    assert {report["case"] for report in project.json()["claims"]} == {"right", "smoke-wrong"}
