@@ -25,8 +25,8 @@ def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     """A folder whose modules are forgotten at the end."""
     monkeypatch.setattr(sys, "path", list(sys.path))
     yield tmp_path
-    for name in ("a_tiny_paper", "a_tiny_paper_of_others"):
-        sys.modules.pop(name, None)
+    for name in [name for name in sys.modules if name.startswith("a_tiny_paper")]:
+        del sys.modules[name]
 
 
 def _sentence(caught: pytest.ExceptionInfo[UserError]) -> str:
@@ -97,7 +97,61 @@ def test_a_module_without_a_reproduction_is_a_sentence(project: Path) -> None:
     _sentence(caught)
 
 
-def test_what_a_module_itself_lacks_is_not_taken_for_the_module(project: Path) -> None:
-    (project / "a_tiny_paper.py").write_text("import a_package_that_is_not_installed\n")
-    with pytest.raises(ModuleNotFoundError, match="a_package_that_is_not_installed"):
+@pytest.mark.parametrize(
+    ("text", "said", "line"),
+    [
+        ("import a_package_that_is_not_installed\n", "ModuleNotFoundError: No module named 'a_package", 1),
+        ("x = 1\n\nimport a_tiny\n", "ModuleNotFoundError: No module named 'a_tiny'", 3),
+        ("from json import nothing\n", "ImportError: cannot import name 'nothing'", 1),
+        ("x = 1\ndef f(:\n    pass\n", "SyntaxError: invalid syntax", 2),
+        ("if True:\nx = 1\n", "IndentationError: expected an indented block", 2),
+        ("# coding: nonsense\n", "SyntaxError: ", None),
+        ("x = 1 / 0\n", "ZeroDivisionError: division by zero", 1),
+        ("import sys\nsys.exit(3)\n", "SystemExit: 3", 2),
+        ("\nimport json\njson.loads('{')\n", "JSONDecodeError: Expecting property name", 3),
+        ("raise ValueError('first line\\nsecond line')\n", "ValueError: first line (", 1),
+        ("class E(Exception):\n    __str__ = 3\nraise E\n", "E (", 3),
+        (
+            "from evoclaims.core.errors import UserError\n\ndef a():\n    raise UserError('Take three.')\na()\n",
+            "does not import: Take three (",
+            4,
+        ),
+        (
+            "from evoclaims.judging.protocol import Protocol\nP = Protocol.fixed(0)\n",
+            "does not import: A look takes",
+            2,
+        ),
+    ],
+)
+def test_a_module_that_does_not_import_is_a_sentence_with_file_and_line(
+    project: Path, text: str, said: str, line: int | None
+) -> None:
+    (project / "a_tiny_paper.py").write_text(text)
+    with pytest.raises(UserError) as caught:
+        load_reproduction(SuiteConfig(project, "a_tiny_paper"))
+    told = _sentence(caught)
+    assert told.startswith("The module 'a_tiny_paper', which [tool.evoclaims] names, does not import: ")
+    assert said in told
+    assert told.endswith(f"(a_tiny_paper.py, line {line})." if line else "(a_tiny_paper.py).")
+
+
+def test_a_file_that_cannot_be_compiled_without_a_line_is_named_by_its_module(project: Path) -> None:
+    (project / "a_tiny_paper.py").write_bytes(b"x = 1\n\0\n")
+    with pytest.raises(UserError, match="'a_tiny_paper'.*null bytes") as caught:
+        load_reproduction(SuiteConfig(project, "a_tiny_paper"))
+    _sentence(caught)
+
+
+def test_the_line_is_the_innermost_one_of_the_project_and_not_of_what_it_calls(project: Path) -> None:
+    (project / "a_tiny_paper_of_others").mkdir()
+    (project / "a_tiny_paper_of_others" / "__init__.py").write_text("\nfrom a_tiny_paper_of_others import part\n")
+    (project / "a_tiny_paper_of_others" / "part.py").write_text("import json\n\n\nx = json.loads('')\n")
+    with pytest.raises(UserError) as caught:
+        load_reproduction(SuiteConfig(project, "a_tiny_paper_of_others"))
+    assert _sentence(caught).endswith("(a_tiny_paper_of_others/part.py, line 4).")
+
+
+def test_an_interrupted_import_is_no_error_of_the_module(project: Path) -> None:
+    (project / "a_tiny_paper.py").write_text("raise KeyboardInterrupt\n")
+    with pytest.raises(KeyboardInterrupt):
         load_reproduction(SuiteConfig(project, "a_tiny_paper"))

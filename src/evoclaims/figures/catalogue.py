@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import importlib
-
 from evoclaims.core.errors import UnknownNameError, UserError
 from evoclaims.figures.figure import Figure
+from evoclaims.suite.importing import import_module
 from evoclaims.suite.reproduction import Reproduction
 
 
@@ -19,14 +18,15 @@ def load(reproduction: Reproduction, name: str) -> Figure:
 
     Raises:
         UnknownNameError: for another name; it lists the known ones.
-        UserError: when the module holds no figure of this name.
+        UserError: when the module does not import, or holds no figure of this name.
     """
     if not reproduction.figures:
         raise UserError(f"The reproduction {reproduction.name!r} names no figures: Reproduction(figures=...) is empty.")
     modules = dict(zip(names(reproduction), reproduction.figures, strict=True))
     if name not in modules:
         raise UnknownNameError("figure", name, modules)
-    figure = getattr(importlib.import_module(modules[name]), "FIGURE", None)
+    module = import_module(modules[name], reproduction.folder, f"the reproduction {reproduction.name!r}")
+    figure = getattr(module, "FIGURE", None)
     if not isinstance(figure, Figure) or figure.name != name:
         raise UserError(f"The module {modules[name]!r} has no FIGURE = Figure(name={name!r}, ...).")
     return figure

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import importlib
 import sys
 import tomllib
 from dataclasses import dataclass
 from pathlib import Path
 
 from evoclaims.core.errors import UserError
+from evoclaims.suite.importing import import_module
 from evoclaims.suite.reproduction import Reproduction
 
 
@@ -62,18 +62,11 @@ def load_reproduction(config: SuiteConfig) -> Reproduction:
     """Import the project's reproduction.
 
     Raises:
-        UserError: when the module or its `REPRODUCTION` is missing.
+        UserError: when the module or its `REPRODUCTION` is missing, or the module does not import.
     """
     if str(config.root) not in sys.path:
         sys.path.insert(0, str(config.root))
-    try:
-        module = importlib.import_module(config.reproduction)
-    except ModuleNotFoundError as error:
-        if error.name is None or not config.reproduction.startswith(error.name):
-            raise
-        raise UserError(
-            f"There is no module {config.reproduction!r} in {config.root}, which [tool.evoclaims] names."
-        ) from error
+    module = import_module(config.reproduction, config.root, "[tool.evoclaims]")
     found = getattr(module, "REPRODUCTION", None)
     if not isinstance(found, Reproduction):
         raise UserError(f"The module {config.reproduction!r} has no REPRODUCTION = Reproduction(...).")

@@ -1,0 +1,32 @@
+"""Importing a project's own modules: whatever goes wrong in them is one sentence with the file and the line."""
+
+from __future__ import annotations
+
+import importlib
+from pathlib import Path
+from types import ModuleType
+
+from evoclaims.core.errors import UserError
+from evoclaims.core.raised import in_one_line
+
+
+def import_module(name: str, root: Path, named_by: str) -> ModuleType:
+    """Return a project's module.
+
+    Args:
+        name: of the module, with dots.
+        root: the project's folder; files in it are named from there.
+        named_by: what names the module, such as "[tool.evoclaims]".
+
+    Raises:
+        UserError: when there is no such module, or when anything is raised while it is imported.
+    """
+    try:
+        return importlib.import_module(name)
+    except KeyboardInterrupt:
+        raise
+    except BaseException as error:  # a module may raise SystemExit as well
+        if isinstance(error, ModuleNotFoundError) and error.name and f"{name}.".startswith(f"{error.name}."):
+            raise UserError(f"There is no module {name!r} in {root}, which {named_by} names.") from error
+        said = in_one_line(error, root)
+        raise UserError(f"The module {name!r}, which {named_by} names, does not import: {said}.") from error
