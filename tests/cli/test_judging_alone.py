@@ -1,0 +1,172 @@
+"""Judging from the command line: settings of other runs of pytest have no say, and every claim is spoken of."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from tiny_project import PYPROJECT
+
+from evoclaims.cli import main
+
+CLAIMS = {"a": "refuted", "b": "supported", "c": "supported"}
+VERDICTS = "claims (smoke): 2 supported, 1 refuted"
+
+Run = Callable[..., tuple[int, str, str]]
+
+OPTIONS = [
+    "-x",
+    "-k b",
+    "-m full",
+    "-m 'not claim'",
+    "--maxfail=1",
+    "-n 2",
+    "--collect-only",
+    "--setup-only",
+    "--deselect claims/test_claims.py::test_a",
+    "--ignore=claims",
+    "--lf",
+    "--claims-only=b",
+    "--claims-tier=full",
+    "--claims-trials=2",
+    "--claims-variant=traded",
+    "--claims-json=out.json",
+    "--strict-markers --strict-config -q -rA --tb=short",
+]
+
+
+@pytest.fixture
+def evoclaims(project: Any, capsys: pytest.CaptureFixture[str]) -> Run:
+    """A function that runs a command in the project on the trials of three claims, of which the first is refuted."""
+    project.write(**CLAIMS)
+    for method in ("right", "wrong"):
+        main(["run", method, f"--storage={project.store}"])
+
+    def run(*arguments: str) -> tuple[int, str, str]:
+        capsys.readouterr()
+        status = main([*arguments, f"--storage={project.store}"])
+        out, err = capsys.readouterr()
+        assert "Traceback" not in out + err
+        assert "INTERNALERROR" not in out + err
+        return status, out, err
+
+    return run
+
+
+def _set(addopts: str) -> None:
+    Path("pyproject.toml").write_text(PYPROJECT.replace('addopts = "', f'addopts = "{addopts} '))
+
+
+@pytest.mark.parametrize("options", OPTIONS)
+def test_options_for_other_runs_leave_no_claim_out(evoclaims: Run, options: str) -> None:
+    _set(options)
+    status, out, _ = evoclaims("status")
+    assert (status, out.splitlines()[-1]) == (1, VERDICTS)
+    assert not Path("out.json").exists()
+
+
+@pytest.mark.parametrize("options", ["-x", "-p picky -n 2", "--nonsense"])
+@pytest.mark.parametrize("where", ["pytest.ini", "the environment"])
+def test_it_does_not_matter_where_such_options_are_set(
+    evoclaims: Run, monkeypatch: pytest.MonkeyPatch, options: str, where: str
+) -> None:
+    Path("picky.py").write_text("")
+    if where == "pytest.ini":
+        Path("pytest.ini").write_text(f"[pytest]\naddopts = {options}\n")
+    else:
+        monkeypatch.setenv("PYTEST_ADDOPTS", options)
+    status, out, _ = evoclaims("status")
+    assert (status, out.splitlines()[-1]) == (1, VERDICTS)
+
+
+def test_no_verdict_is_left_unaccepted_for_such_options(evoclaims: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    _set("-x")
+    monkeypatch.setenv("PYTEST_ADDOPTS", "-k a")
+    status, out, _ = evoclaims("accept", "--tier=smoke")
+    assert status == 1
+    assert [line for line in out.splitlines() if line.startswith("accepted")] == [
+        "accepted: a (smoke): refuted, the first verdict",
+        "accepted: b (smoke): supported, the first verdict",
+        "accepted: c (smoke): supported, the first verdict",
+    ]
+
+
+def test_the_environment_is_as_before_once_claims_are_judged(evoclaims: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PYTEST_ADDOPTS", "-x")
+    monkeypatch.delenv("PYTEST_PLUGINS", raising=False)
+    evoclaims("status")
+    assert os.environ["PYTEST_ADDOPTS"] == "-x"
+    assert "PYTEST_PLUGINS" not in os.environ
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [("PYTEST_PLUGINS", "picky"), ("PYTEST_DISABLE_PLUGIN_AUTOLOAD", "1"), ("PYTEST_PLUGINS", "nope")],
+)
+def test_plugins_that_the_environment_adds_or_leaves_out_change_nothing(
+    evoclaims: Run, monkeypatch: pytest.MonkeyPatch, name: str, value: str
+) -> None:
+    Path("picky.py").write_text("def pytest_collection_modifyitems(items):\n    items.clear()\n")
+    monkeypatch.setenv(name, value)
+    status, out, _ = evoclaims("status")
+    assert (status, out.splitlines()[-1]) == (1, VERDICTS)
+
+
+def test_how_files_are_imported_and_plugins_with_fixtures_are_kept(project: Any, evoclaims: Run) -> None:
+    """Two files of one name can only be imported with importlib."""
+    (project.path / "giving.py").write_text("import pytest\n\n@pytest.fixture\ndef method():\n    return 'right'\n")
+    text = (
+        "@says('d')\ndef test_d(trials, verdict, method):\n    verdict(trials(method, on='parity').mean_success > 0)\n"
+    )
+    project.write(text)
+    more = project.path / "claims" / "more"
+    more.mkdir()
+    (more / "test_claims.py").write_text((project.path / "claims" / "test_claims.py").read_text().replace("'d'", "'e'"))
+    _set("-x -p giving --import-mode=importlib")
+    _, out, err = evoclaims("status")
+    assert err == ""
+    assert out.splitlines()[-1].startswith("claims (smoke): 2 ")
+
+
+def test_a_plugin_that_the_project_requires_is_not_missed(evoclaims: Run) -> None:
+    with Path("pyproject.toml").open("a") as file:
+        file.write('\nrequired_plugins = ["pytest-xdist"]\n')
+    status, out, _ = evoclaims("status")
+    assert (status, out.splitlines()[-1]) == (1, VERDICTS)
+
+
+@pytest.mark.parametrize(
+    "hook",
+    [
+        "def pytest_collection_modifyitems(items):\n    items[:] = [one for one in items if 'b' not in one.name]\n",
+        "import pytest\n\n@pytest.hookimpl(tryfirst=True)\ndef pytest_collection_modifyitems(items):\n"
+        "    del items[2:]\n",
+        "import pytest\ndef pytest_runtest_setup(item):\n    'b' in item.name and pytest.exit('enough')\n",
+        "def pytest_runtest_setup(item):\n    item.session.shouldstop = 'enough'\n",
+    ],
+)
+@pytest.mark.parametrize("command", ["status", "accept"])
+def test_claims_that_something_leaves_out_are_an_error_and_not_forgotten(
+    evoclaims: Run, hook: str, command: str
+) -> None:
+    Path("conftest.py").write_text(hook)
+    status, _, err = evoclaims(command, "--tier=smoke")
+    assert (status, err.count("\n")) == (2, 1)
+    assert " of 3 claims of the smoke tier were collected and not judged (claims/test_claims.py::test_" in err
+    assert not Path("verdicts.toml").exists()
+
+
+def test_a_claim_that_is_marked_to_be_skipped_is_spoken_of(project: Any, evoclaims: Run) -> None:
+    path = project.path / "claims" / "test_claims.py"
+    path.write_text(path.read_text().replace("@says('b')", "@pytest.mark.skip(reason='later')\n@says('b')"))
+    _, out, _ = evoclaims("status")
+    assert out.splitlines()[-1] == "claims (smoke): 1 supported, 1 refuted, 1 not run"
+
+
+def test_an_interrupt_while_claims_are_judged_ends_the_command(evoclaims: Run) -> None:
+    Path("conftest.py").write_text("def pytest_runtest_setup(item):\n    raise KeyboardInterrupt\n")
+    assert evoclaims("accept")[0] == 130
+    assert not Path("verdicts.toml").exists()
