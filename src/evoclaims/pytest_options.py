@@ -37,7 +37,8 @@ def add(parser: pytest.Parser) -> None:
     group.addoption(
         "--claims-committed",
         action="store_true",
-        help="with --claims-stored: take what the store lacks from the committed reference trials",
+        help="with --claims-stored: take what the store lacks from the committed reference trials, and compare the "
+        "rest with them",
     )
 
 
@@ -53,6 +54,11 @@ def check(config: pytest.Config) -> None:
             raise UnknownNameError("tier", tier, TIERS)
         if changes is not None:
             _check_changes(config, changes)
+        if config.getoption("claims_committed") and not config.getoption("claims_stored"):
+            raise UserError(
+                "--claims-committed says what --claims-stored takes where the store has no trial, and does nothing by "
+                "itself: add --claims-stored, or leave it out."
+            )
     except UserError as error:
         raise pytest.UsageError(str(error)) from error
 

@@ -123,6 +123,79 @@ def test_outside_of_a_project_a_command_says_what_is_missing(
     assert "has a [tool.evoclaims] table" in err
 
 
+RAISING = """
+
+class Leaving(Coin):
+    name: ClassVar[str] = "leaving"
+
+    def step(self, key, task, level, state):
+        raise SystemExit("gone")
+
+
+@dataclass(frozen=True)
+class BrokenParity(NParity):
+    def examine(self, policy, key, level):
+        return super().examine(policy, key, level).nonsense
+
+
+def with_raising(generations):
+    found = {("leaving", "parity"): replace(conditions(generations)["coin", "parity"], method=Leaving())}
+    found["broken", "parity"] = conditions(generations)["broken", "parity"]
+    found["coin", "broken_parity"] = replace(conditions(generations)["coin", "parity"], task=BrokenParity(2))
+    return {**found, ("right", "parity"): conditions(generations)["right", "parity"]}
+
+
+REPRODUCTION = replace(REPRODUCTION, tiers={"smoke": Tier(with_raising(1), Protocol.fixed(10))}, variants={})
+"""
+
+
+def test_a_method_or_task_that_raises_is_a_sentence_and_the_other_conditions_run(evoclaims: Evoclaims) -> None:
+    reproduction = Path("tiny_paper.py")
+    reproduction.write_text(reproduction.read_text() + RAISING)
+    lines = reproduction.read_text().splitlines()
+    places = [
+        1 + lines.index(f"        {line}")
+        for line in (
+            'raise SystemExit("gone")',
+            'raise RuntimeError("out of order")',
+            "return super().examine(policy, key, level).nonsense",
+        )
+    ]
+    status, out, err = evoclaims("run")
+    assert status == 1
+    assert err.splitlines() == [
+        f"evoclaims: leaving on parity (smoke) failed: SystemExit: gone (tiny_paper.py, line {places[0]}).",
+        f"evoclaims: broken on parity (smoke) failed: RuntimeError: out of order (tiny_paper.py, line {places[1]}).",
+        "evoclaims: coin on broken_parity (smoke) failed: AttributeError: 'Episode' object has no attribute 'nonsense' "
+        f"(tiny_paper.py, line {places[2]}).",
+        "evoclaims: 3 of 4 conditions failed.",
+    ]
+    assert "right on parity (smoke)" in out.splitlines()
+    assert len(Store(Path(".evoclaims")).ids()) == 10
+    assert evoclaims("run", "right")[0] == 0
+
+
+def test_a_record_that_is_damaged_keeps_no_other_condition_from_running(evoclaims: Evoclaims, stored: Store) -> None:
+    record = stored.record_path(stored.ids()[3])
+    record.write_bytes(record.read_bytes()[:50])
+    status, out, err = evoclaims("run", "--on", "parity", "--trials", "10")
+    assert status == 1
+    assert err.count(str(record)) == 1
+    assert sum(line.endswith("on parity (smoke)") for line in out.splitlines()) == 2  # of four, one is broken as such
+
+
+def test_an_interrupt_ends_the_run_at_once(evoclaims: Evoclaims, monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[object] = []
+
+    def interrupt(*arguments: object) -> None:
+        asked.append(arguments)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("evoclaims.suite.modes.RunMissing.__call__", interrupt)
+    assert evoclaims("run")[0] == 130
+    assert len(asked) == 1
+
+
 def test_an_interrupted_command_says_that_it_goes_on(evoclaims: Evoclaims, monkeypatch: pytest.MonkeyPatch) -> None:
     def interrupt(*arguments: object) -> None:
         raise KeyboardInterrupt
@@ -240,7 +313,8 @@ def test_a_device_without_enough_memory_is_one_sentence(evoclaims: Evoclaims, mo
 
     monkeypatch.setattr(Lanes, "advance", advance)
     status, _, err = evoclaims("run", "right", "--trials", "50")
-    assert (status, err.count("\n")) == (2, 1)
+    assert (status, err.count("\n")) == (1, 1)
+    assert err.startswith("evoclaims: right on parity (smoke) failed: The device's memory ")
     assert "does not hold 50 trials of hand_built on n_parity at once. Run fewer at a time: `evoclaims run`" in err
 
 

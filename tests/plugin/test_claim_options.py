@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from shutil import rmtree
 from typing import Any
 
 import pytest
@@ -180,6 +181,7 @@ def test_trials_that_drifted_from_the_committed_ones_fail_the_run(project: Any) 
     result = project.run(own_store=True)
     assert result.ret == 0
     result.stdout.fnmatch_lines(["reference trials: 3 comparisons, 0 drifted*", "to the bit: 10 trials *, 0 changed"])
+    assert project.run("--claims-stored", "--claims-committed", own_store=True).ret == 0
     worse = {"mean_success": 0.5}
     made = [replace(t, metrics={**t.metrics, **worse}, digest=digest("done", worse, {}, {}, b"")) for t in stored]
     references.write(path, made)
@@ -187,3 +189,21 @@ def test_trials_that_drifted_from_the_committed_ones_fail_the_run(project: Any) 
     assert result.ret == 1
     result.stdout.fnmatch_lines(["*✓ supported*", "DRIFT in right on parity (smoke): mean_success, p = *"])
     result.stdout.fnmatch_lines(["to the bit: 10 trials compared with the same machine and versions, 10 changed"])
+    for options in (("--claims-stored",), ("--claims-stored", "--claims-committed")):
+        result = project.run(*options, own_store=True)
+        assert result.ret == 1
+        result.stdout.fnmatch_lines(["*✓ supported*", "DRIFT in right on parity (smoke): mean_success, p = *"])
+    rmtree(project.path / ".evoclaims")
+    result = project.run("--claims-stored", "--claims-committed", own_store=True)
+    assert result.ret == 0  # the committed trials are all there is, and nothing is compared with itself
+    result.stdout.fnmatch_lines(["reference trials: 0 comparisons, 0 drifted*"])
+
+
+def test_committed_trials_alone_would_be_judged_by_no_run_and_the_option_says_so(
+    project: Any, sentence: Sentence
+) -> None:
+    project.write(a="supported")
+    result = project.run("--claims-committed", own_store=True)
+    assert result.ret == pytest.ExitCode.USAGE_ERROR
+    sentence(result, "add --claims-stored, or leave it out.")
+    assert not (project.path / ".evoclaims").exists()

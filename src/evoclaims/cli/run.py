@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
+import sys
 from collections.abc import Mapping
 
 from evoclaims.cli.project import judge_stored, open_project, open_store
 from evoclaims.cli.terminal import StdoutTerminal
 from evoclaims.core.errors import UnknownNameError, UserError
+from evoclaims.core.raised import in_one_line
 from evoclaims.judging.counting import MAX_TRIALS
 from evoclaims.suite.config import SuiteConfig
 from evoclaims.suite.live import LiveLine, duration
@@ -15,11 +18,13 @@ from evoclaims.suite.modes import RunMissing
 from evoclaims.suite.reproduction import Tier
 from evoclaims.suite.robustness import matrix
 from evoclaims.suite.variant import Variant
+from evoclaims.trials.records import printable
 from evoclaims.trials.result import TrialResult
+from evoclaims.trials.spec import TrialSpec
 
 
 def main(options: argparse.Namespace) -> int:
-    """Run what is missing and list the trials."""
+    """Run what is missing and list the trials; 1 when a condition failed, which keeps no other from running."""
     config, reproduction = open_project()
     tier = reproduction.tier(options.tier, options.variant)
     chosen = choose(tier, options.method, options.on)
@@ -37,20 +42,32 @@ def main(options: argparse.Namespace) -> int:
             f"--trials takes 1 to {MAX_TRIALS} trials a condition (no verdict looks at more), not {n}. Further seeds "
             "are run by another call, with --first-seed."
         )
+    seeds = range(options.first_seed, options.first_seed + n)
+    for names in chosen[:1]:  # a seed that is none is so for every condition: it is said once, and nothing is run
+        _ = [TrialSpec(tier.condition(*names), seed) for seed in seeds]
     line = LiveLine(StdoutTerminal())
     fetch = RunMissing(open_store(options.storage), options.device, line)
     fetch.check()
+    failed = 0
     for method, task in chosen:
+        name = f"{method} on {task} ({options.tier})"
         try:
-            results = fetch(tier.condition(method, task), range(options.first_seed, options.first_seed + n))
-        finally:
-            line.close()
-        print(f"{method} on {task} ({options.tier})")
+            with contextlib.closing(line):
+                results = fetch(tier.condition(method, task), seeds)
+        except (KeyboardInterrupt, BrokenPipeError):  # the user, or who reads the output, has had enough
+            raise
+        except BaseException as error:  # whatever a method or a task raises, the other conditions are not its matter
+            print(f"evoclaims: {name} failed: {printable(in_one_line(error, config.root))}.", file=sys.stderr)
+            failed += 1
+            continue
+        print(name)
         for result in results:
             print(f"  {describe(result)}")
+    if failed and len(chosen) > 1:
+        print(f"evoclaims: {failed} of {len(chosen)} conditions failed.", file=sys.stderr)
     if options.variant:
         _print_matrix(config, options.storage, options.tier, {options.variant: reproduction.variants[options.variant]})
-    return 0
+    return int(failed > 0)
 
 
 def _print_matrix(config: SuiteConfig, storage: str, tier: str, variants: Mapping[str, Variant]) -> None:
