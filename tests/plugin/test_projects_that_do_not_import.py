@@ -55,7 +55,9 @@ def test_a_reproduction_that_does_not_import_is_a_sentence(
     line = _spoil(project, text)
     result = project.run(*options, own_store=True)
     assert result.ret == pytest.ExitCode.USAGE_ERROR
-    sentence(result, "The module 'tiny_paper', which [tool.evoclaims] names, does not import: " + said.format(line=line))
+    sentence(
+        result, "The module 'tiny_paper', which [tool.evoclaims] names, does not import: " + said.format(line=line)
+    )
 
 
 @pytest.mark.parametrize(("text", "said"), MISTAKES[:2])
