@@ -6,10 +6,9 @@ import traceback
 from pathlib import Path
 from typing import Final
 
-import evoclaims
 from evoclaims.core.errors import UserError
 
-_OWN: Final = Path(evoclaims.__file__).resolve().parent
+_OWN: Final = Path(__file__).resolve().parents[1]
 _INSTALLED: Final = {"site-packages", "dist-packages"}
 
 
