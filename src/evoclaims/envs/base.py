@@ -9,6 +9,7 @@ from typing import Any, Protocol, runtime_checkable
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int, PRNGKeyArray
 
+from evoclaims.core.errors import UserError
 from evoclaims.core.pytree import pytree
 
 PolicyFn = Callable[[Float[Array, " observation"]], Float[Array, " action"]]
@@ -63,6 +64,15 @@ def share(part: Int[Array, ""], whole: Int[Array, ""]) -> Float[Array, ""]:
     return jnp.where(part == whole, 1.0, part.astype(jnp.float32) / whole.astype(jnp.float32))
 
 
+class MisfitError(UserError):
+    """What a policy, a method or a task gives is not what the other side takes; `clause` says what, and where."""
+
+    def __init__(self, clause: str) -> None:
+        """Make a sentence of the clause."""
+        super().__init__(f"{clause[0].upper()}{clause[1:]}.")
+        self.clause = clause
+
+
 class Task(Protocol):
     """A task, as pure functions of explicit state; frozen and hashable, so that programs can close over it.
 
@@ -104,6 +114,23 @@ class Task(Protocol):
 
     def examine(self, policy: PolicyFn, key: PRNGKeyArray, level: Int[Array, ""]) -> Episode:
         """Score `policy` on `level`: the test that decides level-ups and final results, the same for every method."""
+
+
+def fitting(task: Task, action: Float[Array, " action"]) -> Float[Array, " action"]:
+    """Return an action as it is; every task asks this of every action, while its program is traced.
+
+    jax would broadcast one of another shape: a policy whose only fault is an action of shape [] scores nothing.
+
+    Raises:
+        MisfitError: when its shape or type is not that of the task's actions.
+    """
+    found, wanted = jnp.asarray(action), (task.action_size,)
+    if found.shape != wanted or found.dtype != jnp.float32:
+        raise MisfitError(
+            f"an action has shape {found.shape} and type {found.dtype}, and {task.name!r} takes shape {wanted} and "
+            "type float32"
+        )
+    return found
 
 
 @runtime_checkable

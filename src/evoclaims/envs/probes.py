@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from evoclaims.core.pytree import pytree
 from evoclaims.core.registry import Registry
-from evoclaims.envs.base import Episode, PolicyFn, TaskState, share
+from evoclaims.envs.base import Episode, PolicyFn, TaskState, fitting, share
 
 Question = tuple[tuple[float, ...], int | None]
 """An observation and the bit wanted as its answer; None where any answer will do."""
@@ -104,7 +104,7 @@ class Probe:
     def step(self, state: TaskState, action: Float[Array, " action"]) -> TaskState:
         """Answer the question being asked."""
         asked: Asked = state.inner
-        right = (action[0] > 0) == jnp.asarray(self.wanted)[asked.case, asked.time]
+        right = (fitting(self, action)[0] > 0) == jnp.asarray(self.wanted)[asked.case, asked.time]
         matters = jnp.asarray(self.matters)[asked.case, asked.time]
         earned = asked.owed + jnp.where(matters, jnp.where(right, 1.0, -1.0), 0.0)
         last = asked.time + 1 >= self.horizon
@@ -143,7 +143,7 @@ class Probe:
         state, alive = self._first(case), jnp.ones((), bool)
         total, right = jnp.zeros(()), jnp.zeros((), jnp.int32)
         for time in range(self.horizon):
-            action = policy(state.observation)
+            action = fitting(self, policy(state.observation))
             good = ((action[0] > 0) == jnp.asarray(self.wanted)[case, time]) & jnp.asarray(self.matters)[case, time]
             state = self.step(state, action)
             total = total + jnp.where(alive, state.reward, 0.0)

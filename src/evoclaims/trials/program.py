@@ -16,6 +16,7 @@ from evoclaims.core.pytree import pytree, strong
 from evoclaims.envs.base import Episode, Numbered, Task
 from evoclaims.methods.base import Progress
 from evoclaims.trials import curriculum
+from evoclaims.trials.fit import both_named, check_scores, traced_progress
 from evoclaims.trials.rollout import score_every_level
 from evoclaims.trials.spec import Condition
 
@@ -80,7 +81,12 @@ class Program:
     condition: Condition
 
     def start(self, seed: Int[Array, ""], idle: Bool[Array, ""]) -> TrialState:
-        """Build the state of a trial that has not taken a step."""
+        """Build the state of a trial that has not taken a step.
+
+        Raises:
+            UserError: when method and task do not fit together (see `fit`).
+        """
+        progress = self._progress
         method, task = self.condition.method, self.condition.task
         init_key = streams(trial_key(seed, TRAINING), "init")[0]
         return TrialState(
@@ -88,7 +94,7 @@ class Program:
             method=strong(method.init(init_key, task)),
             ascent=curriculum.start(task.levels, self.condition.progression),
             steps=jnp.zeros((), jnp.int32),
-            last=jax.tree.map(lambda leaf: jnp.zeros(leaf.shape, leaf.dtype), self._progress),
+            last=jax.tree.map(lambda leaf: jnp.zeros(leaf.shape, leaf.dtype), progress),
             diverged=jnp.zeros((), bool),
             idle=idle,
             numbers=jax.tree.map(jnp.asarray, task.numbers) if isinstance(task, Numbered) else (),
@@ -131,23 +137,17 @@ class Program:
 
     def score(self, trial: TrialState) -> Score:
         """Judge the trial's champion on every level, with keys that training never sees."""
-        task = self._task(trial)
-        policy = self.condition.method.best(task, trial.method)
-        final = score_every_level(task, policy, trial_key(trial.seed, EVALUATION))
+        method, task = self.condition.method, self._task(trial)
+        policy = method.best(task, trial.method)
+        with both_named(method, task):
+            final = score_every_level(task, policy, trial_key(trial.seed, EVALUATION))
+            check_scores(task, final)
         return Score(final=final, parameters=policy.parameters, solved_at=trial.ascent.solved_at)
 
     @cached_property
     def _progress(self) -> Progress:
         """The shapes of what a step reports; tracing one takes seconds, so that it is done once."""
-        method, task = self.condition.method, self.condition.task
-
-        def report(seed: Int[Array, ""], level: Int[Array, ""]) -> Progress:
-            key = trial_key(seed, TRAINING)
-            return method.step(key, task, level, strong(method.init(key, task)))[1]
-
-        number = jax.ShapeDtypeStruct((), jnp.int32)
-        shapes: Progress = jax.eval_shape(report, number, number)
-        return shapes
+        return traced_progress(self.condition.method, self.condition.task)
 
     def _task(self, trial: TrialState) -> Task:
         """Return the task, its numbers taken from the trial."""

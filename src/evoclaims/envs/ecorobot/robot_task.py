@@ -17,7 +17,7 @@ from evoclaims.core.errors import UserError
 from evoclaims.core.kernels.one_kernel import has_gpu, one_kernel
 from evoclaims.core.keys import streams
 from evoclaims.core.pytree import pytree, select, strong
-from evoclaims.envs.base import Episode, PolicyFn, TaskState
+from evoclaims.envs.base import Episode, PolicyFn, TaskState, fitting
 from evoclaims.envs.ecorobot import physics
 from evoclaims.envs.ecorobot.boxes import Box
 from evoclaims.envs.ecorobot.physics import Body
@@ -201,6 +201,7 @@ class RobotTask(ABC):
 
     def step(self, state: TaskState, action: Float[Array, " action"]) -> TaskState:
         """Act for `robot.frames` simulation steps: `plain_step`, on an NVIDIA GPU in one kernel (`one_kernel`)."""
+        action = fitting(self, action)
         if not has_gpu():  # and no task needs to be hashed for its kernel
             return self.plain_step(state, action)
         return _kernel(self.with_numbers(None))(state, action, self.numbers)

@@ -11,7 +11,7 @@ from jaxtyping import Array, Bool, Float, Int, PRNGKeyArray
 
 from evoclaims.core.errors import UnknownNameError
 from evoclaims.core.pytree import pytree
-from evoclaims.envs.base import Episode, PolicyFn, TaskState, share
+from evoclaims.envs.base import Episode, PolicyFn, TaskState, fitting, share
 from evoclaims.envs.gates.truth_table import TruthTable
 
 Sampling = Literal["exhaustive", "sampled"]
@@ -77,7 +77,7 @@ class Circuit(ABC):
     def step(self, state: TaskState, action: Float[Array, " action"]) -> TaskState:
         """Answer the row being asked; reward is minus the row's error."""
         row: Row = state.inner
-        wrong, _ = self._errors(jnp.asarray(action)[None], row.index[None])
+        wrong, _ = self._errors(fitting(self, action)[None], row.index[None])
         following = Row(level=row.level, index=row.index + 1)
         last = following.index >= self._rows(row.level)
         ended = jnp.logical_or(last, self.sampling == "sampled")
@@ -88,7 +88,8 @@ class Circuit(ABC):
         if self.sampling == "exhaustive":
             return self.examine(policy, key, level)
         index = jax.random.randint(key, (1,), 0, self._rows(level), jnp.int32)
-        wrong, _ = self._errors(policy(jnp.asarray(self.table.inputs)[index[0]])[None], index)
+        answer = fitting(self, policy(jnp.asarray(self.table.inputs)[index[0]]))
+        wrong, _ = self._errors(answer[None], index)
         return Episode(fitness=-wrong[0], success=self.examine(policy, key, level).success)
 
     def examine(self, policy: PolicyFn, key: PRNGKeyArray, level: Int[Array, ""]) -> Episode:
@@ -96,7 +97,8 @@ class Circuit(ABC):
 
         The key is not used: the examination is exhaustive.
         """
-        wrong, right = self._errors(jax.vmap(policy)(jnp.asarray(self.table.inputs)), jnp.arange(self.table.rows))
+        answers = jax.vmap(lambda bits: fitting(self, policy(bits)))(jnp.asarray(self.table.inputs))
+        wrong, right = self._errors(answers, jnp.arange(self.table.rows))
         rows = self._rows(level)
         asked = jnp.arange(self.table.rows) < rows
         return Episode(

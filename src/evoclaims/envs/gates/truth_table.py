@@ -4,9 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from evoclaims.envs.base import MisfitError
 
 Bits = tuple[int, ...]
 
@@ -26,6 +30,32 @@ class TruthTable:
     targets: NDArray[np.bool_]
     active: NDArray[np.bool_]
     rows_at_level: tuple[int, ...]
+
+    def __post_init__(self) -> None:
+        """Check that the parts belong together; jax would broadcast what does not, and read past the last row.
+
+        Raises:
+            MisfitError: when shapes or types are others, an output is never asked, or levels have no ascending rows.
+        """
+        rows = len(self.inputs)
+        wanted: tuple[tuple[str, NDArray[Any], type], ...] = (
+            ("inputs", self.inputs, np.float32),
+            ("targets", self.targets, np.bool_),
+            ("active", self.active, np.bool_),
+        )
+        for name, part, dtype in wanted:
+            if part.ndim != 2 or len(part) != rows or part.dtype != dtype:
+                raise MisfitError(
+                    f"a truth table's {name} have shape {part.shape} and type {part.dtype}, and it takes [{rows} rows, "
+                    f"…] of type {np.dtype(dtype)}"
+                )
+        if self.active.shape != self.targets.shape:
+            raise MisfitError(
+                f"a truth table's active outputs have shape {self.active.shape}, and its targets {self.targets.shape}"
+            )
+        levels = self.rows_at_level
+        if not levels or levels[0] < 1 or levels[-1] > rows or any(b <= a for a, b in pairwise(levels)):
+            raise MisfitError(f"a truth table's levels ask for {levels} rows, not for ever more of its {rows}")
 
     @property
     def rows(self) -> int:

@@ -1,0 +1,130 @@
+"""Whether a method and a task fit together: shapes and types where they meet, found by tracing and before compiling.
+
+jax broadcasts what does not fit. A policy whose action is a scalar would be scored, wrongly, and its claim refuted.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Int
+
+from evoclaims.core.errors import UserError
+from evoclaims.core.keys import TRAINING, trial_key
+from evoclaims.core.pytree import strong
+from evoclaims.envs.base import Episode, MisfitError, Task, TaskState, fitting
+from evoclaims.methods.base import Method, Progress
+
+_NUMBER = jax.ShapeDtypeStruct((), jnp.int32)
+
+
+@contextmanager
+def both_named(method: Method[Any], task: Task) -> Iterator[None]:
+    """Name method and task in the sentence about what does not fit.
+
+    Raises:
+        UserError: in the place of a `MisfitError`.
+    """
+    try:
+        yield
+    except MisfitError as error:
+        raise UserError(f"The method {method.name!r} does not fit the task {task.name!r}: {error.clause}.") from error
+
+
+def traced_progress(method: Method[Any], task: Task) -> Progress:
+    """Return the shapes of what a step of `method` on `task` reports, after checking all that they give each other.
+
+    Each part is traced once, the parts that take seconds last. Nothing is compiled.
+
+    Raises:
+        UserError: when something has another shape, type or structure than it must have; names both.
+    """
+    with both_named(method, task):
+        shown: TaskState = jax.eval_shape(lambda seed, level: task.reset(_key(seed), level), _NUMBER, _NUMBER)
+        _check_task_state(task, "reset", shown)
+        before = jax.eval_shape(lambda seed: strong(method.init(_key(seed), task)), _NUMBER)
+        jax.eval_shape(lambda state, seen: fitting(task, method.best(task, state)(seen)), before, shown.observation)
+        action = jax.ShapeDtypeStruct((task.action_size,), jnp.float32)
+        following: TaskState = jax.eval_shape(task.step, shown, action)
+        _check_task_state(task, "step", following)
+        _check_unchanged(f"{task.name!r} changes its state by a step", shown.inner, following.inner)
+
+        def step(seed: Int[Array, ""], level: Int[Array, ""], state: Any) -> tuple[Any, Progress]:
+            after, progress = method.step(_key(seed), task, level, state)
+            return strong(after), progress
+
+        after, progress = jax.eval_shape(step, _NUMBER, _NUMBER, before)
+        _check_unchanged(f"{method.name!r} changes its state by a step", before, after)
+        return _checked_progress(method, progress)
+
+
+def check_scores(task: Task, final: Episode) -> None:
+    """Check an examination's results of every level, leaves [levels].
+
+    Raises:
+        MisfitError: when one is not a number for each level.
+    """
+    what = f"the examination by {task.name!r} gives"
+    for name, leaf in (("fitness", final.fitness), ("success", final.success)):
+        _check(f"{what} a {name}", leaf, (task.levels,), jnp.float32)
+    _check_numbers(f"{what} a metric", final.metrics, (task.levels,))
+
+
+def _key(seed: Int[Array, ""]) -> Array:
+    """Return a key for tracing."""
+    return trial_key(seed, TRAINING)
+
+
+def _check_task_state(task: Task, function: str, state: TaskState) -> None:
+    """Check what `reset` or `step` gives to a policy and to a method."""
+    what = f"the {function} of {task.name!r} gives"
+    _check(f"{what} an observation", state.observation, (task.observation_size,), jnp.float32)
+    _check(f"{what} a reward", state.reward, (), jnp.float32)
+    _check(f"{what} a mark `terminated`", state.terminated, (), jnp.bool_)
+    _check(f"{what} a mark `truncated`", state.truncated, (), jnp.bool_)
+
+
+def _checked_progress(method: Method[Any], progress: object) -> Progress:
+    """Return what a step tells the engine, once it is what it should be."""
+    what = f"a step of {method.name!r} reports"
+    if not isinstance(progress, Progress):
+        raise MisfitError(f"{what} a {type(progress).__name__}, and the engine takes a Progress")
+    _check(f"{what} a fitness", progress.fitness, (), jnp.float32)
+    _check(f"{what} a success", progress.success, (), jnp.float32)
+    _check(f"{what} a mark `healthy`", progress.healthy, (), jnp.bool_)
+    _check_numbers(f"{what} a metric", progress.metrics, ())
+    return progress
+
+
+def _check_numbers(what: str, metrics: Mapping[str, Any], shape: tuple[int, ...]) -> None:
+    """Check that metrics are real numbers of one shape."""
+    for name, leaf in metrics.items():
+        if leaf.shape != shape or not (np.can_cast(leaf.dtype, np.float64) or leaf.dtype == jnp.bfloat16):
+            raise MisfitError(f"{what} {name!r} of {_described(leaf)}, not a real number of shape {shape}")
+
+
+def _check(what: str, leaf: Any, shape: tuple[int, ...], dtype: Any) -> None:
+    """Check one array's shape and type."""
+    if (leaf.shape, leaf.dtype) != (shape, np.dtype(dtype)):
+        raise MisfitError(f"{what} of {_described(leaf)}, not of shape {shape} and type {np.dtype(dtype)}")
+
+
+def _check_unchanged(what: str, before: Any, after: Any) -> None:
+    """Check that a state keeps its structure, and every array in it its shape and type."""
+    (paths, structure), (leaves, following) = jax.tree_util.tree_flatten_with_path(before), jax.tree.flatten(after)
+    if structure != following:
+        raise MisfitError(f"{what}: its structure is another one afterwards")
+    for (path, was), now in zip(paths, leaves, strict=True):
+        if (was.shape, was.dtype) != (now.shape, now.dtype):
+            place = jax.tree_util.keystr(path) or "it"
+            raise MisfitError(f"{what}: {place} is of {_described(was)} before and of {_described(now)} afterwards")
+
+
+def _described(leaf: Any) -> str:
+    """Return shape and type in words."""
+    return f"shape {leaf.shape} and type {leaf.dtype}"
