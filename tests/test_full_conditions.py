@@ -1,4 +1,4 @@
-"""The full tier, which no CI runs: its conditions at least fit together, begin and trace a step of several trials at once."""
+"""The full tier, which no CI runs: its methods and tasks at least fit, begin and trace a step of several trials."""
 
 from __future__ import annotations
 

@@ -20,6 +20,7 @@ from evoclaims.envs.base import Episode
 from evoclaims.envs.gates.parity import NParity
 from evoclaims.methods.map_elites import MapElites, beaten, lecun_uniform
 from evoclaims.networks.mlp import Mlp
+from evoclaims.trials.outcome import is_sound
 
 LEVEL = jnp.zeros((), jnp.int32)
 X, Y = 4, 3  # cells of the small grid, told apart by their numbers
@@ -428,3 +429,12 @@ def test_a_wrong_hyperparameter_is_one_sentence(wrong: dict[str, Any], sentence:
     with pytest.raises(UserError) as told:
         replace(SMALL, **wrong)
     assert sentence in str(told.value)
+
+
+def test_an_elite_is_sound_though_the_map_beside_it_has_empty_cells() -> None:
+    elite, cells = jax.device_get(SMALL.best(Plane(), BENCH.run(1)[0]).parameters)
+    assert np.isneginf(cells).any()
+    assert is_sound(SMALL, (elite, cells))
+    elite = elite.copy()
+    elite[3] = np.nan
+    assert not is_sound(SMALL, (elite, cells))

@@ -10,6 +10,7 @@ import numpy as np
 from workbench import Workbench, close, same_bits
 
 from evoclaims.core.canonical import canonical_json
+from evoclaims.trials.outcome import is_sound
 
 LEVEL = jnp.zeros((), jnp.int32)
 
@@ -103,6 +104,23 @@ def test_numbers_that_are_not_finite_are_told_as_unhealthy(bench: Workbench) -> 
     poisoned = jax.tree.map(lambda x: x * jnp.nan if jnp.issubdtype(x.dtype, jnp.floating) else x, state)
     _, (progress,) = bench.run(1, state=poisoned)
     assert not bool(progress.healthy)
+
+
+def test_a_policy_is_sound_until_one_of_its_numbers_is_not_finite(bench: Workbench) -> None:
+    for state in (bench.init(), bench.run(2)[0]):
+        parameters = jax.device_get(bench.method.best(bench.task, state).parameters)
+        assert is_sound(bench.method, parameters)
+    leaves, structure = jax.tree.flatten(parameters)
+    spoilt = 0
+    for index, leaf in enumerate(leaves):
+        for worst in (np.nan, np.inf) if np.issubdtype(leaf.dtype, np.floating) else ():
+            bad = leaf.copy()
+            bad.flat[0] = worst
+            assert not is_sound(
+                bench.method, jax.tree.unflatten(structure, [*leaves[:index], bad, *leaves[index + 1 :]])
+            )
+            spoilt += 1
+    assert spoilt
 
 
 def test_the_best_never_worsens_where_evaluation_is_deterministic(entry: Any, bench: Workbench) -> None:

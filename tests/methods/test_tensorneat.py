@@ -30,6 +30,7 @@ from evoclaims.methods.neat.species import SpeciesState, speciate
 from evoclaims.methods.tensorneat import NeatTensorneat, library, neat, policy
 from evoclaims.methods.tensorneat_genes import Genes, translated
 from evoclaims.networks.graph import GraphNetwork
+from evoclaims.trials.outcome import is_sound
 
 SMALL = Settings(population=60, nodes=12, connections=30, species=Species(most=5))
 METHODS = {
@@ -302,3 +303,14 @@ def _empty() -> Any:
 def _state() -> Any:
     """Return a state to make a policy from whose function alone is wanted."""
     return NeatTensorneat(SMALL).init(jax.random.key(0), NParity(2))
+
+
+@pytest.mark.parametrize("name", METHODS)
+def test_a_genome_is_sound_though_nan_stands_where_there_is_no_gene(name: str) -> None:
+    nodes, links = np.full((4, 5), np.nan, np.float32), np.full((3, 3), np.nan, np.float32)
+    nodes[:2], links[0] = 0.5, 0.25
+    assert is_sound(METHODS[name], Genes(nodes=nodes, connections=links))
+    for table, worst in ((nodes, np.nan), (nodes, np.inf), (links, np.nan), (links, -np.inf)):
+        was, table[0, 2] = table[0, 2], worst
+        assert not is_sound(METHODS[name], Genes(nodes=nodes, connections=links))
+        table[0, 2] = was

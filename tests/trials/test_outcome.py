@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from datetime import datetime
 from pathlib import Path
 from typing import Any
 
+import jax.numpy as jnp
 import numpy as np
 import pytest
-from trial_toys import walk
+from trial_toys import Walker, walk
 
 from evoclaims.envs.gates.parity import NParity
+from evoclaims.methods.base import Policy
 from evoclaims.methods.hand_built import HandBuilt
 from evoclaims.trials.budget import Budget
 from evoclaims.trials.result import TrialResult
@@ -115,3 +118,59 @@ def test_a_direct_trial_trains_on_the_last_level_and_is_examined_on_all(tmp_path
     (result,) = run(condition, [0], Store(tmp_path), cpus[:1])
     assert result.levels["solved_at"] == (-1.0, 8.0)
     assert result.levels["success"] == (1.0, 1.0)
+
+
+@dataclass(frozen=True)
+class Spoilt(Walker):
+    """Trains in good health, and ends with a champion that holds a number which is not finite, used or not."""
+
+    worst: float = float("nan")
+    acts_by_it: bool = True
+
+    def best(self, task: Any, state: Any) -> Policy:
+        parameters = {"weights": state, "beside": jnp.array([self.worst])}
+        return Policy(parameters, lambda own, bits: jnp.where(own["weights"][:1] > 0, 1.0, -1.0))
+
+
+@dataclass(frozen=True)
+class Careful(Spoilt):
+    """Says what it does not act by."""
+
+    acts_by_it: bool = False
+
+    def used(self, parameters: Any) -> Any:
+        return parameters["weights"]
+
+
+@dataclass(frozen=True)
+class Unscored(NParity):
+    """An examination whose fitness or success is not finite."""
+
+    fitness: float = 0.0
+    success: float = 0.0
+
+    def examine(self, policy: Any, key: Any, level: Any) -> Any:
+        episode = super().examine(policy, key, level)
+        return replace(episode, fitness=episode.fitness + self.fitness, success=episode.success + self.success)
+
+
+@pytest.mark.parametrize(
+    ("method", "task", "status"),
+    [
+        (Spoilt(), NParity(3), "diverged"),
+        (Spoilt(worst=float("inf")), NParity(3), "diverged"),
+        (Spoilt(worst=1.0), NParity(3), "done"),
+        (Careful(), NParity(3), "done"),
+        (Walker(), Unscored(3, fitness=float("nan")), "diverged"),
+        (Walker(), Unscored(3, fitness=float("-inf")), "diverged"),
+        (Walker(), Unscored(3, success=float("nan")), "diverged"),
+        (Walker(), Unscored(3), "done"),
+    ],
+)
+def test_a_trial_has_diverged_when_its_final_policy_or_its_score_is_not_finite(
+    method: Any, task: Any, status: str, tmp_path: Path, cpus: list[Any]
+) -> None:
+    condition = Condition(method, task, "direct", Budget(generations=2, reports=1))
+    (result,) = run(condition, [0], Store(tmp_path), cpus[:1])
+    assert result.status == status
+    assert result.metrics["steps"] == 2

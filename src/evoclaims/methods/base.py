@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any, Protocol, TypeVar
+from typing import Any, Protocol, TypeVar, runtime_checkable
 
 from jaxtyping import Array, Bool, Float, Int, PRNGKeyArray
 
@@ -74,3 +74,14 @@ class Method(Protocol[S]):
 
     def cost(self, task: Task) -> int:
         """Return the environment steps that one step spends, counting the longest episode."""
+
+
+@runtime_checkable
+class PartlyUsed(Protocol):
+    """A method whose policies' parameters hold more than the numbers they act by: padding, or what is stored beside.
+
+    All numbers that a policy acts by are finite; a trial whose champion has others ends as diverged.
+    """
+
+    def used(self, parameters: Any) -> Any:
+        """Return the arrays of a policy's parameters (on the host) that it acts by; of another method, all are."""

@@ -15,6 +15,7 @@ from evoclaims.methods.base import Policy, Progress
 from evoclaims.methods.hyperneat import PAPER
 from evoclaims.methods.neat.settings import Settings
 from evoclaims.methods.tensorneat import TensorneatState, begin, evolve, library, neat, policy
+from evoclaims.methods.tensorneat_genes import Genes, present
 from evoclaims.networks.activations import ACTIVATIONS
 from evoclaims.networks.substrate import Extent
 
@@ -64,6 +65,10 @@ class HyperneatTensorneat:
     def best(self, task: Task, state: TensorneatState) -> Policy:
         """Return the best genome of the last population that was evaluated."""
         return policy(self._algorithm(task), state)
+
+    def used(self, parameters: Genes) -> Any:
+        """Return the genes; NaN stands where there is none."""
+        return present(parameters)
 
     def cost(self, task: Task) -> int:
         """Return the environment steps of one generation, at the longest episode."""

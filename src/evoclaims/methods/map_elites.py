@@ -179,6 +179,10 @@ class MapElites:
             function=lambda parameters, observation: self.network.apply(parameters[0], observation, task.action_size),
         )
 
+    def used(self, parameters: Any) -> Any:
+        """Return the elite's vector; the map beside it is -inf where no elite is."""
+        return parameters[0]
+
     def cost(self, task: Task) -> int:
         """Return the environment steps of one iteration, at the longest episode."""
         return self.batch * task.horizon

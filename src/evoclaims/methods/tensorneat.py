@@ -23,7 +23,7 @@ from evoclaims.envs.base import Episode, PolicyFn, Task
 from evoclaims.methods.base import Policy, Progress
 from evoclaims.methods.champion import no_episode
 from evoclaims.methods.neat.settings import PAPER, Settings, Species
-from evoclaims.methods.tensorneat_genes import Genes
+from evoclaims.methods.tensorneat_genes import Genes, present
 from evoclaims.networks.activations import ACTIVATIONS
 
 INSTALL = 'pip install "tensorneat @ git+https://github.com/EMI-Group/tensorneat"'
@@ -69,6 +69,10 @@ class NeatTensorneat:
     def best(self, task: Task, state: TensorneatState) -> Policy:
         """Return the best genome of the last population that was evaluated."""
         return policy(self._algorithm(task), state)
+
+    def used(self, parameters: Genes) -> Any:
+        """Return the genes; NaN stands where there is none."""
+        return present(parameters)
 
     def cost(self, task: Task) -> int:
         """Return the environment steps of one generation, at the longest episode."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
+from numpy.typing import NDArray
 
 from evoclaims.core.pytree import pytree
 from evoclaims.networks.genome import Genome
@@ -21,6 +22,12 @@ class Genes:
 
     nodes: Float[Array, "nodes 5"]
     connections: Float[Array, "connections 3"]
+
+
+def present(genes: Genes) -> list[NDArray[np.float32]]:
+    """Return the rows of nodes and of connections that hold a gene, on the host."""
+    tables = np.asarray(genes.nodes), np.asarray(genes.connections)
+    return [table[~np.isnan(table).all(axis=1)] for table in tables]
 
 
 def translated(genome: Genome) -> Genes:

@@ -116,10 +116,11 @@ def _check(what: str, leaf: Any, shape: tuple[int, ...], dtype: Any) -> None:
 
 def _check_unchanged(what: str, before: Any, after: Any) -> None:
     """Check that a state keeps its structure, and every array in it its shape and type."""
-    (paths, structure), (leaves, following) = jax.tree_util.tree_flatten_with_path(before), jax.tree.flatten(after)
-    if structure != following:
+    structure: Any = jax.tree.structure(before)
+    if structure != jax.tree.structure(after):
         raise MisfitError(f"{what}: its structure is another one afterwards")
-    for (path, was), now in zip(paths, leaves, strict=True):
+    paths = jax.tree_util.tree_flatten_with_path(before)[0]
+    for (path, was), now in zip(paths, jax.tree.leaves(after), strict=True):
         if (was.shape, was.dtype) != (now.shape, now.dtype):
             place = jax.tree_util.keystr(path) or "it"
             raise MisfitError(f"{what}: {place} is of {_described(was)} before and of {_described(now)} afterwards")

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evoclaims.core.provenance import collect
+from evoclaims.methods.base import Method, PartlyUsed
 from evoclaims.trials.arrays import pack
 from evoclaims.trials.curriculum import NEVER
 from evoclaims.trials.devices import MATMUL_PRECISION
@@ -49,7 +50,8 @@ def make_result(
         furthest_solved: highest level solved while training, -1 for none.
         furthest_reached: highest level trained on.
         steps, environment_steps: spent until the trial ended.
-    The task's own metrics of the final policy on the last level stand beside them.
+    The task's own metrics of the final policy on the last level stand beside them. A trial whose last step was healthy
+    has still diverged when its final policy acts by numbers that are not finite, or scores one.
     """
     cost = spec.condition.method.cost(spec.condition.task)
     success, fitness = np.asarray(score.final.success)[lane], np.asarray(score.final.fitness)[lane]
@@ -71,8 +73,10 @@ def make_result(
         "fitness": tuple(map(float, fitness)),
         "solved_at": tuple(float(int(x) * cost) if x != NEVER else float(NEVER) for x in solved_at),
     }
-    champion = named_leaves(jax.tree.map(lambda leaf: np.asarray(leaf)[lane], score.parameters))
-    status: Status = "diverged" if bool(report.diverged[lane]) else "done"
+    parameters = jax.tree.map(lambda leaf: np.asarray(leaf)[lane], score.parameters)
+    champion = named_leaves(parameters)
+    healthy = not report.diverged[lane] and is_sound(spec.condition.method, parameters) and are_finite(success, fitness)
+    status: Status = "done" if healthy else "diverged"
     plain_curves = {name: tuple(map(float, values)) for name, values in curves.items()}
     result = TrialResult(
         id=spec.id,
@@ -88,6 +92,16 @@ def make_result(
         provenance=provenance(devices),
     )
     return result, champion
+
+
+def is_sound(method: Method[Any], parameters: Any) -> bool:
+    """Whether all numbers that a policy of `method` acts by are finite; `parameters` are on the host."""
+    return are_finite(*jax.tree.leaves(method.used(parameters) if isinstance(method, PartlyUsed) else parameters))
+
+
+def are_finite(*arrays: NDArray[Any]) -> bool:
+    """Whether no array holds NaN or an infinity."""
+    return all(bool(np.all(np.isfinite(array))) for array in arrays)
 
 
 def provenance(devices: Sequence[jax.Device]) -> dict[str, Any]:
