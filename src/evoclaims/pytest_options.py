@@ -19,6 +19,11 @@ def add(parser: pytest.Parser) -> None:
     group.addoption("--claims-trials", metavar="N", type=int, help="judge by one look at N trials a condition")
     group.addoption("--claims-only", metavar="IDS", help="judge only these claims, such as G1,G7")
     group.addoption("--claims-device", metavar="DEVICE", default="auto", help="auto (default), cpu or gpu")
+    group.addoption(
+        "--claims-time-limit",
+        metavar="TIME",
+        help="time that a batch of trials may take, such as 90s, 30min, 24h or none (24h, or what pyproject.toml says)",
+    )
     group.addoption("--claims-json", metavar="FILE", help="write all verdicts to FILE, also when there are none")
     group.addoption(
         "--claims-undecided",

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 _session: pytest.StashKey[Session] = pytest.StashKey()
 _line: pytest.StashKey[LiveLine] = pytest.StashKey()
 _verdicts: pytest.StashKey[Verdicts] = pytest.StashKey()
+_status: pytest.StashKey[pytest.Session] = pytest.StashKey()
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -138,8 +139,10 @@ def make_session(config: pytest.Config) -> Session:
     devices.configure()
     store = Store(config.invocation_params.dir / config.getoption("claims_storage"))
     line = LiveLine(Uncaptured(config)) if config.pluginmanager.has_plugin("terminalreporter") else None
-    mode: Any = RunMissing(store, config.getoption("claims_device"), line or ignore)
-    reproduction = load_reproduction(load_config(config.rootpath))
+    project = load_config(config.rootpath)
+    limit = project.seconds(config.getoption("claims_time_limit"))
+    mode: Any = RunMissing(store, config.getoption("claims_device"), line or ignore, limit)
+    reproduction = load_reproduction(project)
     if config.getoption("claims_stored"):
         mode = StoredOnly(Archive(store, reproduction.references if config.getoption("claims_committed") else None))
     made = Session(reproduction, store, mode, config.getoption("claims_trials"), config.getoption("claims_variant"))
@@ -150,6 +153,22 @@ def make_session(config: pytest.Config) -> Session:
     if line is not None:
         config.stash[_line] = line
     return made
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_sessionfinish(session: pytest.Session) -> None:
+    """Keep the exit status for `pytest_unconfigure`."""
+    session.config.stash[_status] = session
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_unconfigure(config: pytest.Config) -> None:
+    """End the process if trials that did not return in time still run in it."""
+    ended = config.stash.get(_status, None)
+    if ended is not None and _session in config.stash:
+        from evoclaims.trials.allowance import end_without
+
+        end_without(int(ended.exitstatus))
 
 
 @pytest.fixture

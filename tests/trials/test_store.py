@@ -160,10 +160,41 @@ def test_a_trial_run_again_after_a_crash_takes_its_place(
     assert kept.status == "done"
 
 
-@pytest.mark.parametrize("status", ["diverged", "timeout"])
-def test_a_trial_that_diverged_or_timed_out_keeps_its_place(store: Store, make_result: Make, status: str) -> None:
-    store.put(make_result(status=status), {})
+def test_a_trial_that_diverged_keeps_its_place(store: Store, make_result: Make) -> None:
+    store.put(make_result(status="diverged"), {})
     assert store.put(make_result(), {}) == "differs"
+
+
+def _timed_out(make_result: Make, seconds: float) -> TrialResult:
+    made = make_result(status="timeout")
+    return dataclasses.replace(made, timing={**made.timing, "limit": seconds})
+
+
+@pytest.mark.parametrize("status", ["done", "diverged", "crashed"])
+def test_a_trial_that_ran_out_of_time_gives_way_to_any_other_end_and_never_takes_its_place(
+    store: Store, make_result: Make, parameters: dict[str, Any], status: str
+) -> None:
+    late, ended = _timed_out(make_result, 5.0), make_result(status=status)
+    assert store.put(late, {}) == "stored"
+    assert store.put(ended, parameters) == "stored"
+    kept = store.get(ended.id)
+    assert kept is not None
+    assert (kept.status, sorted(store.champion(ended.id))) == (status, sorted(parameters))
+    if status != "crashed":
+        assert store.put(_timed_out(make_result, 50.0), {}) == "differs"
+
+
+def test_of_two_ends_of_its_time_the_one_that_had_more_stays(store: Store, make_result: Make) -> None:
+    for seconds, became, kept in (
+        (5.0, "stored", 5.0),
+        (3.0, "present", 5.0),
+        (5.0, "present", 5.0),
+        (8.0, "stored", 8.0),
+    ):
+        assert store.put(_timed_out(make_result, seconds), {}) == became
+        found = store.get(make_result().id)
+        assert found is not None
+        assert found.timing["limit"] == kept
 
 
 def test_a_champion_is_written_before_its_record(

@@ -67,6 +67,12 @@ def _parser() -> argparse.ArgumentParser:
     device(run)
     run.add_argument("--variant", metavar="NAME", default="", help="run what this variant changes, then judge by it")
     run.add_argument("--trials", type=int, metavar="N", help="trials per condition (default: the tier's)")
+    run.add_argument(
+        "--time-limit",
+        metavar="TIME",
+        help="time that a batch of trials may take, such as 90s, 30min, 24h or none (24h, or what pyproject.toml says)",
+    )
+    run.add_argument("--retry", action="store_true", help="run trials again that ran out of time under this limit")
     run.add_argument("--first-seed", type=int, default=0, metavar="SEED", help="seed of the first trial (0)")
 
     status = add("status", "show the verdicts that the stored trials give; run nothing")

@@ -21,6 +21,7 @@ from evoclaims.suite.variant import Variant
 from evoclaims.trials.records import printable
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.spec import TrialSpec
+from evoclaims.trials.time_limit import time_allowed
 
 
 def main(options: argparse.Namespace) -> int:
@@ -46,14 +47,18 @@ def main(options: argparse.Namespace) -> int:
     for names in chosen[:1]:  # a seed that is none is so for every condition: it is said once, and nothing is run
         _ = [TrialSpec(tier.condition(*names), seed) for seed in seeds]
     line = LiveLine(StdoutTerminal())
-    fetch = RunMissing(open_store(options.storage), options.device, line)
+    store = open_store(options.storage)
+    fetch = RunMissing(store, options.device, line, config.seconds(options.time_limit))
     fetch.check()
     failed = 0
     for method, task in chosen:
         name = f"{method} on {task} ({options.tier})"
         try:
             with contextlib.closing(line):
-                results = fetch(tier.condition(method, task), seeds)
+                condition = tier.condition(method, task)
+                if options.retry:
+                    store.forget_timeouts(TrialSpec(condition, seed).id for seed in seeds)
+                results = fetch(condition, seeds)
         except (KeyboardInterrupt, BrokenPipeError):  # the user, or who reads the output, has had enough
             raise
         except BaseException as error:  # whatever a method or a task raises, the other conditions are not its matter
@@ -102,8 +107,10 @@ def choose(tier: Tier, method: str | None, task: str | None) -> list[tuple[str, 
 
 def describe(result: TrialResult) -> str:
     """Return a trial in one line."""
+    spent = f"seed {result.seed}: {result.status} after {int(result.metrics['environment_steps']):,} environment steps"
+    took = f"({duration(result.timing['run'])} for the batch of {result.timing['batch']})"
+    if result.status == "timeout":
+        limit = duration(time_allowed(result))
+        return f"{spent}: its batch had {limit}; more by --time-limit, as much again by --retry {took}"
     success = " ".join(f"{value:.3f}" for value in result.levels["success"])
-    return (
-        f"seed {result.seed}: {result.status} after {int(result.metrics['environment_steps']):,} environment steps, "
-        f"success by level {success} ({duration(result.timing['run'])} for the batch of {result.timing['batch']})"
-    )
+    return f"{spent}, success by level {success} {took}"

@@ -10,6 +10,7 @@ from pathlib import Path
 from evoclaims.core.errors import UserError
 from evoclaims.suite.importing import import_module
 from evoclaims.suite.reproduction import Reproduction
+from evoclaims.trials.time_limit import DEFAULT_LIMIT, seconds_of
 
 
 @dataclass(frozen=True)
@@ -20,11 +21,21 @@ class SuiteConfig:
         root: the project's folder, put on the import path.
         reproduction: module that holds `REPRODUCTION`.
         claims: folder of claim tests, relative to `root`.
+        time_limit: time that a batch of trials may take, such as "90s" or "24h" (see `trials.time_limit`).
     """
 
     root: Path
     reproduction: str
     claims: str = "claims"
+    time_limit: str = DEFAULT_LIMIT
+
+    def seconds(self, option: str | None) -> float:
+        """Return the time that a batch of trials may take: what an option says, or else these settings.
+
+        Raises:
+            UserError: when that is no length of time.
+        """
+        return seconds_of(self.time_limit if option is None else option)
 
 
 def find_root(start: Path) -> Path:
@@ -49,11 +60,11 @@ def load_config(root: Path) -> SuiteConfig:
         UserError: when the table is missing, has other keys, or a value that is no text.
     """
     table = _tool_tables(root / "pyproject.toml").get("evoclaims")
-    known = isinstance(table, dict) and {"reproduction"} <= set(table) <= {"reproduction", "claims"}
+    known = isinstance(table, dict) and {"reproduction"} <= set(table) <= {"reproduction", "claims", "time_limit"}
     if not isinstance(table, dict) or not known or not all(isinstance(value, str) for value in table.values()):
         raise UserError(
             f'{root / "pyproject.toml"} needs a [tool.evoclaims] table with reproduction = "package.module" and, if '
-            'it is not "claims", claims = "folder"; no other keys.'
+            'it is not "claims", claims = "folder"; time_limit = "24h" if trials may take another time; no other keys.'
         )
     return SuiteConfig(root=root, **table)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -21,11 +22,17 @@ class NotStoredError(Exception):
 
 @dataclass(frozen=True)
 class RunMissing:
-    """Run what the store lacks."""
+    """Run what the store lacks.
+
+    Attributes:
+        device: "auto", "cpu" or "gpu".
+        time_limit: seconds that a batch of trials may take.
+    """
 
     store: Store
     device: str
     watch: Watcher
+    time_limit: float = math.inf
 
     def check(self) -> None:
         """Find out before the first trial whether the store can be written and the device is there."""
@@ -34,7 +41,8 @@ class RunMissing:
 
     def __call__(self, condition: Condition, seeds: Sequence[int]) -> Sequence[TrialResult]:
         """Return one trial per seed."""
-        return run(condition, seeds, self.store, devices.choose(self.device), self.watch)
+        chosen = devices.choose(self.device)
+        return run(condition, seeds, self.store, chosen, self.watch, time_limit=self.time_limit)
 
 
 @dataclass(frozen=True)

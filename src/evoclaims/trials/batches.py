@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
+from functools import partial
 
 import numpy as np
 
@@ -17,16 +18,23 @@ from evoclaims.trials.outcome import provenance
 from evoclaims.trials.progress import RunProgress, Watcher
 from evoclaims.trials.spec import Condition, TrialSpec
 from evoclaims.trials.store import DamagedFileError, Store
+from evoclaims.trials.time_limit import is_final
 
 
 @dataclass(frozen=True)
 class Run:
-    """Where a condition's trials run, where they are kept, and who watches."""
+    """Where a condition's trials run, where they are kept, and who watches.
+
+    Attributes:
+        checkpoint_seconds: least time between two checkpoints.
+        time_limit: seconds that a batch may take.
+    """
 
     lanes: Lanes
     store: Store
     watch: Watcher
     checkpoint_seconds: float
+    time_limit: float
 
     @property
     def condition(self) -> Condition:
@@ -44,10 +52,12 @@ class Batch:
         stored: seeds in the lanes whose records are there already. An interrupted batch has them where trials ended
             after its last checkpoint and trials run side by side: their bits depend on the number of lanes, so these
             trials run along until they end again, and the batch narrows when it would have without the interruption.
+        steps: what the running trials have taken, which may be more than whole chunks.
     """
 
     header: Header
     state: Shares
+    steps: int = 0
     stored: frozenset[int] = frozenset()
 
     @property
@@ -61,16 +71,20 @@ class Batch:
         return [lane for lane in self.running if self.header.lanes[lane] not in self.stored]
 
 
-def batches(run: Run, missing: Sequence[int]) -> Iterator[Batch]:
-    """Give the interrupted batches that owe one of the missing trials, then the trials that none of them has."""
+def batches(run: Run, missing: Sequence[int]) -> Iterator[tuple[Header, Callable[[], Batch]]]:
+    """Give the interrupted batches that owe one of the missing trials, then the trials that none of them has.
+
+    Each comes as its header and what begins it, which may take long: it traces and compiles.
+    """
     remaining = list(missing)
     for header in checkpoint.find(run.store.checkpoints, run.condition.id, _platform(run.lanes)):
         held = [seed for seed in header.lanes if seed is not None]
         if not set(held).isdisjoint(remaining):
             remaining = [seed for seed in remaining if seed not in held]
-            yield _resumed(run, header)
+            yield header, partial(_resumed, run, header)
     if remaining:
-        yield _started(run, remaining)
+        header = _planned(run.lanes, remaining)
+        yield header, partial(_started, run, header)
 
 
 def drop_finished_checkpoints(store: Store, condition: Condition) -> None:
@@ -82,7 +96,7 @@ def drop_finished_checkpoints(store: Store, condition: Condition) -> None:
 
     def is_stored(seed: int) -> bool:
         try:
-            return store.get(TrialSpec(condition, seed).id) is not None
+            return is_final(store.get(TrialSpec(condition, seed).id))
         except DamagedFileError:
             return False
 
@@ -95,7 +109,7 @@ def _resumed(run: Run, header: Header) -> Batch:
     """Return an interrupted batch as its checkpoint has it, on the devices."""
     lanes, width = run.lanes, len(header.lanes)
     held = [seed for seed in header.lanes if seed is not None]
-    stored = frozenset(seed for seed in held if run.store.get(TrialSpec(run.condition, seed).id) is not None)
+    stored = frozenset(seed for seed in held if is_final(run.store.get(TrialSpec(run.condition, seed).id)))
     run.watch(RunProgress(run.condition.label, "resuming", len(held) - len(stored)))
     state = checkpoint.restore(run.store.checkpoints, header, lanes.shapes(width))
     if lanes.layout == "alone":
@@ -103,30 +117,32 @@ def _resumed(run: Run, header: Header) -> Batch:
         header = replace(header, lanes=[None if seed in stored else seed for seed in header.lanes])
         state = replace(state, idle=state.idle | np.array([seed is None for seed in header.lanes]))
         stored = frozenset()
-    return Batch(header, lanes.place(state, width), stored)
+    return Batch(header, lanes.place(state, width), int(np.max(state.steps)), stored)
 
 
-def _started(run: Run, seeds: Sequence[int]) -> Batch:
-    """Return a new batch."""
-    lanes = run.lanes
-    run.watch(RunProgress(run.condition.label, "compiling", len(seeds)))
+def _planned(lanes: Lanes, seeds: Sequence[int]) -> Header:
+    """Return the header of a batch that is about to begin."""
     width = lanes.width(len(seeds), len(seeds))
     order = lanes.arrangement(range(len(seeds)), width)
-    placed = [None if lane is None else seeds[lane] for lane in order]
-    lanes.programs(width)
-    state = lanes.start(placed, width)
-    header = Header(
-        condition=run.condition.id,
+    return Header(
+        condition=lanes.condition.id,
         platform=_platform(lanes),
         batch=list(seeds),
-        lanes=placed,
+        lanes=[None if lane is None else seeds[lane] for lane in order],
         chunks=0,
         curves={str(seed): {} for seed in seeds},
         run_seconds=0.0,
         compile_seconds=0.0,
         started=datetime.now(UTC).isoformat(timespec="seconds"),
     )
-    return Batch(header, state)
+
+
+def _started(run: Run, header: Header) -> Batch:
+    """Return a new batch."""
+    lanes, width = run.lanes, len(header.lanes)
+    run.watch(RunProgress(run.condition.label, "compiling", len(header.batch)))
+    lanes.programs(width)
+    return Batch(header, lanes.start(header.lanes, width))
 
 
 def _platform(lanes: Lanes) -> str:

@@ -77,8 +77,36 @@ def make_result(
     champion = named_leaves(parameters)
     healthy = not report.diverged[lane] and is_sound(spec.condition.method, parameters) and are_finite(success, fitness)
     status: Status = "done" if healthy else "diverged"
+    return _record(spec, status, metrics, levels, curves, pack(champion), timing, devices), champion
+
+
+def make_timeout(
+    spec: TrialSpec, curves: Mapping[str, Sequence[float]], timing: Mapping[str, Any], devices: Sequence[jax.Device]
+) -> TrialResult:
+    """Return the record of a trial that ran out of time: its curves so far, and what they say; it has no champion.
+
+    Metrics are "steps", "environment_steps" and "furthest_reached", at the curve's last point.
+    """
+    last = {name: float(values[-1]) for name, values in curves.items() if values}
+    metrics = {"steps": last.get("steps", 0.0), "environment_steps": last.get("environment_steps", 0.0)}
+    if "level" in last:
+        metrics["furthest_reached"] = last["level"]
+    return _record(spec, "timeout", metrics, {}, curves, b"", timing, devices)
+
+
+def _record(
+    spec: TrialSpec,
+    status: Status,
+    metrics: Mapping[str, float],
+    levels: Mapping[str, tuple[float, ...]],
+    curves: Mapping[str, Sequence[float]],
+    champion: bytes,
+    timing: Mapping[str, Any],
+    devices: Sequence[jax.Device],
+) -> TrialResult:
+    """Return the record; `champion` is its packed parameters."""
     plain_curves = {name: tuple(map(float, values)) for name, values in curves.items()}
-    result = TrialResult(
+    return TrialResult(
         id=spec.id,
         condition=spec.condition.id,
         spec=spec.plain,
@@ -87,11 +115,10 @@ def make_result(
         metrics=metrics,
         levels=levels,
         curves=plain_curves,
-        digest=digest(status, metrics, levels, plain_curves, pack(champion)),
+        digest=digest(status, metrics, levels, plain_curves, champion),
         timing={**timing, "ended": datetime.now(UTC).isoformat(timespec="seconds")},
         provenance=provenance(devices),
     )
-    return result, champion
 
 
 def is_sound(method: Method[Any], parameters: Any) -> bool:

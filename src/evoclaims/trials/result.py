@@ -22,14 +22,15 @@ class TrialResult:
         condition: hash of the specification without the seed.
         spec: the specification itself, as plain JSON.
         seed: the trial's seed.
-        status: "done" when it ran to its end, "diverged" when a number stopped being finite, "timeout" and
-            "crashed" when it was ended from outside.
+        status: "done" when it ran to its end, "diverged" when a number stopped being finite, "timeout" when its batch
+            took too long, "crashed" when it was ended from outside.
         metrics: final scalars of the champion and of the run, such as "mean_success" or "environment_steps".
         levels: per-level vectors of the champion, such as "success" with one value per level.
         curves: training curves; equally long lists, one value per report.
         digest: hash of everything above that is deterministic, and of the champion's parameters: equal digests
             mean the same trial to the bit.
-        timing: seconds ("run", "compile", both shared by `batch` trials) and "started", "ended" (UTC, ISO 8601).
+        timing: seconds ("run", "compile", both shared by `batch` trials) and "started", "ended" (UTC, ISO 8601); of a
+            trial that ran out of time also "limit", the seconds that its batch might take.
         provenance: versions, device, flags and git revision (see `core.provenance`).
         champion: SHA-256 of the stored champion's file, filled in by `Store.put`; empty while there is none.
     """

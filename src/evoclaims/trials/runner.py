@@ -3,32 +3,37 @@
 from __future__ import annotations
 
 import logging
+import math
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
-from typing import Final
+from typing import Any, Final
 
 import jax
 import numpy as np
 
 from evoclaims.core.errors import UserError
 from evoclaims.trials import checkpoint
+from evoclaims.trials.allowance import Allowance, OutOfTimeError
 from evoclaims.trials.batches import Batch, Run, batches, drop_finished_checkpoints
+from evoclaims.trials.checkpoint import Header
 from evoclaims.trials.devices import single_threaded_linear_algebra
 from evoclaims.trials.lanes import Lanes
 from evoclaims.trials.notice import Notice, wait_while_others_run
-from evoclaims.trials.outcome import curve_point, make_result
+from evoclaims.trials.outcome import curve_point, make_result, make_timeout
+from evoclaims.trials.pacing import Rhythm, Strides
 from evoclaims.trials.program import Report
 from evoclaims.trials.progress import RunProgress, Watcher, ignore
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.spec import Condition, TrialSpec
 from evoclaims.trials.store import Store
+from evoclaims.trials.time_limit import answers, is_final
 
 _log = logging.getLogger(__name__)
 
-CHECKPOINT_SECONDS: Final = 5.0
-"""Least time between two checkpoints: what a kill can cost, against the time that writing takes."""
+CHECKPOINT_SECONDS: Final = 1.0
+"""Least time between two checkpoints: what a kill can cost."""
 
 
 def run(
@@ -38,17 +43,26 @@ def run(
     devices: Sequence[jax.Device],
     watch: Watcher = ignore,
     checkpoint_seconds: float = CHECKPOINT_SECONDS,
+    time_limit: float = math.inf,
 ) -> list[TrialResult]:
     """Return the trials of `condition` with these seeds, running those that the store lacks.
 
     Each trial is stored as soon as it has ended; a kill at any moment loses at most the time since the last
     checkpoint, from which the same call goes on to the same bits (on the same kind of device and versions).
 
+    A batch that takes longer than `time_limit` (seconds, on the device and compiling) ends there: its trials are stored
+    as "timeout" with their curves so far, and answer until a call allows more. With a limit the work is done on another
+    thread, since it may never return (see `allowance`).
+
     Raises:
         UserError: when the store is damaged or cannot be written, or the device's memory does not hold the batch.
     """
     specs = {seed: TrialSpec(condition, seed) for seed in seeds}
-    while any(store.get(spec.id) is None for spec in specs.values()):
+
+    def missing() -> list[int]:
+        return [seed for seed, spec in specs.items() if not answers(store.get(spec.id), time_limit)]
+
+    while missing():
         store.check_writable()
         wait_while_others_run(
             store.root, condition.id, lambda text: watch(RunProgress(condition.label, text, len(seeds)))
@@ -56,11 +70,11 @@ def run(
         with Notice(store.root, condition.id) as notice:
             if notice.other is not None:
                 continue  # another process was faster: wait for it, then look again
-            missing = [seed for seed, spec in specs.items() if store.get(spec.id) is None]
-            one = Run(Lanes(condition, devices), store, watch, checkpoint_seconds)
-            with single_threaded_linear_algebra(), _memory_told(condition, len(missing)):
-                for batch in batches(one, missing):
-                    _finish(one, batch)
+            owed = missing()
+            one = Run(Lanes(condition, devices), store, watch, checkpoint_seconds, time_limit)
+            with single_threaded_linear_algebra(), _memory_told(condition, len(owed)):
+                for header, begin in batches(one, owed):
+                    _finish(one, header, begin)
     drop_finished_checkpoints(store, condition)
     results = [store.get(spec.id) for spec in specs.values()]
     return [result for result in results if result is not None]
@@ -81,54 +95,78 @@ def _memory_told(condition: Condition, trials: int) -> Iterator[None]:
         ) from error
 
 
-def _finish(run: Run, batch: Batch) -> None:
-    """Run a batch until none of its trials is owed, storing each when it ends and a checkpoint now and then."""
-    folder, began, first_chunk = run.store.checkpoints, time.monotonic(), batch.header.chunks
-    saved = began
-    while batch.owed:
-        batch, report = _advance(run, batch)
-        ended = [lane for lane in batch.running if report.ended[lane]]
-        if ended:
-            batch = _store_ended(run, batch, report, ended)
-        reported = batch  # the lanes that the report speaks of
-        if ended:
-            batch = _rearranged(run, batch)
-        now = time.monotonic()
-        if batch.owed and now - saved >= run.checkpoint_seconds:
-            spent = batch.header.compile_seconds + run.lanes.seconds
-            checkpoint.save(folder, replace(batch.header, compile_seconds=spent), run.lanes.gather(batch.state))
-            saved = now
-        pace = (now - began) / (batch.header.chunks - first_chunk)
-        run.watch(_progress(run, reported, report, pace))
-    checkpoint.remove(folder, batch.header)
+def _finish(run: Run, header: Header, begin: Callable[[], Batch]) -> None:
+    """Run a batch until none of its trials is owed or its time is over."""
+    allowance, strides = Allowance(run.time_limit), Strides()
+    try:
+        batch = allowance.spend(begin)
+        rhythm = Rhythm(run.checkpoint_seconds)
+        while batch.owed:
+            batch, progress = _go_on(run, batch, allowance, strides)
+            header = batch.header
+            late = batch.owed and allowance.left < 2 * strides.seconds  # the next call might not return in time
+            if batch.owed and (late or rhythm.due):
+                with rhythm.saving():
+                    _save(run, batch)
+            if progress is not None:
+                run.watch(progress)
+            if late:
+                raise OutOfTimeError
+    except OutOfTimeError:
+        _give_up(run, header)
+    else:
+        checkpoint.remove(run.store.checkpoints, header)
 
 
-def _advance(run: Run, batch: Batch) -> tuple[Batch, Report]:
-    """Run one chunk and note each running trial's point on its curve."""
+def _go_on(run: Run, batch: Batch, allowance: Allowance, strides: Strides) -> tuple[Batch, RunProgress | None]:
+    """Call the device once; where that ends a chunk, store the trials that have ended and say how it stands."""
+    batch, report, whole = _advance(run, batch, allowance, strides)
+    if not whole:
+        return batch, None
+    ended = [lane for lane in batch.running if report.ended[lane]]
+    if ended:
+        batch = _store_ended(run, batch, report, ended, allowance)
+    progress = _progress(run, batch, report, strides)  # the report speaks of the lanes as they are
+    return _rearranged(run, batch) if ended else batch, progress
+
+
+def _save(run: Run, batch: Batch) -> None:
+    """Write a checkpoint."""
+    spent = batch.header.compile_seconds + run.lanes.seconds
+    state = run.lanes.gather(batch.state)
+    checkpoint.save(run.store.checkpoints, replace(batch.header, compile_seconds=spent), state)
+
+
+def _advance(run: Run, batch: Batch, allowance: Allowance, strides: Strides) -> tuple[Batch, Report, bool]:
+    """Call the device once; where that ends a chunk, note each running trial's point on its curve.
+
+    Returns:
+        The batch, what the device reports, and whether it has ended a chunk (or every running trial).
+    """
     cost = run.condition.method.cost(run.condition.task)
-    chunks, began = batch.header.chunks + 1, time.perf_counter()
-    until = min(chunks * run.condition.budget.chunk(cost), run.condition.steps)
-    state, report = run.lanes.advance(batch.state, until, len(batch.header.lanes))
-    curves = dict(batch.header.curves)
-    for lane in batch.running:
-        seed = str(batch.header.lanes[lane])
-        point = curve_point(cost, report, lane)
-        curves[seed] = {name: [*curves[seed].get(name, []), value] for name, value in point.items()}
-    spent = batch.header.run_seconds + time.perf_counter() - began
-    header = replace(batch.header, chunks=chunks, curves=curves, run_seconds=spent)
-    return replace(batch, header=header, state=state), report
+    end = min((batch.header.chunks + 1) * run.condition.budget.chunk(cost), run.condition.steps)
+    until = strides.after(batch.steps, end)
+    began, compiled = time.perf_counter(), run.lanes.seconds
+    state, report = allowance.spend(lambda: run.lanes.advance(batch.state, until, len(batch.header.lanes)))
+    seconds = time.perf_counter() - began - (run.lanes.seconds - compiled)
+    strides.took(until - batch.steps, seconds)
+    header = replace(batch.header, run_seconds=batch.header.run_seconds + seconds)
+    whole = until == end or all(report.ended[lane] for lane in batch.running)
+    if whole:
+        curves = dict(header.curves)
+        for lane in batch.running:
+            seed = str(header.lanes[lane])
+            point = curve_point(cost, report, lane)
+            curves[seed] = {name: [*curves[seed].get(name, []), value] for name, value in point.items()}
+        header = replace(header, chunks=header.chunks + 1, curves=curves)
+    return replace(batch, header=header, state=state, steps=until), report, whole
 
 
-def _store_ended(run: Run, batch: Batch, report: Report, ended: Sequence[int]) -> Batch:
+def _store_ended(run: Run, batch: Batch, report: Report, ended: Sequence[int], allowance: Allowance) -> Batch:
     """Judge the trials in the lanes that have ended, and store those that are owed."""
     header, due = batch.header, [lane for lane in ended if lane in batch.owed]
-    timing = {
-        "run": header.run_seconds,
-        "compile": header.compile_seconds + run.lanes.seconds,
-        "batch": len(header.batch),
-        "started": header.started,
-    }
-    score = run.lanes.score(batch.state, len(header.lanes)) if due else None
+    timing = _timing(run, header)
+    score = allowance.spend(lambda: run.lanes.score(batch.state, len(header.lanes))) if due else None
     for lane in due:
         seed = header.lanes[lane]
         assert seed is not None
@@ -140,6 +178,29 @@ def _store_ended(run: Run, batch: Batch, report: Report, ended: Sequence[int]) -
             _tell_of_difference(run, seed)
     running = [None if lane in ended else seed for lane, seed in enumerate(header.lanes)]
     return replace(batch, header=replace(header, lanes=running))
+
+
+def _give_up(run: Run, header: Header) -> None:
+    """Store as timed out the trials of a batch that have not ended."""
+    timing = {**_timing(run, header), "limit": run.time_limit}
+    owed = [
+        TrialSpec(run.condition, seed)
+        for seed in header.lanes
+        if seed is not None and not is_final(run.store.get(TrialSpec(run.condition, seed).id))
+    ]
+    for spec in owed:
+        run.store.put(make_timeout(spec, header.curves[str(spec.seed)], timing, run.lanes.devices), {})
+    run.watch(RunProgress(run.condition.label, f"out of time after {run.time_limit:g} s", len(owed)))
+
+
+def _timing(run: Run, header: Header) -> dict[str, Any]:
+    """Return what the records of a batch's trials say of its time."""
+    return {
+        "run": header.run_seconds,
+        "compile": header.compile_seconds + run.lanes.seconds,
+        "batch": len(header.batch),
+        "started": header.started,
+    }
 
 
 def _tell_of_difference(run: Run, seed: int) -> None:
@@ -161,13 +222,11 @@ def _rearranged(run: Run, batch: Batch) -> Batch:
     return replace(batch, header=replace(batch.header, lanes=moved), state=state)
 
 
-def _progress(run: Run, batch: Batch, report: Report, seconds_per_chunk: float) -> RunProgress:
+def _progress(run: Run, batch: Batch, report: Report, strides: Strides) -> RunProgress:
     """Say where the batch stands; `report` is about its lanes as they are."""
-    cost = run.condition.method.cost(run.condition.task)
     shown = batch.owed if batch.owed else list(range(len(report.steps)))
     highest = max((int(report.level[lane]) for lane in shown), default=0)
     best = max((float(report.success[lane]) for lane in shown if report.level[lane] == highest), default=0.0)
-    left = -(-run.condition.steps // run.condition.budget.chunk(cost)) - batch.header.chunks
     return RunProgress(
         condition=run.condition.label,
         phase="training",
@@ -178,5 +237,5 @@ def _progress(run: Run, batch: Batch, report: Report, seconds_per_chunk: float) 
         best=best,
         level=highest,
         levels=run.condition.task.levels,
-        seconds_left=left * seconds_per_chunk if batch.owed else 0.0,
+        seconds_left=strides.seconds_for(run.condition.steps - batch.steps) if batch.owed else 0.0,
     )

@@ -10,7 +10,7 @@ import dataclasses
 import hashlib
 import os
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final, Literal
@@ -23,6 +23,7 @@ from evoclaims.trials.arrays import pack, unpack
 from evoclaims.trials.once import write_once
 from evoclaims.trials.records import RecordError, dump, is_hash, parse, printable
 from evoclaims.trials.result import TrialResult
+from evoclaims.trials.time_limit import time_allowed
 
 DEFAULT_ROOT: Final = Path(".evoclaims")
 
@@ -138,9 +139,9 @@ class Store:
         """Store a trial and its champion's parameters (named arrays of any shape; empty for none).
 
         The champion is written first, so that a record that exists is complete. A trial that is there already
-        stays as it is, whatever its digest, with one exception: a crash is no outcome of the trial, so a trial
-        run again after a crash takes its place. Of processes that put the same trial at the same time, the first
-        record stays and keeps its own champion: no champion is ever written over another.
+        stays as it is, whatever its digest, with one exception: neither a crash nor the end of its time is an outcome
+        of the trial, so a trial run again takes its place (see `_gives_way`). Of processes that put the same trial at
+        the same time, the first record stays and keeps its own champion: no champion is ever written over another.
 
         Returns:
             "stored", "present" (there already with an equal digest) or "differs" (there with another digest).
@@ -157,7 +158,7 @@ class Store:
         except RecordError as error:  # a mistake in the program: found here rather than by the next reader
             raise ValueError(str(error)) from error
         present = self.get(result.id)
-        if present is not None and (present.status != "crashed" or present.digest == result.digest):
+        if present is not None and not _gives_way(present, result):
             return "present" if present.digest == result.digest else "differs"
         if packed:
             self._write_champion(sealed, packed)
@@ -170,6 +171,21 @@ class Store:
             return self.put(result, champion)
         write_atomically(path, record)
         return "stored"
+
+    def forget_timeouts(self, trial_ids: Iterable[str]) -> None:
+        """Remove the records of those trials that ran out of time, so that they are run again; they have no champion.
+
+        Raises:
+            DamagedFileError: when a record is torn, edited, foreign or unreadable.
+            UserError: when a record cannot be removed.
+        """
+        for trial_id in trial_ids:
+            if (present := self.get(trial_id)) is not None and present.status == "timeout":
+                path = self.record_path(trial_id)
+                try:
+                    path.unlink(missing_ok=True)
+                except OSError as error:
+                    raise UserError(f"Cannot remove {printable(path)}: {error.strerror or error}.") from error
 
     def _write_champion(self, sealed: TrialResult, packed: bytes) -> None:
         """Write a champion to its usual place, or beside it where another one lies there."""
@@ -234,6 +250,13 @@ class Store:
     def champion_paths(self) -> Iterator[Path]:
         """Iterate over all that lies where champions belong, strange entries included (hidden ones left out)."""
         return _walk(self.root / "champions")
+
+
+def _gives_way(present: TrialResult, result: TrialResult) -> bool:
+    """Whether a stored trial without an outcome is replaced: by another end, or by one that had more time."""
+    if present.status == "timeout":
+        return result.status != "timeout" or time_allowed(result) > time_allowed(present)
+    return present.status == "crashed" and present.digest != result.digest
 
 
 def _sha256(path: Path) -> str:

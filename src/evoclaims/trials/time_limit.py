@@ -1,0 +1,47 @@
+"""The time that a batch of trials may take: how it is written, and which records it makes outdated."""
+
+from __future__ import annotations
+
+import math
+import re
+from typing import Final
+
+from evoclaims.core.errors import UserError
+from evoclaims.trials.result import TrialResult
+
+DEFAULT_LIMIT: Final = "24h"
+"""Long enough for every condition of the full tier on the hardware it is meant for."""
+
+_UNITS: Final = {"s": 1.0, "min": 60.0, "h": 3600.0}
+
+
+def seconds_of(text: str) -> float:
+    """Return a length of time such as "90s", "30min", "1.5h" in seconds; infinity for "none".
+
+    Raises:
+        UserError: for another text, or no time at all.
+    """
+    if text.strip() == "none":
+        return math.inf
+    found = re.fullmatch(r"\s*(\d+(?:\.\d+)?)\s*(s|min|h)\s*", text, re.ASCII)
+    if found is None or float(found[1]) == 0:
+        raise UserError(f'A time limit is a length of time such as "90s", "30min" or "24h", or "none", not {text!r}.')
+    return float(found[1]) * _UNITS[found[2]]
+
+
+def is_final(result: TrialResult | None) -> bool:
+    """Whether there is a trial that time has not ended."""
+    return result is not None and result.status != "timeout"
+
+
+def answers(result: TrialResult | None, limit: float) -> bool:
+    """Whether a trial need not be run under a limit of so many seconds.
+
+    One that ran out of time answers as long as it would have no more of it now.
+    """
+    return is_final(result) or (result is not None and limit <= time_allowed(result))
+
+
+def time_allowed(result: TrialResult) -> float:
+    """Return the seconds that a trial which ran out of time had with its batch; 0 where its record does not say."""
+    return float(result.timing.get("limit", 0.0))
