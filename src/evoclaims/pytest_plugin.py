@@ -16,6 +16,7 @@ from evoclaims import pytest_options
 from evoclaims.core.errors import UnknownNameError, UserError
 from evoclaims.pytest_options import TIERS
 from evoclaims.pytest_summary import ATTRIBUTE, TROUBLE, Summary
+from evoclaims.trials.allowance import end_without
 
 if TYPE_CHECKING:
     from evoclaims.suite.group import TrialGroup
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
 _session: pytest.StashKey[Session] = pytest.StashKey()
 _line: pytest.StashKey[LiveLine] = pytest.StashKey()
 _verdicts: pytest.StashKey[Verdicts] = pytest.StashKey()
-_status: pytest.StashKey[pytest.Session] = pytest.StashKey()
+_ended: pytest.StashKey[pytest.Session] = pytest.StashKey()
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -157,18 +158,15 @@ def make_session(config: pytest.Config) -> Session:
 
 @pytest.hookimpl(trylast=True)
 def pytest_sessionfinish(session: pytest.Session) -> None:
-    """Keep the exit status for `pytest_unconfigure`."""
-    session.config.stash[_status] = session
+    """Keep the session, which knows the exit status, for `pytest_unconfigure`."""
+    session.config.stash[_ended] = session
 
 
 @pytest.hookimpl(trylast=True)
 def pytest_unconfigure(config: pytest.Config) -> None:
     """End the process if trials that did not return in time still run in it."""
-    ended = config.stash.get(_status, None)
-    if ended is not None and _session in config.stash:
-        from evoclaims.trials.allowance import end_without
-
-        end_without(int(ended.exitstatus))
+    if _ended in config.stash:
+        end_without(int(config.stash[_ended].exitstatus))
 
 
 @pytest.fixture

@@ -8,13 +8,14 @@ from typing import Any
 
 import pytest
 from climbers import SEEDS, Log, digests, run_climbers
-from trial_toys import StoppedError, stopping
+from trial_toys import StoppedError, stopping, walk
 
 from evoclaims.envs.gates.parity import NParity
 from evoclaims.methods.cma_es import CmaEs
 from evoclaims.networks.all_skips import AllSkips
 from evoclaims.trials import checkpoint
 from evoclaims.trials.budget import Budget
+from evoclaims.trials.lanes import Lanes
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.spec import Condition
 from evoclaims.trials.store import Store
@@ -50,6 +51,36 @@ def test_a_run_stopped_again_and_again_goes_on_to_the_same_bits(
             run_climbers(store, cpus, stopping(1))
     assert digests(run_climbers(store, cpus)) == digests(uninterrupted)
     assert puts == Counter(SEEDS)
+
+
+def test_a_run_that_is_killed_before_a_chunk_is_done_gets_further_each_time(
+    store: Store, tmp_path: Path, cpus: list[Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Each life has the time of three steps, and the whole budget is one chunk."""
+    condition = walk(chance=0.1, hazard=0.02, reports=1)
+    wanted = run_climbers(Store(tmp_path / "whole"), cpus, condition=condition)
+    advance, lived, lives = Lanes.advance, [0, 0], 0
+
+    def mortal(self: Lanes, state: Any, until: int, width: int) -> Any:
+        state, report = advance(self, state, until, width)
+        steps = int(report.steps.max())
+        if steps > lived[1] + 3:
+            raise StoppedError
+        lived[0] = steps
+        return state, report
+
+    monkeypatch.setattr(Lanes, "advance", mortal)
+    monkeypatch.setattr("evoclaims.trials.pacing.CALL_SECONDS", 0.0)  # a step a call
+    while lives < 6:
+        lives += 1
+        try:
+            results = run_climbers(store, cpus, condition=condition)
+            break
+        except StoppedError:
+            lived[1] = lived[0]
+    assert lives == 4  # 12 steps
+    assert digests(results) == digests(wanted)
+    assert [result.curves for result in results] == [result.curves for result in wanted]
 
 
 def test_a_stopped_run_goes_on_beside_trials_that_had_been_stored_before(

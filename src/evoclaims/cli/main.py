@@ -8,12 +8,20 @@ import sys
 from collections.abc import Callable, Sequence
 
 from evoclaims.core.errors import UserError
+from evoclaims.trials.allowance import end_without
 
 USER_ERROR, INTERRUPTED, CLOSED_PIPE = 2, 130, 141
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command and return its exit status: 0, what the command says, 2 for a user's mistake."""
+    status = _status(arguments)
+    end_without(status)
+    return status
+
+
+def _status(arguments: Sequence[str] | None) -> int:
+    """Run one command and return its exit status."""
     options = _parser().parse_args(arguments)
     try:
         status: int = _command(options.command)(options)

@@ -10,6 +10,7 @@ from evoclaims.core.errors import UserError
 from evoclaims.judging.baseline import MIN_REFERENCES
 from evoclaims.suite import references
 from evoclaims.trials.spec import TrialSpec
+from evoclaims.trials.time_limit import is_final
 
 
 def main(options: argparse.Namespace) -> int:
@@ -29,13 +30,13 @@ def main(options: argparse.Namespace) -> int:
         condition = tier.condition(method, task)
         seeds = range(tier.protocol.first_seed, tier.protocol.first_seed + sizes[-1])
         found = [store.get(TrialSpec(condition, seed).id) for seed in seeds]
-        results = list(takewhile(lambda result: result is not None, found))
+        results = list(takewhile(is_final, found))
         size = max((size for size in sizes if size <= len(results)), default=0)
         path = references.path_of(reproduction.references_of(options.variant), options.tier, method, task)
         committed = sum(trial.condition == condition.id for trial in references.load(path))
         needed = max(committed, sizes[0])
         if size < needed:
-            stored = sum(result is not None for result in found)
+            stored = sum(map(is_final, found))
             print(f"left alone: {method} on {task}: {stored} of {needed} trials are stored")
             continue
         references.write(path, (result for result in results[:size] if result is not None))

@@ -45,13 +45,14 @@ def judge(assertion: Assertion, protocol: Protocol, *, claim: str = "", tier: st
             return Verdict(Outcome.ERROR, str(error), assertion.describe(), mark, n=look.n)
         outcome = finding.p.outcome(look.alpha)
         reason = _reason(finding, look, assertion, protocol)
-        verdict = _verdict(outcome, reason, finding, look, assertion, mark)
+        broken = _without_result(assertion, trials)
+        verdict = _verdict(outcome, reason, finding, look, assertion, mark, broken)
         if outcome is not Outcome.INCONCLUSIVE:
             return verdict
         settled = _settled(assertion, trials, looks[index + 1 :], protocol)
         if settled is not None:
             final, note = settled
-            return _verdict(final, f"{note}; {reason}", finding, look, assertion, mark)
+            return _verdict(final, f"{note}; {reason}", finding, look, assertion, mark, broken)
     return verdict
 
 
@@ -92,6 +93,18 @@ def _crashed(assertion: Assertion, trials: Trials) -> str:
         if trial.status == "crashed"
     ]
     return f"trials crashed: {', '.join(crashes)}" if crashes else ""
+
+
+def _without_result(assertion: Assertion, trials: Trials) -> str:
+    """Return a clause that names the trials which diverged or ran out of time, or nothing."""
+    words = {"diverged": "diverged", "timeout": "ran out of time"}
+    found = [
+        f"{len(seeds)} of {len(trials[mark])} trials of {label} {words[status]} (seeds {', '.join(map(str, seeds))})"
+        for mark, label in {source.fingerprint: source.label for source in assertion.sources()}.items()
+        for status in words
+        if (seeds := [trial.seed for trial in trials[mark] if trial.status == status])
+    ]
+    return "; ".join(found)
 
 
 def _settled(
@@ -165,7 +178,9 @@ def _underpowered(assertion: Assertion, protocol: Protocol, mark: str) -> Verdic
     )
 
 
-def _verdict(outcome: Outcome, reason: str, finding: Finding, look: Look, assertion: Assertion, mark: str) -> Verdict:
+def _verdict(
+    outcome: Outcome, reason: str, finding: Finding, look: Look, assertion: Assertion, mark: str, broken: str
+) -> Verdict:
     """Fill in the numbers of a look; a fact (no part of which was tested) has no p."""
     tested = any(entry.p is not None for entry in finding.evidence)
     return Verdict(
@@ -180,4 +195,5 @@ def _verdict(outcome: Outcome, reason: str, finding: Finding, look: Look, assert
         p_refuted=finding.p.refuted if tested else None,
         attainable_p_refuted=finding.attainable.refuted if tested else None,
         evidence=finding.evidence,
+        without_result=broken,
     )

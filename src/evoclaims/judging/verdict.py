@@ -111,6 +111,7 @@ class Verdict:
         p_refuted: against the whole assertion.
         attainable_p_refuted: the smallest p against it that n and the ties allowed.
         evidence: one entry for each part of the assertion.
+        without_result: which trials ended without a result of their own, and how; they took the worst rank.
     """
 
     outcome: Outcome
@@ -124,6 +125,7 @@ class Verdict:
     p_refuted: float | None = None
     attainable_p_refuted: float | None = None
     evidence: tuple[Evidence, ...] = ()
+    without_result: str = ""
 
     def to_json(self) -> dict[str, Any]:
         """Return the verdict as strict JSON: an infinity becomes the string "inf" or "-inf"."""

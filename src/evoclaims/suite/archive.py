@@ -11,6 +11,7 @@ from evoclaims.suite import references
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.spec import Condition, TrialSpec
 from evoclaims.trials.store import Store
+from evoclaims.trials.time_limit import is_final
 
 
 @dataclass(frozen=True)
@@ -18,7 +19,7 @@ class Archive:
     """Trials by id, wherever they are kept; a trial's id is the hash of its specification, so either copy will do.
 
     Attributes:
-        store: looked into first.
+        store: looked into first; what ran out of time there may still be among the reference trials.
         references: folder of the committed reference trials; None for none.
     """
 
@@ -32,7 +33,7 @@ class Archive:
             UserError: when its record, or a file of reference trials, is torn or edited.
         """
         found = self.store.get(trial)
-        return self._committed.get(trial) if found is None else found
+        return found if is_final(found) else self._committed.get(trial, found)
 
     def trials(self, condition: Condition, seeds: Sequence[int]) -> tuple[TrialResult | None, ...]:
         """Return a condition's trial for each seed, None where there is none."""

@@ -17,6 +17,7 @@ from evoclaims.trials.lanes import Lanes
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.spec import Condition, TrialSpec
 from evoclaims.trials.store import Store
+from evoclaims.trials.time_limit import is_final
 
 SEEDS_LOOKED_AT = 64
 
@@ -51,7 +52,7 @@ def known_pace(
 ) -> Pace | None:
     """Return the pace of stored or reference trials of this condition on this kind of device; None without any."""
     stored = (store.get(TrialSpec(condition, seed).id) for seed in range(SEEDS_LOOKED_AT))
-    trials = [trial for trial in stored if trial is not None]
+    trials = [trial for trial in stored if trial is not None and is_final(trial)]
     committed = references.load(references.path_of(folder, tier, method, task))
     trials += [trial for trial in committed if trial.condition == condition.id]
     batches: dict[str, list[TrialResult]] = defaultdict(list)

@@ -12,6 +12,7 @@ from evoclaims.judging.baseline import DriftCase, DriftReport, check_drift
 from evoclaims.judging.tripwire import DigestCheck, compare_digests
 from evoclaims.trials.records import RecordError, dump, parse
 from evoclaims.trials.result import TrialResult
+from evoclaims.trials.time_limit import is_final
 
 METRICS = ("mean_success", "last_fitness", "environment_steps")
 """What the drift check compares: how well a trial ended, in success and in reward, and how long it took."""
@@ -62,7 +63,7 @@ def compare(cases: Sequence[DriftCase]) -> tuple[DriftReport, DigestCheck]:
         compare_digests([trial], [old for old in case.reference if _bits_should_agree(trial, old)])
         for case in cases
         for trial in case.new
-        if _made_on_cpu(trial)
+        if _made_on_cpu(trial) and is_final(trial)
     ]
     changed = tuple(change for check in checks for change in check.changed)
     return check_drift(cases), DigestCheck(sum(check.compared for check in checks), changed)

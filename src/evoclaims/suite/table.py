@@ -62,16 +62,18 @@ def verdict_table(reports: Sequence[ClaimReport], width: int, colour: bool) -> s
 
 
 def explanations(reports: Sequence[ClaimReport], width: int, colour: bool) -> str:
-    """Return a line for every verdict that is not plainly supported: why, and what was accepted."""
+    """Return a line for every verdict that is not plainly supported: why, what was accepted, which trials broke."""
     lines = []
     for report in reports:
-        if report.outcome == Outcome.SUPPORTED and report.expected in (None, report.outcome):
+        broken = (report.verdict or {}).get("without_result", "")
+        if report.outcome == Outcome.SUPPORTED and report.expected in (None, report.outcome) and not broken:
             continue
         note = ""
         if report.expected is not None and report.outcome != Outcome.NOT_RUN:
             kept = "accepted" if report.as_expected else f"no longer {report.expected}, which was accepted"
             note = f" [{kept}: {report.because}]"
-        lines.append(f"{Outcome(report.outcome).symbol} {report.name}: {report.reason}{note}")
+        worst = f" [worst rank: {broken}]" if broken else ""
+        lines.append(f"{Outcome(report.outcome).symbol} {report.name}: {report.reason}{worst}{note}")
     return _rendered("\n".join(_literal(line) for line in lines), width, colour) if lines else ""
 
 

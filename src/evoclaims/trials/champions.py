@@ -96,7 +96,7 @@ def load(store: Store, condition: Condition, result: TrialResult) -> Any:
     """
     arrays = store.champion_of(result)
     shapes = jax.eval_shape(lambda: _policy(condition).parameters)
-    if not arrays and jax.tree.leaves(shapes):
+    if result.status in ("timeout", "crashed") or (not arrays and jax.tree.leaves(shapes)):
         raise UserError(f"Seed {result.seed} of {condition.label} has no champion: it is {result.status}.")
     return _filled(shapes, arrays, f"The champion of {condition.label}, seed {result.seed},")
 

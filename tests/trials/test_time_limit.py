@@ -1,0 +1,201 @@
+"""A batch whose time is over: what is kept of it, how long that answers, and from where it goes on."""
+
+from __future__ import annotations
+
+import math
+import threading
+import time
+from collections.abc import Callable
+from typing import Any
+
+import jax
+import pytest
+from climbers import CLIMBING, SEEDS, Log, digests, run_climbers
+from hypothesis import given
+from hypothesis import strategies as st
+
+from evoclaims.core.errors import UserError
+from evoclaims.trials import allowance as allowances
+from evoclaims.trials.allowance import Allowance, OutOfTimeError
+from evoclaims.trials.result import TrialResult
+from evoclaims.trials.runner import run
+from evoclaims.trials.store import Store
+from evoclaims.trials.time_limit import DEFAULT_LIMIT, answers, is_final, seconds_of
+
+Make = Callable[..., TrialResult]
+
+
+class Counted(Allowance):
+    """Each piece of work costs a second, however long it takes."""
+
+    def spend(self, work: Callable[[], Any]) -> Any:
+        if self.left <= 0:
+            raise OutOfTimeError
+        self.left -= 1
+        return work()
+
+
+def _run(store: Store, cpus: list[Any], limit: float, watch: Any = lambda progress: None) -> list[TrialResult]:
+    return run(CLIMBING, SEEDS, store, cpus, watch, time_limit=limit)
+
+
+@pytest.fixture
+def counted(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("evoclaims.trials.runner.Allowance", Counted)
+
+
+def test_a_batch_that_takes_too_long_ends_between_two_calls_and_keeps_what_it_has(
+    counted: None, store: Store, cpus: list[Any], uninterrupted: list[TrialResult]
+) -> None:
+    log = Log()
+    results = _run(store, cpus, 4.0, log)  # to begin, and three calls of the device
+    late = [result for result in results if result.status == "timeout"]
+    assert late
+    for result, whole in zip(results, uninterrupted, strict=True):
+        if result.status != "timeout":
+            assert result.digest == whole.digest
+            continue
+        steps = result.curves["steps"]
+        assert len(steps) > 0
+        assert {name: values[: len(steps)] for name, values in whole.curves.items()} == result.curves
+        assert (result.levels, result.champion) == ({}, "")
+        assert result.metrics["environment_steps"] == result.curves["environment_steps"][-1]
+        assert result.timing["limit"] == 4.0
+        assert result.id == whole.id
+    assert log[-1].phase == "out of time after 4 s"
+    assert log[-1].trials == len(late)
+
+
+def test_what_ran_out_of_time_answers_until_more_is_allowed_and_then_goes_on_where_it_was(
+    counted: None, store: Store, cpus: list[Any], uninterrupted: list[TrialResult], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    first = _run(store, cpus, 4.0)
+    with monkeypatch.context() as patch:
+        patch.setattr("evoclaims.trials.runner.Lanes", None)
+        for limit in (4.0, 1.0):
+            assert [result.to_json() for result in _run(store, cpus, limit)] == [result.to_json() for result in first]
+    log = Log()
+    assert digests(_run(store, cpus, 40.0, log)) == digests(uninterrupted)
+    assert log.phases()[0] == "resuming"
+    assert log.steps()[0] > min(max(r.curves["steps"]) for r in first if r.status == "timeout")
+    assert not list(store.checkpoints.iterdir())
+
+
+def test_on_request_it_has_as_much_time_again(
+    counted: None, store: Store, cpus: list[Any], uninterrupted: list[TrialResult]
+) -> None:
+    tries = 0
+    while any(result.status == "timeout" for result in _run(store, cpus, 4.0)):
+        store.forget_timeouts(store.ids())
+        tries += 1
+        assert tries < 10
+    assert tries > 0
+    assert digests(_run(store, cpus, 4.0)) == digests(uninterrupted)
+
+
+def test_a_batch_that_had_no_time_to_begin_is_stored_without_a_curve(
+    store: Store, cpus: list[Any], monkeypatch: pytest.MonkeyPatch, uninterrupted: list[TrialResult]
+) -> None:
+    class Never(Allowance):
+        def spend(self, work: Any) -> Any:
+            raise OutOfTimeError
+
+    with monkeypatch.context() as patch:
+        patch.setattr("evoclaims.trials.runner.Allowance", Never)
+        results = _run(store, cpus, 4.0)
+    assert {(r.status, r.metrics["steps"], len(r.curves)) for r in results} == {("timeout", 0.0, 0)}
+    assert digests(run_climbers(store, cpus)) == digests(uninterrupted)
+
+
+def test_under_a_limit_that_is_not_reached_trials_come_out_to_the_same_bits(
+    store: Store, cpus: list[Any], uninterrupted: list[TrialResult]
+) -> None:
+    assert digests(_run(store, cpus, 86_400.0)) == digests(uninterrupted)
+
+
+def test_without_a_limit_the_work_stays_on_its_thread_and_with_one_it_has_its_own() -> None:
+    assert Allowance(math.inf).spend(threading.current_thread) is threading.current_thread()
+    assert Allowance(600.0).spend(threading.current_thread).daemon
+
+
+def test_what_the_work_raises_is_raised() -> None:
+    for seconds in (math.inf, 600.0):
+        with pytest.raises(ZeroDivisionError):
+            Allowance(seconds).spend(lambda: 1 // 0)
+
+
+def test_work_that_does_not_return_is_left_behind_and_no_other_is_begun(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(allowances, "_left_behind", [])
+    ended: list[int] = []
+    monkeypatch.setattr("os._exit", ended.append)
+    allowance, release = Allowance(0.05), threading.Event()
+    with pytest.raises(OutOfTimeError):
+        allowance.spend(release.wait)
+    with pytest.raises(OutOfTimeError):
+        allowance.spend(lambda: pytest.fail("begun without time"))
+    (thread,) = allowances._left_behind
+    allowances.end_without(7)
+    release.set()
+    thread.join()
+    allowances.end_without(8)
+    assert ended == [7]
+
+
+def test_time_in_which_the_process_was_stopped_does_not_count(monkeypatch: pytest.MonkeyPatch) -> None:
+    stopped, release = iter([0.0, 5_000.0, 5_000.0, 10_000.0]), threading.Event()
+
+    def clock() -> float:
+        now = next(stopped, None)
+        if now is None:
+            release.set()
+            return 10_001.0
+        return now
+
+    monkeypatch.setattr("evoclaims.trials.allowance.time.monotonic", clock)
+    monkeypatch.setattr(allowances, "LOOK_SECONDS", 0.01)
+    allowance = Allowance(1.0)
+    assert allowance.spend(release.wait)
+    assert allowance.left > 0.9
+
+
+@given(st.integers(1, 10**6), st.sampled_from([("s", 1.0), ("min", 60.0), ("h", 3600.0)]), st.sampled_from(["", " "]))
+def test_a_time_is_a_number_and_its_unit(number: int, unit: tuple[str, float], space: str) -> None:
+    assert seconds_of(f"{number}{space}{unit[0]}") == number * unit[1]
+    assert seconds_of(f"{number}.5{space}{unit[0]}") == (number + 0.5) * unit[1]
+
+
+def test_no_limit_is_none_and_the_usual_one_is_hours() -> None:
+    assert seconds_of("none") == math.inf
+    assert seconds_of(DEFAULT_LIMIT) >= 3600.0
+
+
+@pytest.mark.parametrize("text", ["", "3", "h", "-1h", "0s", "0.0min", "1e3s", "2 days", "nan h", "1h 30min", "٣h"])
+def test_another_text_is_a_sentence(text: str) -> None:
+    with pytest.raises(UserError, match='such as "90s", "30min" or "24h", or "none", not'):
+        seconds_of(text)
+
+
+def test_only_a_trial_that_ran_out_of_as_much_time_must_not_be_run(make_result: Make) -> None:
+    assert not is_final(None)
+    assert not answers(None, math.inf)
+    for status in ("done", "diverged"):
+        assert answers(make_result(status=status), math.inf)
+    late = make_result(status="timeout")
+    assert not answers(late, 1.0)  # a record that does not say
+    object.__setattr__(late, "timing", {**late.timing, "limit": 60})
+    assert [answers(late, limit) for limit in (59.0, 60.0, 61.0, math.inf)] == [True, True, False, False]
+
+
+def test_an_interrupt_waits_for_the_work_that_is_under_way(monkeypatch: pytest.MonkeyPatch) -> None:
+    join, done = threading.Thread.join, []
+    interrupts = iter([KeyboardInterrupt()])
+
+    def interrupted(thread: threading.Thread, timeout: float | None = None) -> None:
+        for error in interrupts:
+            raise error
+        join(thread, timeout)
+
+    monkeypatch.setattr(threading.Thread, "join", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        Allowance(600.0).spend(lambda: (time.sleep(0.05), done.append(jax.__version__)))
+    assert done
