@@ -192,3 +192,12 @@ def test_a_control_beside_a_test_waits_for_every_trial(source) -> None:
     a = source("a", [1.0] * 10)
     verdict = judge(a.solved().in_every_trial() & a.score().between(0, 2), SEQUENTIAL)
     assert (verdict.outcome, a.asked) == (Outcome.SUPPORTED, [tuple(range(10))])
+
+
+def test_a_verdict_says_which_trials_took_the_worst_rank_and_why(source) -> None:
+    broken = source("a", ["timeout", 5.0, "diverged", "timeout", *[5.0] * 6])
+    verdict = judge(broken.score() > source("b", [1.0] * 10).score(), FIXED_10)
+    assert verdict.without_result == (
+        "1 of 10 trials of a diverged (seeds 2); 2 of 10 trials of a ran out of time (seeds 0, 3)"
+    )
+    assert judge(source("a", HIGH).score() > source("b", LOW).score(), FIXED_10).without_result == ""

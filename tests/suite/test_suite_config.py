@@ -155,3 +155,26 @@ def test_an_interrupted_import_is_no_error_of_the_module(project: Path) -> None:
     (project / "a_tiny_paper.py").write_text("raise KeyboardInterrupt\n")
     with pytest.raises(KeyboardInterrupt):
         load_reproduction(SuiteConfig(project, "a_tiny_paper"))
+
+
+@pytest.mark.parametrize(
+    ("line", "option", "seconds"),
+    [
+        ("", None, 86_400.0),
+        ('time_limit = "90min"\n', None, 5_400.0),
+        ('time_limit = "90min"\n', "30s", 30.0),
+        ("", "none", float("inf")),
+    ],
+)
+def test_a_batch_may_take_what_the_option_says_or_else_the_table(
+    project: Path, line: str, option: str | None, seconds: float
+) -> None:
+    (project / "pyproject.toml").write_text(TABLE + line)
+    assert load_config(project).seconds(option) == seconds
+
+
+def test_a_time_limit_that_is_no_time_is_a_sentence(project: Path) -> None:
+    (project / "pyproject.toml").write_text(TABLE + 'time_limit = "soon"\n')
+    with pytest.raises(UserError, match="A time limit is a length of time") as caught:
+        load_config(project).seconds(None)
+    assert "'soon'" in _sentence(caught)

@@ -29,6 +29,17 @@ def test_the_store_comes_first_and_the_committed_trials_fill_in(
     assert Archive(store).trials(condition, [1, 0])[0] is None
 
 
+def test_a_committed_trial_comes_before_one_that_ran_out_of_time(
+    tmp_path: Path, store: Store, made: Any, reproduction: Reproduction
+) -> None:
+    condition = reproduction.tier("smoke").condition("better", "small")
+    for seed in (0, 1):
+        store.put(made(condition, seed, 0.0, "timeout"), {})
+    references.write(references.path_of(tmp_path / "reference", "smoke", "better", "small"), [made(condition, 0, 1.0)])
+    found = Archive(store, tmp_path / "reference").trials(condition, [0, 1])
+    assert [trial and trial.status for trial in found] == ["done", "timeout"]
+
+
 def test_a_torn_file_of_reference_trials_is_said(
     tmp_path: Path, store: Store, made: Any, reproduction: Reproduction
 ) -> None:

@@ -143,3 +143,11 @@ def test_eighty_columns_leave_out_the_files_and_nothing_else() -> None:
     assert " ".join(lines[0].split()) == "claim what is claimed verdict n A12 p (attainable)"
     assert all(len(line) <= 80 for line in lines)
     assert lines[-1] == "evidence: a/verdicts/smoke/<claim>.json"
+
+
+def test_trials_without_a_result_are_told_of_whatever_the_verdict() -> None:
+    for outcome in ("supported", "refuted"):
+        verdict = {"n": 10, "evidence": [], "without_result": "2 of 10 trials of a ran out of time (seeds 0, 3)"}
+        told = explanations([_report(outcome=outcome, verdict=verdict)], 160, False)
+        assert told.endswith("G1: for a reason [worst rank: 2 of 10 trials of a ran out of time (seeds 0, 3)]")
+    assert explanations([_report()], 160, False) == ""
