@@ -113,8 +113,7 @@ def test_trials_are_compared_to_the_bit_where_all_that_fixes_bits_is_the_same(
 
 def test_a_trial_that_ran_out_of_time_is_not_compared_to_the_bit(made: Made, reproduction: Reproduction) -> None:
     condition = reproduction.tier("smoke").condition("better", "small")
-    device = {"platform": "cpu", "kind": "cpu", "count": 1}
-    old, late = made(condition, 0, 1.0, device=device), made(condition, 0, 1.0, "timeout", device=device)
+    old, late = made(condition, 0, 1.0, **SAYS), made(condition, 0, 1.0, "timeout", **SAYS)
     for new, compared in ((old, 1), (late, 0)):
         _, check = references.compare([DriftCase("a", condition.id, (new,), (old,), ("mean_success",))])
         assert (check.compared, check.changed) == (compared, ())
