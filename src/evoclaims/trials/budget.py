@@ -15,7 +15,7 @@ class Budget:
         generations: steps of the method, for evolution (one generation a step).
         environment_steps: interactions with the task, for reinforcement learning; rounded up to whole steps of
             the method.
-        reports: points on the training curve; the host reads the device this many times.
+        reports: points on the training curve.
     """
 
     generations: int | None = None
@@ -40,5 +40,5 @@ class Budget:
         return -(-self.environment_steps // cost)
 
     def chunk(self, cost: int) -> int:
-        """Return how many steps run on the device between two reports."""
+        """Return how many steps lie between two reports."""
         return -(-self.steps(cost) // self.reports)

@@ -1,4 +1,4 @@
-"""Interrupted batches: the whole state of some trials at a chunk's end, from which they go on to the same bits."""
+"""Interrupted batches: some trials after a call of the device, from which they go on to the same bits."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class Header:
             bits, so that such a checkpoint is passed over.
         batch: seeds that the batch was started with; it fixes the widths the batch goes through.
         lanes: for each lane, the seed of the trial that has not ended in it, or None.
-        chunks: chunks of the budget done.
+        chunks: whole chunks of the budget done; the state may be further.
         curves: for each seed (as text), the points of its training curve so far, by name.
         run_seconds: spent on running so far.
         compile_seconds: spent on compiling by the processes that had the batch before.

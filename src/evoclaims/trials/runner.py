@@ -1,4 +1,4 @@
-"""The one loop that runs trials: chunk by chunk on the device, reports and files in between."""
+"""The one loop that runs trials: on the device for about a second at a time, reports and files in between."""
 
 from __future__ import annotations
 
@@ -104,7 +104,7 @@ def _finish(run: Run, header: Header, begin: Callable[[], Batch]) -> None:
         while batch.owed:
             batch, progress = _go_on(run, batch, allowance, strides)
             header = batch.header
-            late = batch.owed and allowance.left < 2 * strides.seconds  # the next call might not return in time
+            late = bool(batch.owed) and allowance.left < 2 * strides.seconds  # the next call might not return in time
             if batch.owed and (late or rhythm.due):
                 with rhythm.saving():
                     _save(run, batch)
