@@ -18,6 +18,7 @@ from evoclaims.suite.reproduction import Tier
 from evoclaims.trials import devices
 from evoclaims.trials.spec import Condition, TrialSpec
 from evoclaims.trials.store import Store
+from evoclaims.trials.time_limit import answers
 
 
 def main(options: argparse.Namespace) -> int:
@@ -39,7 +40,7 @@ def main(options: argparse.Namespace) -> int:
     console = Console()
     where = f"as they took on one {kind}" if options.like else f"on {len(chosen)} × {kind}"
     console.print(escape(f"Conditions of the {options.tier} tier, {where}"))
-    console.print(_conditions(tier, store, used, paces))
+    console.print(_conditions(tier, store, used, paces, config.seconds(None)))
     console.print(f"\nClaims: the smallest p that the protocol allows (n trials a side, α {tier.protocol.alpha:g})")
     console.print(_claims(reports))
     if any(pace is None for pace in paces.values()):
@@ -48,9 +49,16 @@ def main(options: argparse.Namespace) -> int:
 
 
 def _conditions(
-    tier: Tier, store: Store, used: Sequence[tuple[str, str]], paces: dict[tuple[str, str], Pace | None]
+    tier: Tier,
+    store: Store,
+    used: Sequence[tuple[str, str]],
+    paces: dict[tuple[str, str], Pace | None],
+    limit: float,
 ) -> Table:
-    """Build the table of conditions; steps and times are upper bounds, since a trial that has solved all stops."""
+    """Build the table of conditions; steps and times are upper bounds, since a trial that has solved all stops.
+
+    Missing are, too, trials that ran out of less time than `limit`, in seconds.
+    """
     table = Table(box=None, pad_edge=False)
     for heading in ("condition", "cached", "missing", "environment steps", "time, at most"):
         table.add_column(heading, justify="left" if heading == "condition" else "right")
@@ -58,7 +66,7 @@ def _conditions(
     steps, seconds, unknown = 0, 0.0, False
     for names in used:
         condition = tier.condition(*names)
-        missing = sum(store.get(TrialSpec(condition, seed).id) is None for seed in seeds)
+        missing = sum(not answers(store.get(TrialSpec(condition, seed).id), limit) for seed in seeds)
         owed = missing * condition.environment_steps
         pace = paces[names]
         time = 0.0 if not missing else None if pace is None else pace.seconds(condition, missing)
