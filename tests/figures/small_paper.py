@@ -38,8 +38,12 @@ HEADING = Heading("A title", "§1, Fig. 1 – full tier")
 def made(condition: Condition, seed: int, value: float, status: Status = "done") -> TrialResult:
     """Return a record whose success is `value` on every level; its reward is ten times that."""
     levels = condition.task.levels
-    metrics = {"mean_success": value, "last_success": value, "last_fitness": 10 * value}
-    success = {"success": (value,) * levels}
+    metrics = {
+        **dict.fromkeys(("mean_success", "last_success"), value),
+        "last_fitness": 10 * value,
+        **dict.fromkeys(("furthest_solved", "furthest_reached", "steps", "environment_steps"), 1.0),
+    }
+    success = {"success": (value,) * levels, "fitness": (10 * value,) * levels}
     spec = TrialSpec(condition, seed)
     return TrialResult(
         id=spec.id,

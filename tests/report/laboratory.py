@@ -52,8 +52,13 @@ Judge = Callable[[Callable[[str], Any]], Assertion]
 def record(condition: Condition, seed: int, value: float, **changes: Any) -> TrialResult:
     """Return a sound record whose numbers follow from `value`."""
     spec, levels = TrialSpec(condition, seed), condition.task.levels
-    metrics = {"mean_success": value, "last_success": value, "furthest_solved": 1.0, "furthest_reached": 1.0}
-    success = {"success": (value,) * levels}
+    metrics = {
+        **dict.fromkeys(("mean_success", "last_success", "last_fitness"), value),
+        **dict.fromkeys(("furthest_solved", "furthest_reached"), 1.0),
+        "steps": 2.0,
+        "environment_steps": 50.0,
+    }
+    success = dict.fromkeys(("success", "fitness"), (value,) * levels)
     points = 5
     finite = value if math.isfinite(value) else 0.0
     curves = {
@@ -71,7 +76,7 @@ def record(condition: Condition, seed: int, value: float, **changes: Any) -> Tri
         levels=success,
         curves=curves,
         digest=digest("done", metrics, success, curves, b""),
-        timing={"run": 1.0},
+        timing={"run": 1.0, "compile": 0.5, "batch": 1, "started": "2025-01-01T00:00:00+00:00"},
         provenance=HERE,
     )
     return replace(made, **changes)

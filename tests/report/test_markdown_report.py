@@ -50,7 +50,7 @@ def test_the_report_has_the_scoreboard_and_every_claim(filled: Laboratory) -> No
 
 @pytest.mark.parametrize("text", ["<script>alert(1)</script>", "[x](javascript:alert(1))", "a | b\n\n# c"])
 def test_hostile_sentences_and_versions_make_no_markup(filled: Laboratory, text: str) -> None:
-    filled.put("neat", [1.0] * 6, provenance={**HERE, "device": {"kind": text}})
+    filled.put("neat", [1.0] * 6, provenance={**HERE, "device": {"kind": text, "platform": "cpu"}})
     report = filled.judge(lambda group: group("neat").solves_every_level.in_most_trials(), says=text, where=text)
     rendered = READER.render(markdown(filled.page(report)))
     assert "<script" not in rendered

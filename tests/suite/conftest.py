@@ -37,7 +37,7 @@ def _made(condition: Condition, seed: int, value: float, status: Status = "done"
         "steps": 2.0,
         "environment_steps": 100.0 + seed,
     }
-    success = {"success": (value,) * levels}
+    success = {"success": (value,) * levels, "fitness": (value - 1.0,) * levels}
     spec = TrialSpec(condition, seed)
     return TrialResult(
         id=spec.id,

@@ -16,6 +16,18 @@ from evoclaims.trials.result import Status, TrialResult, digest
 from evoclaims.trials.store import Store
 
 
+METRICS = {
+    "mean_success": 0.75,
+    "last_success": 0.5,
+    "last_fitness": -0.5,
+    "furthest_solved": 0.0,
+    "furthest_reached": 1.0,
+    "steps": 4.0,
+    "environment_steps": 40.0,
+}
+"""What every trial has measured that has come to its end."""
+
+
 def _make_result(
     seed: int = 0,
     status: Status = "done",
@@ -27,8 +39,8 @@ def _make_result(
     """Return a sound result whose id, condition and digest follow from its parts."""
     condition = {"engine": 1, "method": {"name": method, "revision": 1, "parameters": {"rate": 0.1}}}
     spec = {**condition, "seed": seed}
-    metrics = {"mean_success": 0.75} if metrics is None else metrics
-    levels = {"success": (1.0, 0.5)} if levels is None else levels
+    metrics = {**METRICS, **(metrics or {})}
+    levels = {"success": (1.0, 0.5), "fitness": (0.0, -0.5), **(levels or {})}
     curves = {"best": (0.25, 0.75)} if curves is None else curves
     return TrialResult(
         id=content_hash(spec),

@@ -33,7 +33,7 @@ equal_vectors = st.integers(0, 4).flatmap(
 
 @settings(max_examples=60, deadline=None)
 @given(
-    st.integers(0, 2**63),
+    st.integers(0, 2**31 - 1),
     st.sampled_from(["done", "diverged", "timeout", "crashed"]),
     st.dictionaries(names, numbers, max_size=4),
     vectors,
@@ -61,7 +61,7 @@ def test_numbers_that_json_lacks_come_back_as_floats(store: Store, make_result: 
 
 
 def test_a_text_that_is_no_number_word_stays_out_of_metrics(store: Store, make_result: Make) -> None:
-    with pytest.raises(ValueError, match="'NaN' in its metrics is not a number"):
+    with pytest.raises(ValueError, match="its metrics field is not as the schema says: Invalid enum value 'NaN'"):
         store.put(make_result(metrics={"m": "NaN"}), {})
     assert store.ids() == ()
 
@@ -134,7 +134,7 @@ def test_an_equal_trial_put_again_changes_nothing(
     store: Store, trial: TrialResult, make_result: Make, parameters: dict[str, Any]
 ) -> None:
     before = store.record_path(trial.id).read_bytes()
-    again = dataclasses.replace(make_result(), timing={"run": 99.0})
+    again = dataclasses.replace(make_result(), timing={**trial.timing, "run": 99.0})
     assert store.put(again, parameters) == "present"
     assert store.record_path(trial.id).read_bytes() == before
 

@@ -7,8 +7,8 @@ from pathlib import Path
 
 from evoclaims.cli.project import judge_stored, open_project
 from evoclaims.cli.stored import write
+from evoclaims.core.printable import printable
 from evoclaims.report.badge import colour_of, message_of, svg
-from evoclaims.trials.records import printable
 
 
 def main(options: argparse.Namespace) -> int:

@@ -14,12 +14,12 @@ from evoclaims.cli.project import open_project
 from evoclaims.cli.run import describe
 from evoclaims.cli.stored import Stored, load, write
 from evoclaims.core.errors import UnknownNameError, UserError
+from evoclaims.core.printable import printable
 from evoclaims.networks import export, picture
 from evoclaims.networks.genome import Genome
 from evoclaims.networks.graph import GraphNetwork
 from evoclaims.trials import champions, devices
 from evoclaims.trials.champions import Replay
-from evoclaims.trials.records import printable
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,7 @@ from pathlib import Path
 from evoclaims.cli.project import judge_stored, open_project, open_store
 from evoclaims.cli.tiers import tiers_of
 from evoclaims.core.errors import UserError
+from evoclaims.core.printable import printable
 from evoclaims.judging.baseline import DriftReport
 from evoclaims.judging.tripwire import DigestCheck
 from evoclaims.suite import history, sides, transitions
@@ -20,7 +21,6 @@ from evoclaims.suite.revision import Revision, find_revision
 from evoclaims.suite.sides import Side
 from evoclaims.suite.timeline import timeline
 from evoclaims.suite.transitions import Kind
-from evoclaims.trials.records import printable
 from evoclaims.trials.store import Store
 
 UNSAID = (Kind.SAME, Kind.NOT_RUN)

@@ -10,11 +10,11 @@ from evoclaims.cli.project import judge_stored, open_archive, open_project
 from evoclaims.cli.stored import write
 from evoclaims.cli.tiers import ALL, tiers_of
 from evoclaims.core.errors import UnknownNameError, UserError
+from evoclaims.core.printable import printable
 from evoclaims.suite import export, references
 from evoclaims.suite.modes import StoredOnly
 from evoclaims.suite.naming import names_of
 from evoclaims.suite.reproduction import Reproduction
-from evoclaims.trials.records import printable
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.store import DamagedFileError
 

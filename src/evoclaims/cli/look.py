@@ -16,6 +16,7 @@ from evoclaims.cli.project import open_project
 from evoclaims.cli.run import describe
 from evoclaims.cli.stored import Stored, load, write
 from evoclaims.core.errors import UnknownNameError, UserError
+from evoclaims.core.printable import printable
 from evoclaims.envs.ecorobot.robot_task import RobotTask
 from evoclaims.envs.ecorobot.views import film, page, pictures
 from evoclaims.envs.ecorobot.views.marks import marks
@@ -24,7 +25,6 @@ from evoclaims.methods.map_elites import MapElites
 from evoclaims.networks.picture import Format
 from evoclaims.suite.reproduction import Tier
 from evoclaims.trials import devices
-from evoclaims.trials.records import printable
 
 PICTURE: Final = get_args(Format)
 

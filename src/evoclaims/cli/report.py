@@ -13,6 +13,7 @@ from evoclaims.cli.outings import run_again
 from evoclaims.cli.project import judge_stored, open_archive, open_project
 from evoclaims.cli.stored import Stored, write
 from evoclaims.core.errors import UnknownNameError
+from evoclaims.core.printable import printable
 from evoclaims.envs.ecorobot.robot_task import RobotTask
 from evoclaims.envs.ecorobot.views import pictures
 from evoclaims.report.champion import network
@@ -27,7 +28,6 @@ from evoclaims.suite.report import ClaimReport
 from evoclaims.suite.reproduction import Reproduction
 from evoclaims.suite.robustness import Robustness, matrix
 from evoclaims.trials import devices
-from evoclaims.trials.records import printable
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.spec import Condition
 

@@ -11,9 +11,9 @@ from pathlib import Path
 from evoclaims.cli.project import open_archive, open_project
 from evoclaims.core.errors import UserError
 from evoclaims.core.files import write_atomically
+from evoclaims.core.printable import printable
 from evoclaims.figures import catalogue, files
 from evoclaims.figures.figure import Drawing
-from evoclaims.trials.records import printable
 
 ALL = "all"
 

@@ -19,7 +19,7 @@ from evoclaims.suite.reproduction import Tier
 from evoclaims.suite.robustness import matrix
 from evoclaims.suite.variant import Variant
 from evoclaims.trials.records import printable
-from evoclaims.trials.result import TrialResult
+from evoclaims.trials.result import COMPLETE, TrialResult
 from evoclaims.trials.spec import TrialSpec
 from evoclaims.trials.time_limit import time_allowed
 
@@ -107,10 +107,13 @@ def choose(tier: Tier, method: str | None, task: str | None) -> list[tuple[str, 
 
 def describe(result: TrialResult) -> str:
     """Return a trial in one line."""
-    spent = f"seed {result.seed}: {result.status} after {int(result.metrics['environment_steps']):,} environment steps"
+    steps = result.metrics.get("environment_steps")
+    spent = f"seed {result.seed}: {result.status}" + ("" if steps is None else f" after {int(steps):,} environment steps")
     took = f"({duration(result.timing['run'])} for the batch of {result.timing['batch']})"
     if result.status == "timeout":
         limit = duration(time_allowed(result))
         return f"{spent}: its batch had {limit}; more by --time-limit, as much again by --retry {took}"
+    if result.status not in COMPLETE:
+        return f"{spent} {took}"
     success = " ".join(f"{value:.3f}" for value in result.levels["success"])
     return f"{spent}, success by level {success} {took}"

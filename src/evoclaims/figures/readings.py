@@ -8,17 +8,17 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from evoclaims.core.printable import printable
 from evoclaims.figures.figure import Scope
 from evoclaims.judging.measure import Measure
-from evoclaims.judging.sample import is_failed
+from evoclaims.judging.sample import MissingNumberError, UnreadableTrialError, checked, is_failed
 from evoclaims.suite.group import TrialGroup
-from evoclaims.trials.records import printable
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.spec import TrialSpec
 
 MeasureOf = Callable[[TrialGroup], Measure]
 
-NOT_FINITE, NOT_RUN = "not finite", "not run"
+NOT_FINITE, NOT_RUN, NOT_MEASURED = "not finite", "not run", "not measured"
 PLACE, WHAT = ("panel", "at", "series", "method", "task"), ("what", "against", "n")
 COLUMNS = (*PLACE, *WHAT, "seed", "trial", "status", "value", "error")
 """Of the table of a figure: one number a row. `what` is "trial", "mean" (`error`: the standard deviation), "reported"
@@ -31,7 +31,8 @@ class Reading:
 
     Attributes:
         seed, trial: which trial; `trial` is its id.
-        status: the record's; "not finite" for a finished trial with such a number, "not run" for none.
+        status: the record's; "not finite" for a finished trial with such a number, "not measured" for one without the
+            number, "not run" for none.
         value: the number; None where there is none to draw.
         rank: what rank tests see: the number, or -inf or inf, the worst, for a trial that diverged or ran out of time.
     """
@@ -140,7 +141,12 @@ def _reading(measure: Measure, seed: int, trial_id: str, trial: TrialResult | No
         return Reading(seed, trial_id, trial.status, None, None)
     if is_failed(trial):
         return Reading(seed, trial_id, trial.status, None, -math.inf if measure.better == "higher" else math.inf)
-    value = float(measure.read(trial))
+    try:
+        value = float(measure.read(checked(trial)))
+    except MissingNumberError:
+        return Reading(seed, trial_id, NOT_MEASURED, None, None)
+    except UnreadableTrialError:  # NaN
+        value = math.nan
     if math.isfinite(value):
         return Reading(seed, trial_id, trial.status, value, value)
     return Reading(seed, trial_id, NOT_FINITE, None, None if math.isnan(value) else value)
@@ -162,5 +168,6 @@ def _end(status: str) -> str:
         "diverged": "diverged (no value; the worst rank in tests)",
         "timeout": "ran out of time (no value; the worst rank in tests)",
         "crashed": "crashed (left out)",
+        NOT_MEASURED: "left no such number (left out)",
     }
     return ends.get(status, "ended with a number that is not finite (left out of the mean)")

@@ -39,6 +39,12 @@ class UnreadableTrialError(Exception):
     """A finished trial whose number cannot be judged; its claim ends as an error, never as a zero."""
 
 
+class MissingNumberError(UnreadableTrialError, KeyError):
+    """A finished trial without the number; a `KeyError` too, so that a mapping keeps what it promises (`get`, `in`)."""
+
+    __str__ = Exception.__str__  # a KeyError would show the sentence in quotation marks
+
+
 @dataclass(frozen=True)
 class Sample:
     """What was read from every trial of one condition, for the record.
@@ -63,18 +69,19 @@ def is_failed(trial: TrialResult) -> bool:
     return trial.status != "done"
 
 
-class _Numbers(Mapping[str, Any]):
-    """A trial's numbers by name; meeting NaN is an error, since any comparison with it is silently false."""
+class _Named(Mapping[str, Any]):
+    """What a trial has measured, by name; asking for what is not there is an error that names it."""
 
     def __init__(self, numbers: Mapping[str, Any], where: str) -> None:
         self._numbers = numbers
         self._where = where
 
     def __getitem__(self, name: str) -> Any:
-        value = self._numbers[name]
-        if any(math.isnan(number) for number in (value if isinstance(value, list | tuple) else (value,))):
-            raise UnreadableTrialError(f"{name!r} is NaN in {self._where}.")
+        value = self._numbers.get(name, ())
+        if value == ():
+            raise MissingNumberError(f"There is no {name!r} in {self._where}.")
         return value
+
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._numbers)
@@ -83,10 +90,25 @@ class _Numbers(Mapping[str, Any]):
         return len(self._numbers)
 
 
+class _Numbers(_Named):
+    """A trial's numbers by name; meeting NaN is an error, since any comparison with it is silently false."""
+
+    def __getitem__(self, name: str) -> Any:
+        value = super().__getitem__(name)
+        if any(math.isnan(number) for number in (value if isinstance(value, list | tuple) else (value,))):
+            raise UnreadableTrialError(f"{name!r} is NaN in {self._where}.")
+        return value
+
+
 def checked(trial: TrialResult) -> TrialResult:
-    """Return the trial with metrics and levels that raise `UnreadableTrialError` where NaN is read."""
+    """Return the trial with metrics and levels that raise `UnreadableTrialError` where NaN is read, or nothing is."""
     where = f"the finished trial of seed {trial.seed} (id {trial.id[:12]})"
-    return replace(trial, metrics=_Numbers(trial.metrics, where), levels=_Numbers(trial.levels, where))
+    return replace(
+        trial,
+        metrics=_Numbers(trial.metrics, where),
+        levels=_Numbers(trial.levels, where),
+        curves=_Named(trial.curves, where),
+    )
 
 
 def read_number(trial: TrialResult, what: str, read: Callable[[TrialResult], float], worst: float) -> float:

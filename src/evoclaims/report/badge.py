@@ -8,9 +8,9 @@ from collections.abc import Sequence
 from html import escape
 from typing import Final
 
+from evoclaims.core.printable import printable
 from evoclaims.judging.verdict import Outcome
 from evoclaims.suite.report import ClaimReport
-from evoclaims.trials.records import printable
 
 GREEN, BLUE, RED, GREY = "#2e7d32", "#1565c0", "#c62828", "#616161"
 _NARROW: Final = frozenset("fijlrtI.,:;|!'()[]{}/ ")

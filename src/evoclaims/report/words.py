@@ -8,7 +8,7 @@ from collections import Counter
 from collections.abc import Iterable
 from typing import Final
 
-from evoclaims.trials.records import printable
+from evoclaims.core.printable import printable
 
 _PLACE: Final = re.compile(r"§\s*(\d+(?:\.\d+)*)")
 

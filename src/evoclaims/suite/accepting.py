@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from typing import Any
 
 from evoclaims.core.canonical import content_hash
+from evoclaims.core.printable import printable
 from evoclaims.judging.verdict import Outcome
 from evoclaims.suite.archive import Archive
 from evoclaims.suite.history import Entry, History, key_of
 from evoclaims.suite.report import ClaimReport
-from evoclaims.trials.records import printable
 from evoclaims.trials.result import TrialResult
 
 UNDECIDED = (Outcome.NOT_RUN, Outcome.ERROR)

@@ -14,7 +14,7 @@ import numpy as np
 from evoclaims.suite import references
 from evoclaims.trials.devices import layout_on, usable_cores
 from evoclaims.trials.lanes import Lanes
-from evoclaims.trials.result import TrialResult
+from evoclaims.trials.result import COMPLETE, TrialResult
 from evoclaims.trials.spec import Condition, TrialSpec
 from evoclaims.trials.store import Store
 from evoclaims.trials.time_limit import is_final
@@ -57,7 +57,7 @@ def known_pace(
     trials += [trial for trial in committed if trial.condition == condition.id]
     batches: dict[str, list[TrialResult]] = defaultdict(list)
     for trial in trials:
-        if trial.provenance.get("device", {}).get("kind") == kind:
+        if trial.status in COMPLETE and (trial.provenance.get("device") or {}).get("kind") == kind:
             batches[str(trial.timing["started"])].append(trial)
     if not batches:
         return None
@@ -66,7 +66,7 @@ def known_pace(
     steps = [trial.metrics["steps"] for trial in batch]
     seconds = max(float(trial.timing["run"]) for trial in batch)
     work = sum(steps) if layout == "alone" else max(steps)
-    return Pace(seconds / work, max(float(trial.timing["compile"]) for trial in batch), layout)
+    return Pace(seconds / max(work, 1), max(float(trial.timing["compile"]) for trial in batch), layout)
 
 
 def measured_pace(condition: Condition, devices: Sequence[jax.Device]) -> Pace:

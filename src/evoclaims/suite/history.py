@@ -15,9 +15,9 @@ import tomli_w
 
 from evoclaims.core.canonical import content_hash
 from evoclaims.core.errors import UserError
+from evoclaims.core.printable import printable
 from evoclaims.judging.verdict import Outcome
 from evoclaims.suite.report import ClaimReport
-from evoclaims.trials.records import printable
 
 SCHEMA: Final = 1
 FILE: Final = "verdicts.toml"

@@ -7,10 +7,10 @@ import re
 from collections.abc import Sequence
 from typing import Final
 
+from evoclaims.core.printable import printable
 from evoclaims.judging.verdict import Outcome
 from evoclaims.suite.report import ClaimReport
 from evoclaims.suite.table import totals
-from evoclaims.trials.records import printable
 
 _MARKS: Final = re.compile(r"([\\`*_{}\[\]()#+!|~$@:^=-])")
 

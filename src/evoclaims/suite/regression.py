@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from evoclaims.core.errors import UserError
+from evoclaims.core.printable import printable
 from evoclaims.suite import history, transitions
 from evoclaims.suite.report import ClaimReport
 from evoclaims.suite.transitions import Kind, Transition
-from evoclaims.trials.records import printable
 
 
 @dataclass(frozen=True)

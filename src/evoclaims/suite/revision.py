@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Final
 
 from evoclaims.core.errors import UserError
-from evoclaims.trials.records import printable
+from evoclaims.core.printable import printable
 
 GIT_SECONDS: Final = 60.0
 """How long one call of git may take."""

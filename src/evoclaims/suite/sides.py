@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath
 
 from evoclaims.core.errors import UserError
+from evoclaims.core.printable import printable
 from evoclaims.judging.baseline import DriftCase, DriftReport
 from evoclaims.judging.tripwire import DigestCheck
 from evoclaims.judging.verdict import Outcome
@@ -17,7 +18,7 @@ from evoclaims.suite.report import ClaimReport
 from evoclaims.suite.reproduction import Reproduction
 from evoclaims.suite.revision import Revision
 from evoclaims.suite.transitions import Standings
-from evoclaims.trials.records import RecordError, parse, printable
+from evoclaims.trials.records import RecordError, parse
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.store import DamagedFileError, Store
 

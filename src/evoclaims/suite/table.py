@@ -13,10 +13,10 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from evoclaims.core.printable import printable
 from evoclaims.judging.baseline import DriftReport
 from evoclaims.judging.verdict import Outcome
 from evoclaims.suite.report import ClaimReport
-from evoclaims.trials.records import printable
 
 WIDE = 120
 """Columns from which there is room to name each claim's file of evidence."""

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from evoclaims.core.errors import UnknownNameError, UserError
+from evoclaims.core.printable import printable
 from evoclaims.suite.accepting import changed_versions
 from evoclaims.suite.history import Entry, History, eras, in_order
-from evoclaims.trials.records import printable
 
 SHORT = 12
 """Digits of a hash that are shown."""

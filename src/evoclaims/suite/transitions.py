@@ -9,10 +9,10 @@ from enum import StrEnum
 from typing import Final
 
 from evoclaims.core.errors import UnknownNameError, UserError
+from evoclaims.core.printable import printable
 from evoclaims.judging.verdict import Outcome
 from evoclaims.suite.history import History, in_order, key_of
 from evoclaims.suite.report import ClaimReport
-from evoclaims.trials.records import printable
 
 ANY: Final = "*"
 ARROW: Final = "->"

@@ -113,6 +113,12 @@ def replay(condition: Condition, result: TrialResult, parameters: Any, devices: 
         compiled = jax.jit(over_trials(score, layout_for(list(devices))))
         episode: Episode = jax.device_get(compiled(*jax.device_put(arguments, devices[0])))
     again = {"success": episode.success[0], "fitness": episode.fitness[0]}
+    for name, values in again.items():
+        if len(result.levels.get(name, ())) != len(values):
+            raise UserError(
+                f"The record of {condition.label}, seed {result.seed}, has no {name} for each of the task's "
+                f"{len(values)} levels, so there is nothing to compare a replay with: it is {result.status}."
+            )
     here, there = what_fixes_bits(provenance(devices)), what_fixes_bits(result.provenance)
     return Replay(
         recorded={name: result.levels[name] for name in again},

@@ -15,9 +15,10 @@ from numpy.typing import NDArray
 from evoclaims.core.canonical import content_hash
 from evoclaims.core.errors import UserError
 from evoclaims.core.files import write_atomically
+from evoclaims.core.printable import printable
 from evoclaims.trials.arrays import pack, unpack
 from evoclaims.trials.program import TrialState
-from evoclaims.trials.records import is_hash, printable
+from evoclaims.trials.records import is_hash
 from evoclaims.trials.store import DamagedFileError
 
 SCHEMA: Final = 1

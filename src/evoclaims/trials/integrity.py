@@ -13,8 +13,9 @@ from pathlib import Path
 from typing import Final, Literal
 
 from evoclaims.core.errors import UserError
+from evoclaims.core.printable import printable
 from evoclaims.trials.notice import fresh
-from evoclaims.trials.records import is_hash, printable
+from evoclaims.trials.records import is_hash
 from evoclaims.trials.store import SPARE_DIGITS, DamagedFileError, Store
 
 SETTLED_SECONDS: Final = 60.0

@@ -20,8 +20,9 @@ from types import TracebackType
 from typing import Final
 
 from evoclaims.core.errors import UserError
+from evoclaims.core.printable import printable
 from evoclaims.trials.heartbeat import beating
-from evoclaims.trials.records import is_hash, printable
+from evoclaims.trials.records import is_hash
 
 FRESH_SECONDS: Final = 60.0
 """A notice from another host counts for this long after its last refresh; here its process can be asked."""

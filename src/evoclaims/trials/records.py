@@ -12,11 +12,15 @@ from typing import Any, Final, NoReturn, cast
 
 from evoclaims.core.canonical import canonical_json
 from evoclaims.core.errors import UserError
-from evoclaims.trials.result import SCHEMA, STATUSES, Status, TrialResult
+from evoclaims.core.printable import printable
+from evoclaims.trials.record_schema import MisfitError, Number, Vector, check
+from evoclaims.trials.result import SCHEMA, TrialResult
 
 _HASH: Final = re.compile(r"[0-9a-f]{64}")
 _WORDS: Final = {"nan": math.nan, "inf": math.inf, "-inf": -math.inf}
 _LONGEST: Final = 300
+_MOST_DIGITS: Final = 19
+_ENCODER: Final = json.JSONEncoder(sort_keys=True, separators=(",", ":"), allow_nan=False)
 _FIELDS: Final = {field.name for field in dataclasses.fields(TrialResult)} | {"schema", "seal"}
 
 
@@ -34,11 +38,6 @@ def is_hash(text: object) -> bool:
     return isinstance(text, str) and _HASH.fullmatch(text) is not None
 
 
-def printable(text: object) -> str:
-    """Return `text` with control characters and stray surrogates escaped: safe to print to any terminal."""
-    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in str(text))
-
-
 def dump(result: TrialResult) -> bytes:
     """Return the sealed record of `result`: one line of canonical JSON."""
     return canonical_json(result.to_json()).encode("ascii") + b"\n"
@@ -50,43 +49,38 @@ def parse(data: bytes | str) -> TrialResult:
     Raises:
         RecordError: when the text is torn, edited, of another schema, or has a field of the wrong type.
     """
+    data = data.encode(errors="replace") if isinstance(data, str) else data
     plain = _load(data)
     if plain.get("schema") != SCHEMA or isinstance(plain.get("schema"), bool):
         _fail(f"its schema is {plain.get('schema')!r} and this version of evoclaims reads schema {SCHEMA}")
     if plain.keys() != _FIELDS:
         _fail(f"these fields are missing or unknown: {', '.join(sorted(plain.keys() ^ _FIELDS))}")
-    if _seal(plain) != plain["seal"]:
+    if not _is_sealed(data, plain):
         _fail("its contents do not match its seal, so it was torn or edited")
-    spec = _mapping(plain, "spec")
-    seed = plain["seed"]
-    if isinstance(seed, bool) or not isinstance(seed, int) or seed < 0 or spec.get("seed") != seed:
-        _fail("its seed is not a whole number from 0 up that agrees with its specification")
-    if _hash_of_json(spec) != plain["id"]:
+    try:
+        record = check(plain)
+    except MisfitError as error:
+        _fail(str(error))
+    spec = record.spec
+    if type(spec.get("seed")) is not int or spec["seed"] != record.seed:
+        _fail("its seed does not agree with its specification")
+    if _hash_of_json(spec) != record.id:
         _fail("its id is not the hash of its specification")
-    if _hash_of_json({key: value for key, value in spec.items() if key != "seed"}) != plain["condition"]:
+    if _hash_of_json({key: value for key, value in spec.items() if key != "seed"}) != record.condition:
         _fail("its condition is not the hash of its specification without the seed")
-    if plain["status"] not in STATUSES:
-        _fail(f"its status is {plain['status']!r}; known: {', '.join(STATUSES)}")
-    if not is_hash(plain["digest"]):
-        _fail("its digest is not a hash")
-    if plain["champion"] != "" and not is_hash(plain["champion"]):
-        _fail("its champion is not a hash")
-    curves = _vectors(plain, "curves")
-    if len({len(curve) for curve in curves.values()}) > 1:
-        _fail("its curves are not equally long")
     return TrialResult(
-        id=plain["id"],
-        condition=plain["condition"],
+        id=record.id,
+        condition=record.condition,
         spec=spec,
-        seed=seed,
-        status=cast(Status, plain["status"]),
-        metrics={name: _number(value, "metrics") for name, value in _mapping(plain, "metrics").items()},
-        levels=_vectors(plain, "levels"),
-        curves=curves,
-        digest=plain["digest"],
-        timing=_mapping(plain, "timing"),
-        provenance=_mapping(plain, "provenance"),
-        champion=plain["champion"],
+        seed=record.seed,
+        status=record.status,
+        metrics={name: _number(value) for name, value in record.metrics.items()},
+        levels=_vectors(record.levels),
+        curves=_vectors(record.curves),
+        digest=record.digest,
+        timing=record.timing,
+        provenance=record.provenance,
+        champion=record.champion,
     )
 
 
@@ -95,21 +89,23 @@ def _fail(reason: str) -> NoReturn:
     raise RecordError(printable(reason)[:_LONGEST])
 
 
-def _seal(plain: dict[str, Any]) -> str:
-    """Return the seal that the contents of a record call for."""
-    try:
-        return _hash_of_json({key: value for key, value in plain.items() if key != "seal"})
-    except RecursionError:
-        _fail("it is nested too deeply")
-    except ValueError:  # 1e999, which Python reads as infinite and which would pass for "inf" under the seal
-        _fail("a number in it is too large")
+def _is_sealed(data: bytes, plain: dict[str, Any]) -> bool:
+    """Whether the contents of a record match its seal, byte for byte as `dump` writes them or else in other words."""
+    seal: object = plain["seal"]
+    if not is_hash(seal):
+        return False
+    written = data.strip().replace(f'"seal":"{seal}",'.encode(), b"", 1)
+    if hashlib.sha256(written).hexdigest() == seal:
+        return True
+    return _hash_of_json({key: value for key, value in plain.items() if key != "seal"}) == seal
 
 
-def _load(data: bytes | str) -> dict[str, Any]:
+def _load(data: bytes) -> dict[str, Any]:
     """Return the JSON object in `data`; refuse what JSON forbids but Python's reader lets through."""
     try:
-        text = data if isinstance(data, str) else data.decode("utf-8")
-        plain = json.loads(text, parse_constant=_no_constant, object_pairs_hook=_unique)
+        plain = json.loads(
+            data.decode("utf-8"), parse_int=_whole, parse_constant=_no_constant, object_pairs_hook=_unique
+        )
     except (ValueError, RecursionError):
         _fail("it is not one whole JSON text")
     if not isinstance(plain, dict):
@@ -122,6 +118,13 @@ def _no_constant(word: str) -> NoReturn:
     raise ValueError(word)
 
 
+def _whole(digits: str) -> int:
+    """Refuse whole numbers that no counter and no float can hold."""
+    if len(digits.lstrip("-")) > _MOST_DIGITS:
+        raise ValueError("a whole number is too large")
+    return int(digits)
+
+
 def _unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     """Refuse an object that names a key twice, of which Python would keep the last."""
     plain = dict(pairs)
@@ -130,39 +133,25 @@ def _unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     return plain
 
 
-def _mapping(plain: Mapping[str, Any], field: str) -> dict[str, Any]:
-    """Return the JSON object in `field`."""
-    value = plain[field]
-    if not isinstance(value, dict):
-        _fail(f"its {field} field is not a JSON object")
-    return value
-
-
-def _vectors(plain: Mapping[str, Any], field: str) -> dict[str, tuple[float, ...]]:
-    """Return the named lists of numbers in `field`."""
-    vectors = {}
-    for name, values in _mapping(plain, field).items():
-        if not isinstance(values, list):
-            _fail(f"{name!r} in its {field} is not a list of numbers")
-        plain_floats = set(map(type, values)) <= {float}  # nearly always; the rest is looked at one by one
-        vectors[name] = tuple(values) if plain_floats else tuple(_number(value, field) for value in values)
+def _vectors(fields: Mapping[str, Vector]) -> dict[str, tuple[float, ...]]:
+    """Return named vectors of floats."""
+    vectors: dict[str, tuple[float, ...]] = {}
+    for name, values in fields.items():
+        worded = str in set(map(type, values))  # hardly ever
+        vectors[name] = tuple(map(_number, values)) if worded else cast(tuple[float, ...], values)
     return vectors
 
 
-def _number(value: Any, field: str) -> float:
+def _number(value: Number) -> float:
     """Return a number, with "nan", "inf" and "-inf" turned back into floats."""
-    if isinstance(value, str) and value in _WORDS:
-        return _WORDS[value]
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        _fail(f"{value!r} in its {field} is not a number")
-    return value
+    return _WORDS[value] if isinstance(value, str) else value
 
 
 def _hash_of_json(plain: Any) -> str:
-    """Return `content_hash` of what was read from JSON, which has no need of `as_plain`.
-
-    Raises:
-        ValueError: for an infinite number.
-    """
-    text = json.dumps(plain, sort_keys=True, separators=(",", ":"), allow_nan=False)
-    return hashlib.sha256(text.encode("ascii")).hexdigest()
+    """Return `content_hash` of what was read from JSON, which has no need of `as_plain`."""
+    try:
+        return hashlib.sha256(_ENCODER.encode(plain).encode("ascii")).hexdigest()
+    except RecursionError:
+        _fail("it is nested too deeply")
+    except ValueError:  # 1e999, which Python reads as infinite and which would pass for "inf" under the seal
+        _fail("a number in it is too large")

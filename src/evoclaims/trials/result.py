@@ -10,6 +10,8 @@ from evoclaims.core.canonical import as_plain, content_hash
 
 Status = Literal["done", "diverged", "timeout", "crashed"]
 STATUSES: tuple[str, ...] = get_args(Status)
+COMPLETE: tuple[str, ...] = ("done", "diverged")
+"""Statuses of trials that have come to their end, and whose metrics are all there."""
 SCHEMA = 1
 
 

@@ -19,9 +19,10 @@ from numpy.typing import NDArray
 
 from evoclaims.core.errors import UserError
 from evoclaims.core.files import write_atomically
+from evoclaims.core.printable import printable
 from evoclaims.trials.arrays import pack, unpack
 from evoclaims.trials.once import write_once
-from evoclaims.trials.records import RecordError, dump, is_hash, parse, printable
+from evoclaims.trials.records import RecordError, dump, is_hash, parse
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.time_limit import time_allowed
 
