@@ -143,7 +143,9 @@ def warmed() -> None:
 @pytest.fixture(scope="session")
 def shared_store(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A store that tests share which do not look into it, so that their trials are run once."""
-    return tmp_path_factory.mktemp("shared") / "store"
+    store = tmp_path_factory.mktemp("shared") / "store"
+    store.mkdir()
+    return store
 
 
 class Project:

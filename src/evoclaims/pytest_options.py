@@ -14,7 +14,7 @@ TIERS: Final = ("smoke", "full")
 def add(parser: pytest.Parser) -> None:
     """Add the options."""
     group = parser.getgroup("claims", "claims of a paper (evoclaims)")
-    group.addoption("--claims-storage", metavar="DIR", default=".evoclaims", help="folder of trials (.evoclaims)")
+    group.addoption("--claims-storage", metavar="DIR", help="folder of trials (.evoclaims in the project's root)")
     group.addoption("--claims-tier", metavar="TIER", help="judge this tier's claims: smoke or full; as -m TIER")
     group.addoption("--claims-trials", metavar="N", type=int, help="judge by one look at N trials a condition")
     group.addoption("--claims-only", metavar="IDS", help="judge only these claims, such as G1,G7")

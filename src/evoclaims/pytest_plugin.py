@@ -5,9 +5,11 @@ Nothing heavy is imported here at the top: pytest loads this file in every run o
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Callable, Generator
 from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
@@ -138,7 +140,7 @@ def make_session(config: pytest.Config) -> Session:
     from evoclaims.trials.store import Store
 
     devices.configure()
-    store = Store(config.invocation_params.dir / config.getoption("claims_storage"))
+    store = Store(_storage(config))
     line = LiveLine(Uncaptured(config)) if config.pluginmanager.has_plugin("terminalreporter") else None
     project = load_config(config.rootpath)
     limit = project.seconds(config.getoption("claims_time_limit"))
@@ -154,6 +156,24 @@ def make_session(config: pytest.Config) -> Session:
     if line is not None:
         config.stash[_line] = line
     return made
+
+
+def _storage(config: pytest.Config) -> Path:
+    """Return the store's folder: the project's own, or the one that is named, relative to the current folder."""
+    from evoclaims.trials.store import DEFAULT_ROOT
+
+    named = config.getoption("claims_storage")
+    if named is None:
+        return config.rootpath / DEFAULT_ROOT
+    if not named:
+        raise UserError("--claims-storage names no folder; leave it out for the project's own store.")
+    folder = Path(config.invocation_params.dir, named)
+    if config.getoption("claims_stored") and not os.path.lexists(folder):
+        raise UserError(
+            f"There is no trial store {folder}: the folder does not exist. Check its name, or leave --claims-storage "
+            "out for the project's own store."
+        )
+    return folder
 
 
 @pytest.hookimpl(trylast=True)
@@ -267,10 +287,7 @@ def _claim_report(item: pytest.Item, call: pytest.CallInfo[None]) -> ClaimReport
         return report
     if item.config.getoption("claims_stored"):
         return located(report, session.store.root)
-    try:
-        return save(report, session.store.root)
-    except UserError:
-        return report  # a full disk must not hide the verdict
+    return save(report, session.store.root)
 
 
 def _skipped_report(item: pytest.Item, report: pytest.TestReport) -> ClaimReport:

@@ -125,9 +125,11 @@ class Summary:
             terminalreporter.write_line(note)
         for trouble in self._troubles:
             terminalreporter.write_line(f"error: {trouble}", red=True)
-        warning = self._write_step_summary(notes)
-        if warning:
-            terminalreporter.write_line(f"warning: {warning}", yellow=True)
+        unsaved = sorted({report.unsaved for report in self.reports} - {""})
+        warnings = [f"The files of evidence could not be written. {reason}" for reason in unsaved[:1]]
+        for warning in (*warnings, self._write_step_summary(notes)):
+            if warning:
+                terminalreporter.write_line(f"warning: {warning}", yellow=True)
         terminalreporter.write_line(f"claims: {table.totals(self.reports)}", bold=True)
         if not any(report.n for report in self.reports):
             what = "No trial was looked at" if self._judged else "No claim was judged"

@@ -187,6 +187,7 @@ def test_a_users_mistake_is_one_sentence_and_status_2(
 
 def test_the_command_that_a_missing_trial_names_runs_it(evoclaims: Evoclaims) -> None:
     storage = Path("own")
+    storage.mkdir()
     _, _, err = evoclaims("champion", "cma_es", "--on=parity", "--seed=5", storage=storage)
     command = re.findall("`evoclaims (.*)`", err)[0].split()
     assert evoclaims(*command, storage=storage)[0] == 0

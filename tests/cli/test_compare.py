@@ -138,6 +138,7 @@ def test_verdicts_of_now_come_from_reference_trials_where_the_store_has_none(
         smoke = [trial for trial in trials if trial.spec["budget"]["generations"] == 1 and trial.seed < 10]
         references.write(references.path_of(Path("reference"), "smoke", name, "parity"), smoke)
     capsys.readouterr()
+    Path("empty").mkdir()
     assert main(["compare", "--storage=empty", "--tier=smoke"]) == 0
     out = capsys.readouterr().out
     assert "verdicts: 2 the same\n" in out
@@ -241,8 +242,8 @@ def test_a_timeline_shows_the_versions_that_differ(accepted: Evoclaims) -> None:
         (("./nothing",), "There is neither a git revision nor a folder called ./nothing."),
         (("/nothing",), "There is neither a git revision nor a folder called /nothing."),
         (("\x1b[2J",), r"There is neither a git revision nor a folder called \x1b[2J."),
-        (("claims",), "The folder claims holds no trials, so there is nothing to compare."),
-        (("HEAD", "./claims"), "HEAD is a revision and claims a store: two of a kind can be compared."),
+        (("claims",), "claims is no trial store: it has no store.json, and a store has no test_claims.py in it."),
+        (("HEAD", "./claims"), "claims is no trial store"),
         (("both",), "both is both a folder and a git revision: write ./both for the folder, or the revision's hash, "),
         (("bare",), "The revision bare has neither verdicts.toml nor reference trials in "),
         (("--", "--output=x"), "There is neither a git revision nor a folder called --output=x."),

@@ -70,6 +70,7 @@ def test_a_tier_without_trials_is_one_sentence(stored: Evoclaims) -> None:
 def test_reference_trials_fill_in_what_the_store_lacks(stored: Evoclaims) -> None:
     trials = list(Store(Path(".evoclaims")).results([]))
     references.write(references.path_of(Path("reference"), "smoke", "right", "parity"), trials)
+    Path("elsewhere").mkdir()
     status, out, _ = stored("export", "--storage=elsewhere", "--out=here/t.json")
     assert (status, out) == (0, "wrote here/t.json: 12 trials\n")
     assert stored("export")[1] == "wrote trials.json: 12 trials\n"

@@ -95,6 +95,7 @@ def test_committed_trials_are_drawn_where_the_store_has_none(stored: Evoclaims) 
     first = Path("figures/smoke/fig1.csv").read_bytes()
     Path("claims/test_claims.py").write_text(tiny_project.claims(a="supported", b="refuted"))
     assert stored("reference")[0] == 0
+    Path("empty").mkdir()
     assert stored("reproduce", "fig1", "--storage=empty", "--out=again")[0] == 0
     assert Path("again/fig1.csv").read_bytes() == first
 
@@ -104,7 +105,7 @@ def test_committed_trials_are_drawn_where_the_store_has_none(stored: Evoclaims) 
     [
         (("fig3",), "There is no figure named 'fig3'. Did you mean 'fig2'? Known: fig1, fig2."),
         (("fig1", "--tier", "ful"), "There is no tier named 'ful'."),
-        (("fig1", "--storage", "pyproject.toml"), "it cannot be read (Not a directory)"),
+        (("fig1", "--storage", "pyproject.toml"), "The trial store pyproject.toml is a file, not a folder"),
         (("fig1", "--out", "pyproject.toml"), "Cannot write pyproject.toml/fig1.png: "),
     ],
 )

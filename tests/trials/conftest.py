@@ -15,7 +15,6 @@ from evoclaims.core.canonical import content_hash
 from evoclaims.trials.result import Status, TrialResult, digest
 from evoclaims.trials.store import Store
 
-
 METRICS = {
     "mean_success": 0.75,
     "last_success": 0.5,

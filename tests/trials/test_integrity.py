@@ -179,6 +179,7 @@ def test_the_notice_of_a_process_that_is_gone_is_a_leftover_and_that_of_a_live_o
 
 
 def test_a_checkpoint_is_judged_by_whoever_knows_its_schema(store: Store) -> None:
+    store.check_writable()
     store.checkpoints.mkdir(parents=True)
     good, bad = store.checkpoints / "good.ckpt", store.checkpoints / "bad.ckpt"
     for path in (good, bad):

@@ -103,9 +103,9 @@ def test_a_read_only_or_full_disk_is_found_at_the_start(
         store.check_writable()
 
 
-def test_the_writable_check_leaves_nothing_behind(store: Store) -> None:
+def test_the_writable_check_leaves_the_mark_of_a_store_alone(store: Store) -> None:
     store.check_writable()
-    assert list(store.root.iterdir()) == []
+    assert sorted(path.name for path in store.root.iterdir()) == [".gitignore", "store.json"]
 
 
 def test_a_disk_that_fills_up_leaves_no_record_of_the_trial(

@@ -24,7 +24,9 @@ def _status(arguments: Sequence[str] | None) -> int:
     """Run one command and return its exit status."""
     options = _parser().parse_args(arguments)
     try:
-        status: int = _command(options.command)(options)
+        run = _command(options.command)
+        options.storage = _storage(options)
+        status: int = run(options)
         sys.stdout.flush()
     except UserError as error:
         print(f"evoclaims: {error}", file=sys.stderr)
@@ -46,6 +48,13 @@ def _command(name: str) -> Callable[[argparse.Namespace], int]:
     return function
 
 
+def _storage(options: argparse.Namespace) -> str:
+    """Return the folder of the command's store."""
+    from evoclaims.cli.storage import storage_of
+
+    return storage_of(options.storage, options.command)
+
+
 def _parser() -> argparse.ArgumentParser:
     """Build the parser."""
     parser = argparse.ArgumentParser(prog="evoclaims", description="Claims of a paper, judged by real trials.")
@@ -53,7 +62,7 @@ def _parser() -> argparse.ArgumentParser:
 
     def add(name: str, text: str) -> argparse.ArgumentParser:
         command = commands.add_parser(name, help=text, description=text)
-        command.add_argument("--storage", metavar="DIR", default=".evoclaims", help="folder of trials (.evoclaims)")
+        command.add_argument("--storage", metavar="DIR", help="folder of trials (.evoclaims in the project's root)")
         return command
 
     def tier(command: argparse.ArgumentParser) -> None:

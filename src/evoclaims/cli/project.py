@@ -21,8 +21,14 @@ def open_project() -> tuple[SuiteConfig, Reproduction]:
 
 
 def open_store(name: str) -> Store:
-    """Return the store in the folder `name`, relative to the current one."""
-    return Store(Path(name))
+    """Return the store in the folder `name`, relative to the current one.
+
+    Raises:
+        UserError: when that is there and is no store.
+    """
+    store = Store(Path(name))
+    store.check()
+    return store
 
 
 def open_archive(storage: str, reproduction: Reproduction) -> Archive:
@@ -39,7 +45,8 @@ def judge_stored(config: SuiteConfig, storage: str, tier: str, variant: str = ""
     options = (
         "--claims-stored",
         "--claims-committed",
-        f"--claims-storage={Path(storage).absolute()}",
+        # the project's own store may not be there yet, which of a folder that is named would be a mistake
+        *([f"--claims-storage={Path(storage).absolute()}"] if Path(storage).exists() else []),
         f"--claims-variant={variant}",
     )
     return judge(config.root / config.claims, config.root, tier, options)

@@ -108,7 +108,8 @@ def choose(tier: Tier, method: str | None, task: str | None) -> list[tuple[str, 
 def describe(result: TrialResult) -> str:
     """Return a trial in one line."""
     steps = result.metrics.get("environment_steps")
-    spent = f"seed {result.seed}: {result.status}" + ("" if steps is None else f" after {int(steps):,} environment steps")
+    after = "" if steps is None else f" after {int(steps):,} environment steps"
+    spent = f"seed {result.seed}: {result.status}{after}"
     took = f"({duration(result.timing['run'])} for the batch of {result.timing['batch']})"
     if result.status == "timeout":
         limit = duration(time_allowed(result))

@@ -1,13 +1,31 @@
-"""Files that are whole or absent: written aside, flushed, then renamed into place."""
+"""Files that are whole or absent: written aside, flushed, then renamed into place; and read without ever waiting."""
 
 from __future__ import annotations
 
 import contextlib
+import errno
 import os
 import secrets
+import stat
 from pathlib import Path
 
 from evoclaims.core.errors import UserError
+
+
+def read_file(path: Path) -> bytes:
+    """Return the bytes of a regular file (also by a link to one).
+
+    Raises:
+        OSError: when it is not there or cannot be read; when it is a folder, or a pipe or device, from which a reader
+            would wait for ever.
+    """
+    descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
+    mode = os.fstat(descriptor).st_mode
+    if not stat.S_ISREG(mode):
+        os.close(descriptor)
+        raise OSError(errno.EINVAL, "it is a folder" if stat.S_ISDIR(mode) else "it is no regular file", str(path))
+    with open(descriptor, "rb") as file:
+        return file.read()
 
 
 def write_atomically(path: Path, data: bytes) -> None:

@@ -82,7 +82,6 @@ class _Named(Mapping[str, Any]):
             raise MissingNumberError(f"There is no {name!r} in {self._where}.")
         return value
 
-
     def __iter__(self) -> Iterator[str]:
         return iter(self._numbers)
 

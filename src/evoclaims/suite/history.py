@@ -15,6 +15,7 @@ import tomli_w
 
 from evoclaims.core.canonical import content_hash
 from evoclaims.core.errors import UserError
+from evoclaims.core.files import read_file
 from evoclaims.core.printable import printable
 from evoclaims.judging.verdict import Outcome
 from evoclaims.suite.report import ClaimReport
@@ -82,7 +83,7 @@ def load(path: Path) -> History:
         UserError: when the file is torn, of another schema, or has an entry that is none.
     """
     try:
-        data = path.read_bytes()
+        data = read_file(path)
     except FileNotFoundError:
         return {}
     except OSError as error:

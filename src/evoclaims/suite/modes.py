@@ -35,8 +35,17 @@ class RunMissing:
     time_limit: float = math.inf
 
     def check(self) -> None:
-        """Find out before the first trial whether the store can be written and the device is there."""
-        self.store.check_writable()
+        """Find out before the first trial whether the store can be written and the device is there.
+
+        A store with trials that cannot be written may have all that is asked for; where it does not, the first
+        condition that lacks a trial says so.
+        """
+        try:
+            self.store.check_writable()
+        except UserError:
+            self.store.check()
+            if not self.store.ids():
+                raise
         devices.choose(self.device)
 
     def __call__(self, condition: Condition, seeds: Sequence[int]) -> Sequence[TrialResult]:
@@ -52,10 +61,8 @@ class StoredOnly:
     archive: Archive
 
     def check(self) -> None:
-        """A store that is a file cannot be read."""
-        root = self.archive.store.root
-        if root.exists() and not root.is_dir():
-            raise UserError(f"The trial store {root} is a file, not a folder: name another with --storage.")
+        """What is no store cannot be read."""
+        self.archive.store.check()
 
     def __call__(self, condition: Condition, seeds: Sequence[int]) -> Sequence[TrialResult]:
         """Return one trial per seed, or raise `NotStoredError`."""

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import errno
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from evoclaims.core.errors import UserError
-from evoclaims.core.files import write_atomically
+from evoclaims.core.files import read_file, write_atomically
 from evoclaims.core.provenance import what_fixes_bits
 from evoclaims.judging.baseline import DriftCase, DriftReport, check_drift
 from evoclaims.judging.tripwire import DigestCheck, compare_digests
@@ -16,6 +17,8 @@ from evoclaims.trials.time_limit import is_final
 
 METRICS = ("mean_success", "last_fitness", "environment_steps")
 """What the drift check compares: how well a trial ended, in success and in reward, and how long it took."""
+
+_MEND = "Restore the file from version control, or write it anew with `evoclaims reference`."
 
 
 def path_of(folder: Path, tier: str, method: str, task: str) -> Path:
@@ -27,21 +30,24 @@ def load(path: Path) -> tuple[TrialResult, ...]:
     """Read reference trials; none when there is no such file.
 
     Raises:
-        UserError: when a line is torn or edited.
+        UserError: when the file cannot be read, or a line is torn or edited.
     """
     try:
-        lines = path.read_bytes().splitlines()
-    except FileNotFoundError:
+        lines = read_file(path).splitlines()
+    except FileNotFoundError as error:
+        if path.is_symlink():
+            raise UserError(f"The reference trials {path} are a link to a file that is not there. {_MEND}") from error
         return ()
+    except OSError as error:
+        if error.errno == errno.ENAMETOOLONG:  # no file has such a name
+            return ()
+        raise UserError(f"The reference trials {path} cannot be read: {error.strerror or error}. {_MEND}") from error
     results = []
     for number, line in enumerate(lines, start=1):
         try:
             results.append(parse(line))
         except RecordError as error:
-            raise UserError(
-                f"Line {number} of {path} is no reference trial: {error.reason}. Restore the file from version "
-                "control, or write it anew with `evoclaims reference`."
-            ) from error
+            raise UserError(f"Line {number} of {path} is no reference trial: {error.reason}. {_MEND}") from error
     return tuple(results)
 
 

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from evoclaims.core.canonical import as_plain
+from evoclaims.core.errors import UserError
 from evoclaims.core.file_names import file_name
 from evoclaims.core.files import write_atomically
 from evoclaims.judging.assertion import Assertion
@@ -37,6 +39,7 @@ class ClaimReport:
         attainable: for each look: "n", "alpha", and the smallest p for ("supported") and against ("refuted").
         evidence: path of the file that holds all this.
         variant: name of the variant of the protocol; empty for the protocol itself.
+        unsaved: why that file could not be written; empty when it was, or was not to be.
     """
 
     claim: str
@@ -53,6 +56,7 @@ class ClaimReport:
     attainable: tuple[dict[str, Any], ...] = ()
     evidence: str = ""
     variant: str = ""
+    unsaved: str = ""
 
     @property
     def name(self) -> str:
@@ -127,16 +131,19 @@ def expecting(report: ClaimReport, expectation: Expectation | None) -> ClaimRepo
 
 
 def save(report: ClaimReport, root: Path) -> ClaimReport:
-    """Write the report under `root`/verdicts and return it with the path filled in."""
+    """Write the report under `root`/verdicts and return it with the path filled in, or why it could not be written."""
     saved = replace(report, evidence=str(_path(report, root)))
-    write_atomically(_path(report, root), (json.dumps(saved.to_json(), indent=1, sort_keys=True) + "\n").encode())
+    try:
+        write_atomically(_path(report, root), (json.dumps(saved.to_json(), indent=1, sort_keys=True) + "\n").encode())
+    except UserError as error:  # a full or read-only disk must not hide the verdict
+        return replace(report, unsaved=str(error))
     return saved
 
 
 def located(report: ClaimReport, root: Path) -> ClaimReport:
     """Return the report with the path of the file that an earlier run has written, if there is one."""
     path = _path(report, root)
-    return replace(report, evidence=str(path)) if path.is_file() else report
+    return replace(report, evidence=str(path)) if os.path.isfile(path) else report
 
 
 def _unjudged(claim: Claim, case: str, tier: str, outcome: Outcome, reason: str) -> ClaimReport:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from evoclaims.core.canonical import content_hash
 from evoclaims.core.errors import UserError
-from evoclaims.core.files import write_atomically
+from evoclaims.core.files import read_file, write_atomically
 from evoclaims.core.printable import printable
 from evoclaims.trials.arrays import pack, unpack
 from evoclaims.trials.program import TrialState
@@ -93,7 +93,7 @@ def read(path: Path) -> tuple[Header, list[NDArray[Any]]]:
         DamagedFileError: when the file is torn, edited, misplaced or not a checkpoint.
     """
     try:
-        arrays = unpack(path.read_bytes())
+        arrays = unpack(read_file(path))
         header = Header(**json.loads(arrays.pop(_HEADER).tobytes()))
         sound = header.schema != SCHEMA or _is_sound(header)
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:

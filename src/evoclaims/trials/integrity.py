@@ -62,10 +62,9 @@ def verify(
         One problem per file, records first.
 
     Raises:
-        UserError: when the root is a file, or a bad file cannot be moved.
+        UserError: when the folder is no store, in which case nothing is moved; or when a bad file cannot be moved.
     """
-    if store.root.exists() and not store.root.is_dir():
-        raise UserError(f"The trial store {printable(store.root)} is a file, not a folder; name the folder instead.")
+    store.check()
     checks = (_records(store), _champions(store), _checkpoints(store, checkpoint_fault), _leftovers(store))
     found: dict[Path, Problem] = {}
     for problem in itertools.chain.from_iterable(checks):

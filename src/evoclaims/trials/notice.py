@@ -20,6 +20,7 @@ from types import TracebackType
 from typing import Final
 
 from evoclaims.core.errors import UserError
+from evoclaims.core.files import read_file
 from evoclaims.core.printable import printable
 from evoclaims.trials.heartbeat import beating
 from evoclaims.trials.records import is_hash
@@ -173,7 +174,7 @@ def fresh(path: Path) -> Runner | None:
 def _read(path: Path) -> Runner | None:
     """Return what the notice says, or None when it is absent or not a notice."""
     try:
-        plain = json.loads(path.read_bytes())
+        plain = json.loads(read_file(path))
     except (OSError, ValueError, RecursionError):
         return None
     if not isinstance(plain, dict) or plain.keys() != Runner.__dataclass_fields__.keys():

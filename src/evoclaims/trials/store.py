@@ -18,12 +18,13 @@ from typing import Any, Final, Literal
 from numpy.typing import NDArray
 
 from evoclaims.core.errors import UserError
-from evoclaims.core.files import write_atomically
+from evoclaims.core.files import read_file, write_atomically
 from evoclaims.core.printable import printable
 from evoclaims.trials.arrays import pack, unpack
 from evoclaims.trials.once import write_once
 from evoclaims.trials.records import RecordError, dump, is_hash, parse
 from evoclaims.trials.result import TrialResult
+from evoclaims.trials.store_mark import check_store, mark
 from evoclaims.trials.time_limit import time_allowed
 
 DEFAULT_ROOT: Final = Path(".evoclaims")
@@ -74,30 +75,36 @@ class Store:
     def champion_files(self, trial_id: str) -> tuple[Path, ...]:
         """Return the files that hold a champion of `trial_id`; more than one where processes have raced (see `put`)."""
         usual = self.champion_path(trial_id)
-        return tuple(path for path in (usual, *sorted(usual.parent.glob(f"{trial_id}.*.npz"))) if path.exists())
+        found = (usual, *sorted(usual.parent.glob(f"{trial_id}.*.npz")))
+        return tuple(path for path in found if os.path.exists(path))
 
     def champion_file(self, result: TrialResult) -> Path:
         """Return the file that holds the champion which a record of this store names."""
         spare = self._spare_champion_path(result.id, result.champion)
-        return spare if spare.exists() else self.champion_path(result.id)
+        return spare if os.path.exists(spare) else self.champion_path(result.id)
 
     def _spare_champion_path(self, trial_id: str, champion: str) -> Path:
         """Return where a champion goes when the usual place holds another one."""
         return self.champion_path(trial_id).with_suffix(f".{champion[:SPARE_DIGITS]}.npz")
 
-    def check_writable(self) -> None:
-        """Write and remove a small file, so that a bad folder is found before an hour of training, not after.
+    def check(self) -> None:
+        """Refuse a folder that is there and is no store (see `store_mark.check_store`).
 
         Raises:
-            UserError: when the root is a file, cannot be written, or the disk is full.
+            UserError: when it is something else, cannot be read, or is of a later release.
         """
+        check_store(self.root)
+
+    def check_writable(self) -> None:
+        """Mark the store and write and remove a small file, so that a bad folder is found before an hour of training.
+
+        Raises:
+            UserError: when the folder is no store, cannot be written, or the disk is full.
+        """
+        self.check()
         probe = self.root / f".writable.{os.getpid()}.tmp"
         try:
-            if self.root.exists() and not self.root.is_dir():
-                raise UserError(
-                    f"The trial store {printable(self.root)} is a file, not a folder: name another with "
-                    "--claims-storage (pytest) or --storage (evoclaims)."
-                )
+            mark(self.root)
             write_atomically(probe, bytes(4096))
             probe.unlink(missing_ok=True)
         except OSError as error:
@@ -123,7 +130,7 @@ class Store:
         if not is_hash(path.stem) or path != self.record_path(path.stem):
             raise DamagedFileError(path, "its name or place is not that of a trial record")
         try:
-            data = path.read_bytes()
+            data = read_file(path)
         except FileNotFoundError:
             return None
         except OSError as error:
@@ -161,6 +168,7 @@ class Store:
         present = self.get(result.id)
         if present is not None and not _gives_way(present, result):
             return "present" if present.digest == result.digest else "differs"
+        mark(self.root)
         if packed:
             self._write_champion(sealed, packed)
         path = self.record_path(result.id)
@@ -218,7 +226,7 @@ class Store:
             return {}
         path = self.champion_file(result)
         try:
-            data = path.read_bytes()
+            data = read_file(path)
         except OSError as error:
             raise DamagedFileError(path, f"it cannot be read ({error.strerror or error})") from error
         if hashlib.sha256(data).hexdigest() != result.champion:
@@ -263,7 +271,7 @@ def _gives_way(present: TrialResult, result: TrialResult) -> bool:
 def _sha256(path: Path) -> str:
     """Return the hash of a file; empty when it cannot be read."""
     try:
-        return hashlib.sha256(path.read_bytes()).hexdigest()
+        return hashlib.sha256(read_file(path)).hexdigest()
     except OSError:
         return ""
 

@@ -1,0 +1,45 @@
+"""Which folder a command's store is in: the one that --storage names, or the project's own."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Final
+
+from evoclaims.core.errors import UserError
+from evoclaims.suite.config import find_root
+from evoclaims.trials.store import DEFAULT_ROOT
+
+BEGINNING: Final = frozenset({"run"})
+"""Commands that begin a store where none is; the others read one."""
+
+
+def storage_of(named: str | None, command: str) -> str:
+    """Return the folder of a command's store, relative to the current one where that is how it was named.
+
+    Args:
+        named: as --storage says; None for the store in the root of the project that the current folder lies in (of
+            which a fresh clone has none yet).
+        command: the command's name.
+
+    Raises:
+        UserError: for a name that is no folder's, and when a command that only reads is sent where nothing is.
+    """
+    if named is None:
+        return os.path.relpath(_project() / DEFAULT_ROOT)
+    if not named:
+        raise UserError("--storage names no folder; leave it out for the project's own store.")
+    if command not in BEGINNING and not os.path.lexists(named):
+        raise UserError(
+            f"There is no trial store {named}: the folder does not exist. Check its name, or leave --storage out for "
+            "the project's own store."
+        )
+    return named
+
+
+def _project() -> Path:
+    """Return the root of the project around the current folder; the folder itself where there is none."""
+    try:
+        return find_root(Path.cwd())
+    except UserError:
+        return Path.cwd()
