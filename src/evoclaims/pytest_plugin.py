@@ -16,6 +16,7 @@ import pytest
 
 from evoclaims import pytest_options
 from evoclaims.core.errors import UnknownNameError, UserError
+from evoclaims.core.printable import shown
 from evoclaims.pytest_options import TIERS
 from evoclaims.pytest_summary import ATTRIBUTE, TROUBLE, Summary
 from evoclaims.trials.allowance import end_without
@@ -251,7 +252,8 @@ def pytest_runtest_makereport(
     report.outcome = "failed" if failed else "passed"
     expected_failure = call.excinfo is None or call.excinfo.errisinstance(UserError)
     if expected_failure:
-        report.longrepr = f"{claimed.name} ({claimed.tier}) is {claimed.outcome}: {claimed.reason}" if failed else None
+        said = f"{claimed.name} ({claimed.tier}) is {claimed.outcome}: {claimed.reason}"
+        report.longrepr = shown(said) if failed else None
     properties: list[tuple[str, object]] = [
         ("claim", claimed.claim),
         ("tier", claimed.tier),

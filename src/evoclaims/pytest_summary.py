@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Final
 import pytest
 
 from evoclaims.core.errors import UserError
+from evoclaims.core.printable import shown, spelled
 
 if TYPE_CHECKING:
     from evoclaims.judging.baseline import DriftReport
@@ -107,33 +108,42 @@ class Summary:
         """Print the verdict table and what lies behind it."""
         if not self.reports:
             for trouble in self._troubles:
-                terminalreporter.write_line(f"ERROR: {trouble}", red=True)
+                terminalreporter.write_line(self._said(f"ERROR: {trouble}"), red=True)
             return
         from evoclaims.suite import table
 
         writer = self._config.get_terminal_writer()
         width, colour = writer.fullwidth, writer.hasmarkup
         terminalreporter.section("claims")
-        terminalreporter.write_line(table.verdict_table(self.reports, width, colour))
+        terminalreporter.write_line(self._drawn(table.verdict_table(self.reports, width, colour)))
         terminalreporter.write_line("")
         explained = table.explanations(self.reports, width, colour)
         if explained:
-            terminalreporter.write_line(explained)
+            terminalreporter.write_line(self._drawn(explained))
             terminalreporter.write_line("")
         notes = self._notes()
         for note in notes:
-            terminalreporter.write_line(note)
+            terminalreporter.write_line(self._said(note))
         for trouble in self._troubles:
-            terminalreporter.write_line(f"error: {trouble}", red=True)
+            terminalreporter.write_line(self._said(f"error: {trouble}"), red=True)
         unsaved = sorted({report.unsaved for report in self.reports} - {""})
         warnings = [f"The files of evidence could not be written. {reason}" for reason in unsaved[:1]]
         for warning in (*warnings, self._write_step_summary(notes)):
             if warning:
-                terminalreporter.write_line(f"warning: {warning}", yellow=True)
+                terminalreporter.write_line(self._said(f"warning: {warning}"), yellow=True)
         terminalreporter.write_line(f"claims: {table.totals(self.reports)}", bold=True)
         if not any(report.n for report in self.reports):
             what = "No trial was looked at" if self._judged else "No claim was judged"
             terminalreporter.write_line(f"{what}: nothing was measured.", red=True)
+
+    def _said(self, text: str) -> str:
+        """Return a line for the terminal, whoever the words are from."""
+        return self._drawn(shown(text))
+
+    def _drawn(self, text: str) -> str:
+        """Return what rich has drawn in characters that the terminal has."""
+        file: Any = getattr(self._config.get_terminal_writer(), "_file", None)
+        return spelled(text, getattr(file, "encoding", None))
 
     def _notes(self) -> list[str]:
         """Return what the comparisons with reference trials and with accepted verdicts found, in lines."""

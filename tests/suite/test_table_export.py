@@ -19,6 +19,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from evoclaims.core.errors import UserError
+from evoclaims.core.printable import printable
 from evoclaims.suite.export import FORMS, as_csv, as_json, as_parquet, columns_of, trial_rows, verdict_rows
 from evoclaims.suite.naming import Name, names_of
 from evoclaims.suite.report import ClaimReport
@@ -159,3 +160,24 @@ def test_a_verdict_is_a_row_with_the_numbers_of_the_whole_assertion() -> None:
     )
     assert (second["n"], second["p"], second["fingerprint"]) == (0, None, None)
     assert next(csv.DictReader(io.StringIO(as_csv([first, second]).decode())))["statement"] == "s, t"
+
+
+@pytest.mark.parametrize(
+    "text", ["=cmd|' /C calc'!A0", "+1", "-1", "@SUM(A1)", "\t=1+1", "\r=1+1", "\n=1+1", "\x1b[2J=1"]
+)
+def test_no_text_in_a_csv_file_is_calculated_or_steers_anything(text: str) -> None:
+    written = as_csv([{"text": text, text: "heading", "number": -1.5, "count": -3, "list": [-1.0, 2.0]}]).decode()
+    heading, cells = csv.reader(io.StringIO(written))
+    assert cells[2:] == ["-1.5", "-3", "[-1.0, 2.0]"]
+    for cell in (heading[1], cells[0]):
+        assert cell[0] in "'\\"
+        assert cell.isprintable()
+        assert cell.lstrip("'") == printable(text)
+
+
+@given(st.text(st.characters(exclude_categories=())))
+def test_any_text_is_one_printable_cell_that_is_no_formula(text: str) -> None:
+    _, (cell, end) = csv.reader(io.StringIO(as_csv([{"text": text, "end": 1}]).decode()))
+    assert end == "1"
+    assert cell.isprintable()
+    assert not cell.startswith(("=", "+", "-", "@"))

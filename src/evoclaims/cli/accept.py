@@ -8,7 +8,6 @@ from datetime import UTC, datetime
 from evoclaims.cli.project import judge_stored, open_archive, open_project
 from evoclaims.cli.tiers import tiers_of
 from evoclaims.core.files import write_atomically
-from evoclaims.core.printable import printable
 from evoclaims.suite import history
 from evoclaims.suite.accepting import accept
 
@@ -26,12 +25,12 @@ def main(options: argparse.Namespace) -> int:
     now = {history.key_of(report) for report in reports}
     for tier, claim in before.keys() - now:
         if tier in tiers:
-            print(f"kept: {printable(claim)} ({printable(tier)}), which is no longer among the claims")
+            print(f"kept: {claim} ({tier}), which is no longer among the claims")
     if not made.accepted:
-        print(f"{printable(path)} stays as it is: no verdict differs from the accepted one.")
+        print(f"{path} stays as it is: no verdict differs from the accepted one.")
         return 0
     write_atomically(path, history.dump(made.history).encode())
     for line in made.accepted:
         print(f"accepted: {line}")
-    print(f"wrote {printable(path)}: look at the changes and commit them")
+    print(f"wrote {path}: look at the changes and commit them")
     return 1

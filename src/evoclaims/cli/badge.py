@@ -7,7 +7,6 @@ from pathlib import Path
 
 from evoclaims.cli.project import judge_stored, open_project
 from evoclaims.cli.stored import write
-from evoclaims.core.printable import printable
 from evoclaims.report.badge import colour_of, message_of, svg
 
 
@@ -19,5 +18,5 @@ def main(options: argparse.Namespace) -> int:
     out = Path(options.out or f"claims-{options.tier}.svg")
     message = message_of(reports)
     write(out, svg(f"claims ({options.tier})", message, colour_of(reports)).encode())
-    print(f"wrote {printable(out)}: {message}")
+    print(f"wrote {out}: {message}")
     return 0

@@ -7,17 +7,17 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from rich.console import Console
 from rich.table import Table
 
 from evoclaims.cli.project import open_project
 from evoclaims.cli.run import describe
 from evoclaims.cli.stored import Stored, load, write
+from evoclaims.cli.terminal import styled
 from evoclaims.core.errors import UnknownNameError, UserError
-from evoclaims.core.printable import printable
 from evoclaims.networks import export, picture
 from evoclaims.networks.genome import Genome
 from evoclaims.networks.graph import GraphNetwork
+from evoclaims.suite.console import PlainSpokenConsole
 from evoclaims.trials import champions, devices
 from evoclaims.trials.champions import Replay
 
@@ -62,18 +62,18 @@ def main(options: argparse.Namespace) -> int:
             raise UserError(
                 f"A champion of {options.method} is no genome but arrays of parameters, of which there is no graph to "
                 f"write as {options.form}. Leave --as out to replay it; its arrays are in "
-                f"{printable(trial.file)}."
+                f"{trial.file}."
             )
         made = FORMS[options.form](Subject(trial, network))
     replay = champions.replay(trial.condition, trial.result, trial.parameters, chosen)
     print(f"{trial.title}\n  {describe(trial.result)}")
-    Console().print(_table(replay))
+    PlainSpokenConsole(file=styled()).print(_table(replay))
     print(_judgement(replay))
     if made is not None:
         default = f"{options.method}-{options.on}-{options.seed}.{options.form}"
         path = Path(default if options.out is None else options.out)
         write(path, made)
-        print(f"wrote {printable(path)}")
+        print(f"wrote {path}")
     return int(not replay.exact)
 
 

@@ -10,7 +10,6 @@ from pathlib import Path
 from evoclaims.cli.project import judge_stored, open_project, open_store
 from evoclaims.cli.tiers import tiers_of
 from evoclaims.core.errors import UserError
-from evoclaims.core.printable import printable
 from evoclaims.judging.baseline import DriftReport
 from evoclaims.judging.tripwire import DigestCheck
 from evoclaims.suite import history, sides, transitions
@@ -47,13 +46,13 @@ def main(options: argparse.Namespace) -> int:
     found = transitions.compare(old.verdicts, new.verdicts)
     drift, digests = sides.compare_trials(old, new)
     for line in (
-        f"old: {printable(old.name)}",
-        f"new: {printable(new.name)}",
+        f"old: {old.name}",
+        f"new: {new.name}",
         f"verdicts: {transitions.counts(found)}",
         *(f"  {transitions.describe(one)}" for one in found if one.kind not in UNSAID),
         *_drift_lines(drift, digests, new),
         *_one_sided(old, new),
-        *(printable(trouble) for side in (old, new) for trouble in side.troubles),
+        *(trouble for side in (old, new) for trouble in side.troubles),
     ):
         print(line)
     matched = transitions.matched(found, patterns)
@@ -87,8 +86,7 @@ class _Places:
         stores = [place for place in found if isinstance(place, Store)]
         if revisions and stores:
             raise UserError(
-                f"{printable(revisions[0].name)} is a revision and {printable(stores[0].root)} a store: two of a kind "
-                "can be compared."
+                f"{revisions[0].name} is a revision and {stores[0].root} a store: two of a kind can be compared."
             )
         if revisions:
             read = [sides.revision(self.reproduction, place) for place in revisions]
@@ -110,19 +108,19 @@ class _Places:
             revision = find_revision(name, self.reproduction.folder)
         if revision is not None and path.is_dir():
             raise UserError(
-                f"{printable(name)} is both a folder and a git revision: write ./{printable(name)} for the folder, or "
+                f"{name} is both a folder and a git revision: write ./{name} for the folder, or "
                 f"the revision's hash, {revision.sha[:12]}."
             )
         if revision is not None:
             return revision
         if not path.is_dir():
-            raise UserError(f"There is neither a git revision nor a folder called {printable(name)}.")
+            raise UserError(f"There is neither a git revision nor a folder called {name}.")
         return open_store(name)
 
     def _store(self, store: Store) -> Side:
         """Judge a store from its own trials."""
         if not store.ids():
-            raise UserError(f"The folder {printable(store.root)} holds no trials, so there is nothing to compare.")
+            raise UserError(f"The folder {store.root} holds no trials, so there is nothing to compare.")
         return sides.store(self.reproduction, store, self._judged(str(store.root)))
 
     def _judged(self, storage: str) -> list[ClaimReport]:
@@ -137,17 +135,14 @@ def _drift_lines(drift: DriftReport, digests: DigestCheck, new: Side) -> Iterato
     tested = len(drift.rows) - len(drift.unchecked)
     yield f"trials: {tested} comparisons, {len(drifted)} drifted (exact rank tests, Holm, α = {drift.alpha:g})"
     for row in drifted:
-        yield f"  DRIFT in {printable(row.label)}: {row.metric}, p = {row.p_holm:.2g} (Holm)"
-    for line in dict.fromkeys(f"  not checked: {row.label}: {row.detail or row.status}" for row in drift.unchecked):
-        yield printable(line)
+        yield f"  DRIFT in {row.label}: {row.metric}, p = {row.p_holm:.2g} (Holm)"
+    yield from dict.fromkeys(f"  not checked: {row.label}: {row.detail or row.status}" for row in drift.unchecked)
     yield f"to the bit: {digests.compared} trials compared, {len(digests.changed)} changed"
     seeds: dict[str, list[int]] = {}
     for change in digests.changed:
         seeds.setdefault(change.condition, []).append(change.seed)
     for condition, those in seeds.items():
-        yield printable(
-            f"  CHANGED in {names.get(condition, condition)}: seeds {', '.join(map(str, sorted(set(those))))}"
-        )
+        yield f"  CHANGED in {names.get(condition, condition)}: seeds {', '.join(map(str, sorted(set(those))))}"
 
 
 def _one_sided(old: Side, new: Side) -> Iterator[str]:
@@ -156,4 +151,4 @@ def _one_sided(old: Side, new: Side) -> Iterator[str]:
         rest = len(names) - MOST_NAMES
         listed = ", ".join(sorted(names)[:MOST_NAMES]) + (f" and {rest} more" if rest > 0 else "")
         if names:
-            yield printable(f"trials of the {word} side alone: {listed}")
+            yield f"trials of the {word} side alone: {listed}"

@@ -10,7 +10,6 @@ from evoclaims.cli.project import judge_stored, open_archive, open_project
 from evoclaims.cli.stored import write
 from evoclaims.cli.tiers import ALL, tiers_of
 from evoclaims.core.errors import UnknownNameError, UserError
-from evoclaims.core.printable import printable
 from evoclaims.suite import export, references
 from evoclaims.suite.modes import StoredOnly
 from evoclaims.suite.naming import names_of
@@ -39,12 +38,12 @@ def main(options: argparse.Namespace) -> int:
         rows = export.trial_rows((t for t in trials if options.tier == ALL or names.get(t.condition)), names)
         if not rows:
             raise UserError(
-                f"Neither {printable(options.storage)} nor the reference trials hold a trial of this tier; "
+                f"Neither {options.storage} nor the reference trials hold a trial of this tier; "
                 "`evoclaims run` runs some."
             )
     out = Path(options.out or f"{what}.{options.form}")
     write(out, export.FORMS[options.form](rows))
-    print(f"wrote {printable(out)}: {len(rows)} {what}")
+    print(f"wrote {out}: {len(rows)} {what}")
     for error in damaged:
         print(f"left out: {error}", file=sys.stderr)
     return int(bool(damaged))

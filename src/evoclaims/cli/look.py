@@ -16,7 +16,6 @@ from evoclaims.cli.project import open_project
 from evoclaims.cli.run import describe
 from evoclaims.cli.stored import Stored, load, write
 from evoclaims.core.errors import UnknownNameError, UserError
-from evoclaims.core.printable import printable
 from evoclaims.envs.ecorobot.robot_task import RobotTask
 from evoclaims.envs.ecorobot.views import film, page, pictures
 from evoclaims.envs.ecorobot.views.marks import marks
@@ -107,14 +106,14 @@ def main(options: argparse.Namespace) -> int:
     tier = reproduction.tier(options.tier)
     path, data = _task_alone(options, tier) if options.method is None else _champion(options, tier)
     write(path, data)
-    print(f"wrote {printable(path)}")
+    print(f"wrote {path}")
     return 0
 
 
 def _task_alone(options: argparse.Namespace, tier: Tier) -> tuple[Path, bytes]:
     """Return the file to write without --method, and its contents."""
     if options.form is not None:
-        raise UserError(f"--as {printable(options.form)} shows what a champion does; name its method with --method.")
+        raise UserError(f"--as {options.form} shows what a champion does; name its method with --method.")
     # Methods that see more of a task than others share its ground.
     tasks = {name: condition.task for (_, name), condition in tier.conditions.items()}
     if options.task not in tasks:
@@ -160,8 +159,7 @@ def _target(out: str | None, default: str, endings: tuple[str, ...]) -> tuple[Pa
     ending = path.suffix.removeprefix(".").lower()
     if ending not in endings:
         raise UserError(
-            f"--out names a file that ends in .{' or .'.join(endings)}, which tells its format; "
-            f"{printable(path)!r} does not."
+            f"--out names a file that ends in .{' or .'.join(endings)}, which tells its format; {path!r} does not."
         )
     return path, ending
 

@@ -7,6 +7,7 @@ import os
 import sys
 from collections.abc import Callable, Sequence
 
+from evoclaims.cli.terminal import plain_output
 from evoclaims.core.errors import UserError
 from evoclaims.trials.allowance import end_without
 
@@ -21,7 +22,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _status(arguments: Sequence[str] | None) -> int:
-    """Run one command and return its exit status."""
+    """Run one command, and print nothing that a terminal would obey."""
+    try:
+        with plain_output():
+            return _ended(arguments)
+    except BrokenPipeError:  # `evoclaims status | head`: the reader has seen enough
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return CLOSED_PIPE
+
+
+def _ended(arguments: Sequence[str] | None) -> int:
+    """Run one command to its end, or to the sentence that says why there is none."""
     options = _parser().parse_args(arguments)
     try:
         run = _command(options.command)
@@ -34,9 +45,6 @@ def _status(arguments: Sequence[str] | None) -> int:
     except KeyboardInterrupt:
         print("\nevoclaims: interrupted; the same command goes on from the last checkpoint.", file=sys.stderr)
         return INTERRUPTED
-    except BrokenPipeError:  # `evoclaims status | head`: the reader has seen enough
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return CLOSED_PIPE
     return status
 
 

@@ -5,12 +5,13 @@ from __future__ import annotations
 import argparse
 from collections.abc import Sequence
 
-from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
 from evoclaims.cli.project import judge_stored, open_project, open_store
+from evoclaims.cli.terminal import styled
 from evoclaims.core.errors import UserError
+from evoclaims.suite.console import PlainSpokenConsole
 from evoclaims.suite.cost import Pace, known_pace, measured_pace
 from evoclaims.suite.live import duration
 from evoclaims.suite.report import ClaimReport
@@ -37,7 +38,7 @@ def main(options: argparse.Namespace) -> int:
     paces = {names: pace(tier.condition(*names), *names) for names in used}
     if options.like and not any(paces.values()):
         raise UserError(f"No trial of the {options.tier} tier at hand was made on a device called {options.like!r}.")
-    console = Console()
+    console = PlainSpokenConsole(file=styled())
     where = f"as they took on one {kind}" if options.like else f"on {len(chosen)} × {kind}"
     console.print(escape(f"Conditions of the {options.tier} tier, {where}"))
     console.print(_conditions(tier, store, used, paces, config.seconds(None)))

@@ -13,7 +13,6 @@ from evoclaims.cli.outings import run_again
 from evoclaims.cli.project import judge_stored, open_archive, open_project
 from evoclaims.cli.stored import Stored, write
 from evoclaims.core.errors import UnknownNameError
-from evoclaims.core.printable import printable
 from evoclaims.envs.ecorobot.robot_task import RobotTask
 from evoclaims.envs.ecorobot.views import pictures
 from evoclaims.report.champion import network
@@ -65,7 +64,7 @@ def main(options: argparse.Namespace) -> int:
     folder = Path(options.out)
     for name, text in (("index.html", html(page)), ("report.md", markdown(page))):
         write(folder / name, text.encode())
-        print(f"wrote {printable(folder / name)}")
+        print(f"wrote {folder / name}")
     for board in page.boards:
         print(f"claims ({board.tier}): {table.totals(verdicts[board.tier])}")
     return 0

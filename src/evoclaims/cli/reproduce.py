@@ -11,7 +11,6 @@ from pathlib import Path
 from evoclaims.cli.project import open_archive, open_project
 from evoclaims.core.errors import UserError
 from evoclaims.core.files import write_atomically
-from evoclaims.core.printable import printable
 from evoclaims.figures import catalogue, files
 from evoclaims.figures.figure import Drawing
 
@@ -31,7 +30,7 @@ def main(options: argparse.Namespace) -> int:
     for figure in figures:
         drawing = figure.draw(archive, reproduction, options.tier)
         _write(drawing, folder, figure.name)
-        print(f"{figure.name}: wrote {printable(folder / figure.name)}.png, .svg and .csv")
+        print(f"{figure.name}: wrote {folder / figure.name}.png, .svg and .csv")
         for sentence in drawing.missing:
             print(f"  {sentence}")
         shown += drawing.shown
@@ -51,4 +50,4 @@ def _write(drawing: Drawing, folder: Path, name: str) -> None:
             write_atomically(path, data)
         except UserError as error:
             reason = getattr(error.__cause__, "strerror", None) or error.__cause__
-            raise UserError(f"Cannot write {printable(path)}: {reason}. Name another folder with --out.") from error
+            raise UserError(f"Cannot write {path}: {reason}. Name another folder with --out.") from error

@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from evoclaims.cli.project import judge_stored, open_project, open_store
 from evoclaims.cli.terminal import StdoutTerminal
 from evoclaims.core.errors import UnknownNameError, UserError
+from evoclaims.core.printable import printable
 from evoclaims.core.raised import in_one_line
 from evoclaims.judging.counting import MAX_TRIALS
 from evoclaims.suite.config import SuiteConfig
@@ -18,7 +19,6 @@ from evoclaims.suite.modes import RunMissing
 from evoclaims.suite.reproduction import Tier
 from evoclaims.suite.robustness import matrix
 from evoclaims.suite.variant import Variant
-from evoclaims.trials.records import printable
 from evoclaims.trials.result import COMPLETE, TrialResult
 from evoclaims.trials.spec import TrialSpec
 from evoclaims.trials.time_limit import time_allowed

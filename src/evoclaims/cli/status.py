@@ -7,6 +7,7 @@ import argparse
 from rich.console import Console
 
 from evoclaims.cli.project import judge_stored, open_project
+from evoclaims.cli.terminal import styled
 from evoclaims.suite import table
 
 
@@ -15,12 +16,12 @@ def main(options: argparse.Namespace) -> int:
     config, reproduction = open_project()
     reproduction.tier(options.tier)
     reports = judge_stored(config, options.storage, options.tier)
-    console = Console()
+    console = Console(file=styled())
     for part in (
         table.verdict_table(reports, console.width, console.is_terminal),
         table.explanations(reports, console.width, console.is_terminal),
         f"claims ({options.tier}): {table.totals(reports)}",
     ):
         if part:
-            print(part)
+            print(part, file=styled())
     return int(any(report.failed for report in reports))

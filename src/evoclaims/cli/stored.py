@@ -9,7 +9,6 @@ from typing import Any
 from evoclaims.cli.project import open_store
 from evoclaims.core.errors import UserError
 from evoclaims.core.files import write_atomically
-from evoclaims.core.printable import printable
 from evoclaims.suite.reproduction import Tier
 from evoclaims.trials import champions
 from evoclaims.trials.result import TrialResult
@@ -47,7 +46,7 @@ def load(storage: str, tier: Tier, tier_name: str, method: str, task: str, seed:
     result = store.get(spec.id)
     if result is None:
         raise UserError(
-            f"{printable(store.root)} holds no trial of {title} with seed {seed}. "
+            f"{store.root} holds no trial of {title} with seed {seed}. "
             f"`evoclaims run {method} --on {task} --tier {tier_name} --trials 1 --first-seed {seed}` runs it."
         )
     return Stored(title, condition, result, champions.load(store, condition, result), store.champion_file(result))
@@ -60,9 +59,9 @@ def write(path: Path, data: bytes) -> None:
         UserError: when it cannot be written there.
     """
     if path.is_dir():
-        raise UserError(f"{printable(path)} is a folder; name a file in it with --out.")
+        raise UserError(f"{path} is a folder; name a file in it with --out.")
     try:
         write_atomically(path, data)
     except UserError as error:
         reason = getattr(error.__cause__, "strerror", None) or error.__cause__
-        raise UserError(f"Cannot write {printable(path)}: {reason}. Name another file with --out.") from error
+        raise UserError(f"Cannot write {path}: {reason}. Name another file with --out.") from error

@@ -1,13 +1,55 @@
-"""Standard output as the progress line wants it."""
+"""Standard output and errors as commands write them: the one place where their text becomes safe to print."""
 
 from __future__ import annotations
 
 import shutil
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager, redirect_stderr, redirect_stdout
+from typing import Any
+
+from evoclaims.core.printable import shown, spelled
+
+
+class Styled:
+    """A stream for text that may hold colours: signs that the terminal lacks are spelled out, and no more is done."""
+
+    def __init__(self, stream: Any) -> None:
+        """Write to `stream`."""
+        self.stream = stream
+
+    def write(self, text: str) -> int:
+        """Write text as it is."""
+        self.stream.write(spelled(text, self.stream.encoding))
+        return len(text)
+
+    def __getattr__(self, name: str) -> Any:
+        """Return what else the stream can do."""
+        return getattr(self.stream, name)
+
+
+class Plain(Styled):
+    """A stream for text from anywhere: control characters are escaped."""
+
+    def write(self, text: str) -> int:
+        """Write text so that it steers nothing."""
+        return super().write(shown(text))
+
+
+@contextmanager
+def plain_output() -> Iterator[None]:
+    """Escape control characters in all that is printed in a `with` block."""
+    with redirect_stdout(Plain(sys.stdout)), redirect_stderr(Plain(sys.stderr)):
+        yield
+
+
+def styled() -> Any:
+    """Return standard output for what the program itself has coloured or moves the cursor with."""
+    return Styled(sys.stdout.stream if isinstance(sys.stdout, Plain) else sys.stdout)
 
 
 class StdoutTerminal:
-    """Standard output; rewritten in place only when a person is looking."""
+    """Standard output as the progress line wants it; rewritten in place only when a person is looking."""
 
     def __init__(self) -> None:
         """Look at what standard output is."""
@@ -16,4 +58,4 @@ class StdoutTerminal:
 
     def write(self, msg: str, *, flush: bool = False) -> None:
         """Write text as it is."""
-        print(msg, end="", flush=flush)
+        print(msg, end="", flush=flush, file=styled())

@@ -5,9 +5,15 @@ from __future__ import annotations
 import difflib
 from collections.abc import Iterable
 
+from evoclaims.core.printable import shown
+
 
 class UserError(Exception):
-    """Something a user can cause and mend; shown as its message alone, without a traceback."""
+    """Something a user can cause and mend; shown as its message alone, without a traceback, and safe to print."""
+
+    def __init__(self, message: object) -> None:
+        """Keep a sentence, whatever the names in it hold."""
+        super().__init__(shown(message))
 
 
 class UnknownNameError(UserError, KeyError):

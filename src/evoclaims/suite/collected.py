@@ -8,8 +8,8 @@ from typing import Final
 import pytest
 
 from evoclaims.core.errors import UserError
+from evoclaims.core.printable import printable
 from evoclaims.suite.claim import Claim, claim_of, named
-from evoclaims.trials.records import printable
 
 TIER: Final = "claim_tier"
 """The parameter that makes a claim test run once per tier; the plugin makes it the first one."""

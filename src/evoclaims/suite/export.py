@@ -11,6 +11,7 @@ from typing import Any, Final
 
 from evoclaims.core.canonical import as_plain
 from evoclaims.core.errors import UserError
+from evoclaims.core.printable import printable
 from evoclaims.suite.naming import Name
 from evoclaims.suite.report import ClaimReport
 from evoclaims.trials.result import TrialResult
@@ -20,6 +21,9 @@ SCHEMA: Final = 1
 
 Row = Mapping[str, Any]
 """One line of a table: values by column. None where there is nothing; a column may be missing for it."""
+
+_FORMULA: Final = ("=", "+", "-", "@")
+"""How a text begins that spreadsheets calculate (a tab or a carriage return before it has been escaped by then)."""
 
 
 def trial_rows(trials: Iterable[TrialResult], names: Mapping[str, Sequence[Name]]) -> list[Row]:
@@ -63,13 +67,17 @@ def as_json(rows: Sequence[Row]) -> bytes:
 
 
 def as_csv(rows: Sequence[Row]) -> bytes:
-    """Return comma-separated values: empty for None, "nan" for NaN, JSON for lists."""
+    """Return comma-separated values: empty for None, "nan" for NaN, JSON for lists.
+
+    In texts and headings, control characters are escaped, and an apostrophe stands before what a spreadsheet would take
+    for a formula; numbers are left as they are.
+    """
     text = io.StringIO(newline="")
-    writer = csv.DictWriter(text, columns_of(rows), restval="", lineterminator="\n")
-    writer.writeheader()
-    for row in rows:
-        writer.writerow({name: json.dumps(as_plain(v)) if _nested(v) else v for name, v in row.items()})
-    return text.getvalue().encode("utf-8", errors="backslashreplace")
+    columns = columns_of(rows)
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow([_cell(name) for name in columns])
+    writer.writerows([_cell(row.get(name)) for name in columns] for row in rows)
+    return text.getvalue().encode()
 
 
 def as_parquet(rows: Sequence[Row]) -> bytes:
@@ -140,9 +148,14 @@ def _flat(name: str, value: Any) -> dict[str, Any]:
     return {column: leaf for key, part in value.items() for column, leaf in _flat(f"{name}.{key}", part).items()}
 
 
-def _nested(value: Any) -> bool:
-    """Whether a value needs JSON to fit into a cell."""
-    return isinstance(value, list | tuple | dict)
+def _cell(value: Any) -> Any:
+    """Return a value as a cell of comma-separated values."""
+    if isinstance(value, list | tuple | dict):
+        return json.dumps(as_plain(value))
+    if not isinstance(value, str):
+        return value
+    text = printable(value)
+    return f"'{text}" if text.startswith(_FORMULA) else text
 
 
 def _uniform(values: list[Any]) -> list[Any]:

@@ -87,7 +87,7 @@ def load(path: Path) -> History:
     except FileNotFoundError:
         return {}
     except OSError as error:
-        raise UserError(f"Cannot read {printable(path)}: {error.strerror or error}.") from error
+        raise UserError(f"Cannot read {path}: {error.strerror or error}.") from error
     return parse(data, str(path))
 
 
@@ -166,4 +166,4 @@ def _table(value: object, name: str, part: str) -> dict[str, Any]:
 
 def _torn(name: str, reason: str) -> UserError:
     """Return the error of a file that holds no history."""
-    return UserError(f"{printable(name)} holds no accepted verdicts: {printable(reason)}. {_MEND}")
+    return UserError(f"{name} holds no accepted verdicts: {reason}. {_MEND}")

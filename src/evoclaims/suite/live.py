@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable
 from typing import Final, Protocol
 
+from evoclaims.core.printable import printable
 from evoclaims.trials.progress import RunProgress
 
 LOG_SECONDS: Final = 10.0
@@ -57,12 +58,12 @@ class LiveLine:
 
 
 def describe(progress: RunProgress) -> str:
-    """Return the line: condition, trials, step, level, best, time left."""
+    """Return the line: condition, trials, step, level, best, time left; safe to print, whoever the words are from."""
     if progress.best is None:
         count = f" ({progress.trials} trials)" if progress.trials else ""
-        return f"{progress.condition}: {progress.phase}{count}"
+        return printable(f"{progress.condition}: {progress.phase}{count}")
     left = "" if progress.seconds_left is None else f", {duration(progress.seconds_left)} left"
-    return (
+    return printable(
         f"{progress.condition}: {progress.ended}/{progress.trials} trials ended, "
         f"step {progress.steps:,}/{progress.total_steps:,}, "
         f"level {progress.level} of {progress.levels - 1}, best {progress.best:.3f}{left}"

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from evoclaims.core.errors import UserError
-from evoclaims.core.printable import printable
 from evoclaims.suite import history, transitions
 from evoclaims.suite.report import ClaimReport
 from evoclaims.suite.transitions import Kind, Transition
@@ -53,7 +52,7 @@ def regression(folder: Path, reports: Sequence[ClaimReport], changes: str | None
     accepted = transitions.accepted(history.load(path))
     if patterns and not accepted:
         raise UserError(
-            f"There are no accepted verdicts to compare with, since {printable(path)} does not exist: "
+            f"There are no accepted verdicts to compare with, since {path} does not exist: "
             "`evoclaims accept` writes it."
         )
     if not accepted:

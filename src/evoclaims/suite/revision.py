@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Final
 
 from evoclaims.core.errors import UserError
-from evoclaims.core.printable import printable
 
 GIT_SECONDS: Final = 60.0
 """How long one call of git may take."""
@@ -51,8 +50,8 @@ class Revision:
         """Return what git prints."""
         done = run_git(self.folder, *arguments)
         if done.returncode:
-            said = printable(" ".join(done.stderr.decode(errors="replace").split()))
-            raise UserError(f"git cannot read the revision {printable(self.name)}: {said}.")
+            said = " ".join(done.stderr.decode(errors="replace").split())
+            raise UserError(f"git cannot read the revision {self.name}: {said}.")
         return done.stdout
 
 
@@ -65,7 +64,7 @@ def find_revision(name: str, folder: Path) -> Revision | None:
     inside = run_git(folder, "rev-parse", "--is-inside-work-tree")
     if inside.returncode or inside.stdout.strip() != b"true":
         raise UserError(
-            f"{printable(folder)} lies in no git repository, so that no revision can be compared with. Compare two "
+            f"{folder} lies in no git repository, so that no revision can be compared with. Compare two "
             "stores instead, or `evoclaims compare` alone: verdicts of now with accepted ones."
         )
     if not name or "\0" in name:

@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath
 
 from evoclaims.core.errors import UserError
-from evoclaims.core.printable import printable
 from evoclaims.judging.baseline import DriftCase, DriftReport
 from evoclaims.judging.tripwire import DigestCheck
 from evoclaims.judging.verdict import Outcome
@@ -79,8 +78,7 @@ def revision(reproduction: Reproduction, at: Revision) -> Side:
     files = [path for path in at.files(top) if path.endswith(".jsonl")]
     if verdicts is None and not files:
         raise UserError(
-            f"The revision {printable(at.name)} has neither {history.FILE} nor reference trials in "
-            f"{printable(reproduction.folder)}."
+            f"The revision {at.name} has neither {history.FILE} nor reference trials in {reproduction.folder}."
         )
     accepted = history.parse(verdicts, f"{history.FILE} at {at.name}") if verdicts is not None else {}
     trials = {_named(PurePosixPath(path).relative_to(top)): _records(at, path) for path in files}
@@ -110,7 +108,7 @@ def store(reproduction: Reproduction, of: Store, reports: Iterable[ClaimReport])
         for report in reports
     ]
     troubles = tuple(f"not read: {error}" for error in damaged)
-    return Side(f"the store {printable(of.root)}", transitions.standings(own), trials, troubles)
+    return Side(f"the store {of.root}", transitions.standings(own), trials, troubles)
 
 
 def compare_trials(old: Side, new: Side) -> tuple[DriftReport, DigestCheck]:
@@ -142,7 +140,5 @@ def _records(at: Revision, path: str) -> tuple[TrialResult, ...]:
         try:
             results.append(parse(line))
         except RecordError as error:
-            raise UserError(
-                f"Line {number} of {printable(path)} at {printable(at.name)} is no reference trial: {error.reason}."
-            ) from error
+            raise UserError(f"Line {number} of {path} at {at.name} is no reference trial: {error.reason}.") from error
     return tuple(results)

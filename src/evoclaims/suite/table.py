@@ -9,13 +9,13 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Literal
 
-from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
 from evoclaims.core.printable import printable
 from evoclaims.judging.baseline import DriftReport
 from evoclaims.judging.verdict import Outcome
+from evoclaims.suite.console import PlainSpokenConsole
 from evoclaims.suite.report import ClaimReport
 
 WIDE = 120
@@ -94,8 +94,8 @@ def drift_lines(drift: DriftReport, changed: int, compared: int) -> str:
 
 
 def _literal(text: str) -> str:
-    """Return text as markup that shows it as it is, on one line, without what would steer the terminal."""
-    return escape(printable(" ".join(text.split())))
+    """Return text as markup that shows it as it is, on one line."""
+    return escape(" ".join(text.split()))
 
 
 def _effect(report: ClaimReport) -> str:
@@ -117,6 +117,6 @@ def _rendered(content: Table | str, width: int, colour: bool) -> str:
     """Return rich content as text."""
     file = io.StringIO()
     system: Literal["standard"] | None = "standard" if colour else None
-    console = Console(file=file, width=max(width, 60), force_terminal=colour, color_system=system, emoji=False)
+    console = PlainSpokenConsole(file=file, width=max(width, 60), force_terminal=colour, color_system=system)
     console.print(content, highlight=False)
     return file.getvalue().rstrip("\n")

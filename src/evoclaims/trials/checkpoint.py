@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from evoclaims.core.canonical import content_hash
 from evoclaims.core.errors import UserError
 from evoclaims.core.files import read_file, write_atomically
-from evoclaims.core.printable import printable
 from evoclaims.trials.arrays import pack, unpack
 from evoclaims.trials.program import TrialState
 from evoclaims.trials.records import is_hash
@@ -133,7 +132,7 @@ def restore(folder: Path, header: Header, like: Any) -> TrialState:
     expected, structure = jax.tree.flatten(like)
     if [(x.shape, x.dtype) for x in leaves] != [(x.shape, x.dtype) for x in expected]:
         raise UserError(
-            f"Cannot go on from {printable(path)}: its arrays are not those of this condition's state, so it was made "
+            f"Cannot go on from {path}: its arrays are not those of this condition's state, so it was made "
             "by another version of the code; delete it, and its trials begin anew."
         )
     state: TrialState = jax.tree.unflatten(structure, leaves)

@@ -44,8 +44,8 @@ class Problem:
 
     def __str__(self) -> str:
         """Return one line for the terminal."""
-        moved = f" (moved to {printable(self.moved_to)})" if self.moved_to else ""
-        return f"{self.kind} {printable(self.path)}: {self.reason}{moved}"
+        moved = f" (moved to {self.moved_to})" if self.moved_to else ""
+        return f"{self.kind} {self.path}: {self.reason}{moved}"
 
 
 def verify(
@@ -170,7 +170,5 @@ def _set_aside(store: Store, path: Path) -> Path | None:
     except FileNotFoundError:
         return None
     except OSError as error:
-        raise UserError(
-            f"Cannot move {printable(path)} to {printable(folder)}: {error.strerror or error}; move it by hand."
-        ) from error
+        raise UserError(f"Cannot move {path} to {folder}: {error.strerror or error}; move it by hand.") from error
     return target

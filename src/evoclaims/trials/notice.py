@@ -21,7 +21,6 @@ from typing import Final
 
 from evoclaims.core.errors import UserError
 from evoclaims.core.files import read_file
-from evoclaims.core.printable import printable
 from evoclaims.trials.heartbeat import beating
 from evoclaims.trials.records import is_hash
 
@@ -149,10 +148,7 @@ def wait_while_others_run(
     waited = False
     while (runner := running_elsewhere(store_root, condition_id)) is not None:
         waited = True
-        tell(
-            f"waiting for process {runner.pid} on {printable(runner.host)}, which runs the same trials "
-            f"since {printable(runner.started)}"
-        )
+        tell(f"waiting for process {runner.pid} on {runner.host}, which runs the same trials since {runner.started}")
         sleep(poll)
     return waited
 

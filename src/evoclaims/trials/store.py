@@ -19,7 +19,6 @@ from numpy.typing import NDArray
 
 from evoclaims.core.errors import UserError
 from evoclaims.core.files import read_file, write_atomically
-from evoclaims.core.printable import printable
 from evoclaims.trials.arrays import pack, unpack
 from evoclaims.trials.once import write_once
 from evoclaims.trials.records import RecordError, dump, is_hash, parse
@@ -42,7 +41,7 @@ class DamagedFileError(UserError):
     def __init__(self, path: Path, reason: str) -> None:
         """Build the sentence that names the file and the way out."""
         super().__init__(
-            f"Cannot use {printable(path)}: {reason}; run `evoclaims verify`, which moves the file aside so that "
+            f"Cannot use {path}: {reason}; run `evoclaims verify`, which moves the file aside so that "
             "the trial is run again."
         )
         self.path = path
@@ -109,7 +108,7 @@ class Store:
             probe.unlink(missing_ok=True)
         except OSError as error:
             raise UserError(
-                f"Cannot write to the trial store {printable(self.root)}: {error.strerror or error}. Name another "
+                f"Cannot write to the trial store {self.root}: {error.strerror or error}. Name another "
                 "folder with --claims-storage (pytest) or --storage (evoclaims)."
             ) from error
 
@@ -217,7 +216,7 @@ class Store:
         """
         result = self.get(trial_id)
         if result is None:
-            raise UserError(f"There is no trial {trial_id} in {printable(self.root)}.")
+            raise UserError(f"There is no trial {trial_id} in {self.root}.")
         return self.champion_of(result)
 
     def champion_of(self, result: TrialResult) -> dict[str, NDArray[Any]]:

@@ -1,0 +1,24 @@
+"""Tables and other rich content as text: the content's own characters steer nothing, rich's colours do."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+from rich.console import Console, ConsoleOptions, RenderableType
+from rich.segment import Segment
+
+from evoclaims.core.printable import shown
+
+
+class PlainSpokenConsole(Console):
+    """A console that escapes control characters in whatever it is given, after they were laid out."""
+
+    def __init__(self, **settings: Any) -> None:
+        """Take no word for an emoji."""
+        super().__init__(emoji=False, **settings)
+
+    def render(self, renderable: RenderableType, options: ConsoleOptions | None = None) -> Iterable[Segment]:
+        """Yield the pieces that content is made of, each safe to print."""
+        for segment in super().render(renderable, options):
+            yield segment if segment.control else segment._replace(text=shown(segment.text))

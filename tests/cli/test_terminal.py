@@ -1,0 +1,149 @@
+"""What records, claims and arguments say reaches a terminal as text: by every command, and by pytest."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from evoclaims.cli import main
+from evoclaims.core.canonical import content_hash
+from evoclaims.suite import history
+from evoclaims.trials.store import Store
+
+HOSTILE = "\x1b[2J\x1b]0;owned\x07\x9b31m\u202e\r"
+
+READING = (
+    ("status",),
+    ("plan",),
+    ("verify", "--dry-run"),
+    ("accept",),
+    ("compare",),
+    ("export", "--as=csv"),
+    ("export", "--as=csv", "--verdicts"),
+    ("report",),
+    ("champion", "right", "--on=parity"),
+    ("badge",),
+    ("run", "right", "--trials=10"),
+    ("compare", "."),
+    ("compare", HOSTILE),
+    ("export", "--as=" + HOSTILE),
+    ("status", "--storage=" + HOSTILE),
+    ("status", "--" + HOSTILE),
+)
+
+
+def texts(value: Any, path: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
+    """Yield where the texts are in plain JSON."""
+    if isinstance(value, str):
+        yield path
+    for name, part in value.items() if isinstance(value, dict) else ():
+        yield from texts(part, (*path, name))
+
+
+def with_hostile_texts(path: Path) -> None:
+    """Put control characters into every text of a record that is not fixed by its specification, and seal it."""
+    plain = json.loads(path.read_text())
+    for part in ("timing", "provenance"):
+        for *way, last in list(texts(plain[part])):
+            table = plain[part]
+            for name in way:
+                table = table[name]
+            table[last] = HOSTILE + table[last]
+        plain[part][HOSTILE] = HOSTILE
+    plain["provenance"]["versions"][HOSTILE] = HOSTILE
+    for part in ("metrics", "levels", "curves"):
+        values = next(iter(plain[part].values()))
+        plain[part][HOSTILE] = values
+    plain["seal"] = content_hash({key: value for key, value in plain.items() if key != "seal"})
+    path.write_text(json.dumps(plain, sort_keys=True, separators=(",", ":")))
+
+
+@pytest.fixture
+def hostile(project: Any, capfd: pytest.CaptureFixture[str]) -> Store:
+    """The project's store, with control characters wherever a sealed record may hold them, and in a claim."""
+    project.write(
+        f"@claim('T1', says={HOSTILE!r}, where={HOSTILE!r}, smoke={HOSTILE!r})\n"
+        "def test_it(trials, verdict):\n"
+        "    verdict(trials('right', on='parity').solves_every_level.in_most_trials())\n\n"
+        f"@claim('T2', says={HOSTILE!r}, where={HOSTILE!r}, smoke={HOSTILE!r})\n"
+        "def test_error(trials, verdict):\n"
+        f"    raise __import__('evoclaims.core.errors', fromlist=['x']).UserError({HOSTILE!r})\n\n"
+        f"@expected(Outcome.REFUTED, because={HOSTILE!r})\n"
+        f"@claim('T3', says={HOSTILE!r}, where={HOSTILE!r}, smoke={HOSTILE!r})\n"
+        "def test_refuted(trials, verdict):\n"
+        "    verdict(trials('wrong', on='parity').solves_every_level.in_most_trials())\n"
+    )
+    for method in ("right", "wrong"):
+        assert main(["run", method, "--device=cpu"]) == 0
+    store = Store(project.path / ".evoclaims")
+    for path in list(store.record_paths()):
+        with_hostile_texts(path)
+    damaged = store.record_path("0" * 64)
+    damaged.parent.mkdir(exist_ok=True)
+    damaged.write_text(json.dumps({"schema": HOSTILE}))
+    (store.root / "trials" / "\x1b[31m").touch()
+    return store
+
+
+def steering(text: str) -> set[str]:
+    """Return the characters of an output that are neither printable nor ends of lines."""
+    return {c for c in text if not c.isprintable() and c != "\n"}
+
+
+@pytest.mark.parametrize("arguments", READING, ids=" ".join)
+def test_no_text_of_a_record_or_an_argument_steers_the_terminal(
+    hostile: Store, capfd: pytest.CaptureFixture[str], arguments: tuple[str, ...]
+) -> None:
+    main(["accept"])
+    capfd.readouterr()
+    with contextlib.suppress(SystemExit):  # the parser's
+        main(arguments)
+    out, err = capfd.readouterr()
+    assert out + err
+    assert "Traceback" not in out + err
+    assert steering(out + err) == set()
+
+
+def test_no_text_steers_what_files_for_people_show(hostile: Store, capfd: pytest.CaptureFixture[str]) -> None:
+    for arguments in (("export", "--as=csv"), ("report",), ("accept",), ("badge",)):
+        main(arguments)
+    for name in ("trials.csv", "report/report.md", "report/index.html", history.FILE, "claims-smoke.svg"):
+        text = Path(name).read_text()
+        assert steering(text) - {"\t"} == set(), name
+
+
+def test_no_text_steers_the_terminal_of_a_run(hostile: Store, project: Any) -> None:
+    result = project.run(own_store=True)
+    assert result.ret == 1
+    text = result.stdout.str() + result.stderr.str()
+    assert "T2" in text
+    assert steering(text) == set()
+
+
+@pytest.mark.parametrize("command", [(), ("-m", "pytest", "-p", "no:cacheprovider")], ids=["evoclaims", "pytest"])
+def test_a_terminal_that_knows_ascii_alone_is_told_the_same(project: Any, command: tuple[str, ...]) -> None:
+    project.write(a="supported", b="refuted")
+    project.run(own_store=True)
+    code = ("-c", "from evoclaims.cli import main; raise SystemExit(main())")
+    for arguments in ("status", "plan", "champion right --on parity") if not command else ("--claims-stored",):
+        done = subprocess.run(
+            [sys.executable, *(command or code), *arguments.split()],
+            env={**os.environ, "PYTHONIOENCODING": "ascii", "PYTHONPATH": os.pathsep.join(sys.path)},
+            capture_output=True,
+            check=False,
+        )
+        text = (done.stdout + done.stderr).decode("ascii")
+        assert "Traceback" not in text
+        if "champion" not in arguments:
+            assert done.returncode == (0 if arguments == "plan" else 1), text
+        if arguments in ("status", "--claims-stored"):
+            assert "+ supported" in text
+            assert any(line.startswith("a ") and line.rstrip().endswith(("a.json", ")")) for line in text.splitlines())
