@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import hashlib
 import json
 import os
 import signal
@@ -17,10 +19,23 @@ from typing import Any
 import pytest
 
 from evoclaims.core.errors import UserError
+from evoclaims.suite.live import describe
+from evoclaims.suite.modes import RunMissing
 from evoclaims.trials import notice as notices
-from evoclaims.trials.notice import FRESH_SECONDS, Notice, fresh, notice_path, running_elsewhere, wait_while_others_run
+from evoclaims.trials.notice import (
+    FRESH_SECONDS,
+    Notice,
+    fresh,
+    notice_path,
+    running_elsewhere,
+    sweep,
+    wait_while_others_run,
+)
+from evoclaims.trials.progress import RunProgress, ignore
+from evoclaims.trials.store import Store
 
 CONDITION = "c0" * 32
+HOSTS = (("gone", socket.gethostname()), ("old", "elsewhere"), ("young", "elsewhere"))
 SCRIPT = (
     "import sys; from pathlib import Path; from evoclaims.trials.notice import Notice\n"
     "with Notice(Path(sys.argv[1]), sys.argv[2]) as notice:\n"
@@ -191,6 +206,7 @@ def test_a_refresh_never_keeps_anothers_notice_alive(tmp_path: Path) -> None:
         path = forge_in_place(notice, host="elsewhere", token="another")
         notice.refresh()
         assert path.stat().st_mtime == 1.0
+        os.utime(path)  # the other has refreshed it
     assert path.exists()
 
 
@@ -263,4 +279,49 @@ def test_control_characters_of_a_notice_never_reach_the_terminal(tmp_path: Path)
     said: list[str] = []
     wait_while_others_run(tmp_path, CONDITION, said.append, sleep=lambda seconds: path.unlink())
     assert said
-    assert said[0].isprintable()
+    assert describe(RunProgress("neat on parity", said[0], 10)).isprintable()
+
+
+def announce(root: Path, name: str, **changes: Any) -> Path:
+    """Write a notice of another condition, as this process would but for some fields."""
+    plain = {"pid": os.getpid(), "host": socket.gethostname(), "started": "now", "born": "never", "token": "0"}
+    path = notice_path(root, hashlib.sha256(name.encode()).hexdigest())
+    path.parent.mkdir(exist_ok=True)
+    path.write_text(json.dumps({**plain, **changes}))
+    return path
+
+
+def test_notices_of_processes_that_are_gone_are_swept_and_the_others_stay(
+    tmp_path: Path, runner: subprocess.Popen[str]
+) -> None:
+    _, old, young = (announce(tmp_path, name, host=host) for name, host in HOSTS)
+    os.utime(old, (0, 0))
+    torn = announce(tmp_path, "torn")
+    torn.write_text("{")
+    sweep(tmp_path)
+    assert {path.name for path in (tmp_path / "running").iterdir()} == {young.name, f"{CONDITION}.json"}
+    assert running_elsewhere(tmp_path, CONDITION) is not None
+
+
+def test_a_condition_that_ends_leaves_no_stale_notice_of_others(tmp_path: Path) -> None:
+    gone = announce(tmp_path, "gone")
+    with Notice(tmp_path, CONDITION):
+        assert gone.exists()
+    assert list((tmp_path / "running").iterdir()) == []
+
+
+def test_a_run_that_has_nothing_to_run_sweeps_too(tmp_path: Path) -> None:
+    gone = announce(tmp_path, "gone")
+    RunMissing(Store(tmp_path), "cpu", ignore).check()
+    assert not gone.exists()
+
+
+def test_a_folder_that_cannot_be_swept_stops_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(*arguments: Any) -> None:
+        raise OSError(errno.EROFS, "Read-only file system")
+
+    gone = announce(tmp_path, "gone")
+    monkeypatch.setattr(os, "rename", refuse)
+    sweep(tmp_path)
+    assert gone.exists()
+    sweep(tmp_path / "none")

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from evoclaims.core.errors import UserError
 from evoclaims.suite.archive import Archive
 from evoclaims.trials import devices
+from evoclaims.trials.notice import sweep
 from evoclaims.trials.progress import Watcher
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.runner import run
@@ -47,6 +48,7 @@ class RunMissing:
             if not self.store.ids():
                 raise
         devices.choose(self.device)
+        sweep(self.store.root)
 
     def __call__(self, condition: Condition, seeds: Sequence[int]) -> Sequence[TrialResult]:
         """Return one trial per seed."""

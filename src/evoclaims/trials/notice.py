@@ -109,6 +109,7 @@ class Notice:
         if self.held:
             with contextlib.suppress(OSError):
                 self.path.unlink()
+        sweep(self.store_root)
 
 
 def notice_path(store_root: Path, condition_id: str) -> Path:
@@ -116,6 +117,13 @@ def notice_path(store_root: Path, condition_id: str) -> Path:
     if not is_hash(condition_id):
         raise UserError(f"{condition_id!r} is not a condition's id: an id is 64 lower-case hexadecimal digits.")
     return store_root / "running" / f"{condition_id}.json"
+
+
+def sweep(store_root: Path) -> None:
+    """Remove the notices of processes that are gone: of what they had finished nobody would look at them again."""
+    for path in sorted((store_root / "running").glob("*.json")):
+        if fresh(path) is None and not path.is_dir():
+            _clear(path)
 
 
 def running_elsewhere(store_root: Path, condition_id: str) -> Runner | None:
