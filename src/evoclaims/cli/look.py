@@ -159,7 +159,7 @@ def _target(out: str | None, default: str, endings: tuple[str, ...]) -> tuple[Pa
     ending = path.suffix.removeprefix(".").lower()
     if ending not in endings:
         raise UserError(
-            f"--out names a file that ends in .{' or .'.join(endings)}, which tells its format; {path!r} does not."
+            f"--out names a file that ends in .{' or .'.join(endings)}, which tells its format; {str(path)!r} does not."
         )
     return path, ending
 
