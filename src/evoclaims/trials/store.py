@@ -193,7 +193,7 @@ class Store:
                 try:
                     path.unlink(missing_ok=True)
                 except OSError as error:
-                    raise UserError(f"Cannot remove {printable(path)}: {error.strerror or error}.") from error
+                    raise UserError(f"Cannot remove {path}: {error.strerror or error}.") from error
 
     def _write_champion(self, sealed: TrialResult, packed: bytes) -> None:
         """Write a champion to its usual place, or beside it where another one lies there."""
