@@ -1,4 +1,4 @@
-"""Settings of every test: two CPU devices wherever it runs, and one compilation cache for the processes of a run."""
+"""Settings of every test: two CPU devices, quick compilation, and one compilation cache for the processes of a run."""
 
 from __future__ import annotations
 
@@ -17,6 +17,8 @@ _made = ""
 # Before anything imports jax; environment variables, so that xdist workers and subprocesses see the same.
 os.environ.setdefault("JAX_PLATFORMS", "cpu")
 os.environ.setdefault("JAX_NUM_CPU_DEVICES", "2")
+# Nearly all that a test compiles runs for less time than it compiles.
+os.environ.setdefault("XLA_FLAGS", "--xla_backend_optimization_level=1 --xla_llvm_disable_expensive_passes=true")
 if _CACHE not in os.environ:
     _made = os.environ[_CACHE] = tempfile.mkdtemp(prefix="evoclaims-tests-")
     os.environ["JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS"] = "0.1"

@@ -14,6 +14,8 @@ from evoclaims.trials.fit import traced_progress
 from evoclaims.trials.spec import Condition
 from reproductions.nisioti2025 import REPRODUCTION
 
+pytestmark = pytest.mark.slow
+
 CONDITIONS = REPRODUCTION.tier("full").conditions
 # One of each method with each kind of task and robot: what differs beyond is a number.
 KINDS = {(type(c.method), type(c.task), getattr(c.task, "robot", None)): names for names, c in CONDITIONS.items()}

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import jax
 import jax.numpy as jnp
+import pytest
 
 from evoclaims.envs.ecorobot.deceptive import DeceptiveMaze
 from evoclaims.methods.map_elites import MapElites, MapElitesState
 from evoclaims.networks.mlp import Mlp
 from evoclaims.trials.devices import MATMUL_PRECISION
+
+pytestmark = pytest.mark.slow
 
 TASK = DeceptiveMaze(difficulty="difficult", episode_steps=400)
 METHOD = MapElites(network=Mlp((16,)), batch=64, initial=128, cells=(16, 14), iso_sigma=0.5, line_sigma=0.3)

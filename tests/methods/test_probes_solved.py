@@ -15,6 +15,8 @@ from evoclaims.trials.runner import run
 from evoclaims.trials.spec import Condition
 from evoclaims.trials.store import Store
 
+pytestmark = pytest.mark.slow
+
 SEEDS = range(8)
 """One trial may be lucky: about every third untrained policy is right."""
 AT_ONCE = 10

@@ -18,6 +18,8 @@ from evoclaims.envs.ecorobot.robots import ANT
 from evoclaims.envs.ecorobot.stones import STONES, TARGET, SteppingStones
 from evoclaims.methods.waypoints import Waypoints
 
+pytestmark = pytest.mark.slow
+
 METHOD, TASK = Waypoints(), SteppingStones(shows_goal=True)
 STARTS, STRAIGHT = 64, 8
 LEVEL = jnp.zeros((), jnp.int32)

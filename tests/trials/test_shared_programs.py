@@ -5,6 +5,7 @@ from __future__ import annotations
 import jax
 import jax.numpy as jnp
 import numpy as np
+import pytest
 
 from evoclaims.core.keys import trial_key
 from evoclaims.envs.ecorobot.obstacles import Heights, Obstacles
@@ -14,6 +15,8 @@ from evoclaims.networks.mlp import Mlp
 from evoclaims.trials.budget import Budget
 from evoclaims.trials.program import Program, TrialState
 from evoclaims.trials.spec import Condition
+
+pytestmark = pytest.mark.slow
 
 HEIGHTS: tuple[Heights, ...] = ("hierarchical", "medium", "high")
 METHOD = RandomPolicy(Mlp((4,)))

@@ -5,11 +5,14 @@ from __future__ import annotations
 import jax
 import jax.numpy as jnp
 import numpy as np
+import pytest
 from brax.envs.wrappers import training
 
 from evoclaims.core.foreign import implicit_promotions
 from evoclaims.envs.ecorobot.brax_env import BraxEnv
 from evoclaims.envs.ecorobot.stones import SteppingStones
+
+pytestmark = pytest.mark.slow
 
 TASK = SteppingStones(episode_steps=3)
 EAST = jnp.array([0.0, 1.0, 0.0, 0.0])

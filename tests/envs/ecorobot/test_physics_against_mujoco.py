@@ -18,6 +18,8 @@ from evoclaims.envs.ecorobot.physics import Body
 from evoclaims.envs.ecorobot.robots import ANT, HALF_CHEETAH, HOPPER, HUMANOID, SIMPLE_ROB, WALKER2D, Robot
 from evoclaims.envs.ecorobot.scene import Scene, mjx, scene
 
+pytestmark = pytest.mark.slow
+
 # Their numbers are sums of powers of two, so that they are the same in float32 (where boxes take turns) and float64.
 ROW = tuple(Box((x, 0.0), (0.25, 3.0), bottom=-0.75, top=0.25) for x in (9.0, 11.0, 13.0))
 

@@ -5,11 +5,14 @@ from __future__ import annotations
 import jax
 import jax.numpy as jnp
 import numpy as np
+import pytest
 from plain_mujoco import quickly_compiled
 
 from evoclaims.envs.ecorobot import physics
 from evoclaims.envs.ecorobot.physics import Body
 from evoclaims.envs.ecorobot.stones import SteppingStones
+
+pytestmark = pytest.mark.slow
 
 TASK = SteppingStones()
 ROBOTS, STEPS, KEPT = 1_000, 80, 40

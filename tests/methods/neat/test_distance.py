@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import jax
 import numpy as np
+import pytest
 import reference
 from genomes import at, dags, made, read, read_all
 from history import History
@@ -14,6 +15,8 @@ from evoclaims.methods.neat.distance import distance
 from evoclaims.methods.neat.homology import index
 from evoclaims.methods.neat.settings import Species
 from evoclaims.networks.genome import Genome
+
+pytestmark = pytest.mark.slow
 
 
 def _of(chosen: Species, one: Genome, other: Genome) -> jax.Array:

@@ -5,11 +5,14 @@ from __future__ import annotations
 import jax
 import jax.numpy as jnp
 import numpy as np
+import pytest
 
 from evoclaims.envs.gates.parity import NParity
 from evoclaims.methods.neat.evolution import Evolution, begin, evolve
 from evoclaims.methods.neat.settings import Mutation, Settings, Species
 from evoclaims.networks.graph import GraphNetwork
+
+pytestmark = pytest.mark.slow
 
 SEEDS, GENERATIONS = 12, 120
 SETTINGS = Settings(
