@@ -38,6 +38,11 @@ def add(parser: pytest.Parser) -> None:
         "'*->error,supported->*'",
     )
     group.addoption("--claims-stored", action="store_true", help="judge from stored trials alone; run nothing")
+    group.addoption(
+        "--claims-any-version",
+        action="store_true",
+        help="judge stored trials whatever versions they were made with; run only what is missing",
+    )
     group.addoption("--claims-variant", metavar="NAME", default="", help="judge under a variant of the protocol")
     group.addoption(
         "--claims-committed",

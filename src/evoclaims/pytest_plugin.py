@@ -144,12 +144,14 @@ def make_session(config: pytest.Config) -> Session:
     store = Store(_storage(config))
     line = LiveLine(Uncaptured(config)) if config.pluginmanager.has_plugin("terminalreporter") else None
     project = load_config(config.rootpath)
-    limit = project.seconds(config.getoption("claims_time_limit"))
-    mode: Any = RunMissing(store, config.getoption("claims_device"), line or ignore, limit)
+    limit, any_version = project.seconds(config.getoption("claims_time_limit")), config.getoption("claims_any_version")
+    mode: Any = RunMissing(store, config.getoption("claims_device"), line or ignore, limit, any_version)
+    again = mode.again
     reproduction = load_reproduction(project)
     if config.getoption("claims_stored"):
         mode = StoredOnly(Archive(store, reproduction.references if config.getoption("claims_committed") else None))
-    made = Session(reproduction, store, mode, config.getoption("claims_trials"), config.getoption("claims_variant"))
+    trials, variant = config.getoption("claims_trials"), config.getoption("claims_variant")
+    made = Session(reproduction, store, mode, trials, variant, again)
     reproduction.tier("smoke", made.variant)
     made.protocol("smoke")
     mode.check()
@@ -272,7 +274,7 @@ def _claim_report(item: pytest.Item, call: pytest.CallInfo[None]) -> ClaimReport
     """Return what became of a claim test: its verdict, or the error in the way of one."""
     from evoclaims.suite.claim import claim_of, expectation_of
     from evoclaims.suite.collected import case_of, tier_of
-    from evoclaims.suite.report import broken, expecting, located, save
+    from evoclaims.suite.report import broken, expecting, located, save, succeeding
 
     claim, case, tier = claim_of(item), case_of(item), tier_of(item)
     assert claim is not None
@@ -289,7 +291,7 @@ def _claim_report(item: pytest.Item, call: pytest.CallInfo[None]) -> ClaimReport
         return report
     if item.config.getoption("claims_stored"):
         return located(report, session.store.root)
-    return save(report, session.store.root)
+    return save(succeeding(report, session.store.root), session.store.root)
 
 
 def _skipped_report(item: pytest.Item, report: pytest.TestReport) -> ClaimReport:

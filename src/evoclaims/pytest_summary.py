@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from evoclaims.suite.regression import Regression
     from evoclaims.suite.report import ClaimReport
     from evoclaims.suite.session import Session
+    from evoclaims.suite.upgrade import Upgrade
 
 ATTRIBUTE: Final = "claim_report"
 """Name under which a test's report carries the claim's, also from an xdist worker to its controller."""
@@ -36,6 +37,7 @@ class Summary:
         self._make_session = make_session
         self.reports: list[ClaimReport] = []
         self._drift: tuple[DriftReport, DigestCheck] | None = None
+        self._upgrade: Upgrade | None = None
         self._regression: Regression | None = None
         self._troubles: list[str] = []
 
@@ -64,7 +66,12 @@ class Summary:
         (all are skipped, say), so that nothing was measured.
         """
         refused = bool(self._troubles)
-        for finish in (self._compare, self._compare_with_accepted, self._write_json):
+        for finish in (
+            self._compare,
+            self._compare_with_predecessors,
+            self._compare_with_accepted,
+            self._write_json,
+        ):
             try:
                 finish()
             except UserError as error:
@@ -79,6 +86,11 @@ class Summary:
         if self.reports:
             self._drift = self._make_session(self._config).drift(self.reports)
 
+    def _compare_with_predecessors(self) -> None:
+        """Compare the trials of this environment with those that other versions have left in the store."""
+        if self.reports and not self._config.getoption("claims_committed"):
+            self._upgrade = self._make_session(self._config).upgrade(self.reports)
+
     def _compare_with_accepted(self) -> None:
         """Compare the verdicts with those last accepted, which are of the protocol itself and not of a variant."""
         from evoclaims.suite.regression import regression
@@ -90,6 +102,8 @@ class Summary:
     def _status(self) -> pytest.ExitCode:
         """Return the exit status of a run in which no test failed."""
         if self._troubles or (self._drift is not None and self._drift[0].drifted):
+            return pytest.ExitCode.TESTS_FAILED
+        if self._upgrade is not None and self._upgrade.drifted:
             return pytest.ExitCode.TESTS_FAILED
         if self._regression is not None and self._regression.matched:
             return pytest.ExitCode.TESTS_FAILED
@@ -146,13 +160,17 @@ class Summary:
         return spelled(text, getattr(file, "encoding", None))
 
     def _notes(self) -> list[str]:
-        """Return what the comparisons with reference trials and with accepted verdicts found, in lines."""
+        """Return in lines what comparisons found: with reference trials, trials of other versions, and verdicts."""
         from evoclaims.suite import table
+        from evoclaims.suite.upgrade import verdict_changes
 
         notes = []
         if self._drift is not None:
             drift, digests = self._drift
             notes += table.drift_lines(drift, len(digests.changed), digests.compared).splitlines()
+        if self._upgrade is not None:
+            notes += self._upgrade.lines
+        notes += verdict_changes(self.reports)
         return [*notes, *(self._regression.lines if self._regression else ())]
 
     def _write_json(self) -> None:
@@ -163,7 +181,9 @@ class Summary:
         if name is None or self._config.option.collectonly:
             return
         drift = self._drift[0].to_json() if self._drift else None
-        plain = {"schema": 1, "claims": [report.to_json() for report in self.reports], "drift": drift}
+        upgrade = self._upgrade.to_json() if self._upgrade else None
+        claims = [report.to_json() for report in self.reports]
+        plain = {"schema": 1, "claims": claims, "drift": drift, "upgrade": upgrade}
         path = Path(self._config.invocation_params.dir) / name
         try:
             write_atomically(path, (json.dumps(plain, indent=1, sort_keys=True) + "\n").encode())

@@ -105,7 +105,7 @@ def test_a_champion_that_a_killed_process_left_is_a_leftover_once_settled(store:
     _age(*store.champion_files(raced.id))
     (problem,) = verify(store, repair=True)
     assert (problem.kind, problem.path) == ("leftover", store.champion_path(raced.id))
-    assert "names another champion" in problem.reason
+    assert "no record of its trial names it" in problem.reason
     assert store.champion(raced.id)["w"].tolist() == [1.0, 1.0, 1.0]
 
 

@@ -135,7 +135,7 @@ def _drift_lines(drift: DriftReport, digests: DigestCheck, new: Side) -> Iterato
     tested = len(drift.rows) - len(drift.unchecked)
     yield f"trials: {tested} comparisons, {len(drifted)} drifted (exact rank tests, Holm, α = {drift.alpha:g})"
     for row in drifted:
-        yield f"  DRIFT in {row.label}: {row.metric}, p = {row.p_holm:.2g} (Holm)"
+        yield f"  DRIFT in {row.in_words}"
     yield from dict.fromkeys(f"  not checked: {row.label}: {row.detail or row.status}" for row in drift.unchecked)
     yield f"to the bit: {digests.compared} trials compared, {len(digests.changed)} changed"
     seeds: dict[str, list[int]] = {}

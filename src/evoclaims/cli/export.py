@@ -9,6 +9,7 @@ from pathlib import Path
 from evoclaims.cli.project import judge_stored, open_archive, open_project
 from evoclaims.cli.stored import write
 from evoclaims.cli.tiers import ALL, tiers_of
+from evoclaims.core.canonical import content_hash
 from evoclaims.core.errors import UnknownNameError, UserError
 from evoclaims.suite import export, references
 from evoclaims.suite.modes import StoredOnly
@@ -50,11 +51,16 @@ def main(options: argparse.Namespace) -> int:
 
 
 def _trials(reproduction: Reproduction, storage: str, damaged: list[DamagedFileError]) -> list[TrialResult]:
-    """Return all trials of the store, then the reference trials that it does not have."""
+    """Return all records of the store, several of a trial that several versions have run, then further references."""
     archive = open_archive(storage, reproduction)
     StoredOnly(archive).check()
-    found = {trial.id: trial for trial in archive.store.results(damaged)}
+    found = {_key(trial): trial for trial in archive.store.results(damaged)}
     for path in sorted(reproduction.references.rglob("*.jsonl")):
         for trial in references.load(path):
-            found.setdefault(trial.id, trial)
+            found.setdefault(_key(trial), trial)
     return list(found.values())
+
+
+def _key(trial: TrialResult) -> tuple[str, str, str]:
+    """Return what tells a record from others: its trial, its outcome, and the versions that it was made with."""
+    return trial.id, trial.digest, content_hash(trial.provenance.get("versions"))

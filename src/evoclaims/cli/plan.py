@@ -67,7 +67,9 @@ def _conditions(
     steps, seconds, unknown = 0, 0.0, False
     for names in used:
         condition = tier.condition(*names)
-        missing = sum(not answers(store.get(TrialSpec(condition, seed).id), limit) for seed in seeds)
+        versions = condition.versions
+        stored = (store.made_with(TrialSpec(condition, seed).id, versions) for seed in seeds)
+        missing = sum(not answers(result, limit) for result in stored)
         owed = missing * condition.environment_steps
         pace = paces[names]
         time = 0.0 if not missing else None if pace is None else pace.seconds(condition, missing)

@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
 from itertools import takewhile
 
 from evoclaims.cli.project import judge_stored, open_project, open_store
 from evoclaims.core.errors import UserError
+from evoclaims.core.packages import agree, recorded
 from evoclaims.judging.baseline import MIN_REFERENCES
 from evoclaims.suite import references
-from evoclaims.trials.spec import TrialSpec
+from evoclaims.suite.versions import change
+from evoclaims.trials.result import TrialResult
+from evoclaims.trials.spec import Condition, TrialSpec
+from evoclaims.trials.store import Store
 from evoclaims.trials.time_limit import is_final
 
 
@@ -29,22 +34,42 @@ def main(options: argparse.Namespace) -> int:
     for method, task in used:
         condition = tier.condition(method, task)
         seeds = range(tier.protocol.first_seed, tier.protocol.first_seed + sizes[-1])
-        found = [store.get(TrialSpec(condition, seed).id) for seed in seeds]
-        results = list(takewhile(is_final, found))
+        results = _of_one_environment(store, condition, seeds, sizes[0])
         size = max((size for size in sizes if size <= len(results)), default=0)
         path = references.path_of(reproduction.references_of(options.variant), options.tier, method, task)
         committed = sum(trial.condition == condition.id for trial in references.load(path))
         needed = max(committed, sizes[0])
         if size < needed:
-            stored = sum(map(is_final, found))
-            print(f"left alone: {method} on {task}: {stored} of {needed} trials are stored")
+            print(f"left alone: {method} on {task}: {len(results)} of {needed} trials are stored")
             continue
-        references.write(path, (result for result in results[:size] if result is not None))
+        references.write(path, results[:size])
         written += 1
-        print(f"wrote {path}: {size} trials")
+        there = change(recorded(results[0].provenance, condition.packages), condition.versions)
+        print(
+            f"wrote {path}: {size} trials"
+            + (f", made with other versions than are installed: {there}" if there else "")
+        )
     if not written:
         raise UserError(
             f"No condition of the {options.tier} tier has {sizes[0]} stored trials; run them first with "
             f"`evoclaims run --tier {options.tier}`."
         )
     return 0
+
+
+def _of_one_environment(store: Store, condition: Condition, seeds: Sequence[int], needed: int) -> list[TrialResult]:
+    """Return the trials of the first seeds that one environment has made: this one if it has enough, else the newest.
+
+    Reference trials of mixed versions would be no reference for anything.
+    """
+    records = [record for seed in seeds for record in store.records(TrialSpec(condition, seed).id) if is_final(record)]
+    environments = [condition.versions]
+    for record in sorted(records, key=lambda record: str(record.timing.get("ended", "")), reverse=True):
+        versions = recorded(record.provenance, condition.packages)
+        if versions not in environments:
+            environments.append(versions)
+    runs = []
+    for versions in environments:
+        made = {record.seed: record for record in records if agree(record.provenance, versions)}
+        runs.append([made[seed] for seed in takewhile(made.__contains__, seeds)])
+    return next((run for run in runs if len(run) >= needed), max(runs, key=len))

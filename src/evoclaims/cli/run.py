@@ -57,7 +57,7 @@ def main(options: argparse.Namespace) -> int:
             with contextlib.closing(line):
                 condition = tier.condition(method, task)
                 if options.retry:
-                    store.forget_timeouts(TrialSpec(condition, seed).id for seed in seeds)
+                    store.forget_timeouts((TrialSpec(condition, seed).id for seed in seeds), condition.versions)
                 results = fetch(condition, seeds)
         except (KeyboardInterrupt, BrokenPipeError):  # the user, or who reads the output, has had enough
             raise

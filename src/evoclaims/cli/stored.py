@@ -35,7 +35,7 @@ class Stored:
 
 
 def load(storage: str, tier: Tier, tier_name: str, method: str, task: str, seed: int) -> Stored:
-    """Return a stored trial with its champion.
+    """Return a stored trial with its champion: this environment's, or else the newest that other versions have made.
 
     Raises:
         UserError: for unknown names, a trial that is not stored (with the command that runs it), and as
@@ -43,7 +43,7 @@ def load(storage: str, tier: Tier, tier_name: str, method: str, task: str, seed:
     """
     condition, title = tier.condition(method, task), f"{method} on {task} ({tier_name})"
     spec, store = TrialSpec(condition, seed), open_store(storage)
-    result = store.get(spec.id)
+    result = store.get(spec.id, condition.versions)
     if result is None:
         raise UserError(
             f"{store.root} holds no trial of {title} with seed {seed}. "

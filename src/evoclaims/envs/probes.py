@@ -54,6 +54,7 @@ class Probe:
     """
 
     revision: ClassVar[int] = 1
+    packages: ClassVar[tuple[str, ...]] = ()
     action_size: ClassVar[int] = 1
 
     name: str

@@ -95,7 +95,7 @@ def _first_map(scope: Scope, ground: Ground) -> Map | None:
     """Return the map of the first trial whose champion is in the store; None without any."""
     condition = scope.tier.condition(ground.method, ground.task)
     for result in scope.group(ground.method, ground.task).fetch(scope.seeds):
-        if scope.archive.store.champion_files(result.id):
+        if scope.archive.store.has_champion(result):
             _, fitnesses = champions.load(scope.archive.store, condition, result)
             return Map(result.seed, result.id, np.asarray(fitnesses))
     return None

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
 from evoclaims.core.canonical import as_plain
+from evoclaims.judging.effect import a12, median
 from evoclaims.judging.exact import rank_attainable, rank_test
 from evoclaims.judging.multiplicity import holm
 from evoclaims.judging.sample import UnreadableTrialError, read_number
@@ -41,7 +42,20 @@ class DriftCase:
 
 @dataclass(frozen=True)
 class DriftRow:
-    """One metric of one condition; p is two-sided and None where nothing was tested, p_holm is Holm-adjusted."""
+    """One metric of one condition.
+
+    Attributes:
+        label: names the condition.
+        metric: what was compared.
+        n_new, n_ref: trials of now and reference trials.
+        status: what became of the comparison.
+        p: two-sided; None where nothing was tested.
+        p_holm: the same, Holm-adjusted.
+        detail: why nothing was tested, or what the test could not have shown.
+        a12: Vargha and Delaney's effect: the chance that a trial of now is above a reference, ties counting half; None
+            where nothing was tested.
+        median_new, median_ref: of either side; None where nothing was tested.
+    """
 
     label: str
     metric: str
@@ -51,11 +65,25 @@ class DriftRow:
     p: float | None = None
     p_holm: float | None = None
     detail: str = ""
+    a12: float | None = None
+    median_new: float | None = None
+    median_ref: float | None = None
 
     @property
     def drifted(self) -> bool:
         """Whether the suite-wide test found a drift."""
         return self.status == "drift"
+
+    @property
+    def in_words(self) -> str:
+        """A tested row in a line: which way, how far, how surely."""
+        if self.a12 is None or self.p_holm is None:
+            return f"{self.label}: {self.metric}: {self.detail or self.status}"
+        way = "higher" if self.a12 > 0.5 else "lower" if self.a12 < 0.5 else "spread otherwise"
+        return (
+            f"{self.label}: {self.metric} is {way} now: median {self.median_ref:.6g} -> {self.median_new:.6g}, "
+            f"A12 = {self.a12:.2f}, p = {self.p_holm:.2g} (Holm)"
+        )
 
 
 @dataclass(frozen=True)
@@ -90,6 +118,9 @@ class _Tested:
     n_new: int
     n_ref: int
     p: float
+    a12: float
+    median_new: float
+    median_ref: float
 
 
 def check_drift(cases: Sequence[DriftCase], alpha: float = ALPHA) -> DriftReport:
@@ -142,7 +173,8 @@ def _test(case: DriftCase, metric: str) -> _Tested | DriftRow:
     except UnreadableTrialError as error:
         return row("error", str(error))
     p = min(1.0, 2 * min(rank_test(values, stored).p, rank_test(stored, values).p))
-    return _Tested(case.label, metric, len(new), len(reference), p)
+    effect = a12(values, stored), median(values), median(stored)
+    return _Tested(case.label, metric, len(new), len(reference), p, *effect)
 
 
 def _corrected(entry: _Tested, p_holm: float, tests: int, alpha: float) -> DriftRow:
@@ -155,4 +187,4 @@ def _corrected(entry: _Tested, p_holm: float, tests: int, alpha: float) -> Drift
         if status == "underpowered"
         else ""
     )
-    return DriftRow(entry.label, entry.metric, entry.n_new, entry.n_ref, status, entry.p, p_holm, detail)
+    return DriftRow(**asdict(entry), status=status, p_holm=p_holm, detail=detail)

@@ -52,6 +52,7 @@ class CmaEs:
 
     name: ClassVar[str] = "cma_es"
     revision: ClassVar[int] = 1
+    packages: ClassVar[tuple[str, ...]] = ("evosax",)
 
     population: int = 256
     network: Network = AllSkips()

@@ -30,6 +30,7 @@ class HandBuilt:
     """
 
     revision: ClassVar[int] = 1
+    packages: ClassVar[tuple[str, ...]] = ()
 
     negated: bool = False
 

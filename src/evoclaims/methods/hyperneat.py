@@ -81,6 +81,7 @@ class HyperNeat:
 
     name: ClassVar[str] = "hyperneat"
     revision: ClassVar[int] = 1
+    packages: ClassVar[tuple[str, ...]] = ()
 
     settings: Settings = PAPER
     hidden: tuple[int, ...] = (16,)

@@ -34,6 +34,7 @@ class HyperneatTensorneat:
 
     name: ClassVar[str] = "hyperneat_tensorneat"
     revision: ClassVar[int] = 1
+    packages: ClassVar[tuple[str, ...]] = ("tensorneat",)
     optional: ClassVar[bool] = True
 
     settings: Settings = PAPER

@@ -82,6 +82,7 @@ class MapElites:
 
     name: ClassVar[str] = "map_elites"
     revision: ClassVar[int] = 1
+    packages: ClassVar[tuple[str, ...]] = ("qdax",)
 
     network: Mlp = Mlp((32,) * 4)
     batch: int = 100

@@ -79,6 +79,7 @@ class Ppo:
 
     name: ClassVar[str] = "ppo"
     revision: ClassVar[int] = 1
+    packages: ClassVar[tuple[str, ...]] = ("brax", "flax", "optax")
 
     policy_layers: tuple[int, ...] = (4,) * 6
     value_layers: tuple[int, ...] = (32,) * 7

@@ -26,6 +26,7 @@ class RandomPolicy:
 
     name: ClassVar[str] = "random_policy"
     revision: ClassVar[int] = 1
+    packages: ClassVar[tuple[str, ...]] = ()
 
     network: Network = Mlp((32,) * 4)
 

@@ -30,6 +30,7 @@ class RandomSearch:
 
     name: ClassVar[str] = "random_search"
     revision: ClassVar[int] = 1
+    packages: ClassVar[tuple[str, ...]] = ()
 
     population: int = 256
     std: float = 1.0

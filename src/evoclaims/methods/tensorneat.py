@@ -52,6 +52,7 @@ class NeatTensorneat:
 
     name: ClassVar[str] = "neat_tensorneat"
     revision: ClassVar[int] = 1
+    packages: ClassVar[tuple[str, ...]] = ("tensorneat",)
     optional: ClassVar[bool] = True
 
     settings: Settings = PAPER

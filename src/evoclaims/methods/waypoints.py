@@ -44,6 +44,7 @@ class Waypoints:
 
     name: ClassVar[str] = "waypoints"
     revision: ClassVar[int] = 1
+    packages: ClassVar[tuple[str, ...]] = ("scipy",)
 
     speed: float = 1.0
     gain: float = 10.0

@@ -48,7 +48,7 @@ def champion_of(store: Store, condition: Condition, trials: Sequence[Glance], dr
         return Champion("No trial has run to its end, so there is no champion to show.")
     trial, which = chosen
     try:
-        result = store.get(trial.trial)
+        result = next((one for one in store.records(trial.trial) if one.champion == trial.champion), None)
         if result is None or not store.champion_file(result).exists():
             return Champion(f"The champion’s parameters ({which}) are not in the store: records alone are kept here.")
         parameters, title = champions.load(store, condition, result), f"{condition.label}, {which}"

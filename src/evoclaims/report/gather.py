@@ -20,6 +20,7 @@ from evoclaims.suite.history import History, key_of
 from evoclaims.suite.report import ClaimReport
 from evoclaims.suite.reproduction import Reproduction
 from evoclaims.suite.robustness import Robustness
+from evoclaims.suite.versions import installed_for
 
 Verdicts = Mapping[str, Sequence[ClaimReport]]
 """Reports by tier, in the order in which tiers are shown."""
@@ -114,7 +115,7 @@ class _Gathering:
     def section(self, report: ClaimReport) -> Section:
         """Return one claim's section."""
         verdict = report.verdict or {}
-        read = {_label(source): self.reader.read(source["trials"]) for source in report.sources}
+        read = {_label(source): self._trials(source) for source in report.sources}
         every = [trial for trials in read.values() for trial in trials]
         made = origin.grouped(trial.origin for trial in every)
         sentence = clean(self._sentences.get(report.name, ""))
@@ -157,7 +158,7 @@ class _Gathering:
         """Return the key of a condition with so many trials, after gathering what is shown of it."""
         key = f"{source['condition']}-{len(source['trials'])}"
         if key not in self.conditions:
-            trials = self.reader.read(source["trials"])
+            trials = self._trials(source)
             panels, rest = curves.panels(trials)
             settings = _flat(self.reader.settings.get(source["condition"], {}))
             says = f"{plural(len(trials), 'trial')}. {rest}".strip()
@@ -165,6 +166,10 @@ class _Gathering:
                 _label(source), says, settings, panels, self._champion(tier, source, trials)
             )
         return key
+
+    def _trials(self, source: Mapping[str, Any]) -> tuple[Glance, ...]:
+        """Read the trials of one condition of a claim: the records that were judged."""
+        return self.reader.read(source["trials"], installed_for(source))
 
     def _champion(self, tier: str, source: Mapping[str, Any], trials: Sequence[Glance]) -> Champion:
         """Return a condition's champion; the condition itself is known by its names."""

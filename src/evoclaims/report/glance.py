@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evoclaims.core.errors import UserError
+from evoclaims.core.packages import Versions
 from evoclaims.report.origin import Origin
 from evoclaims.suite.archive import Archive
 from evoclaims.trials.result import TrialResult
@@ -54,15 +55,21 @@ class Reader:
         self.troubles: dict[str, None] = {}
         """Why trials could not be read: sentences in the order of their coming."""
 
-    def read(self, trials: Sequence[str]) -> tuple[Glance, ...]:
-        """Return those of the trials that can be read; `troubles` says why others cannot."""
-        return tuple(glance for glance in map(self._one, trials) if glance is not None)
+    def read(self, trials: Sequence[str], versions: Versions | None = None) -> tuple[Glance, ...]:
+        """Return those of the trials that can be read; `troubles` says why others cannot.
 
-    def _one(self, trial: str) -> Glance | None:
+        Args:
+            trials: ids.
+            versions: of a trial's several records the one made with these comes first (see `Archive.get`).
+        """
+        glances = (self._one(trial, versions) for trial in trials)
+        return tuple(glance for glance in glances if glance is not None)
+
+    def _one(self, trial: str, versions: Versions | None) -> Glance | None:
         """Return a trial."""
         if trial not in self._read:
             try:
-                found = self._archive.get(trial)
+                found = self._archive.get(trial, versions)
             except UserError as error:
                 self.troubles[str(error)] = None
                 found = None

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
+from evoclaims.core.packages import DEPENDS_ON
 from evoclaims.report.words import clean, counted, listed, plural
 
 SHORT: Final = 9
@@ -40,7 +41,7 @@ class Origin:
         kind, platform = clean(device.get("kind") or ""), clean(device.get("platform") or "")
         known = " ".join([kind, f"({platform})" if platform not in ("", kind) else ""]).strip()
         dirty = git.get("dirty")
-        rest = provenance.keys() - {"device", "git", "machine", "versions"}
+        rest = provenance.keys() - {"device", "git", "machine", "versions", DEPENDS_ON}
         return Origin(
             device=known or "unknown device",
             machine=clean(provenance.get("machine") or "unknown machine"),

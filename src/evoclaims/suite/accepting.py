@@ -12,6 +12,7 @@ from evoclaims.judging.verdict import Outcome
 from evoclaims.suite.archive import Archive
 from evoclaims.suite.history import Entry, History, key_of
 from evoclaims.suite.report import ClaimReport
+from evoclaims.suite.versions import installed_for
 from evoclaims.trials.result import TrialResult
 
 UNDECIDED = (Outcome.NOT_RUN, Outcome.ERROR)
@@ -66,8 +67,9 @@ def entry_of(report: ClaimReport, archive: Archive, today: str) -> Entry:
         UserError: when a trial behind it is damaged.
     """
     verdict: dict[str, Any] = report.verdict or {}
-    ids = dict.fromkeys(trial for source in report.sources for trial in source["trials"])
-    trials = [trial for trial in map(archive.get, ids) if trial is not None]
+    preferred = {trial: installed_for(source) for source in report.sources for trial in source["trials"]}
+    found = (archive.get(trial, versions) for trial, versions in preferred.items())
+    trials = [trial for trial in found if trial is not None]
     return Entry(
         outcome=Outcome(report.outcome),
         reason=printable(report.reason),

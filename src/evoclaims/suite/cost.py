@@ -51,7 +51,8 @@ def known_pace(
     kind: str,
 ) -> Pace | None:
     """Return the pace of stored or reference trials of this condition on this kind of device; None without any."""
-    stored = (store.get(TrialSpec(condition, seed).id) for seed in range(SEEDS_LOOKED_AT))
+    versions = condition.versions
+    stored = (store.get(TrialSpec(condition, seed).id, versions) for seed in range(SEEDS_LOOKED_AT))
     trials = [trial for trial in stored if trial is not None and is_final(trial)]
     committed = references.load(references.path_of(folder, tier, method, task))
     trials += [trial for trial in committed if trial.condition == condition.id]

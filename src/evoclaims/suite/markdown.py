@@ -9,6 +9,7 @@ from typing import Final
 
 from evoclaims.core.printable import printable
 from evoclaims.judging.verdict import Outcome
+from evoclaims.suite import mixture
 from evoclaims.suite.report import ClaimReport
 from evoclaims.suite.table import totals
 
@@ -25,7 +26,7 @@ def run_summary(reports: Sequence[ClaimReport], notes: Sequence[str] = ()) -> st
     lines = ["## Claims", "", f"**{literal(totals(reports))}**", ""]
     lines += ["| claim | what is claimed | verdict | n | p | why |", "| --- | --- | --- | ---: | ---: | --- |"]
     lines += [f"| {' | '.join(_cells(report))} |" for report in sorted(reports, key=_order)]
-    lines += ["", *(f"* {literal(note)}" for note in notes)]
+    lines += ["", *(f"* {literal(note)}" for note in (*mixture.lines(reports), *notes))]
     return "\n".join(lines).rstrip("\n") + "\n"
 
 
@@ -42,7 +43,9 @@ def _cells(report: ClaimReport) -> tuple[str, ...]:
     return (
         literal(f"{report.name} ({report.tier})"),
         literal(f"{report.statement} ({report.where})"),
-        f"{outcome.symbol} {literal(str(outcome))}" + ("\\*" if report.as_expected else ""),
+        f"{outcome.symbol} {literal(str(outcome))}"
+        + "\\*" * report.as_expected
+        + mixture.MARK * mixture.is_mixed(report),
         str(report.n) if report.n else "–",
         "–" if p is None else literal(f"{p:.2g}"),
         "" if outcome is Outcome.SUPPORTED and not because else literal(f"{report.reason}{because}"),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -19,6 +19,7 @@ from evoclaims.judging.protocol import Protocol
 from evoclaims.judging.verdict import Outcome, Verdict
 from evoclaims.suite.claim import Claim, Expectation, named
 from evoclaims.suite.group import TrialGroup
+from evoclaims.suite.versions import found_in, of_sources
 from evoclaims.trials.spec import TrialSpec
 
 
@@ -35,11 +36,14 @@ class ClaimReport:
         outcome, reason: the verdict in short.
         expected, because: an accepted outcome, if there is one.
         verdict: the whole verdict as JSON; None when the test broke before judging.
-        sources: for each condition: "method", "task", "condition" (id) and "trials" (ids).
+        sources: for each condition: "method", "task", "condition" (id), "trials" (ids), "versions" (of the packages
+            that it depends on: the different ones that the trials were made with) and "again" (seeds that this run has
+            run again, since the store's trials were made with other versions).
         attainable: for each look: "n", "alpha", and the smallest p for ("supported") and against ("refuted").
         evidence: path of the file that holds all this.
         variant: name of the variant of the protocol; empty for the protocol itself.
         unsaved: why that file could not be written; empty when it was, or was not to be.
+        before: "outcome", "fingerprint" and "versions" of the verdict that the store held before this run, if any.
     """
 
     claim: str
@@ -57,6 +61,7 @@ class ClaimReport:
     evidence: str = ""
     variant: str = ""
     unsaved: str = ""
+    before: dict[str, Any] | None = None
 
     @property
     def name(self) -> str:
@@ -91,9 +96,15 @@ class ClaimReport:
 
 
 def judged(
-    claim: Claim, case: str, tier: str, assertion: Assertion, protocol: Protocol, verdict: Verdict
+    claim: Claim,
+    case: str,
+    tier: str,
+    assertion: Assertion,
+    protocol: Protocol,
+    verdict: Verdict,
+    again: Mapping[str, Collection[int]],
 ) -> ClaimReport:
-    """Build the report of a claim that was judged."""
+    """Build the report of a claim that was judged; `again` has the seeds that were run again by the condition's id."""
     groups = [source for source in assertion.sources() if isinstance(source, TrialGroup)]
     seeds = protocol.seeds(verdict.n)
     return ClaimReport(
@@ -105,7 +116,7 @@ def judged(
         outcome=str(verdict.outcome),
         reason=verdict.reason,
         verdict=verdict.to_json(),
-        sources=tuple(_source(group, seeds) for group in groups),
+        sources=tuple(_source(group, seeds, sorted(again.get(group.fingerprint, ()))) for group in groups),
         attainable=tuple(
             {"n": look.n, "alpha": look.alpha, "supported": p.supported, "refuted": p.refuted}
             for look, p in attainability(assertion, protocol)
@@ -140,6 +151,17 @@ def save(report: ClaimReport, root: Path) -> ClaimReport:
     return saved
 
 
+def succeeding(report: ClaimReport, root: Path) -> ClaimReport:
+    """Return the report with what the file of the claim's last verdict, which it takes the place of, says of that."""
+    try:
+        last = ClaimReport.from_json(json.loads(_path(report, root).read_bytes()))
+        mark = (last.verdict or {}).get("fingerprint")
+        before = {"outcome": last.outcome, "fingerprint": mark, "versions": of_sources(last.sources)}
+    except (OSError, ValueError, TypeError, KeyError, AttributeError):
+        return report  # none, or one that another release has written: nothing is judged from it
+    return replace(report, before=before)
+
+
 def located(report: ClaimReport, root: Path) -> ClaimReport:
     """Return the report with the path of the file that an earlier run has written, if there is one."""
     path = _path(report, root)
@@ -167,11 +189,14 @@ def _path(report: ClaimReport, root: Path) -> Path:
     return folder / f"{file_name(report.claim, report.case)}.json"
 
 
-def _source(group: TrialGroup, seeds: Sequence[int]) -> dict[str, Any]:
+def _source(group: TrialGroup, seeds: Sequence[int], again: Sequence[int]) -> dict[str, Any]:
     """Describe one condition of a report."""
+    condition = group.condition
     return {
         "method": group.method,
         "task": group.task,
         "condition": group.fingerprint,
-        "trials": [TrialSpec(group.condition, seed).id for seed in seeds],
+        "trials": [TrialSpec(condition, seed).id for seed in seeds],
+        "versions": found_in(group.fetch(seeds), condition.packages) if len(seeds) else {},
+        "again": [*again],
     }

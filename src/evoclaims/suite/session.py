@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 from evoclaims.core.errors import UserError
+from evoclaims.core.packages import agree, recorded
 from evoclaims.judging.assertion import Assertion
 from evoclaims.judging.baseline import DriftReport
 from evoclaims.judging.fingerprint import fingerprint
@@ -19,7 +20,22 @@ from evoclaims.suite.group import Fetch, TrialGroup
 from evoclaims.suite.modes import NotStoredError
 from evoclaims.suite.report import ClaimReport, judged
 from evoclaims.suite.reproduction import Reproduction
+from evoclaims.suite.upgrade import Succession, Upgrade, predecessors, upgrade
+from evoclaims.trials.result import TrialResult
+from evoclaims.trials.spec import Condition, TrialSpec
 from evoclaims.trials.store import Store
+
+
+@dataclass(frozen=True)
+class _Used:
+    """A condition that claims of a tier are about: the ids of its trials, and the seeds that were run again."""
+
+    tier: str
+    method: str
+    task: str
+    condition: Condition
+    ids: set[str] = field(default_factory=set)
+    again: set[int] = field(default_factory=set)
 
 
 @dataclass(frozen=True)
@@ -32,6 +48,7 @@ class Session:
         fetch: how trials are had.
         trials: a fixed number of trials in place of the tier's looks; None keeps the tier's protocol.
         variant: name of a variant of the protocol; empty for the protocol itself.
+        again: seeds that were run again, since stored trials were made with other versions, by the condition's id.
     """
 
     reproduction: Reproduction
@@ -39,6 +56,7 @@ class Session:
     fetch: Fetch
     trials: int | None = None
     variant: str = ""
+    again: Mapping[str, Collection[int]] = field(default_factory=dict)
 
     def group(self, method: str, on: str, tier: str) -> TrialGroup:
         """Return the trials of a method on a task, not yet run."""
@@ -62,7 +80,7 @@ class Session:
         except NotStoredError as error:
             mark = fingerprint(assertion, protocol, claim=name, tier=tier)
             verdict = Verdict(Outcome.NOT_RUN, str(error), assertion.describe(), mark)
-        return replace(judged(claim, case, tier, assertion, protocol, verdict), variant=self.variant)
+        return replace(judged(claim, case, tier, assertion, protocol, verdict, self.again), variant=self.variant)
 
     def _untouched(self, tier: str, assertion: Assertion) -> bool:
         """Whether the protocol itself has all conditions that an assertion is about."""
@@ -72,19 +90,53 @@ class Session:
 
     def drift(self, reports: Sequence[ClaimReport]) -> tuple[DriftReport, DigestCheck]:
         """Compare the trials behind `reports` with the committed reference trials of their tiers."""
-        used: dict[tuple[str, str, str], set[str]] = {}
+        folder = self.reproduction.references_of(self.variant)
+        cases = [
+            references.drift_case(folder, used.tier, used.method, used.task, trials)
+            for used in self._used(reports)
+            if (trials := self._trials(used))
+        ]
+        return references.compare(cases)
+
+    def upgrade(self, reports: Sequence[ClaimReport]) -> Upgrade:
+        """Compare the trials behind `reports` with those that the store holds of other versions."""
+        successions = []
+        for used in self._used(reports):
+            condition, trials = used.condition, self._trials(used)
+            here = condition.versions
+            now = tuple(trial for trial in trials if agree(trial.provenance, here))
+            protocol = self.reproduction.tier(used.tier).protocol
+            records = [
+                record
+                for seed in {*protocol.seeds(protocol.last.n), *(trial.seed for trial in now)}
+                for record in self.store.records(TrialSpec(condition, seed).id)
+            ]
+            before = predecessors(records, here)
+            if now and before:
+                old = recorded(before[0].provenance, condition.packages)
+                label = f"{used.method} on {used.task} ({used.tier})"
+                successions.append(Succession(label, old, here, before, now, len(used.again)))
+        return upgrade(successions)
+
+    def _used(self, reports: Sequence[ClaimReport]) -> list[_Used]:
+        """Return the conditions that `reports` are about, each once, with all trials that were looked at."""
+        found: dict[tuple[str, str, str], _Used] = {}
         for report in reports:
             if self.variant and not report.n:  # most claims are not about what a variant changes
                 continue
             for source in report.sources:
-                used.setdefault((report.tier, source["method"], source["task"]), set()).update(source["trials"])
-        cases = []
-        for (tier, method, task), ids in sorted(used.items()):
-            trials = [trial for trial in map(self.store.get, sorted(ids)) if trial is not None]
-            if trials:
-                folder = self.reproduction.references_of(self.variant)
-                cases.append(references.drift_case(folder, tier, method, task, trials))
-        return references.compare(cases)
+                names = report.tier, source["method"], source["task"]
+                if names not in found:
+                    tier = self.reproduction.tier(report.tier, self.variant)
+                    found[names] = _Used(*names, tier.condition(*names[1:]))
+                found[names].ids.update(source["trials"])
+                found[names].again.update(source.get("again", ()))
+        return [used for _, used in sorted(found.items())]
+
+    def _trials(self, used: _Used) -> list[TrialResult]:
+        """Return the stored trials that a condition's claims were judged from."""
+        stored = (self.store.get(trial, used.condition.versions) for trial in sorted(used.ids))
+        return [trial for trial in stored if trial is not None]
 
 
 class Verdicts:

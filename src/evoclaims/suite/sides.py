@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import itertools
 from collections import defaultdict
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath
 
 from evoclaims.core.errors import UserError
+from evoclaims.core.packages import Versions, agree
 from evoclaims.judging.baseline import DriftCase, DriftReport
 from evoclaims.judging.tripwire import DigestCheck
 from evoclaims.judging.verdict import Outcome
@@ -19,7 +21,7 @@ from evoclaims.suite.revision import Revision
 from evoclaims.suite.transitions import Standings
 from evoclaims.trials.records import RecordError, parse
 from evoclaims.trials.result import TrialResult
-from evoclaims.trials.store import DamagedFileError, Store
+from evoclaims.trials.store import DamagedFileError, Store, newest
 
 Trials = Mapping[str, Sequence[TrialResult]]
 """Trials by condition, named as its file of reference trials is: "smoke/cma_es-n_parity"."""
@@ -95,8 +97,12 @@ def store(reproduction: Reproduction, of: Store, reports: Iterable[ClaimReport])
     """
     names, damaged = names_of(reproduction), list[DamagedFileError]()
     trials: dict[str, list[TrialResult]] = defaultdict(list)
-    for trial in of.results(damaged):
-        for name in names.get(trial.condition, ()):
+    versions = {
+        condition: reproduction.tier(known[0].tier, known[0].variant).condition(known[0].method, known[0].task).versions
+        for condition, known in names.items()
+    }
+    for trial in _one_of_each(of.results(damaged), versions):
+        for name in names[trial.condition]:
             folder = reproduction.references_of(name.variant)
             path = references.path_of(folder, name.tier, name.method, name.task)
             trials[_named(path.relative_to(reproduction.references))].append(trial)
@@ -109,6 +115,21 @@ def store(reproduction: Reproduction, of: Store, reports: Iterable[ClaimReport])
     ]
     troubles = tuple(f"not read: {error}" for error in damaged)
     return Side(f"the store {of.root}", transitions.standings(own), trials, troubles)
+
+
+def _one_of_each(records: Iterable[TrialResult], versions: Mapping[str, Versions]) -> Iterator[TrialResult]:
+    """Return one record of each trial of known conditions: this environment's, or else the newest, as it is judged.
+
+    Args:
+        records: those of a trial one after the other.
+        versions: what this environment has of the packages that a condition depends on, by the condition's id.
+    """
+    for _, several in itertools.groupby(records, key=lambda record: record.id):
+        found = [record for record in several if record.condition in versions]
+        here = [record for record in found if agree(record.provenance, versions[record.condition])]
+        chosen = newest(here or found)
+        if chosen is not None:
+            yield chosen
 
 
 def compare_trials(old: Side, new: Side) -> tuple[DriftReport, DigestCheck]:

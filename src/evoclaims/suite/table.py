@@ -15,6 +15,7 @@ from rich.table import Table
 from evoclaims.core.printable import printable
 from evoclaims.judging.baseline import DriftReport
 from evoclaims.judging.verdict import Outcome
+from evoclaims.suite import mixture
 from evoclaims.suite.console import PlainSpokenConsole
 from evoclaims.suite.report import ClaimReport
 
@@ -43,7 +44,7 @@ def verdict_table(reports: Sequence[ClaimReport], width: int, colour: bool) -> s
         table.add_column("evidence", no_wrap=True, style="dim")
     for report in sorted(reports, key=lambda r: (r.tier, r.claim[:1], len(r.claim), r.claim, r.case)):
         outcome = Outcome(report.outcome)
-        mark = f"{outcome.symbol} {outcome}" + ("*" if report.as_expected else "")
+        mark = f"{outcome.symbol} {outcome}" + "*" * report.as_expected + mixture.MARK * mixture.is_mixed(report)
         cells = (
             _literal(report.name),
             _literal(f"{report.statement} ({report.where})"),
@@ -58,6 +59,7 @@ def verdict_table(reports: Sequence[ClaimReport], width: int, colour: bool) -> s
     captions = [f"evidence: {printable(folder)}/<claim>.json" for folder in folders]
     if any(report.as_expected for report in reports):
         captions.append("* looked into and accepted, see below")
+    captions += mixture.lines(reports)
     return "\n".join([_rendered(table, width, colour), *captions])
 
 
@@ -85,11 +87,15 @@ def totals(reports: Sequence[ClaimReport]) -> str:
 
 def drift_lines(drift: DriftReport, changed: int, compared: int) -> str:
     """Return what the comparison with the committed reference trials found."""
-    found = [f"DRIFT in {row.label}: {row.metric}, p = {row.p_holm:.2g} (Holm)" for row in drift.rows if row.drifted]
+    found = [f"DRIFT in {row.in_words}" for row in drift.rows if row.drifted]
     unchecked = sorted({f"not checked: {row.label}: {row.detail or row.status}" for row in drift.unchecked})
     tested = len(drift.rows) - len(drift.unchecked)
     head = f"reference trials: {tested} comparisons, {len(found)} drifted (exact rank tests, Holm, α = {drift.alpha:g})"
-    bits = f"to the bit: {compared} trials compared with the same machine and versions, {changed} changed"
+    bits = (
+        f"to the bit: {compared} trials compared with the same machine and versions, {changed} changed"
+        if compared
+        else "to the bit: no trial could be compared, since none of the references has the same machine and versions"
+    )
     return "\n".join([head, *found, *unchecked, bits])
 
 

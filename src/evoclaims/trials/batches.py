@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+import math
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from functools import partial
@@ -10,20 +11,52 @@ from functools import partial
 import numpy as np
 
 from evoclaims.core.canonical import content_hash
+from evoclaims.core.packages import short_hash
 from evoclaims.core.provenance import what_fixes_bits
 from evoclaims.trials import checkpoint
 from evoclaims.trials.checkpoint import Header
 from evoclaims.trials.lanes import Lanes, Shares
 from evoclaims.trials.outcome import provenance
 from evoclaims.trials.progress import RunProgress, Watcher
+from evoclaims.trials.result import TrialResult
 from evoclaims.trials.spec import Condition, TrialSpec
 from evoclaims.trials.store import DamagedFileError, Store
-from evoclaims.trials.time_limit import is_final
+from evoclaims.trials.time_limit import answers, is_final
+
+
+@dataclass(frozen=True)
+class StoredTrials:
+    """The trials of a condition that need not be run, since the store has them.
+
+    Attributes:
+        store: where they are kept.
+        condition: whose trials.
+        any_version: take a trial whatever it was made with; else only what this environment's versions have made.
+        time_limit: seconds that a batch may take; a trial that ran out of less time has to be run again.
+    """
+
+    store: Store
+    condition: Condition
+    any_version: bool = False
+    time_limit: float = math.inf
+
+    def get(self, seed: int) -> TrialResult | None:
+        """Return the stored trial of a seed, or None; a `DamagedFileError` for one that cannot be read."""
+        look = self.store.get if self.any_version else self.store.made_with
+        return look(TrialSpec(self.condition, seed).id, self.condition.versions)
+
+    def lacks(self, seed: int) -> bool:
+        """Whether the trial of a seed has to be run."""
+        return not answers(self.get(seed), self.time_limit)
+
+    def answer(self, results: Iterable[TrialResult | None]) -> bool:
+        """Whether none of these trials has to be run."""
+        return all(answers(result, self.time_limit) for result in results)
 
 
 @dataclass(frozen=True)
 class Run:
-    """Where a condition's trials run, where they are kept, and who watches.
+    """Where a condition's trials run, where they are kept, which of them are there, and who watches.
 
     Attributes:
         checkpoint_seconds: least time between two checkpoints.
@@ -31,7 +64,7 @@ class Run:
     """
 
     lanes: Lanes
-    store: Store
+    stored: StoredTrials
     watch: Watcher
     checkpoint_seconds: float
     time_limit: float
@@ -40,6 +73,11 @@ class Run:
     def condition(self) -> Condition:
         """The condition being run."""
         return self.lanes.condition
+
+    @property
+    def store(self) -> Store:
+        """Where its trials are kept."""
+        return self.stored.store
 
 
 @dataclass(frozen=True)
@@ -87,29 +125,30 @@ def batches(run: Run, missing: Sequence[int]) -> Iterator[tuple[Header, Callable
         yield header, partial(_started, run, header)
 
 
-def drop_finished_checkpoints(store: Store, condition: Condition) -> None:
-    """Delete a condition's checkpoints, of whatever platform, whose every trial is stored.
+def drop_finished_checkpoints(stored: StoredTrials) -> None:
+    """Delete a condition's checkpoints, of whatever device, whose every trial is stored.
 
     A kill between the last record and the checkpoint's removal leaves one, and so does a batch that was interrupted on
-    other hardware. What is damaged stays for `evoclaims verify`.
+    other hardware. What is damaged stays for `evoclaims verify`, and what other versions have begun stays for them.
     """
 
     def is_stored(seed: int) -> bool:
         try:
-            return is_final(store.get(TrialSpec(condition, seed).id))
+            return is_final(stored.get(seed))
         except DamagedFileError:
             return False
 
-    for header in checkpoint.sound_ones(store.checkpoints, condition.id):
-        if all(seed is None or is_stored(seed) for seed in header.lanes):
-            checkpoint.remove(store.checkpoints, header)
+    folder, here = stored.store.checkpoints, short_hash(stored.condition.versions)
+    for header in checkpoint.sound_ones(folder, stored.condition.id):
+        if header.versions in ("", here) and all(seed is None or is_stored(seed) for seed in header.lanes):
+            checkpoint.remove(folder, header)
 
 
 def _resumed(run: Run, header: Header) -> Batch:
     """Return an interrupted batch as its checkpoint has it, on the devices."""
     lanes, width = run.lanes, len(header.lanes)
     held = [seed for seed in header.lanes if seed is not None]
-    stored = frozenset(seed for seed in held if is_final(run.store.get(TrialSpec(run.condition, seed).id)))
+    stored = frozenset(seed for seed in held if is_final(run.stored.get(seed)))
     run.watch(RunProgress(run.condition.label, "resuming", len(held) - len(stored)))
     state = checkpoint.restore(run.store.checkpoints, header, lanes.shapes(width))
     if lanes.layout == "alone":
@@ -134,6 +173,7 @@ def _planned(lanes: Lanes, seeds: Sequence[int]) -> Header:
         run_seconds=0.0,
         compile_seconds=0.0,
         started=datetime.now(UTC).isoformat(timespec="seconds"),
+        versions=short_hash(lanes.condition.versions),
     )
 
 
@@ -148,4 +188,4 @@ def _started(run: Run, header: Header) -> Batch:
 def _platform(lanes: Lanes) -> str:
     """Hash what fixes a computation's bits; side by side on several devices, also how many these are."""
     devices = len(lanes.devices) if lanes.layout == "vector" else None
-    return content_hash([what_fixes_bits(provenance(lanes.devices)), lanes.layout, devices])
+    return content_hash([what_fixes_bits(provenance(lanes.devices, lanes.condition)), lanes.layout, devices])

@@ -119,7 +119,7 @@ def replay(condition: Condition, result: TrialResult, parameters: Any, devices: 
                 f"The record of {condition.label}, seed {result.seed}, has no {name} for each of the task's "
                 f"{len(values)} levels, so there is nothing to compare a replay with: it is {result.status}."
             )
-    here, there = what_fixes_bits(provenance(devices)), what_fixes_bits(result.provenance)
+    here, there = what_fixes_bits(provenance(devices, condition)), what_fixes_bits(result.provenance)
     return Replay(
         recorded={name: result.levels[name] for name in again},
         again={name: tuple(map(float, values)) for name, values in again.items()},

@@ -39,6 +39,7 @@ class Header:
         run_seconds: spent on running so far.
         compile_seconds: spent on compiling by the processes that had the batch before.
         started: when the batch began (UTC, ISO 8601).
+        versions: hash of the versions that the condition depends on (`packages.short_hash`); empty in old checkpoints.
         schema: version of this format.
     """
 
@@ -51,6 +52,7 @@ class Header:
     run_seconds: float
     compile_seconds: float
     started: str
+    versions: str = ""
     schema: int = SCHEMA
 
 
@@ -117,6 +119,7 @@ def _is_sound(header: Header) -> bool:
         and all(isinstance(number, int | float) for number in (*points, header.run_seconds, header.compile_seconds))
         and isinstance(header.platform, str)
         and isinstance(header.started, str)
+        and isinstance(header.versions, str)
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import itertools
 import os
@@ -15,8 +16,8 @@ from typing import Final, Literal
 from evoclaims.core.errors import UserError
 from evoclaims.core.printable import printable
 from evoclaims.trials.notice import fresh
-from evoclaims.trials.records import is_hash
-from evoclaims.trials.store import SPARE_DIGITS, DamagedFileError, Store
+from evoclaims.trials.result import TrialResult
+from evoclaims.trials.store import SPARE_DIGITS, DamagedFileError, Store, record_id
 
 SETTLED_SECONDS: Final = 60.0
 """A half-written file younger than this may be another process at work, so it is no leftover yet."""
@@ -85,7 +86,7 @@ def _records(store: Store) -> Iterator[Problem]:
             result = store.read(path)
         except DamagedFileError as error:
             yield Problem(path, "record", error.reason)
-            for champion in store.champion_files(path.stem) if _is_record(store, path) else ():
+            for champion in _champions_of(store, path):
                 yield Problem(champion, "champion", "its trial's record cannot be used")
             continue
         if result is None:
@@ -98,9 +99,22 @@ def _records(store: Store) -> Iterator[Problem]:
                 yield Problem(error.path, "champion", error.reason)
 
 
-def _is_record(store: Store, path: Path) -> bool:
-    """Whether `path` is named and placed as a record is, so that the champion of that name goes with it."""
-    return is_hash(path.stem) and path == store.record_path(path.stem)
+def _champions_of(store: Store, path: Path) -> tuple[Path, ...]:
+    """Return the champions that go with a record that cannot be read: those that no other record names."""
+    trial_id = record_id(path)
+    if trial_id is None or path.parent != store.record_path(trial_id).parent:
+        return ()
+    named = {store.champion_file(result) for result in _sound_records(store, trial_id)}
+    return tuple(champion for champion in store.champion_files(trial_id) if champion not in named)
+
+
+def _sound_records(store: Store, trial_id: str) -> Iterator[TrialResult]:
+    """Read the records of a trial that can be read; what cannot is told of by itself."""
+    for path in store.record_files(trial_id):
+        with contextlib.suppress(DamagedFileError):
+            result = store.read(path)
+            if result is not None:
+                yield result
 
 
 def _champions(store: Store) -> Iterator[Problem]:
@@ -109,19 +123,19 @@ def _champions(store: Store) -> Iterator[Problem]:
         trial_id = path.name.partition(".")[0]
         if not _CHAMPION.fullmatch(path.name) or path.parent != store.champion_path(trial_id).parent:
             yield Problem(path, "champion", "its name or place is not that of a champion")
-        elif not os.path.lexists(store.record_path(trial_id)) and _settled(path):
+        elif not any(map(os.path.lexists, store.record_files(trial_id))) and _settled(path):
             yield Problem(path, "leftover", "it has no record, so its run was stopped before the trial was stored")
         elif len(store.champion_files(trial_id)) > 1 and not _is_named(store, path, trial_id) and _settled(path):
-            yield Problem(path, "leftover", "its trial's record names another champion")
+            yield Problem(path, "leftover", "no record of its trial names it")
 
 
 def _is_named(store: Store, path: Path, trial_id: str) -> bool:
-    """Whether `path` is the champion that the trial's record names; what cannot be read is told of elsewhere."""
+    """Whether `path` is the champion that a record of the trial names; what cannot be read is told of elsewhere."""
     try:
-        result = store.get(trial_id)
+        records = store.records(trial_id)
     except DamagedFileError:
         return True
-    return result is not None and result.champion != "" and store.champion_file(result) == path
+    return any(result.champion != "" and store.champion_file(result) == path for result in records)
 
 
 def _checkpoints(store: Store, fault: Callable[[Path], str | None]) -> Iterator[Problem]:

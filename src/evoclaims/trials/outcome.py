@@ -10,6 +10,7 @@ import jax
 import numpy as np
 from numpy.typing import NDArray
 
+from evoclaims.core.packages import DEPENDS_ON
 from evoclaims.core.provenance import collect
 from evoclaims.methods.base import Method, PartlyUsed
 from evoclaims.trials.arrays import pack
@@ -17,7 +18,7 @@ from evoclaims.trials.curriculum import NEVER
 from evoclaims.trials.devices import MATMUL_PRECISION
 from evoclaims.trials.program import Report, Score
 from evoclaims.trials.result import Status, TrialResult, digest
-from evoclaims.trials.spec import TrialSpec
+from evoclaims.trials.spec import Condition, TrialSpec
 
 
 def curve_point(spec_cost: int, report: Report, lane: int) -> dict[str, float]:
@@ -117,7 +118,7 @@ def _record(
         curves=plain_curves,
         digest=digest(status, metrics, levels, plain_curves, champion),
         timing={**timing, "ended": datetime.now(UTC).isoformat(timespec="seconds")},
-        provenance=provenance(devices),
+        provenance=provenance(devices, spec.condition),
     )
 
 
@@ -131,10 +132,17 @@ def are_finite(*arrays: NDArray[Any]) -> bool:
     return all(bool(np.all(np.isfinite(array))) for array in arrays)
 
 
-def provenance(devices: Sequence[jax.Device]) -> dict[str, Any]:
-    """Return the process's provenance, with the devices and the precision that the trials really use."""
+def provenance(devices: Sequence[jax.Device], condition: Condition) -> dict[str, Any]:
+    """Return the process's provenance, with the devices, the precision and the packages that trials really use."""
+    found = collect()
     device = {"platform": devices[0].platform, "kind": devices[0].device_kind, "count": len(devices)}
-    return {**collect(), "device": device, "matmul_precision": MATMUL_PRECISION}
+    return {
+        **found,
+        "versions": {**found["versions"], **condition.versions},
+        DEPENDS_ON: list(condition.packages),
+        "device": device,
+        "matmul_precision": MATMUL_PRECISION,
+    }
 
 
 def named_leaves(tree: Any) -> dict[str, NDArray[Any]]:

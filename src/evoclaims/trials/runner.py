@@ -16,7 +16,7 @@ import numpy as np
 from evoclaims.core.errors import UserError
 from evoclaims.trials import checkpoint
 from evoclaims.trials.allowance import Allowance, OutOfTimeError
-from evoclaims.trials.batches import Batch, Run, batches, drop_finished_checkpoints
+from evoclaims.trials.batches import Batch, Run, StoredTrials, batches, drop_finished_checkpoints
 from evoclaims.trials.checkpoint import Header
 from evoclaims.trials.devices import single_threaded_linear_algebra
 from evoclaims.trials.lanes import Lanes
@@ -28,7 +28,7 @@ from evoclaims.trials.progress import RunProgress, Watcher, ignore
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.spec import Condition, TrialSpec
 from evoclaims.trials.store import Store
-from evoclaims.trials.time_limit import answers, is_final
+from evoclaims.trials.time_limit import is_final
 
 _log = logging.getLogger(__name__)
 
@@ -44,8 +44,12 @@ def run(
     watch: Watcher = ignore,
     checkpoint_seconds: float = CHECKPOINT_SECONDS,
     time_limit: float = math.inf,
+    any_version: bool = False,
 ) -> list[TrialResult]:
     """Return the trials of `condition` with these seeds, running those that the store lacks.
+
+    A stored trial that was made with other versions than this environment's is run again, and both records stay; with
+    `any_version` it counts as it is.
 
     Each trial is stored as soon as it has ended; a kill at any moment loses at most the time since the last
     checkpoint, from which the same call goes on to the same bits (on the same kind of device and versions).
@@ -57,12 +61,9 @@ def run(
     Raises:
         UserError: when the store is damaged or cannot be written, or the device's memory does not hold the batch.
     """
-    specs = {seed: TrialSpec(condition, seed) for seed in seeds}
-
-    def missing() -> list[int]:
-        return [seed for seed, spec in specs.items() if not answers(store.get(spec.id), time_limit)]
-
-    while missing():
+    stored = StoredTrials(store, condition, any_version, time_limit)
+    wanted = list(dict.fromkeys(seeds))
+    while not stored.answer(found := [stored.get(seed) for seed in wanted]):
         store.check_writable()
         wait_while_others_run(
             store.root, condition.id, lambda text: watch(RunProgress(condition.label, text, len(seeds)))
@@ -70,14 +71,13 @@ def run(
         with Notice(store.root, condition.id) as notice:
             if notice.other is not None:
                 continue  # another process was faster: wait for it, then look again
-            owed = missing()
-            one = Run(Lanes(condition, devices), store, watch, checkpoint_seconds, time_limit)
+            owed = [seed for seed in wanted if stored.lacks(seed)]
+            one = Run(Lanes(condition, devices), stored, watch, checkpoint_seconds, time_limit)
             with single_threaded_linear_algebra(), _memory_told(condition, len(owed)):
                 for header, begin in batches(one, owed):
                     _finish(one, header, begin)
-    drop_finished_checkpoints(store, condition)
-    results = [store.get(spec.id) for spec in specs.values()]
-    return [result for result in results if result is not None]
+    drop_finished_checkpoints(stored)
+    return [result for result in found if result is not None]
 
 
 @contextmanager
@@ -186,7 +186,7 @@ def _give_up(run: Run, header: Header) -> None:
     owed = [
         TrialSpec(run.condition, seed)
         for seed in header.lanes
-        if seed is not None and not is_final(run.store.get(TrialSpec(run.condition, seed).id))
+        if seed is not None and not is_final(run.stored.get(seed))
     ]
     for spec in owed:
         run.store.put(make_timeout(spec, header.curves[str(spec.seed)], timing, run.lanes.devices), {})

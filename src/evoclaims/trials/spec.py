@@ -8,6 +8,7 @@ from typing import Any, Literal, get_args
 
 from evoclaims.core.canonical import as_plain, content_hash
 from evoclaims.core.errors import UnknownNameError, UserError
+from evoclaims.core.packages import ALWAYS, installed, packages_of
 from evoclaims.envs.base import Task
 from evoclaims.methods.base import Method
 from evoclaims.trials.budget import Budget
@@ -60,6 +61,19 @@ class Condition:
     def id(self) -> str:
         """SHA-256 of the canonical JSON of the condition, revisions included."""
         return content_hash(self.plain)
+
+    @cached_property
+    def packages(self) -> tuple[str, ...]:
+        """The packages that compute the trials: those of every trial, and those that method and task declare.
+
+        They are no part of the id: their versions tell apart the records that one trial may have.
+        """
+        return tuple(sorted({*ALWAYS, *packages_of(self.method), *packages_of(self.task)}))
+
+    @property
+    def versions(self) -> dict[str, str | None]:
+        """The versions of `packages` in this environment: a stored trial made with others does not answer for it."""
+        return installed(self.packages)
 
     @property
     def label(self) -> str:

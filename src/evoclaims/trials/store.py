@@ -1,4 +1,8 @@
-"""The trial store: one sealed JSON file per trial, named by its content hash, and the champion beside it.
+"""The trial store: sealed JSON files named by content hashes, and champions beside them.
+
+A trial has one record for each set of versions that it was run with: `trials/ab/<id>.<hash>.json`, whose hash is of the
+versions that its condition depends on. Records of older releases, which do not say what they depend on, are
+`trials/ab/<id>.json`.
 
 No locks and no server: files are whole or absent, and a file's name follows from its contents, so that several
 processes may share a store and a store copied over another merges with it.
@@ -19,6 +23,7 @@ from numpy.typing import NDArray
 
 from evoclaims.core.errors import UserError
 from evoclaims.core.files import read_file, write_atomically
+from evoclaims.core.packages import SHORT_HASH, Versions, agree, depends_on, recorded, short_hash
 from evoclaims.trials.arrays import pack, unpack
 from evoclaims.trials.once import write_once
 from evoclaims.trials.records import RecordError, dump, is_hash, parse
@@ -30,6 +35,8 @@ DEFAULT_ROOT: Final = Path(".evoclaims")
 
 SPARE_DIGITS: Final = 16
 """Digits of a champion's hash in the name of a file beside the usual one."""
+
+_RECORD: Final = re.compile(rf"([0-9a-f]{{64}})(?:\.([0-9a-f]{{{SHORT_HASH}}}))?\.json")
 
 Put = Literal["stored", "present", "differs"]
 """What became of a trial handed to the store: written; there already, equal to the bit; there with another digest."""
@@ -63,9 +70,20 @@ class Store:
         """The folder of interrupted conditions' checkpoints."""
         return self.root / "checkpoints"
 
-    def record_path(self, trial_id: str) -> Path:
-        """Return where the record of `trial_id` belongs; a `UserError` for a text that is not an id."""
-        return self.root / "trials" / _checked(trial_id)[:2] / f"{trial_id}.json"
+    def record_path(self, trial_id: str, versions: Versions | None = None) -> Path:
+        """Return where the record of `trial_id` belongs; a `UserError` for a text that is not an id.
+
+        Args:
+            trial_id: the trial.
+            versions: of the packages that it depends on; None for a record that does not say on which.
+        """
+        name = f"{_checked(trial_id)}.json" if versions is None else f"{trial_id}.{short_hash(versions)}.json"
+        return self.root / "trials" / trial_id[:2] / name
+
+    def record_files(self, trial_id: str) -> tuple[Path, ...]:
+        """Return the files that may hold a record of `trial_id`, whatever versions it was made with."""
+        usual = self.record_path(trial_id)
+        return (usual, *(path for path in _entries(usual.parent) if path != usual and record_id(path) == trial_id))
 
     def champion_path(self, trial_id: str) -> Path:
         """Return where the champion of `trial_id` belongs; a `UserError` for a text that is not an id."""
@@ -81,6 +99,10 @@ class Store:
         """Return the file that holds the champion which a record of this store names."""
         spare = self._spare_champion_path(result.id, result.champion)
         return spare if os.path.exists(spare) else self.champion_path(result.id)
+
+    def has_champion(self, result: TrialResult) -> bool:
+        """Whether the champion that a record names, of this store or not, is here."""
+        return result.champion != "" and _sha256(self.champion_file(result)) == result.champion
 
     def _spare_champion_path(self, trial_id: str, champion: str) -> Path:
         """Return where a champion goes when the usual place holds another one."""
@@ -112,21 +134,58 @@ class Store:
                 "folder with --claims-storage (pytest) or --storage (evoclaims)."
             ) from error
 
-    def get(self, trial_id: str) -> TrialResult | None:
-        """Return the stored trial, or None when there is none.
+    def made_with(self, trial_id: str, versions: Versions) -> TrialResult | None:
+        """Return the record that was made with these versions, or None when there is none.
+
+        This is what answers for an environment: what is asked before a trial is run.
+
+        Args:
+            trial_id: the trial.
+            versions: of all packages that its condition depends on (`Condition.versions`).
 
         Raises:
-            DamagedFileError: when its file is torn, edited, foreign or unreadable.
+            DamagedFileError: when a file that may hold it is torn, edited, foreign or unreadable.
         """
-        return self.read(self.record_path(trial_id))
+        usual = (self.record_path(trial_id, versions), self.record_path(trial_id))
+        for path in usual:
+            result = self.read(path)
+            if result is not None and agree(result.provenance, versions):
+                return result
+        # A record made when its condition declared other packages is named by these.
+        rest = (self._sound(path) for path in self.record_files(trial_id) if path not in usual)
+        return next((result for result in rest if result is not None and agree(result.provenance, versions)), None)
+
+    def get(self, trial_id: str, versions: Versions | None = None) -> TrialResult | None:
+        """Return the record of a trial, whatever versions it was made with, or None when there is none.
+
+        This is what is asked where trials at hand are judged, or looked at. Of several records the one made with
+        `versions` comes first, then the newest.
+
+        Raises:
+            DamagedFileError: when a file that may hold it is torn, edited, foreign or unreadable.
+        """
+        found = None if versions is None else self.made_with(trial_id, versions)
+        return newest(self.records(trial_id)) if found is None else found
+
+    def records(self, trial_id: str) -> tuple[TrialResult, ...]:
+        """Return all records of a trial: one for each set of versions that it was run with; raises as `get` does."""
+        return tuple(result for path in self.record_files(trial_id) if (result := self.read(path)) is not None)
+
+    def _sound(self, path: Path) -> TrialResult | None:
+        """Read a record that is only one of several; `evoclaims verify` tells of a damaged one."""
+        try:
+            return self.read(path)
+        except DamagedFileError:
+            return None
 
     def read(self, path: Path) -> TrialResult | None:
         """Return the trial in the record file `path` of this store, or None when the file is not there.
 
         Raises:
-            DamagedFileError: as for `get`, and when the file is not named and placed as a record is.
+            DamagedFileError: when it is torn, edited, foreign or unreadable, or not named and placed as a record is.
         """
-        if not is_hash(path.stem) or path != self.record_path(path.stem):
+        trial_id = record_id(path)
+        if trial_id is None or path.parent != self.record_path(trial_id).parent:
             raise DamagedFileError(path, "its name or place is not that of a trial record")
         try:
             data = read_file(path)
@@ -138,17 +197,33 @@ class Store:
             result = parse(data)
         except RecordError as error:
             raise DamagedFileError(path, error.reason) from error
-        if result.id != path.stem:
+        if result.id != trial_id:
             raise DamagedFileError(path, f"it holds another trial, {result.id}")
+        if path.name not in (f"{trial_id}.json", self.home(result).name):
+            raise DamagedFileError(path, "its name is not that of the versions that it was made with")
         return result
+
+    def home(self, result: TrialResult) -> Path:
+        """Return where a record belongs."""
+        packages = depends_on(result.provenance)
+        versions = None if packages is None else recorded(result.provenance, packages)
+        return self.record_path(result.id, versions)
+
+    def _present(self, result: TrialResult) -> TrialResult | None:
+        """Return the record that is there already for a trial and the versions that it was made with."""
+        packages = depends_on(result.provenance)
+        if packages is None:
+            return self.read(self.record_path(result.id))
+        return self.made_with(result.id, recorded(result.provenance, packages))
 
     def put(self, result: TrialResult, champion: Mapping[str, Any]) -> Put:
         """Store a trial and its champion's parameters (named arrays of any shape; empty for none).
 
-        The champion is written first, so that a record that exists is complete. A trial that is there already
-        stays as it is, whatever its digest, with one exception: neither a crash nor the end of its time is an outcome
-        of the trial, so a trial run again takes its place (see `_gives_way`). Of processes that put the same trial at
-        the same time, the first record stays and keeps its own champion: no champion is ever written over another.
+        The champion is written first, so that a record that exists is complete. A trial that is there already, made
+        with the same versions, stays as it is, whatever its digest, with one exception: neither a crash nor the end of
+        its time is an outcome of the trial, so a trial run again takes its place (see `_gives_way`). Of processes that
+        put the same trial at the same time, the first record stays and keeps its own champion: no champion is ever
+        written over another.
 
         Returns:
             "stored", "present" (there already with an equal digest) or "differs" (there with another digest).
@@ -164,32 +239,34 @@ class Store:
             parse(record)
         except RecordError as error:  # a mistake in the program: found here rather than by the next reader
             raise ValueError(str(error)) from error
-        present = self.get(result.id)
+        present = self._present(result)
         if present is not None and not _gives_way(present, result):
             return "present" if present.digest == result.digest else "differs"
         mark(self.root)
         if packed:
             self._write_champion(sealed, packed)
-        path = self.record_path(result.id)
+        path = self.home(result)
         if present is None and write_once(path, record):
             return "stored"
-        first = self.get(result.id)
+        first = self._present(result)
         if present is None and first is not None:  # another process was faster
             self._remove_champion_beside(first, sealed)
             return self.put(result, champion)
         write_atomically(path, record)
         return "stored"
 
-    def forget_timeouts(self, trial_ids: Iterable[str]) -> None:
-        """Remove the records of those trials that ran out of time, so that they are run again; they have no champion.
+    def forget_timeouts(self, trial_ids: Iterable[str], versions: Versions) -> None:
+        """Remove the records of these trials, made with these versions, that ran out of time: they are run again.
+
+        They have no champion.
 
         Raises:
             DamagedFileError: when a record is torn, edited, foreign or unreadable.
             UserError: when a record cannot be removed.
         """
-        for trial_id in trial_ids:
-            if (present := self.get(trial_id)) is not None and present.status == "timeout":
-                path = self.record_path(trial_id)
+        for path in (path for trial_id in trial_ids for path in self.record_files(trial_id)):
+            present = self.read(path)
+            if present is not None and present.status == "timeout" and agree(present.provenance, versions):
                 try:
                     path.unlink(missing_ok=True)
                 except OSError as error:
@@ -203,7 +280,9 @@ class Store:
 
     def _remove_champion_beside(self, first: TrialResult, sealed: TrialResult) -> None:
         """Remove the champion of a trial that another process has stored first with another champion."""
-        for path in self.champion_files(sealed.id) if first.champion != sealed.champion else ():
+        if sealed.champion in {first.champion, *(record.champion for record in self.records(sealed.id))}:
+            return
+        for path in self.champion_files(sealed.id):
             if _sha256(path) == sealed.champion:
                 path.unlink(missing_ok=True)
 
@@ -237,11 +316,14 @@ class Store:
 
     def ids(self) -> tuple[str, ...]:
         """Return the sorted ids of the stored trials, by file name alone; the files are not opened."""
-        paths = self.record_paths()
-        return tuple(path.stem for path in paths if is_hash(path.stem) and path == self.record_path(path.stem))
+        named = ((record_id(path), path) for path in self.record_paths())
+        return tuple(sorted({one for one, path in named if one and path.parent == self.record_path(one).parent}))
 
     def results(self, errors: list[DamagedFileError]) -> Iterator[TrialResult]:
-        """Iterate over every sound trial in the order of ids; append one error to `errors` for each bad file."""
+        """Iterate over every sound record in the order of ids; append one error to `errors` for each bad file.
+
+        A trial that was run with several versions has several records.
+        """
         for path in self.record_paths():
             try:
                 result = self.read(path)
@@ -265,6 +347,17 @@ def _gives_way(present: TrialResult, result: TrialResult) -> bool:
     if present.status == "timeout":
         return result.status != "timeout" or time_allowed(result) > time_allowed(present)
     return present.status == "crashed" and present.digest != result.digest
+
+
+def record_id(path: Path) -> str | None:
+    """Return the id of the trial that a file is named as a record of; None when its name is no record's."""
+    named = _RECORD.fullmatch(path.name)
+    return named[1] if named else None
+
+
+def newest(results: Iterable[TrialResult]) -> TrialResult | None:
+    """Return the record that was made last; None without any. One that does not say when is older than others."""
+    return max(results, key=lambda result: str(result.timing.get("ended", "")), default=None)
 
 
 def _sha256(path: Path) -> str:

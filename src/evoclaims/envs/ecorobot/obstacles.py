@@ -14,7 +14,7 @@ from evoclaims.core.pytree import pytree
 from evoclaims.envs.ecorobot.boxes import Box
 from evoclaims.envs.ecorobot.locomotion import forward
 from evoclaims.envs.ecorobot.pose import Pose
-from evoclaims.envs.ecorobot.robot_task import Outing, RobotTask, Ruling
+from evoclaims.envs.ecorobot.robot_task import PACKAGES, Outing, RobotTask, Ruling
 from evoclaims.envs.ecorobot.robots import HALF_CHEETAH, Robot
 
 Heights = Literal["hierarchical", "medium", "high"]
@@ -46,6 +46,7 @@ class Obstacles(RobotTask):
 
     name: ClassVar[str] = "obstacles"  # type: ignore[misc]
     revision: ClassVar[int] = 1
+    packages: ClassVar[tuple[str, ...]] = PACKAGES
 
     robot: Robot = HALF_CHEETAH
     heights: Heights = "hierarchical"

@@ -65,6 +65,7 @@ class SimpleAlu(Circuit):
 
     name: ClassVar[str] = "simple_alu"
     revision: ClassVar[int] = 1
+    packages: ClassVar[tuple[str, ...]] = ()
 
     level_count: int = 9
     operations: OperationList = "paper"

@@ -27,6 +27,7 @@ class CumulativeParity(Circuit):
 
     name: ClassVar[str] = "cumulative_parity"
     revision: ClassVar[int] = 1
+    packages: ClassVar[tuple[str, ...]] = ()
 
     bits: int = 6
     sampling: Sampling = "exhaustive"

@@ -24,6 +24,7 @@ class NParity(Circuit):
 
     name: ClassVar[str] = "n_parity"
     revision: ClassVar[int] = 1
+    packages: ClassVar[tuple[str, ...]] = ()
 
     bits: int = 6
     sampling: Sampling = "exhaustive"

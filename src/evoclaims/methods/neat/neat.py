@@ -20,6 +20,7 @@ class Neat:
 
     name: ClassVar[str] = "neat"
     revision: ClassVar[int] = 1
+    packages: ClassVar[tuple[str, ...]] = ()
 
     settings: Settings = PAPER
 

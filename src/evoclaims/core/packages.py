@@ -1,0 +1,110 @@
+"""The packages that a computation depends on: what declares them, and in which versions they are here or were there."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import importlib.metadata
+from collections.abc import Iterator, Mapping
+from typing import Any, Final
+
+from evoclaims.core.canonical import content_hash
+from evoclaims.core.errors import UserError
+from evoclaims.core.provenance import PACKAGES
+
+Versions = Mapping[str, str | None]
+"""Versions of packages by name; None where one is not installed."""
+
+ALWAYS: Final = ("jax", "jaxlib", "numpy")
+"""What computes every trial."""
+
+UNDECLARED: Final = tuple(name for name in PACKAGES if name not in ("evoclaims", *ALWAYS))
+"""What a component without a declaration may depend on. Of evoclaims itself the revisions tell, in a trial's id."""
+
+DEPENDS_ON: Final = "depends_on"
+"""Name under which a trial's provenance lists the packages that its condition depends on."""
+
+SHORT_HASH: Final = 16
+"""Digits of a hash of versions in a file's name."""
+
+
+def packages_of(component: Any) -> tuple[str, ...]:
+    """Return the packages beyond `ALWAYS` that a method or task depends on, by what it declares as its `packages`.
+
+    One that declares nothing is taken to depend on every package whose version is recorded. What it holds in its fields
+    counts as well: another method or task that it wraps, and any part, such as a network, that declares something.
+
+    Raises:
+        UserError: when some `packages` are not a tuple of names.
+    """
+    declared = getattr(component, "packages", UNDECLARED)
+    if not isinstance(declared, tuple) or not all(isinstance(name, str) for name in declared):
+        raise UserError(
+            f"The packages of {getattr(component, 'name', component)} are {declared!r}; write a tuple of their names, "
+            'such as packages = ("optax",), or () when it needs nothing beyond jax and numpy.'
+        )
+    return tuple(sorted({*declared, *(name for part in _parts(component) for name in packages_of(part))}))
+
+
+def _parts(component: Any) -> Iterator[Any]:
+    """Give what a component holds in its fields that has packages of its own: wrapped components, declaring parts."""
+    held: list[Any] = [component]
+    while held:
+        one = held.pop()
+        if isinstance(one, Mapping):
+            inner = list(one.values())
+        elif isinstance(one, tuple | list):
+            inner = list(one)
+        elif dataclasses.is_dataclass(one):
+            inner = [getattr(one, field.name) for field in dataclasses.fields(one)]
+        else:
+            continue
+        for part in inner:
+            if hasattr(part, "packages") or (hasattr(part, "revision") and hasattr(part, "step")):
+                yield part
+            else:
+                held.append(part)
+
+
+def installed(packages: tuple[str, ...]) -> dict[str, str | None]:
+    """Return the versions of packages in this process's environment."""
+    return {name: _installed(name) for name in packages}
+
+
+@functools.cache
+def _installed(package: str) -> str | None:
+    """Return a package's version; cached because what is imported does not change under a running process."""
+    try:
+        return importlib.metadata.version(package)
+    except importlib.metadata.PackageNotFoundError:
+        return None
+
+
+def recorded(provenance: Mapping[str, Any], packages: tuple[str, ...]) -> dict[str, str | None]:
+    """Return the versions of packages that a provenance records; None where it records none."""
+    versions = provenance.get("versions")
+    return {name: versions.get(name) if isinstance(versions, Mapping) else None for name in packages}
+
+
+def depends_on(provenance: Mapping[str, Any]) -> tuple[str, ...] | None:
+    """Return the packages that a provenance says its trial depends on; None for one that does not say, as old ones."""
+    names = provenance.get(DEPENDS_ON)
+    if not isinstance(names, list | tuple) or not all(isinstance(name, str) for name in names):
+        return None
+    return tuple(names)
+
+
+def agree(provenance: Mapping[str, Any], versions: Versions) -> bool:
+    """Whether a provenance records exactly these versions."""
+    return recorded(provenance, tuple(versions)) == dict(versions)
+
+
+def short_hash(versions: Versions) -> str:
+    """Return what stands for versions in a file's name."""
+    return content_hash(dict(versions))[:SHORT_HASH]
+
+
+def differences(old: Versions, new: Versions) -> dict[str, tuple[str | None, str | None]]:
+    """Return the packages whose versions differ, with both."""
+    names = sorted(old.keys() | new.keys())
+    return {name: (old.get(name), new.get(name)) for name in names if old.get(name) != new.get(name)}
