@@ -40,7 +40,10 @@ def main(options: argparse.Namespace) -> int:
         committed = sum(trial.condition == condition.id for trial in references.load(path))
         needed = max(committed, sizes[0])
         if size < needed:
-            print(f"left alone: {method} on {task}: {len(results)} of {needed} trials are stored")
+            print(
+                f"left alone: {method} on {task}: {len(results)} of {needed} trials are stored, counted from the first "
+                "seed and of one environment"
+            )
             continue
         references.write(path, results[:size])
         written += 1

@@ -6,7 +6,7 @@ from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from evoclaims.core.packages import Versions, installed, recorded
+from evoclaims.core.packages import Versions, differences, installed, recorded
 from evoclaims.trials.result import TrialResult
 
 
@@ -35,13 +35,8 @@ def installed_for(source: Mapping[str, Any]) -> dict[str, str | None]:
 
 def change(old: Versions, new: Versions) -> str:
     """Return in words which versions differ, such as "evosax 0.3.2 -> 0.3.3"; empty when none does."""
-    names = sorted(old.keys() | new.keys())
-    moved = (
-        f"{name} {old.get(name) or 'none'} -> {new.get(name) or 'none'}"
-        for name in names
-        if old.get(name) != new.get(name)
-    )
-    return ", ".join(moved)
+    moved = differences(old, new).items()
+    return ", ".join(f"{name} {was or 'none'} -> {now or 'none'}" for name, (was, now) in moved)
 
 
 def in_words(versions: Iterable[str | None]) -> str:
