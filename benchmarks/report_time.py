@@ -100,7 +100,7 @@ def fill(store: Store, index: int, trials: int) -> None:
     condition = Condition(HandBuilt(), NParity(3), "curriculum", Budget(generations=index + 1))
     for seed in range(trials):
         result = record(condition, seed)
-        path = store.record_path(result.id)
+        path = store.home(result)
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_bytes(dump(result))
 

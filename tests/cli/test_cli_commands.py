@@ -267,7 +267,7 @@ def test_plan_times_a_few_steps_where_it_is_asked_to_and_stores_none(evoclaims: 
 
 def test_verify_moves_bad_files_aside_and_the_trials_run_again(evoclaims: Evoclaims, stored: Store) -> None:
     assert evoclaims("verify")[:2] == (0, "20 trials in .evoclaims, 0 problems\n")
-    record = stored.record_path(stored.ids()[3])
+    record = stored.record_files(stored.ids()[3])[-1]
     record.write_bytes(record.read_bytes()[:50])
     stored.checkpoints.mkdir()
     (stored.checkpoints / "torn.npz").write_bytes(b"PK")

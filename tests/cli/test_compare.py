@@ -208,10 +208,10 @@ def test_a_damaged_record_is_said_and_the_rest_is_compared(evoclaims: Evoclaims,
     for name in ("one", "other"):
         _copy(project.store, Path(name), lambda trial: trial, "hand_built")
     store = Store(Path("other"))
-    store.record_path(store.ids()[0]).write_text("torn")
+    store.record_files(store.ids()[0])[-1].write_text("torn")
     _, out, _ = evoclaims("compare", "one", "other")
     assert "  a (smoke): supported -> error" in out
-    assert f"not read: Cannot use {store.record_path(store.ids()[0])}: it is not one whole JSON text" in out
+    assert f"not read: Cannot use {store.record_files(store.ids()[0])[-1]}: it is not one whole JSON text" in out
 
 
 def test_a_timeline_shows_the_versions_that_differ(accepted: Evoclaims) -> None:

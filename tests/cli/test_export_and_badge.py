@@ -85,7 +85,7 @@ def test_verdicts_are_exported_one_row_a_claim(stored: Evoclaims) -> None:
 
 def test_a_damaged_record_is_left_out_and_said(stored: Evoclaims) -> None:
     store = Store(Path(".evoclaims"))
-    path = store.record_path(store.ids()[0])
+    path = store.record_files(store.ids()[0])[-1]
     path.write_text("torn")
     status, out, err = stored("export")
     assert (status, out) == (1, "wrote trials.json: 11 trials\n")

@@ -136,10 +136,12 @@ def test_a_torn_reference_fails_the_run_and_does_not_keep_the_verdicts_from_bein
 
 
 def test_a_damaged_record_is_an_error_of_the_claims_that_need_it(project: Any, sentence: Sentence) -> None:
+    from evoclaims.trials.store import Store
+
     project.write(a="supported", b="refuted")
     project.run(own_store=True)
     trials = json.loads((project.path / ".evoclaims/verdicts/smoke/a.json").read_text())["sources"][0]["trials"]
-    record = project.path / ".evoclaims" / "trials" / trials[3][:2] / f"{trials[3]}.json"
+    record = Store(project.path / ".evoclaims").record_files(trials[3])[-1]
     record.write_bytes(record.read_bytes()[:99])
     result = project.run("--claims-only=a", own_store=True)
     assert result.ret == 1
