@@ -87,7 +87,12 @@ def test_a_run_without_claims_leaves_no_old_verdicts_behind(project: Any) -> Non
     assert project.run("--claims-json=out.json", "--collect-only").ret == 0
     assert (project.path / "out.json").read_text() == "of an earlier run"
     assert project.run("--claims-json=out.json").ret == 0
-    assert json.loads((project.path / "out.json").read_text()) == {"schema": 1, "claims": [], "drift": None, "upgrade": None}
+    assert json.loads((project.path / "out.json").read_text()) == {
+        "schema": 1,
+        "claims": [],
+        "drift": None,
+        "upgrade": None,
+    }
 
 
 def test_claims_skipped_in_workers_are_known_to_the_controller(project: Any) -> None:

@@ -66,6 +66,9 @@ def main(options: argparse.Namespace) -> int:
             failed += 1
             continue
         print(name)
+        again = len(fetch.again.get(tier.condition(method, task).id, ()))
+        if again:
+            print(f"  {again} of these were run again, since the stored ones were made with other versions")
         for result in results:
             print(f"  {describe(result)}")
     if failed and len(chosen) > 1:

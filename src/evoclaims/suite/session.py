@@ -99,7 +99,10 @@ class Session:
         return references.compare(cases)
 
     def upgrade(self, reports: Sequence[ClaimReport]) -> Upgrade:
-        """Compare the trials behind `reports` with those that the store holds of other versions."""
+        """Compare the trials behind `reports` with those that the store holds of other versions.
+
+        Conditions that are judged from other versions' trials themselves are left out.
+        """
         successions = []
         for used in self._used(reports):
             condition, trials = used.condition, self._trials(used)
@@ -112,7 +115,7 @@ class Session:
                 for record in self.store.records(TrialSpec(condition, seed).id)
             ]
             before = predecessors(records, here)
-            if now and before:
+            if before and len(now) == len(trials):
                 old = recorded(before[0].provenance, condition.packages)
                 label = f"{used.method} on {used.task} ({used.tier})"
                 successions.append(Succession(label, old, here, before, now, len(used.again)))
