@@ -48,7 +48,7 @@ def test_every_trial_is_read_once_for_all_claims(filled: Laboratory, monkeypatch
     reports = [filled.judge(better_wins, id=name) for name in ("T1", "T2", "T3")]
     asked: list[str] = []
     get = Archive.get
-    monkeypatch.setattr(Archive, "get", lambda self, trial: asked.append(trial) or get(self, trial))
+    monkeypatch.setattr(Archive, "get", lambda self, trial, versions: asked.append(trial) or get(self, trial, versions))
     page = filled.page(*reports)
     assert len(asked) == len(set(asked)) == 12
     assert len(page.conditions) == 2

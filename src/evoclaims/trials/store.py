@@ -101,8 +101,9 @@ class Store:
         return spare if os.path.exists(spare) else self.champion_path(result.id)
 
     def has_champion(self, result: TrialResult) -> bool:
-        """Whether the champion that a record names, of this store or not, is here."""
-        return result.champion != "" and _sha256(self.champion_file(result)) == result.champion
+        """Whether a record of this store names the same champion, and its file is there; damaged or not."""
+        named = any(record.champion == result.champion != "" for record in self.records(result.id))
+        return named and self.champion_file(result).exists()
 
     def _spare_champion_path(self, trial_id: str, champion: str) -> Path:
         """Return where a champion goes when the usual place holds another one."""
