@@ -88,7 +88,7 @@ class Summary:
 
     def _compare_with_predecessors(self) -> None:
         """Compare the trials of this environment with those that other versions have left in the store."""
-        if self.reports and not self._config.getoption("claims_committed"):
+        if self.reports:
             self._upgrade = self._make_session(self._config).upgrade(self.reports)
 
     def _compare_with_accepted(self) -> None:

@@ -89,6 +89,13 @@ def test_a_part_of_a_conditions_trials_runs_again_alone(project: Any, aged: Call
     assert "right on parity (smoke): 3 trials run again, 3 of 3 not the same to the bit as before" in lines
 
 
+def test_a_claim_that_looks_at_no_trial_compares_none(project: Any, aged: Callable[..., None]) -> None:
+    aged(10)
+    lines = _lines(project.run("--claims-trials=2", own_store=True))
+    assert "claims: 1 inconclusive" in lines
+    assert not [line for line in lines if line.startswith(("versions changed", "error:"))]
+
+
 def test_bits_are_not_said_to_be_unchanged_where_versions_differ(project: Any, aged: Callable[..., None]) -> None:
     from evoclaims.suite import references
     from evoclaims.trials.store import Store

@@ -80,7 +80,7 @@ class RunMissing:
         versions = spec.condition.versions
         if self.store.record_path(spec.id, versions).exists():  # without reading it: the usual case
             return False
-        return bool(self.store.records(spec.id)) and self.store.made_with(spec.id, versions) is None
+        return bool(self.store.others(spec.id, versions)) and self.store.made_with(spec.id, versions) is None
 
 
 @dataclass(frozen=True)

@@ -109,13 +109,10 @@ class Session:
             here = condition.versions
             now = tuple(trial for trial in trials if agree(trial.provenance, here))
             protocol = self.reproduction.tier(used.tier).protocol
-            records = [
-                record
-                for seed in {*protocol.seeds(protocol.last.n), *(trial.seed for trial in now)}
-                for record in self.store.records(TrialSpec(condition, seed).id)
-            ]
-            before = predecessors(records, here)
-            if before and len(now) == len(trials):
+            seeds = {*protocol.seeds(protocol.last.n), *(trial.seed for trial in now)}
+            others = (self.store.others(TrialSpec(condition, seed).id, here) for seed in seeds)
+            before = predecessors([record for several in others for record in several], condition.packages)
+            if now and before and len(now) == len(trials):
                 old = recorded(before[0].provenance, condition.packages)
                 label = f"{used.method} on {used.task} ({used.tier})"
                 successions.append(Succession(label, old, here, before, now, len(used.again)))

@@ -110,19 +110,18 @@ def upgrade(successions: Sequence[Succession]) -> Upgrade:
     return Upgrade(tuple(successions), check_drift(cases))
 
 
-def predecessors(records: Iterable[TrialResult], here: Versions) -> tuple[TrialResult, ...]:
-    """Return the records that the newest other environment has made, of a condition's records of all environments.
+def predecessors(records: Sequence[TrialResult], packages: tuple[str, ...]) -> tuple[TrialResult, ...]:
+    """Return the records that the newest environment has made.
 
     Args:
-        records: of any trials of one condition.
-        here: versions of the packages that it depends on.
+        records: of trials of one condition, made with other versions than this environment's.
+        packages: what the condition depends on.
     """
-    others = [record for record in records if not agree(record.provenance, here)]
-    last = newest(others)
+    last = newest(records)
     if last is None:
         return ()
-    made_with = recorded(last.provenance, tuple(here))
-    return tuple(record for record in others if agree(record.provenance, made_with))
+    made_with = recorded(last.provenance, packages)
+    return tuple(record for record in records if agree(record.provenance, made_with))
 
 
 def verdict_changes(reports: Iterable[ClaimReport]) -> list[str]:

@@ -172,6 +172,12 @@ class Store:
         """Return all records of a trial: one for each set of versions that it was run with; raises as `get` does."""
         return tuple(result for path in self.record_files(trial_id) if (result := self.read(path)) is not None)
 
+    def others(self, trial_id: str, versions: Versions) -> tuple[TrialResult, ...]:
+        """Return the records of a trial that were made with other versions; raises as `get` does."""
+        usual = self.record_path(trial_id, versions)
+        read = (self.read(path) for path in self.record_files(trial_id) if path != usual)
+        return tuple(result for result in read if result is not None and not agree(result.provenance, versions))
+
     def _sound(self, path: Path) -> TrialResult | None:
         """Read a record that is only one of several; `evoclaims verify` tells of a damaged one."""
         try:
