@@ -25,7 +25,7 @@ import mujoco
 import numpy as np
 from mujoco import mjx
 
-from evoclaims.envs.base import Episode
+from evoclaims.envs.base import Episode, TaskState
 from evoclaims.envs.gates.parity import NParity
 from evoclaims.judging.protocol import Protocol
 from evoclaims.methods.cma_es import CmaEs
@@ -58,6 +58,12 @@ class Plane:
     def reachable(self, cells):
         return np.ones(cells, bool)
 
+    def reset(self, key, level):
+        return TaskState(jnp.ones((2,)), jnp.zeros(()), jnp.zeros((), bool), jnp.zeros((), bool), ())
+
+    def step(self, state, action):
+        return state
+
     def episode(self, policy, key, level):
         x, y = jnp.tanh(policy(jnp.ones((2,))))
         return Episode(x + y, (x + y > 1.5).astype(jnp.float32), {"x": x, "y": y, "reached": jnp.zeros(())})
@@ -82,6 +88,12 @@ class Swing:
     observation_size: ClassVar[int] = 2
     action_size: ClassVar[int] = 1
     horizon: ClassVar[int] = 1
+
+    def reset(self, key, level):
+        return TaskState(jnp.ones((2,)), jnp.zeros(()), jnp.zeros((), bool), jnp.zeros((), bool), ())
+
+    def step(self, state, action):
+        return state
 
     def episode(self, policy, key, level):
         model = hinge()

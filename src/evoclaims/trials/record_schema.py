@@ -101,6 +101,7 @@ class Provenance(Struct):
 
     git: Revision | None = None
     versions: dict[str, str | None] | None = None
+    depends_on: list[str] | None = None
     cuda: dict[str, str] | None = None
     device: Device | None = None
     machine: str | None = None
