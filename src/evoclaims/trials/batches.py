@@ -109,10 +109,11 @@ class Batch:
         return [lane for lane in self.running if self.header.lanes[lane] not in self.stored]
 
 
-def batches(run: Run, missing: Sequence[int]) -> Iterator[tuple[Header, Callable[[], Batch]]]:
+def batches(run: Run, missing: Sequence[int]) -> Iterator[tuple[Header, Callable[[], Batch | None]]]:
     """Give the interrupted batches that owe one of the missing trials, then the trials that none of them has.
 
-    Each comes as its header and what begins it, which may take long: it traces and compiles.
+    Each comes as its header and what begins it, which may take long: it traces and compiles. That gives None for an
+    interrupted batch whose checkpoint is gone by then, since another process has ended it.
     """
     remaining = list(missing)
     for header in checkpoint.find(run.store.checkpoints, run.condition.id, _platform(run.lanes)):
@@ -120,6 +121,8 @@ def batches(run: Run, missing: Sequence[int]) -> Iterator[tuple[Header, Callable
         if not set(held).isdisjoint(remaining):
             remaining = [seed for seed in remaining if seed not in held]
             yield header, partial(_resumed, run, header)
+    # A batch that took hours: another process may have stored the rest meanwhile.
+    remaining = [seed for seed in remaining if not is_final(run.store.get(TrialSpec(run.condition, seed).id))]
     if remaining:
         header = _planned(run.lanes, remaining)
         yield header, partial(_started, run, header)
@@ -144,19 +147,40 @@ def drop_finished_checkpoints(stored: StoredTrials) -> None:
             checkpoint.remove(folder, header)
 
 
-def _resumed(run: Run, header: Header) -> Batch:
-    """Return an interrupted batch as its checkpoint has it, on the devices."""
+def _resumed(run: Run, interrupted: Header) -> Batch | None:
+    """Return an interrupted batch as its checkpoint has it, on the devices; None when another process has ended it."""
+    restored = _restored(run, interrupted)
+    if restored is None:
+        return None
+    header, state = restored
     lanes, width = run.lanes, len(header.lanes)
     held = [seed for seed in header.lanes if seed is not None]
     stored = frozenset(seed for seed in held if is_final(run.stored.get(seed)))
-    run.watch(RunProgress(run.condition.label, "resuming", len(held) - len(stored)))
-    state = checkpoint.restore(run.store.checkpoints, header, lanes.shapes(width))
     if lanes.layout == "alone":
         # A trial's bits are its own: a lane whose trial is stored goes idle, and costs nothing.
         header = replace(header, lanes=[None if seed in stored else seed for seed in header.lanes])
         state = replace(state, idle=state.idle | np.array([seed is None for seed in header.lanes]))
         stored = frozenset()
     return Batch(header, lanes.place(state, width), int(np.max(state.steps)), stored)
+
+
+def _restored(run: Run, interrupted: Header) -> tuple[Header, TrialState] | None:
+    """Return header and state of an interrupted batch as its checkpoint has them, or None when that is gone.
+
+    A process that was taken for dead may have gone on with the batch since its header was read, hours ago if another
+    batch came first: header and state are read anew, since those of two moments would make a trial that never was.
+    """
+    folder = run.store.checkpoints
+    held = [seed for seed in interrupted.lanes if seed is not None]
+    owed = [seed for seed in held if not is_final(run.store.get(TrialSpec(run.condition, seed).id))]
+    run.watch(RunProgress(run.condition.label, "resuming", len(owed)))
+    header = checkpoint.newest(folder, interrupted)
+    while header is not None:
+        state = checkpoint.restore(folder, header, run.lanes.shapes(len(header.lanes)))
+        if state is not None:
+            return header, state
+        header = checkpoint.newest(folder, interrupted)
+    return None
 
 
 def _planned(lanes: Lanes, seeds: Sequence[int]) -> Header:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -14,14 +15,16 @@ from numpy.typing import NDArray
 
 from evoclaims.core.canonical import content_hash
 from evoclaims.core.errors import UserError
-from evoclaims.core.files import read_file, write_atomically
-from evoclaims.trials.arrays import pack, unpack
+from evoclaims.core.files import write_atomically
+from evoclaims.trials.arrays import Packed, pack
 from evoclaims.trials.program import TrialState
 from evoclaims.trials.records import is_hash
 from evoclaims.trials.store import DamagedFileError
 
 SCHEMA: Final = 1
 _HEADER: Final = "header"
+_HEADER_BYTES: Final = 1 << 26
+"""More than the header of any batch takes: a hundred trials with ten curves of fifty points take two megabytes."""
 
 
 @dataclass(frozen=True)
@@ -64,8 +67,13 @@ def path_of(folder: Path, condition: str, batch: list[int], platform: str) -> Pa
 def save(folder: Path, header: Header, state: TrialState) -> None:
     """Write header and state (on the host, leaves [lanes, …]) in one atomic step."""
     arrays = {f"{i:04d}": np.asarray(leaf) for i, leaf in enumerate(jax.tree.leaves(state))}
-    arrays[_HEADER] = np.frombuffer(json.dumps(asdict(header)).encode(), dtype=np.uint8)
+    arrays[_HEADER] = np.frombuffer(_text(header).encode(), dtype=np.uint8)
     write_atomically(path_of(folder, header.condition, header.batch, header.platform), pack(arrays))
+
+
+def _text(header: Header) -> str:
+    """Return a header as it is written; texts can be compared where curves hold NaN."""
+    return json.dumps(asdict(header))
 
 
 def find(folder: Path, condition: str, platform: str) -> list[Header]:
@@ -74,17 +82,41 @@ def find(folder: Path, condition: str, platform: str) -> list[Header]:
     Raises:
         DamagedFileError: when one of them is torn or edited.
     """
-    headers = [read(path)[0] for path in sorted(folder.glob(f"{condition}-*.npz"))]
+    found = [_header(path) for path in sorted(folder.glob(f"{condition}-*.npz"))]
+    headers = [header for header in found if header is not None]
     return [h for h in headers if h.condition == condition and h.platform == platform and h.schema == SCHEMA]
 
 
 def sound_ones(folder: Path, condition: str) -> list[Header]:
     """Return the headers of a condition's checkpoints of every platform, passing over what is torn or edited."""
-    headers = []
+    headers: list[Header | None] = []
     for path in sorted(folder.glob(f"{condition}-*.npz")):
         with contextlib.suppress(DamagedFileError):
-            headers.append(read(path)[0])
-    return [header for header in headers if header.condition == condition and header.schema == SCHEMA]
+            headers.append(_header(path))
+    return [
+        header for header in headers if header is not None and header.condition == condition and header.schema == SCHEMA
+    ]
+
+
+def newest(folder: Path, header: Header) -> Header | None:
+    """Return the header that a batch's checkpoint has now, or None when it is gone.
+
+    A process that others have taken for dead (stopped for long, or on a machine with another clock) may have gone on
+    with the batch meanwhile, or ended it.
+
+    Raises:
+        DamagedFileError: as for `find`.
+    """
+    return _header(path_of(folder, header.condition, header.batch, header.platform))
+
+
+def _header(path: Path) -> Header | None:
+    """Return a checkpoint's header, or None when the file is gone; its state is not looked at."""
+    try:
+        with _opened(path) as (header, _):
+            return header
+    except FileNotFoundError:
+        return None
 
 
 def read(path: Path) -> tuple[Header, list[NDArray[Any]]]:
@@ -92,19 +124,43 @@ def read(path: Path) -> tuple[Header, list[NDArray[Any]]]:
 
     Raises:
         DamagedFileError: when the file is torn, edited, misplaced or not a checkpoint.
+        FileNotFoundError: when it is gone.
+    """
+    with _opened(path) as (header, packed):
+        return header, [packed[name] for name in _leaves(packed)]
+
+
+def _leaves(packed: Packed) -> list[str]:
+    """Return the names of the state's leaves in their order."""
+    return sorted(packed.kinds.keys() - {_HEADER})
+
+
+@contextlib.contextmanager
+def _opened(path: Path) -> Iterator[tuple[Header, Packed]]:
+    """Open a checkpoint, and give its header and its arrays, which are read while it is open.
+
+    Raises:
+        DamagedFileError: as for `read`, also for what is found out within the block.
+        FileNotFoundError: when the file is gone.
     """
     try:
-        arrays = unpack(read_file(path))
-        header = Header(**json.loads(arrays.pop(_HEADER).tobytes()))
-        sound = header.schema != SCHEMA or _is_sound(header)
-    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+        if path.exists() and not path.is_file():
+            raise DamagedFileError(path, "it is not a file")
+        with path.open("rb") as file:
+            packed = Packed(file)
+            if packed.nbytes(_HEADER) > _HEADER_BYTES:
+                raise DamagedFileError(path, "its header is longer than that of any batch of trials")
+            header = Header(**json.loads(packed[_HEADER].tobytes()))
+            if header.schema == SCHEMA:
+                if not _is_sound(header):
+                    raise DamagedFileError(path, "its header does not describe a batch of trials")
+                if path.name != path_of(path.parent, header.condition, header.batch, header.platform).name:
+                    raise DamagedFileError(path, "its name is not that of the batch it holds")
+            yield header, packed
+    except FileNotFoundError:
+        raise
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         raise DamagedFileError(path, "it is not a readable checkpoint") from error
-    if not sound:
-        raise DamagedFileError(path, "its header does not describe a batch of trials")
-    home = path if header.schema != SCHEMA else path_of(path.parent, header.condition, header.batch, header.platform)
-    if path.name != home.name:
-        raise DamagedFileError(path, "its name is not that of the batch it holds")
-    return header, [arrays[name] for name in sorted(arrays)]
 
 
 def _is_sound(header: Header) -> bool:
@@ -123,23 +179,32 @@ def _is_sound(header: Header) -> bool:
     )
 
 
-def restore(folder: Path, header: Header, like: Any) -> TrialState:
+def restore(folder: Path, header: Header, like: Any) -> TrialState | None:
     """Return the state of a checkpoint on the host, in the structure of `like` (leaves with shape and dtype).
+
+    None when the checkpoint is no longer the one with this header: see `newest`.
 
     Raises:
         DamagedFileError: when the file is torn or edited.
         UserError: when its arrays are not those of such a state, which nothing but the condition's program can tell.
     """
     path = path_of(folder, header.condition, header.batch, header.platform)
-    _, leaves = read(path)
     expected, structure = jax.tree.flatten(like)
-    if [(x.shape, x.dtype) for x in leaves] != [(x.shape, x.dtype) for x in expected]:
-        raise UserError(
-            f"Cannot go on from {path}: its arrays are not those of this condition's state, so it was made "
-            "by another version of the code; delete it, and its trials begin anew."
-        )
-    state: TrialState = jax.tree.unflatten(structure, leaves)
-    return state
+    try:
+        with _opened(path) as (there, packed):
+            if _text(there) != _text(header):
+                return None
+            names = _leaves(packed)
+            # Compared before anything is read: a file must not take more memory than the state that it stands for.
+            if [packed.kinds[name] for name in names] != [(x.shape, x.dtype) for x in expected]:
+                raise UserError(
+                    f"Cannot go on from {path}: its arrays are not those of this condition's state, so it "
+                    "was made by another version of the code; delete it, and its trials begin anew."
+                )
+            state: TrialState = jax.tree.unflatten(structure, [packed[name] for name in names])
+            return state
+    except FileNotFoundError:
+        return None
 
 
 def remove(folder: Path, header: Header) -> None:
@@ -149,9 +214,13 @@ def remove(folder: Path, header: Header) -> None:
 
 
 def fault(path: Path) -> str | None:
-    """Return why a checkpoint cannot be gone on from, or None when it can."""
+    """Return why a checkpoint cannot be gone on from, or None when it can (or is gone)."""
     try:
-        header, _ = read(path)
+        with _opened(path) as (header, packed):
+            if not packed.is_whole():
+                return "it is not a readable checkpoint"
+    except FileNotFoundError:
+        return None
     except DamagedFileError as error:
         return error.reason
     return None if header.schema == SCHEMA else f"it has schema {header.schema}, not {SCHEMA}"

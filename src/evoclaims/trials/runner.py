@@ -95,11 +95,14 @@ def _memory_told(condition: Condition, trials: int) -> Iterator[None]:
         ) from error
 
 
-def _finish(run: Run, header: Header, begin: Callable[[], Batch]) -> None:
+def _finish(run: Run, header: Header, begin: Callable[[], Batch | None]) -> None:
     """Run a batch until none of its trials is owed or its time is over."""
     allowance, strides = Allowance(run.time_limit), Strides()
     try:
-        batch = allowance.spend(begin)
+        begun = allowance.spend(begin)
+        if begun is None:
+            return  # another process has ended the batch; what it has not stored is begun anew
+        batch, header = begun, begun.header
         rhythm = Rhythm(run.checkpoint_seconds)
         while batch.owed:
             batch, progress = _go_on(run, batch, allowance, strides)
