@@ -168,6 +168,21 @@ def test_a_notice_of_another_host_counts_while_it_is_refreshed(tmp_path: Path, a
     assert (running_elsewhere(tmp_path, CONDITION) is not None) is waits
 
 
+@pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="only Linux tells that a process is stopped")
+def test_a_stopped_process_keeps_others_waiting_no_longer_than_one_elsewhere(
+    tmp_path: Path, runner: subprocess.Popen[str]
+) -> None:
+    path = notice_path(tmp_path, CONDITION)
+    runner.send_signal(signal.SIGSTOP)
+    os.waitid(os.P_PID, runner.pid, os.WSTOPPED | os.WNOWAIT)
+    assert running_elsewhere(tmp_path, CONDITION) is not None
+    os.utime(path, (time.time() - FRESH_SECONDS - 5,) * 2)
+    assert running_elsewhere(tmp_path, CONDITION) is None
+    runner.send_signal(signal.SIGCONT)
+    os.waitid(os.P_PID, runner.pid, os.WCONTINUED | os.WNOWAIT)
+    assert running_elsewhere(tmp_path, CONDITION) is not None
+
+
 def test_a_refresh_makes_the_notice_young_again(tmp_path: Path) -> None:
     with Notice(tmp_path, CONDITION) as notice:
         os.utime(notice.path, (1.0, 1.0))

@@ -148,13 +148,13 @@ def _checkpoints(store: Store, fault: Callable[[Path], str | None]) -> Iterator[
 
 
 def _leftovers(store: Store) -> Iterator[Problem]:
-    """Find files that a kill left half-written, and notices of processes that are gone."""
+    """Find files that a kill left half-written, and notices of processes that are no longer at work."""
     for path in sorted(store.root.rglob(".*.tmp")):
         if _quarantine(store) not in path.parents and _settled(path):
             yield Problem(path, "leftover", "its writer was stopped before the file was whole")
     for path in sorted((store.root / "running").glob("*")):
         if not path.name.startswith(".") and fresh(path) is None and path.exists():
-            yield Problem(path, "leftover", "the process that it announces is gone")
+            yield Problem(path, "leftover", "the process that it announces is no longer at work")
 
 
 def _settled(path: Path) -> bool:

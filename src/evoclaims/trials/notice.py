@@ -25,7 +25,8 @@ from evoclaims.trials.heartbeat import beating
 from evoclaims.trials.records import is_hash
 
 FRESH_SECONDS: Final = 60.0
-"""A notice from another host counts for this long after its last refresh; here its process can be asked."""
+"""A notice from another host counts for this long after its last refresh; here its process can be asked. One that was
+stopped here (SIGSTOP, Ctrl-Z) may never go on: it counts for as long as if it were elsewhere."""
 
 REFRESH_SECONDS: Final = 15.0
 """Time between two refreshes: some may come late on a slow network folder before the notice looks stale."""
@@ -167,7 +168,10 @@ def fresh(path: Path) -> Runner | None:
     if runner is None:
         return None
     if runner.host == socket.gethostname() and os.name == "posix":
-        return runner if _alive(runner) else None
+        if not _alive(runner):
+            return None
+        if _state(runner.pid)[0] not in ("T", "t"):
+            return runner
     try:
         age = time.time() - path.stat().st_mtime
     except OSError:
