@@ -1,0 +1,42 @@
+"""All attacks by name, with their sizes in large."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import clock_jumps
+import full_disk
+import killing
+import stopping_and_continuing
+import two_hosts
+from bench import Laboratory
+from tally import Tally
+
+
+@dataclass(frozen=True)
+class Attack:
+    """One kind of attack.
+
+    Attributes:
+        make: takes where to make it, how many times, and what to draw from.
+        option: what it is counted in, on the command line.
+        says: what is counted, in words.
+        large: how many times by hand.
+    """
+
+    make: Callable[[Laboratory, int, random.Random], Tally]
+    option: str
+    says: str
+    large: int
+
+
+ATTACKS = {
+    "killing": Attack(killing.attack, "kills", "blows at processes in the middle of trials", 100),
+    "stopping": Attack(stopping_and_continuing.attack, "stops", "rounds of stopping and continuing", 5),
+    "hosts": Attack(two_hosts.attack, "hosts", "stores shared by two hosts, each with two workers", 6),
+    "clocks": Attack(clock_jumps.attack, "clocks", "stores shared while clocks jump", 4),
+    "disk": Attack(full_disk.attack_mounted, "disks", "disks that fill up", 5),
+    "limit": Attack(full_disk.attack_limited, "limits", "processes that may write no longer", 3),
+}

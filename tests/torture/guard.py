@@ -1,0 +1,92 @@
+"""What must hold of a store under attack, at any moment and at the end."""
+
+from __future__ import annotations
+
+import io
+from collections import Counter
+from contextlib import redirect_stdout
+from dataclasses import dataclass, field
+
+from bench import Bench, Running, Truth, digests_of
+from tally import Tally
+
+from evoclaims.cli.main import main as evoclaims
+
+
+@dataclass
+class Guard:
+    """Looks at a bench again and again, and tells a tally what is wrong.
+
+    Attributes:
+        once: whether no trial may be run twice; where a live process was taken for dead it may.
+    """
+
+    bench: Bench
+    truth: Truth
+    tally: Tally
+    once: bool = True
+    _seen: dict[str, bytes] = field(default_factory=dict)
+
+    def look(self) -> None:
+        """Nothing that was stored is lost or changed; to be called at any moment."""
+        said = {line["id"] for line in self.bench.events() if line["what"] == "put"}
+        records = self.bench.records()
+        for name, data in self._seen.items():
+            self.tally.demand(name in records, f"the finished trial {name[:8]} was lost")
+            self.tally.demand(records.get(name, data) == data, f"the record of trial {name[:8]} was written again")
+        for name in sorted(said - records.keys()):
+            self.tally.demand(False, f"trial {name[:8]} was said to be stored and is not there")
+        for name, digest in digests_of(records).items():
+            self.tally.demand(self.truth.digests.get(name) == digest, f"trial {name[:8]} has another digest")
+        self._seen = records
+
+    def finish(self) -> None:
+        """All trials are there, each once, none was begun anew that had a checkpoint, and the store is sound."""
+        self.look()
+        missing = len(self.truth.digests.keys() - self._seen.keys())
+        self.tally.demand(missing == 0, f"{missing} trials are missing at the end")
+        events = self.bench.events()
+        puts = [line for line in events if line["what"] == "put"]
+        for line in puts:
+            self.tally.demand(line["became"] != "differs", f"trial {line['id'][:8]} came out differently")
+        if self.once:
+            times = Counter(line["id"] for line in puts)
+            self.tally.demand(max(times.values()) == 1, f"trials were run again: {times.most_common(3)}")
+        self._went_on()
+        self.tally.done["trials compared"] += len(self._seen)
+        with redirect_stdout(io.StringIO()) as shown:
+            evoclaims(["verify", "--dry-run", "--storage", str(self.bench.store)])
+        bad = [
+            line for line in shown.getvalue().splitlines() if line.startswith(("record ", "champion ", "checkpoint "))
+        ]
+        self.tally.demand(not bad, f"verify says {bad}")
+        self.tally.demand(f"{len(self.truth.digests)} trials" in shown.getvalue(), f"verify says {shown.getvalue()}")
+        print(self.tally, flush=True)
+
+    def judged(self, running: Running) -> None:
+        """The verdicts of a run are those of the truth."""
+        self.tally.done["verdicts compared"] += len(running.verdicts())
+        self.tally.demand(
+            running.verdicts() == self.truth.verdicts,
+            f"other verdicts: {[(claim['claim'], claim['outcome']) for claim in running.verdicts()]}",
+        )
+
+    def plainly(self, running: Running, text: str = "") -> None:
+        """What a run has printed holds a text, and is made for people."""
+        shown = running.output
+        self.tally.demand(text in shown, f"{text!r} was not said: {shown[-2000:]}")
+        for word in ("Traceback", "INTERNALERROR"):
+            self.tally.demand(word not in shown, f"{word} was shown: {shown[-3000:]}")
+
+    def _went_on(self) -> None:
+        """Whoever takes over a batch begins where the one before has said that it was, or later."""
+        last: dict[str, tuple[int, int]] = {}
+        for line in self.bench.events():
+            if line["what"] != "training":
+                continue
+            pid, steps = last.get(line["condition"], (line["pid"], 0))
+            if pid != line["pid"]:
+                self.tally.done["batches gone on with"] += 1
+                if self.once:
+                    self.tally.demand(line["steps"] >= steps, f"from step {steps} a batch fell back to {line['steps']}")
+            last[line["condition"]] = (line["pid"], line["steps"])
