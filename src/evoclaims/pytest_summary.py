@@ -12,6 +12,7 @@ import pytest
 
 from evoclaims.core.errors import UserError
 from evoclaims.core.printable import shown, spelled
+from evoclaims.pytest_options import TIERS
 
 if TYPE_CHECKING:
     from evoclaims.judging.baseline import DriftReport
@@ -40,6 +41,7 @@ class Summary:
         self._upgrade: Upgrade | None = None
         self._regression: Regression | None = None
         self._troubles: list[str] = []
+        self._died: list[str] = []
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
         """Note what became of a claim."""
@@ -55,6 +57,17 @@ class Summary:
         trouble = getattr(node, "workeroutput", {}).get(TROUBLE)
         if trouble is not None and trouble not in self._troubles:
             self._troubles.append(trouble)
+
+    @pytest.hookimpl(optionalhook=True)
+    def pytest_handlecrashitem(self, crashitem: str) -> None:
+        """Note that xdist's worker died over a claim, which has no report then: it must not be missing unsaid."""
+        parameters = crashitem.rpartition("[")[2].removesuffix("]").split("-")
+        if not set(TIERS).isdisjoint(parameters):  # what is no claim is in pytest's own summary
+            self._died.append(
+                f"The process that judged {crashitem} died (it was killed, crashed, or found no memory), so that this "
+                "claim has no verdict here. Its trials are kept as far as they are, and the same command goes on from "
+                "there."
+            )
 
     @pytest.hookimpl(tryfirst=True)
     def pytest_sessionfinish(self, session: pytest.Session) -> None:
@@ -121,7 +134,7 @@ class Summary:
     def pytest_terminal_summary(self, terminalreporter: Any) -> None:
         """Print the verdict table and what lies behind it."""
         if not self.reports:
-            for trouble in self._troubles:
+            for trouble in [*self._troubles, *self._died]:
                 terminalreporter.write_line(self._said(f"ERROR: {trouble}"), red=True)
             return
         from evoclaims.suite import table
@@ -138,7 +151,7 @@ class Summary:
         notes = self._notes()
         for note in notes:
             terminalreporter.write_line(self._said(note))
-        for trouble in self._troubles:
+        for trouble in [*self._troubles, *self._died]:
             terminalreporter.write_line(self._said(f"error: {trouble}"), red=True)
         unsaved = sorted({report.unsaved for report in self.reports} - {""})
         warnings = [f"The files of evidence could not be written. {reason}" for reason in unsaved[:1]]
@@ -205,7 +218,7 @@ class Summary:
             return ""
         try:
             with open(name, "a", encoding="utf-8") as page:
-                page.write(run_summary(self.reports, [*notes, *self._troubles]))
+                page.write(run_summary(self.reports, [*notes, *self._troubles, *self._died]))
         except OSError as error:
             return f"Cannot write the verdicts to GitHub's summary {name}: {error.strerror or error}."
         return ""

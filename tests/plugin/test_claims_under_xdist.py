@@ -49,6 +49,20 @@ def test_workers_give_the_verdicts_of_one_process_and_run_each_trial_once(projec
     assert len(rows[0]) == len(BODIES)
 
 
+def test_a_claim_whose_process_dies_is_not_missing_without_a_word(project: Any) -> None:
+    kill = "import os, signal; os.kill(os.getpid(), signal.SIGKILL)"
+    project.write(a="supported", killed=kill)
+    apart = project.run_apart("-n1", "--claims-json=out.json")
+    assert apart.ret == pytest.ExitCode.TESTS_FAILED
+    shown = " ".join(apart.stdout.str().split())
+    assert "error: The process that judged claims/test_claims.py::test_killed[smoke] died" in shown
+    assert "claims: 1 supported" in shown
+    project.write(killed=kill)
+    apart = project.run_apart("-n1")
+    assert apart.ret == pytest.ExitCode.TESTS_FAILED
+    assert "ERROR: The process that judged claims/test_claims.py::test_killed[smoke] died" in apart.stdout.str()
+
+
 @pytest.mark.parametrize(
     ("argument", "text"),
     [

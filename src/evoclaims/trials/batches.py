@@ -17,6 +17,7 @@ from evoclaims.trials import checkpoint
 from evoclaims.trials.checkpoint import Header
 from evoclaims.trials.lanes import Lanes, Shares
 from evoclaims.trials.outcome import provenance
+from evoclaims.trials.program import TrialState
 from evoclaims.trials.progress import RunProgress, Watcher
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.spec import Condition, TrialSpec
@@ -122,7 +123,7 @@ def batches(run: Run, missing: Sequence[int]) -> Iterator[tuple[Header, Callable
             remaining = [seed for seed in remaining if seed not in held]
             yield header, partial(_resumed, run, header)
     # A batch that took hours: another process may have stored the rest meanwhile.
-    remaining = [seed for seed in remaining if not is_final(run.store.get(TrialSpec(run.condition, seed).id))]
+    remaining = [seed for seed in remaining if not is_final(run.stored.get(seed))]
     if remaining:
         header = _planned(run.lanes, remaining)
         yield header, partial(_started, run, header)
@@ -172,7 +173,7 @@ def _restored(run: Run, interrupted: Header) -> tuple[Header, TrialState] | None
     """
     folder = run.store.checkpoints
     held = [seed for seed in interrupted.lanes if seed is not None]
-    owed = [seed for seed in held if not is_final(run.store.get(TrialSpec(run.condition, seed).id))]
+    owed = [seed for seed in held if not is_final(run.stored.get(seed))]
     run.watch(RunProgress(run.condition.label, "resuming", len(owed)))
     header = checkpoint.newest(folder, interrupted)
     while header is not None:
