@@ -136,10 +136,16 @@ class Running:
 
 @dataclass
 class Bench:
-    """A project in a folder of its own."""
+    """A project in a folder of its own.
+
+    Attributes:
+        pause: seconds that a process rests at every report.
+        kept: whether the folder is to stay, since something was found.
+    """
 
     folder: Path
     pause: float = 0.04
+    kept: bool = False
     started: list[Running] = field(default_factory=list)
     _numbers: Iterator[int] = field(default_factory=itertools.count)
 
@@ -262,13 +268,14 @@ class Laboratory:
 
     @contextmanager
     def bench(self, pause: float = 0.04) -> Iterator[Bench]:
-        """Give a new project; when the block ends well it goes, and if not it stays to be looked at."""
+        """Give a new project; it goes when nothing was found, and stays to be looked at when something was."""
         bench = Bench(self.folder / f"bench-{next(self._numbers)}", pause)
         try:
             yield bench
         finally:
             bench.close()
-        shutil.rmtree(bench.folder)
+        if not bench.kept:
+            shutil.rmtree(bench.folder)
 
     @functools.cached_property
     def truth(self) -> Truth:

@@ -61,6 +61,7 @@ class Guard:
         ]
         self.tally.demand(not bad, f"verify says {bad}")
         self.tally.demand(f"{len(self.truth.digests)} trials" in shown.getvalue(), f"verify says {shown.getvalue()}")
+        self.bench.kept = bool(self.tally.violations)
         print(self.tally, flush=True)
 
     def judged(self, running: Running) -> None:

@@ -24,17 +24,21 @@ def main() -> int:
             f"--{attack.option}", type=int, default=attack.large, help=f"{attack.says} ({attack.large})"
         )
     parser.add_argument("--only", choices=[*attacks.ATTACKS], action="append", help="make this attack alone")
+    parser.add_argument(
+        "--folder", type=Path, help="an empty one, which keeps the projects in which something was found"
+    )
     parser.add_argument("--seed", type=int, default=random.randrange(2**32), help="of all that is drawn")
     options = parser.parse_args()
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))  # so that nothing is left running
     print(f"seed {options.seed}", flush=True)
     tallies = []
-    with tempfile.TemporaryDirectory(prefix="evoclaims-torture-", ignore_cleanup_errors=True) as folder:
+    with tempfile.TemporaryDirectory(prefix="evoclaims-torture-", ignore_cleanup_errors=True) as aside:
+        folder = (options.folder or Path(aside)).resolve()
         os.environ.setdefault("JAX_PLATFORMS", "cpu")
         os.environ.setdefault("JAX_NUM_CPU_DEVICES", "2")
-        os.environ.setdefault("JAX_COMPILATION_CACHE_DIR", str(Path(folder, "compiled")))
+        os.environ.setdefault("JAX_COMPILATION_CACHE_DIR", str(Path(aside, "compiled")))
         os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", "0.1")
-        laboratory = Laboratory(Path(folder))
+        laboratory = Laboratory(folder)
         for name in options.only or attacks.ATTACKS:
             attack, began = attacks.ATTACKS[name], time.monotonic()
             times, draw = getattr(options, attack.option), random.Random(f"{options.seed} {name}")
