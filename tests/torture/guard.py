@@ -81,13 +81,15 @@ class Guard:
 
     def _went_on(self) -> None:
         """Whoever takes over a batch begins where the one before has said that it was, or later."""
-        last: dict[str, tuple[int, int]] = {}
+        last: dict[str, int] = {}
+        runners: dict[str, set[int]] = {}
         for line in self.bench.events():
             if line["what"] != "training":
                 continue
-            pid, steps = last.get(line["condition"], (line["pid"], 0))
-            if pid != line["pid"]:
+            known, steps = runners.setdefault(line["condition"], set()), last.get(line["condition"], 0)
+            if known and line["pid"] not in known:
                 self.tally.done["batches gone on with"] += 1
-                if self.once:
-                    self.tally.demand(line["steps"] >= steps, f"from step {steps} a batch fell back to {line['steps']}")
-            last[line["condition"]] = (line["pid"], line["steps"])
+                fell = line["steps"] < steps and self.once
+                self.tally.demand(not fell, f"from step {steps} a batch fell back to {line['steps']}")
+            known.add(line["pid"])
+            last[line["condition"]] = line["steps"]

@@ -28,7 +28,7 @@ def attack(laboratory: Laboratory, times: int, draw: random.Random, trees: bool 
                 beta = _start(bench, "beta", trees)
                 bench.until_said("waiting", beta, times=3)
             tally.demand(_hosts(bench) == {"alpha", "beta"}, f"the hosts are {_hosts(bench)}")
-            tally.done[f"times one {end}"] += 1
+            tally.done[f"stores of which one host {end}"] += 1
             time.sleep(draw.uniform(0.0, 1.0))
             if end == "dies":
                 alpha.signal(signal.SIGKILL)
