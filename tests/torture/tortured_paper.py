@@ -53,7 +53,9 @@ def say(what: str, **fields: Any) -> None:
 _run, _put = modes.run, Store.put
 
 
-def _slowly(condition: Condition, seeds: Sequence[int], store: Store, devices: Any, watch: Watcher) -> Any:
+def _slowly(
+    condition: Condition, seeds: Sequence[int], store: Store, devices: Any, watch: Watcher, **options: Any
+) -> Any:
     """Run as ever, with a checkpoint after every chunk, and rest after each."""
 
     def told(progress: RunProgress) -> None:
@@ -63,7 +65,7 @@ def _slowly(condition: Condition, seeds: Sequence[int], store: Store, devices: A
         while progress.phase == "training" and _held.exists():
             time.sleep(0.02)
 
-    return _run(condition, seeds, store, devices, told, checkpoint_seconds=0.0)
+    return _run(condition, seeds, store, devices, told, checkpoint_seconds=0.0, **options)
 
 
 def _telling(store: Store, result: TrialResult, champion: Any) -> Any:
