@@ -163,7 +163,7 @@ def make_session(config: pytest.Config) -> Session:
 
 def _storage(config: pytest.Config) -> Path:
     """Return the store's folder: the project's own, or the one that is named, relative to the current folder."""
-    from evoclaims.trials.store import DEFAULT_ROOT
+    from evoclaims.trials.store_files import DEFAULT_ROOT
 
     named = config.getoption("claims_storage")
     if named is None:

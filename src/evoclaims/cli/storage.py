@@ -8,7 +8,7 @@ from typing import Final
 
 from evoclaims.core.errors import UserError
 from evoclaims.suite.config import find_root
-from evoclaims.trials.store import DEFAULT_ROOT
+from evoclaims.trials.store_files import DEFAULT_ROOT
 
 BEGINNING: Final = frozenset({"run"})
 """Commands that begin a store where none is; the others read one."""

@@ -17,7 +17,8 @@ from evoclaims.core.errors import UserError
 from evoclaims.core.printable import printable
 from evoclaims.trials.notice import fresh
 from evoclaims.trials.result import TrialResult
-from evoclaims.trials.store import SPARE_DIGITS, DamagedFileError, Store, record_id
+from evoclaims.trials.store import DamagedFileError, Store
+from evoclaims.trials.store_files import SPARE_DIGITS, record_id
 
 SETTLED_SECONDS: Final = 60.0
 """A half-written file younger than this may be another process at work, so it is no leftover yet."""
@@ -46,7 +47,7 @@ class Problem:
     def __str__(self) -> str:
         """Return one line for the terminal."""
         moved = f" (moved to {self.moved_to})" if self.moved_to else ""
-        return f"{self.kind} {self.path}: {self.reason}{moved}"
+        return printable(f"{self.kind} {self.path}: {self.reason}{moved}")
 
 
 def verify(

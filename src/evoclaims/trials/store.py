@@ -13,30 +13,23 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 import os
-import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final, Literal
+from typing import Any, Literal
 
 from numpy.typing import NDArray
 
 from evoclaims.core.errors import UserError
 from evoclaims.core.files import read_file, write_atomically
-from evoclaims.core.packages import SHORT_HASH, Versions, agree, depends_on, recorded, short_hash
+from evoclaims.core.packages import Versions, agree, depends_on, recorded
 from evoclaims.trials.arrays import pack, unpack
 from evoclaims.trials.once import write_once
-from evoclaims.trials.records import RecordError, dump, is_hash, parse
+from evoclaims.trials.records import RecordError, dump, parse
 from evoclaims.trials.result import TrialResult
+from evoclaims.trials.store_files import StoreFiles, record_id
 from evoclaims.trials.store_mark import check_store, mark
 from evoclaims.trials.time_limit import time_allowed
-
-DEFAULT_ROOT: Final = Path(".evoclaims")
-
-SPARE_DIGITS: Final = 16
-"""Digits of a champion's hash in the name of a file beside the usual one."""
-
-_RECORD: Final = re.compile(rf"([0-9a-f]{{64}})(?:\.([0-9a-f]{{{SHORT_HASH}}}))?\.json")
 
 Put = Literal["stored", "present", "differs"]
 """What became of a trial handed to the store: written; there already, equal to the bit; there with another digest."""
@@ -56,58 +49,18 @@ class DamagedFileError(UserError):
 
 
 @dataclass(frozen=True)
-class Store:
-    """Trials under one folder; making a `Store` touches no file, so that a read-only one can be read.
-
-    Attributes:
-        root: the folder; it need not exist yet.
-    """
-
-    root: Path = DEFAULT_ROOT
-
-    @property
-    def checkpoints(self) -> Path:
-        """The folder of interrupted conditions' checkpoints."""
-        return self.root / "checkpoints"
-
-    def record_path(self, trial_id: str, versions: Versions | None = None) -> Path:
-        """Return where the record of `trial_id` belongs; a `UserError` for a text that is not an id.
-
-        Args:
-            trial_id: the trial.
-            versions: of the packages that it depends on; None for a record that does not say on which.
-        """
-        name = f"{_checked(trial_id)}.json" if versions is None else f"{trial_id}.{short_hash(versions)}.json"
-        return self.root / "trials" / trial_id[:2] / name
-
-    def record_files(self, trial_id: str) -> tuple[Path, ...]:
-        """Return the files that may hold a record of `trial_id`, whatever versions it was made with."""
-        usual = self.record_path(trial_id)
-        return (usual, *(path for path in _entries(usual.parent) if path != usual and record_id(path) == trial_id))
-
-    def champion_path(self, trial_id: str) -> Path:
-        """Return where the champion of `trial_id` belongs; a `UserError` for a text that is not an id."""
-        return self.root / "champions" / _checked(trial_id)[:2] / f"{trial_id}.npz"
-
-    def champion_files(self, trial_id: str) -> tuple[Path, ...]:
-        """Return the files that hold a champion of `trial_id`; more than one where processes have raced (see `put`)."""
-        usual = self.champion_path(trial_id)
-        found = (usual, *sorted(usual.parent.glob(f"{trial_id}.*.npz")))
-        return tuple(path for path in found if os.path.exists(path))
+class Store(StoreFiles):
+    """Trials under one folder; making a `Store` touches no file, so that a read-only one can be read."""
 
     def champion_file(self, result: TrialResult) -> Path:
         """Return the file that holds the champion which a record of this store names."""
-        spare = self._spare_champion_path(result.id, result.champion)
+        spare = self.spare_champion_path(result.id, result.champion)
         return spare if os.path.exists(spare) else self.champion_path(result.id)
 
     def has_champion(self, result: TrialResult) -> bool:
         """Whether a record of this store names the same champion, and its file is there; damaged or not."""
         named = any(record.champion == result.champion != "" for record in self.records(result.id))
         return named and self.champion_file(result).exists()
-
-    def _spare_champion_path(self, trial_id: str, champion: str) -> Path:
-        """Return where a champion goes when the usual place holds another one."""
-        return self.champion_path(trial_id).with_suffix(f".{champion[:SPARE_DIGITS]}.npz")
 
     def check(self) -> None:
         """Refuse a folder that is there and is no store (see `store_mark.check_store`).
@@ -283,7 +236,7 @@ class Store:
         """Write a champion to its usual place, or beside it where another one lies there."""
         usual = self.champion_path(sealed.id)
         if not write_once(usual, packed) and _sha256(usual) != sealed.champion:
-            write_atomically(self._spare_champion_path(sealed.id, sealed.champion), packed)
+            write_atomically(self.spare_champion_path(sealed.id, sealed.champion), packed)
 
     def _remove_champion_beside(self, first: TrialResult, sealed: TrialResult) -> None:
         """Remove the champion of a trial that another process has stored first with another champion."""
@@ -340,26 +293,12 @@ class Store:
             if result is not None:
                 yield result
 
-    def record_paths(self) -> Iterator[Path]:
-        """Iterate over all that lies where records belong, strange entries included (hidden ones left out)."""
-        return _walk(self.root / "trials")
-
-    def champion_paths(self) -> Iterator[Path]:
-        """Iterate over all that lies where champions belong, strange entries included (hidden ones left out)."""
-        return _walk(self.root / "champions")
-
 
 def _gives_way(present: TrialResult, result: TrialResult) -> bool:
     """Whether a stored trial without an outcome is replaced: by another end, or by one that had more time."""
     if present.status == "timeout":
         return result.status != "timeout" or time_allowed(result) > time_allowed(present)
     return present.status == "crashed" and present.digest != result.digest
-
-
-def record_id(path: Path) -> str | None:
-    """Return the id of the trial that a file is named as a record of; None when its name is no record's."""
-    named = _RECORD.fullmatch(path.name)
-    return named[1] if named else None
 
 
 def newest(results: Iterable[TrialResult]) -> TrialResult | None:
@@ -373,30 +312,3 @@ def _sha256(path: Path) -> str:
         return hashlib.sha256(read_file(path)).hexdigest()
     except OSError:
         return ""
-
-
-def _checked(trial_id: str) -> str:
-    """Return `trial_id` when it is one; anything else might climb out of the store's folder."""
-    if not is_hash(trial_id):
-        raise UserError(f"{trial_id!r} is not a trial's id: an id is 64 lower-case hexadecimal digits.")
-    return trial_id
-
-
-def _walk(top: Path) -> Iterator[Path]:
-    """Iterate over `top/<two hex digits>/*`, sorted; an entry that is no such folder is given itself."""
-    for entry in _entries(top):
-        if re.fullmatch(r"[0-9a-f]{2}", entry.name) and entry.is_dir():
-            yield from _entries(entry)
-        else:
-            yield entry
-
-
-def _entries(folder: Path) -> list[Path]:
-    """Return what is in `folder`, sorted; the folder itself when it cannot be listed."""
-    try:
-        names = sorted(os.listdir(folder))
-    except FileNotFoundError:
-        return []
-    except OSError:
-        return [folder]
-    return [folder / name for name in names if not name.startswith(".")]
