@@ -325,7 +325,7 @@ def test_reference_commits_the_trials_of_every_condition_that_has_enough(evoclai
     path = references.path_of(Path.cwd() / "reference", "smoke", "right", "parity")
     assert status == 0
     assert f"wrote {path}: 10 trials" in out
-    assert "left alone: wrong on parity: 9 of 10 trials are stored" in out
+    assert "left alone: wrong on parity: 9 of 10 trials are stored or committed" in out
     assert [trial.seed for trial in references.load(path)] == list(range(10))
     assert not references.path_of(Path.cwd() / "reference", "smoke", "wrong", "parity").exists()
 
@@ -341,11 +341,28 @@ def test_reference_takes_the_trials_of_a_look_and_never_fewer_than_are_committed
     path = references.path_of(Path.cwd() / "reference", "smoke", "right", "parity")
     assert status == 0
     assert f"wrote {path}: 5 trials" in out
-    assert "left alone: wrong on parity: 4 of 5 trials are stored" in out
+    assert "left alone: wrong on parity: 4 of 5 trials are stored or committed" in out
     evoclaims("run", "right")
     assert f"wrote {path}: 10 trials" in evoclaims("reference")[1]
+    before = [(trial.seed, trial.digest) for trial in references.load(path)]
+    assert len(before) == 10
     evoclaims("run", "right", "--trials", "6", "--storage", "other")
-    status, out, err = evoclaims("reference", "--storage", "other")
-    assert "left alone: right on parity: 6 of 10 trials are stored" in out
+    assert f"wrote {path}: 10 trials" in evoclaims("reference", "--storage", "other")[1]
+    assert [(trial.seed, trial.digest) for trial in references.load(path)] == before
+
+
+def test_stored_trials_join_those_that_are_committed(evoclaims: Evoclaims, monkeypatch: pytest.MonkeyPatch) -> None:
+    plain = Reproduction.tier
+    monkeypatch.setattr(Reproduction, "tier", lambda self, *names: replace(plain(self, *names), protocol=SEQUENTIAL))
+    evoclaims("run", "right", "--trials", "5")
+    evoclaims("reference")
+    evoclaims("run", "right", "--trials", "4", "--first-seed", "5", "--storage", "later")
+    status, out, err = evoclaims("reference", "--storage", "later")
+    path = references.path_of(Path.cwd() / "reference", "smoke", "right", "parity")
+    assert f"wrote {path}: 5 trials" in out
+    evoclaims("run", "right", "--trials", "5", "--first-seed", "5", "--storage", "later")
+    assert f"wrote {path}: 10 trials" in evoclaims("reference", "--storage", "later")[1]
+    assert [trial.seed for trial in references.load(path)] == list(range(10))
+    evoclaims("run", "wrong", "--trials", "4", "--storage", "few")
+    status, _, err = evoclaims("reference", "--storage", "few")
     assert (status, "No condition of the smoke tier has 5 stored trials" in err) == (2, True)
-    assert len(references.load(path)) == 10

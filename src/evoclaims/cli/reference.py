@@ -14,7 +14,6 @@ from evoclaims.suite import references
 from evoclaims.suite.versions import change
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.spec import Condition, TrialSpec
-from evoclaims.trials.store import Store
 from evoclaims.trials.time_limit import is_final
 
 
@@ -34,15 +33,18 @@ def main(options: argparse.Namespace) -> int:
     for method, task in used:
         condition = tier.condition(method, task)
         seeds = range(tier.protocol.first_seed, tier.protocol.first_seed + sizes[-1])
-        results = _of_one_environment(store, condition, seeds, sizes[0])
-        size = max((size for size in sizes if size <= len(results)), default=0)
         path = references.path_of(reproduction.references_of(options.variant), options.tier, method, task)
-        committed = sum(trial.condition == condition.id for trial in references.load(path))
-        needed = max(committed, sizes[0])
+        committed = [trial for trial in references.load(path) if trial.condition == condition.id]
+        stored = [record for seed in seeds for record in store.records(TrialSpec(condition, seed).id)]
+        if not stored:
+            continue
+        results = _of_one_environment([*committed, *filter(is_final, stored)], condition, seeds, sizes[0])
+        size = max((size for size in sizes if size <= len(results)), default=0)
+        needed = max(len(committed), sizes[0])
         if size < needed:
             print(
-                f"left alone: {method} on {task}: {len(results)} of {needed} trials are stored, counted from the first "
-                "seed and of one environment"
+                f"left alone: {method} on {task}: {len(results)} of {needed} trials are stored or committed, counted "
+                "from the first seed and of one environment"
             )
             continue
         references.write(path, results[:size])
@@ -60,12 +62,13 @@ def main(options: argparse.Namespace) -> int:
     return 0
 
 
-def _of_one_environment(store: Store, condition: Condition, seeds: Sequence[int], needed: int) -> list[TrialResult]:
+def _of_one_environment(
+    records: Sequence[TrialResult], condition: Condition, seeds: Sequence[int], needed: int
+) -> list[TrialResult]:
     """Return the trials of the first seeds that one environment has made: this one if it has enough, else the newest.
 
-    Reference trials of mixed versions would be no reference for anything.
+    Reference trials of mixed versions would be no reference for anything. Of one seed's the last record counts.
     """
-    records = [record for seed in seeds for record in store.records(TrialSpec(condition, seed).id) if is_final(record)]
     environments = [condition.versions]
     for record in sorted(records, key=lambda record: str(record.timing.get("ended", "")), reverse=True):
         versions = recorded(record.provenance, condition.packages)
