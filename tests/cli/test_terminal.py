@@ -64,6 +64,7 @@ def with_hostile_texts(path: Path) -> None:
         plain[part][HOSTILE] = values
     plain["seal"] = content_hash({key: value for key, value in plain.items() if key != "seal"})
     path.write_text(json.dumps(plain, sort_keys=True, separators=(",", ":")))
+    path.rename(path.with_name(f"{plain['id']}.json"))  # the name of records that do not say what they depend on
 
 
 @pytest.fixture

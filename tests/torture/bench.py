@@ -127,11 +127,12 @@ class Running:
         return self.process.returncode
 
     def verdicts(self) -> list[dict[str, Any]]:
-        """Return what pytest has written of every claim, without the path of its evidence; empty if nothing."""
+        """Return what pytest has written of every claim, but for where its evidence lies and what stood there before."""
         if self.json_file is None or not self.json_file.exists():
             return []
         claims = json.loads(self.json_file.read_text())["claims"]
-        return sorted(({**claim, "evidence": ""} for claim in claims), key=lambda claim: str(claim["claim"]))
+        own = ({name: value for name, value in claim.items() if name not in ("evidence", "before")} for claim in claims)
+        return sorted(own, key=lambda claim: str(claim["claim"]))
 
 
 @dataclass
@@ -236,7 +237,7 @@ class Bench:
 
     def records(self) -> dict[str, bytes]:
         """Return the stored trials' files by id."""
-        return {path.stem: path.read_bytes() for path in (self.store / "trials").glob("??/*.json")}
+        return {path.name.partition(".")[0]: path.read_bytes() for path in (self.store / "trials").glob("??/*.json")}
 
     def age_notices(self, seconds: float = 3600.0) -> None:
         """Make the notices look as if their processes had said nothing for so long."""

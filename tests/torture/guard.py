@@ -67,10 +67,12 @@ class Guard:
     def judged(self, running: Running) -> None:
         """The verdicts of a run are those of the truth."""
         self.tally.done["verdicts compared"] += len(running.verdicts())
-        self.tally.demand(
-            running.verdicts() == self.truth.verdicts,
-            f"other verdicts: {[(claim['claim'], claim['outcome']) for claim in running.verdicts()]}",
-        )
+        found, known = running.verdicts(), self.truth.verdicts
+        names = [claim["claim"] for claim in found]
+        self.tally.demand(names == [claim["claim"] for claim in known], f"other claims: {names}")
+        for claim, true in zip(found, known, strict=False):
+            other = {key: value for key, value in claim.items() if value != true.get(key)}
+            self.tally.demand(not other, f"another verdict of {claim['claim']}: {other}")
 
     def plainly(self, running: Running, text: str = "") -> None:
         """What a run has printed holds a text, and is made for people."""
