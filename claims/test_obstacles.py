@@ -19,6 +19,12 @@ PPO_HOLDS_STILL = expected(
     because="10,000 steps: PPO has learnt to hold still, which costs next to nothing (4 of control cost against NEAT's "
     "58); NEAT's champions of 3 generations flail",
 )
+TOO_EARLY_TO_TELL = expected(
+    Outcome.REFUTED,
+    tier="smoke",
+    because="after 3 generations NEAT and CMA-ES are as good as their first networks: undecided with jax 0.10, "
+    "supported with 0.11, refuted with 0.12",
+)
 
 
 @claim(
@@ -31,7 +37,7 @@ PPO_HOLDS_STILL = expected(
     "other",
     [
         pytest.param("hyperneat", marks=HYPERNEAT_RUNS_AT_ONCE),
-        "cma_es",
+        pytest.param("cma_es", marks=TOO_EARLY_TO_TELL),
         pytest.param("ppo", marks=PPO_HOLDS_STILL),
     ],
 )

@@ -16,11 +16,17 @@ NEAT_FORGETS = expected(
     Outcome.REFUTED, tier="full", because="NEAT forgets what it knew on the way up N-parity: see G2"
 )
 NEAT_NEEDS_TIME = expected(Outcome.REFUTED, tier="smoke", because="NEAT needs more than 300 generations: see G2")
+TIED_AT_THREE_LEVELS = expected(
+    Outcome.REFUTED,
+    tier="smoke",
+    because="after 300 generations CMA-ES has two or three of the third level's 14 rows wrong, as PPO or more: "
+    "undecided with jax 0.10, refuted with 0.11 (PPO is above in 7 of 10 pairs)",
+)
 PAIRS = [
     pytest.param("cma_es", "hyperneat", "n_parity", marks=PARITY_BY_SINES),
     ("cma_es", "hyperneat", "simple_alu"),
     ("cma_es", "ppo", "n_parity"),
-    ("cma_es", "ppo", "simple_alu"),
+    pytest.param("cma_es", "ppo", "simple_alu", marks=TIED_AT_THREE_LEVELS),
     pytest.param("neat", "hyperneat", "n_parity", marks=[PARITY_BY_SINES, NEAT_NEEDS_TIME]),
     pytest.param("neat", "hyperneat", "simple_alu", marks=NEAT_NEEDS_TIME),
     pytest.param("neat", "ppo", "n_parity", marks=[NEAT_FORGETS, NEAT_NEEDS_TIME]),

@@ -127,7 +127,7 @@ class Running:
         return self.process.returncode
 
     def verdicts(self) -> list[dict[str, Any]]:
-        """Return what pytest has written of every claim, but for where its evidence lies and what stood there before."""
+        """Return what pytest has written of every claim, but for its evidence's place and what stood there before."""
         if self.json_file is None or not self.json_file.exists():
             return []
         claims = json.loads(self.json_file.read_text())["claims"]
