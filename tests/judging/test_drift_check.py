@@ -100,3 +100,16 @@ def test_the_report_is_strict_json(case) -> None:
     plain = json.loads(json.dumps(check_drift([case(["diverged"] * 5)]).to_json(), allow_nan=False))
     assert plain["alpha"] == 0.01
     assert plain["rows"][0]["status"] == "drift"
+
+
+def test_a_difference_that_single_precision_cannot_hold_is_no_drift(case) -> None:
+    """The same success, 37.83 of 42 rows, as two releases round its mean: every new value is a little above."""
+    before, now = 0.90079361, 0.90079367
+    (row,) = check_drift([case([now] * 9 + [0.925], [before] * 9 + [0.859])]).rows
+    assert row.status == "no drift"
+    assert row.a12 == pytest.approx(0.595)  # 19 of 100 pairs are above, and 81 ties
+    assert row.median_new == row.median_ref
+
+
+def test_values_that_single_precision_tells_apart_are_told_apart(case) -> None:
+    assert check_drift([case([0.9008] * 5, [0.9007] * 10)]).drifted
