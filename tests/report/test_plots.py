@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import replace
 from itertools import pairwise
 from statistics import median_low
@@ -124,6 +125,7 @@ def test_a_curve_has_a_gap_where_it_has_no_value_and_two_points_for_a_flat_stret
     assert path.findtext("title") == "seed <0>"
 
 
+@example([sys.float_info.max, -1e292])
 @given(st.lists(st.floats(width=64), min_size=2, max_size=20))
 def test_any_curve_makes_a_sound_drawing(values: list[float]) -> None:
     line = Line("seed 0", np.arange(len(values), dtype=float), np.array(values))

@@ -163,8 +163,8 @@ class _Scale:
 
     def __call__(self, value: float) -> float:
         """Return the place of a value; one beyond the ends is put at the end."""
-        share = (value - self.low) / ((self.high - self.low) or 1.0)
-        return self.left + min(max(share, 0.0), 1.0) * (self.right - self.left)
+        shown = min(max(value, self.low), self.high)  # before any arithmetic, which an enormous value would overflow
+        return self.left + (shown - self.low) / ((self.high - self.low) or 1.0) * (self.right - self.left)
 
 
 def _shown(value: float) -> float:
