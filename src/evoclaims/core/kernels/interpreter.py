@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any, Final
 
+import jax
 import numpy as np
 from jax.extend.core import Literal
 from numpy.typing import NDArray
@@ -28,6 +30,8 @@ CALLS: Final = {
     "jit": "jaxpr",
 }
 """Primitives that call a function, and the parameter that holds it."""
+COMPOUND: Final = "call_hi_primitive"
+"""What jax 0.12 stages for some functions, such as `jax.numpy.nonzero`; it says itself what it is made of."""
 
 
 def primitive(*names: str) -> Callable[[Any], Any]:
@@ -112,6 +116,10 @@ class Scalars:
             return [self.elementwise(name, *operands)]
         if name in CALLS:
             return self.run(equation.params[CALLS[name]], operands)
+        if name == COMPOUND:
+            shapes = [jax.ShapeDtypeStruct(variable.aval.shape, variable.aval.dtype) for variable in equation.invars]
+            parts = jax.make_jaxpr(partial(equation.primitive.to_lojax, **equation.params))(*shapes)
+            return self.run(parts, operands)
         if name not in PRIMITIVES:
             raise Unsupported(f"jax's {name}")
         return PRIMITIVES[name](self, equation, *operands)
