@@ -46,7 +46,7 @@ FUNCTIONS: dict[str, tuple[Callable[..., Any], tuple[Any, ...]]] = {
     "a power by a float": (lambda x: jnp.power(x, 2.0), (X,)),
     "sine and cosine": (lambda x: (jnp.sin(x * 50.0), jnp.cos(x * 50.0)), (X,)),
     "an angle": (jnp.arctan2, (X, Y)),
-    "places that are not zero": (lambda x: jnp.nonzero(jnp.ravel(x) > 0, size=2, fill_value=-1)[0], (X,)),
+    "places of a mask that is known": (lambda x: x[jnp.nonzero(jnp.arange(x.shape[0]) % 2 == 0, size=1)[0]], (X,)),
     "rounding": (lambda x: (jnp.floor(x * 3), jnp.ceil(x * 3), jnp.sign(x), jnp.round(x * 3), jnp.trunc(x * 3)), (X,)),
     "halves to even": (lambda i: (jnp.round(i / 2), jnp.sign(i)), (I,)),
     "division of integers": (
