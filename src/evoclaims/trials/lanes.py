@@ -93,9 +93,11 @@ class Lanes:
             self.seconds += time.perf_counter() - began
         return [self._compiled[size, home] for home in homes]
 
-    def shapes(self, width: int) -> Any:
-        """Return shapes and dtypes of the state of `width` lanes, as `gather` gives it."""
-        return self._state(width)
+    def shapes(self, lanes: int) -> Any:
+        """Return shapes and dtypes of the state of so many lanes, as `gather` gives it."""
+        with self._settings():
+            one = jax.eval_shape(over_trials(self._program.start, self.layout), *_seeds(1))
+        return jax.tree.map(lambda leaf: jax.ShapeDtypeStruct((lanes, *leaf.shape[1:]), leaf.dtype), one)
 
     def place(self, tree: Any, width: int) -> tuple[Any, ...]:
         """Deal a tree of host arrays with leading axis [width] out to the shares, each on its device."""
@@ -199,15 +201,9 @@ class Lanes:
         short = self.layout == "alone" and self.condition.environment_steps <= SHORT
         return lowered.compile(FAST_TO_COMPILE if short else None)
 
-    def _state(self, lanes: int) -> Any:
-        """Return shapes and dtypes of the state of so many lanes."""
-        with self._settings():
-            one = jax.eval_shape(over_trials(self._program.start, self.layout), *_seeds(1))
-        return jax.tree.map(lambda leaf: jax.ShapeDtypeStruct((lanes, *leaf.shape[1:]), leaf.dtype), one)
-
     def _compile(self, size: int, homes: Sequence[jax.Device]) -> dict[jax.Device, Compiled]:
         """Compile what runs again and again, ahead of time, so that compile time and run time are told apart."""
-        state, until = self._state(size), _seeds(size)[0]
+        state, until = self.shapes(size), _seeds(size)[0]
         with self._settings():
             lowered = [
                 program
