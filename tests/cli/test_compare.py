@@ -262,6 +262,7 @@ def test_a_users_mistake_is_one_sentence(
     git("commit", "-m", "accepted")
     git("branch", "both")
     Path("both").mkdir()
+    Path("claims/__pycache__").mkdir(exist_ok=True)  # where Python writes bytecode: no name that tells a user anything
     capsys.readouterr()
     status = main(["compare", *arguments])
     err = capsys.readouterr().err

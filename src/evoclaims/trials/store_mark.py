@@ -98,8 +98,8 @@ def _check_mark(path: Path) -> None:
 
 
 def _strange(root: Path, names: list[str]) -> str:
-    """Return the first name in an unmarked folder that no store has; empty when there is none."""
-    for name in sorted(names):
+    """Return the first name in an unmarked folder that no store has, a user's own before Python's; empty when none."""
+    for name in sorted(names, key=lambda name: (name == "__pycache__", name)):
         if name.startswith("."):
             continue
         pattern = _FOLDERS.get(name)
