@@ -13,7 +13,7 @@ from evoclaims.trials import devices
 devices.configure()
 
 from evoclaims.trials.lanes import Lanes  # noqa: E402
-from evoclaims.trials.records import dump, parse  # noqa: E402
+from evoclaims.trials.result_codec import dump, parse  # noqa: E402
 from evoclaims.trials.runner import run  # noqa: E402
 from evoclaims.trials.store import Store  # noqa: E402
 from reproductions.nisioti2025 import REPRODUCTION  # noqa: E402

@@ -21,8 +21,8 @@ from pathlib import Path
 from evoclaims.envs.gates.parity import NParity
 from evoclaims.methods.hand_built import HandBuilt
 from evoclaims.trials.budget import Budget
-from evoclaims.trials.records import dump
 from evoclaims.trials.result import TrialResult, digest
+from evoclaims.trials.result_codec import dump
 from evoclaims.trials.spec import Condition, TrialSpec
 from evoclaims.trials.store import Store
 
@@ -40,7 +40,7 @@ from pathlib import Path
 from evoclaims.envs.gates.parity import NParity
 from evoclaims.judging.protocol import Protocol
 from evoclaims.methods.hand_built import HandBuilt
-from evoclaims.suite.reproduction import Reproduction, Tier
+from evoclaims.paper.reproduction import Reproduction, Tier
 from evoclaims.trials.budget import Budget
 from evoclaims.trials.spec import Condition
 

@@ -9,7 +9,7 @@ from typing import Final
 
 import pytest
 
-pytest_plugins = ["ptx_machine", "pytester", "tiny_project"]
+pytest_plugins = ["hand_made_paper", "ptx_machine", "pytester", "tiny_project"]
 
 _CACHE: Final = "JAX_COMPILATION_CACHE_DIR"
 _made = ""

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from evoclaims.core.kernels import one_kernel
 from evoclaims.envs.ecorobot import robot_task
+from evoclaims.kernels import one_kernel
 
 INSTRUCTION = re.compile(r"(?:@(?P<when>%\w+) )?(?P<code>[\w.]+)(?: (?P<operands>.*))?")
 # fmt: off

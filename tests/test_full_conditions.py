@@ -10,7 +10,7 @@ import pytest
 
 from evoclaims.core.errors import UserError
 from evoclaims.envs.base import Numbered
-from evoclaims.trials.fit import traced_progress
+from evoclaims.trials.compatibility import traced_progress
 from evoclaims.trials.spec import Condition
 from reproductions.nisioti2025 import REPRODUCTION
 

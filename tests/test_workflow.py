@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from evoclaims.cli.main import _parser
-from evoclaims.suite.transitions import parse_patterns
+from evoclaims.verdicts.transitions import parse_patterns
 
 ROOT = Path(__file__).parents[1]
 TEXT = (ROOT / ".github" / "workflows" / "claims.yml").read_text(encoding="utf-8")

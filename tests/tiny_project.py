@@ -32,8 +32,8 @@ from evoclaims.envs.gates.parity import NParity
 from evoclaims.judging.protocol import Protocol
 from evoclaims.methods.base import Policy, Progress
 from evoclaims.methods.hand_built import HandBuilt, threshold_network
-from evoclaims.suite.reproduction import Reproduction, Tier
-from evoclaims.suite.variant import Variant, changed
+from evoclaims.paper.reproduction import Reproduction, Tier
+from evoclaims.paper.variant import Variant, changed
 from evoclaims.trials.budget import Budget
 from evoclaims.trials.spec import Condition
 
@@ -126,7 +126,7 @@ def warmed() -> None:
     import evoclaims.cli.plan
     import evoclaims.cli.project
     import evoclaims.cli.run
-    import evoclaims.suite.table  # noqa: F401
+    import evoclaims.report.terminal_table  # noqa: F401
     from evoclaims.envs.gates.parity import NParity
     from evoclaims.methods.hand_built import HandBuilt
     from evoclaims.trials import devices

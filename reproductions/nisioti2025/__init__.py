@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from evoclaims.judging.protocol import FIXED_10, SEQUENTIAL
-from evoclaims.suite.reproduction import Reproduction, Tier
+from evoclaims.paper.reproduction import Reproduction, Tier
 from reproductions.nisioti2025 import ecorobot, stepping_gates
 from reproductions.nisioti2025.variants import VARIANTS
 

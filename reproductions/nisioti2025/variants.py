@@ -17,7 +17,7 @@ from evoclaims.methods.neat.settings import Mutation
 from evoclaims.methods.ppo import LevelTest, Ppo
 from evoclaims.networks.all_skips import AllSkips
 from evoclaims.networks.mlp import Mlp
-from evoclaims.suite.variant import Variant, changed
+from evoclaims.paper.variant import Variant, changed
 from evoclaims.trials.spec import Condition
 from reproductions.nisioti2025 import ecorobot, stepping_gates
 

@@ -12,7 +12,7 @@ import pytest
 
 from evoclaims.cli import main
 from evoclaims.judging.verdict import Outcome
-from evoclaims.suite import history
+from evoclaims.verdicts import history
 
 Evoclaims = Callable[..., tuple[int, str, str]]
 FILE = Path("verdicts.toml")

@@ -12,8 +12,8 @@ import pytest
 
 from evoclaims.cli import main
 from evoclaims.judging.protocol import SEQUENTIAL
-from evoclaims.suite import references
-from evoclaims.suite.reproduction import Reproduction
+from evoclaims.paper import references
+from evoclaims.paper.reproduction import Reproduction
 from evoclaims.trials.store import Store
 
 Evoclaims = Callable[..., tuple[int, str, str]]
@@ -70,7 +70,7 @@ def test_run_can_be_held_to_a_task_and_a_tier(evoclaims: Evoclaims, monkeypatch:
         asked.append((condition.label, condition.steps))
         return []
 
-    monkeypatch.setattr("evoclaims.suite.modes.RunMissing.__call__", fetch)
+    monkeypatch.setattr("evoclaims.claims.fetching.RunMissing.__call__", fetch)
     assert evoclaims("run", "--on", "parity", "--tier", "full")[0] == 0
     assert asked == [(f"{n} on n_parity", 2) for n in ("hand_built", "hand_built_negated", "coin", "broken")]
 
@@ -191,7 +191,7 @@ def test_an_interrupt_ends_the_run_at_once(evoclaims: Evoclaims, monkeypatch: py
         asked.append(arguments)
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("evoclaims.suite.modes.RunMissing.__call__", interrupt)
+    monkeypatch.setattr("evoclaims.claims.fetching.RunMissing.__call__", interrupt)
     assert evoclaims("run")[0] == 130
     assert len(asked) == 1
 
@@ -200,7 +200,7 @@ def test_an_interrupted_command_says_that_it_goes_on(evoclaims: Evoclaims, monke
     def interrupt(*arguments: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("evoclaims.suite.modes.RunMissing.__call__", interrupt)
+    monkeypatch.setattr("evoclaims.claims.fetching.RunMissing.__call__", interrupt)
     status, _, err = evoclaims("run", "right")
     assert status == 130
     assert "the same command goes on from the last checkpoint" in err

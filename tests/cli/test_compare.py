@@ -13,9 +13,10 @@ import pytest
 
 from evoclaims.cli import main
 from evoclaims.judging.verdict import Outcome
-from evoclaims.suite import history, references
+from evoclaims.paper import references
 from evoclaims.trials.result import TrialResult, digest
 from evoclaims.trials.store import Store
+from evoclaims.verdicts import history
 
 Evoclaims = Callable[..., tuple[int, str, str]]
 FILE = Path("verdicts.toml")

@@ -13,7 +13,7 @@ import pandas.core.arrays.arrow.extension_types  # registers types, once: pytest
 import pytest
 
 from evoclaims.cli import main
-from evoclaims.suite import references
+from evoclaims.paper import references
 from evoclaims.trials.store import Store
 
 Evoclaims = Callable[..., tuple[int, str, str]]

@@ -17,14 +17,14 @@ import pytest
 import tiny_project
 
 from evoclaims.cli import main
-from evoclaims.cli.outings import run_again
+from evoclaims.cli.episodes import run_again
 from evoclaims.cli.stored import load
 from evoclaims.core.canonical import content_hash
 from evoclaims.envs.ecorobot import physics
 from evoclaims.envs.ecorobot.physics import Body
 from evoclaims.envs.ecorobot.scene import Places, Scene
 from evoclaims.networks.export import optional
-from evoclaims.suite.config import load_config, load_reproduction
+from evoclaims.paper.config import load_config, load_reproduction
 from evoclaims.trials.store import Store
 
 # What the command imports late: pytester forgets the modules that a test has imported, and would load them twice.

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from evoclaims.cli import main
-from evoclaims.cli.outings import Outings
+from evoclaims.cli.episodes import Outings
 from evoclaims.cli.report import trajectory
 from evoclaims.envs.ecorobot.stones import SteppingStones
 from evoclaims.envs.gates.parity import NParity

@@ -15,8 +15,8 @@ import pytest
 
 from evoclaims.cli import main
 from evoclaims.core.canonical import content_hash
-from evoclaims.suite import history
 from evoclaims.trials.store import Store
+from evoclaims.verdicts import history
 
 HOSTILE = "\x1b[2J\x1b]0;owned\x07\x9b31m\u202e\r"
 

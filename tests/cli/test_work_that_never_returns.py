@@ -13,7 +13,7 @@ STUCK = '''
 import time
 
 import numpy as np
-from evoclaims.suite.reproduction import Reproduction
+from evoclaims.paper.reproduction import Reproduction
 
 
 class Looping(Coin):

@@ -19,8 +19,8 @@ from evoclaims.figures.files import DOTS_PER_INCH, svg
 from evoclaims.figures.style import plain
 from evoclaims.judging.protocol import Protocol
 from evoclaims.methods.hand_built import HandBuilt
-from evoclaims.suite.archive import Archive
-from evoclaims.suite.reproduction import Reproduction, Tier
+from evoclaims.paper.archive import Archive
+from evoclaims.paper.reproduction import Reproduction, Tier
 from evoclaims.trials.budget import Budget
 from evoclaims.trials.result import Status, TrialResult, digest
 from evoclaims.trials.spec import Condition, TrialSpec

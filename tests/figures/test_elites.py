@@ -15,7 +15,7 @@ from evoclaims.figures.elites import ElitesMap, Ground
 from evoclaims.methods.map_elites import MapElites
 from evoclaims.networks.mlp import Mlp
 from evoclaims.trials.budget import Budget
-from evoclaims.trials.outcome import named_leaves
+from evoclaims.trials.result_making import named_leaves
 from evoclaims.trials.spec import Condition
 
 CELLS = (8, 7)

@@ -12,7 +12,7 @@ from small_paper import collisions
 
 from evoclaims.figures import catalogue
 from evoclaims.figures.figure import Drawing
-from evoclaims.suite.archive import Archive
+from evoclaims.paper.archive import Archive
 from evoclaims.trials.store import Store
 from reproductions.nisioti2025 import REPRODUCTION
 

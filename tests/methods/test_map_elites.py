@@ -20,7 +20,7 @@ from evoclaims.envs.base import Episode
 from evoclaims.envs.gates.parity import NParity
 from evoclaims.methods.map_elites import MapElites, beaten, lecun_uniform
 from evoclaims.networks.mlp import Mlp
-from evoclaims.trials.outcome import is_sound
+from evoclaims.trials.result_making import is_sound
 
 LEVEL = jnp.zeros((), jnp.int32)
 X, Y = 4, 3  # cells of the small grid, told apart by their numbers

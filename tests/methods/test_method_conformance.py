@@ -10,7 +10,7 @@ import numpy as np
 from workbench import Workbench, close, same_bits
 
 from evoclaims.core.canonical import canonical_json
-from evoclaims.trials.outcome import is_sound
+from evoclaims.trials.result_making import is_sound
 
 LEVEL = jnp.zeros((), jnp.int32)
 

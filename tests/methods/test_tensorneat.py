@@ -30,7 +30,7 @@ from evoclaims.methods.neat.species import SpeciesState, speciate
 from evoclaims.methods.tensorneat import NeatTensorneat, library, neat, policy
 from evoclaims.methods.tensorneat_genes import Genes, translated
 from evoclaims.networks.graph import GraphNetwork
-from evoclaims.trials.outcome import is_sound
+from evoclaims.trials.result_making import is_sound
 
 SMALL = Settings(population=60, nodes=12, connections=30, species=Species(most=5))
 METHODS = {

@@ -11,7 +11,7 @@ import pytest
 
 from evoclaims.cli import main
 from evoclaims.judging.verdict import Outcome
-from evoclaims.suite import history
+from evoclaims.verdicts import history
 
 Sentence = Callable[[pytest.RunResult, str], None]
 

@@ -171,7 +171,7 @@ def test_trials_that_drifted_from_the_committed_ones_fail_the_run(project: Any) 
     from dataclasses import replace
     from pathlib import Path
 
-    from evoclaims.suite import references
+    from evoclaims.paper import references
     from evoclaims.trials.result import digest
     from evoclaims.trials.store import Store
 

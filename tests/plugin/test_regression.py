@@ -12,7 +12,7 @@ import pytest
 
 from evoclaims.cli import main
 from evoclaims.judging.verdict import Outcome
-from evoclaims.suite import history
+from evoclaims.verdicts import history
 
 Sentence = Callable[[pytest.RunResult, str], None]
 ALMOST = "verdict(trials('right', on='parity').solves_every_level.in_most_trials(p0=0.6))"

@@ -97,7 +97,7 @@ def test_a_claim_that_looks_at_no_trial_compares_none(project: Any, aged: Callab
 
 
 def test_bits_are_not_said_to_be_unchanged_where_versions_differ(project: Any, aged: Callable[..., None]) -> None:
-    from evoclaims.suite import references
+    from evoclaims.paper import references
     from evoclaims.trials.store import Store
 
     aged(10)
@@ -156,7 +156,7 @@ def test_references_are_of_one_environment(
     project: Any, aged: Callable[..., None], capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     from evoclaims.cli import main
-    from evoclaims.suite import references
+    from evoclaims.paper import references
 
     monkeypatch.chdir(project.path)
     path = references.path_of(Path.cwd() / "reference", "smoke", "right", "parity")

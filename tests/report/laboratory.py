@@ -11,6 +11,10 @@ from typing import Any
 
 import jax
 
+from evoclaims.claims.claim import Claim
+from evoclaims.claims.fetching import StoredOnly
+from evoclaims.claims.reporting import broken
+from evoclaims.claims.session import Session
 from evoclaims.core.keys import TRAINING, trial_key
 from evoclaims.envs.gates.parity import NParity
 from evoclaims.judging.assertion import Assertion
@@ -18,20 +22,17 @@ from evoclaims.judging.protocol import Protocol
 from evoclaims.methods.hand_built import HandBuilt
 from evoclaims.methods.neat.neat import Neat
 from evoclaims.methods.neat.settings import Settings, Species
-from evoclaims.report.gather import gather
+from evoclaims.paper.archive import Archive
+from evoclaims.paper.reproduction import Reproduction, Tier
+from evoclaims.report.build import gather
 from evoclaims.report.model import Page, Plate, Section
-from evoclaims.suite.archive import Archive
-from evoclaims.suite.claim import Claim
-from evoclaims.suite.history import History
-from evoclaims.suite.modes import StoredOnly
-from evoclaims.suite.report import ClaimReport, broken
-from evoclaims.suite.reproduction import Reproduction, Tier
-from evoclaims.suite.session import Session
 from evoclaims.trials.budget import Budget
-from evoclaims.trials.outcome import named_leaves
 from evoclaims.trials.result import TrialResult, digest
+from evoclaims.trials.result_making import named_leaves
 from evoclaims.trials.spec import Condition, TrialSpec
 from evoclaims.trials.store import Store
+from evoclaims.verdicts.claim_report import ClaimReport
+from evoclaims.verdicts.history import History
 
 SMALL = Settings(population=16, nodes=12, connections=24, activations=("tanh",), species=Species(most=4))
 METHODS: dict[str, Any] = {"better": HandBuilt(), "worse": HandBuilt(negated=True), "neat": Neat(SMALL)}

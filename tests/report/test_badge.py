@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from evoclaims.report.badge import BLUE, GREEN, GREY, RED, colour_of, message_of, svg
-from evoclaims.suite.report import ClaimReport
+from evoclaims.verdicts.claim_report import ClaimReport
 
 SVG = "{http://www.w3.org/2000/svg}"
 

@@ -9,8 +9,8 @@ import pytest
 from chromium import NAMES, Chromium, found
 from laboratory import Laboratory, better_solves, better_wins
 
+from evoclaims.report.html import html
 from evoclaims.report.model import Plate
-from evoclaims.report.page import html
 
 PLATE = (
     b'<svg xmlns="http://www.w3.org/2000/svg" width="40" height="30" viewBox="0 0 40 30">'

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from laboratory import HERE, Laboratory, better_solves, better_wins
 from markdown_it import MarkdownIt
 
+from evoclaims.report.formatting import clean
 from evoclaims.report.markdown import literal, markdown
-from evoclaims.report.words import clean
 
 READER = MarkdownIt("commonmark").enable(["table", "strikethrough"])
 

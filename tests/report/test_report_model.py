@@ -12,14 +12,14 @@ from hypothesis import strategies as st
 from laboratory import CONDITIONS, HERE, Laboratory, better_solves, better_wins, neat_solves, record
 
 from evoclaims.judging.verdict import Outcome
+from evoclaims.paper import references
+from evoclaims.paper.archive import Archive
+from evoclaims.report.build import gather
 from evoclaims.report.champion import typical
-from evoclaims.report.gather import gather
-from evoclaims.report.glance import Reader
+from evoclaims.report.formatting import Anchors
 from evoclaims.report.model import Champion
-from evoclaims.report.words import Anchors
-from evoclaims.suite import references
-from evoclaims.suite.archive import Archive
-from evoclaims.suite.history import Entry
+from evoclaims.report.trial_summary import Reader
+from evoclaims.verdicts.history import Entry
 
 
 def test_a_section_holds_what_was_claimed_judged_and_looked_at(filled: Laboratory) -> None:

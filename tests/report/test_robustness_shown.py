@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from evoclaims.judging.verdict import Outcome
+from evoclaims.report.html import html
 from evoclaims.report.markdown import markdown
 from evoclaims.report.model import Page
-from evoclaims.report.page import html
-from evoclaims.suite.robustness import Robustness
+from evoclaims.verdicts.robustness import Robustness
 
 ROW = Robustness("G1[<b>]", "smoke", Outcome.REFUTED, {"network": Outcome.SUPPORTED, "rows": Outcome.REFUTED})
 OTHER = Robustness("G2", "smoke", Outcome.SUPPORTED, {"rows": Outcome.SUPPORTED})

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from laboratory import CONDITIONS, Laboratory, record
 
-from evoclaims.report.curves import MOST_LINES, CurvePanel, panels
-from evoclaims.report.glance import POINTS, Glance, Reader
+from evoclaims.report.training_curves import MOST_LINES, CurvePanel, panels
+from evoclaims.report.trial_summary import POINTS, Glance, Reader
 
 
 @pytest.fixture

@@ -17,10 +17,10 @@ from typing import Any
 
 from trial_toys import Walker
 
+from evoclaims.claims import fetching
 from evoclaims.envs.gates.parity import NParity
 from evoclaims.judging.protocol import Protocol
-from evoclaims.suite import modes
-from evoclaims.suite.reproduction import Reproduction, Tier
+from evoclaims.paper.reproduction import Reproduction, Tier
 from evoclaims.trials.budget import Budget
 from evoclaims.trials.progress import RunProgress, Watcher
 from evoclaims.trials.result import TrialResult
@@ -50,7 +50,7 @@ def say(what: str, **fields: Any) -> None:
     os.write(_log, (json.dumps(line) + "\n").encode())
 
 
-_run, _put = modes.run, Store.put
+_run, _put = fetching.run, Store.put
 
 
 def _slowly(
@@ -74,5 +74,5 @@ def _telling(store: Store, result: TrialResult, champion: Any) -> Any:
     return became
 
 
-modes.run = _slowly  # type: ignore[assignment]
+fetching.run = _slowly  # type: ignore[assignment]
 Store.put = _telling  # type: ignore[method-assign]

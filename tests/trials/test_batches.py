@@ -24,7 +24,7 @@ def test_a_checkpoint_of_another_platform_is_passed_over(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     with monkeypatch.context() as patch:
-        patch.setattr("evoclaims.trials.outcome.collect", lambda: {**collect(), "machine": "another"})
+        patch.setattr("evoclaims.trials.result_making.collect", lambda: {**collect(), "machine": "another"})
         with pytest.raises(StoppedError):
             run_climbers(store, cpus, stopping(2))
     log = Log()
@@ -37,7 +37,7 @@ def test_a_checkpoint_of_another_platform_stays_while_it_owes_a_trial(
     store: Store, cpus: list[Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with monkeypatch.context() as patch:
-        patch.setattr("evoclaims.trials.outcome.collect", lambda: {**collect(), "prng": "another"})
+        patch.setattr("evoclaims.trials.result_making.collect", lambda: {**collect(), "prng": "another"})
         with pytest.raises(StoppedError):
             run_climbers(store, cpus, stopping(1))
     (path,) = store.checkpoints.iterdir()

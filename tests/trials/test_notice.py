@@ -18,9 +18,9 @@ from typing import Any
 
 import pytest
 
+from evoclaims.claims.fetching import RunMissing
 from evoclaims.core.errors import UserError
-from evoclaims.suite.live import describe
-from evoclaims.suite.modes import RunMissing
+from evoclaims.report.live_line import describe
 from evoclaims.trials import notice as notices
 from evoclaims.trials.notice import (
     FRESH_SECONDS,

@@ -12,12 +12,13 @@ import pytest
 
 from evoclaims.core.errors import UserError
 from evoclaims.core.files import read_file
-from evoclaims.suite import history, references
+from evoclaims.paper import references
 from evoclaims.trials import checkpoint
 from evoclaims.trials.integrity import verify
 from evoclaims.trials.notice import fresh
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.store import DamagedFileError, Store
+from evoclaims.verdicts import history
 
 
 @pytest.fixture(autouse=True)

@@ -14,8 +14,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from evoclaims.trials.records import RecordError, dump, parse
 from evoclaims.trials.result import TrialResult
+from evoclaims.trials.result_codec import RecordError, dump, parse
 from evoclaims.trials.store import DamagedFileError, Store
 
 Make = Callable[..., TrialResult]

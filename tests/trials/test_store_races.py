@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from evoclaims.trials import once
+from evoclaims.trials import first_writer
 from evoclaims.trials import store as stores
 from evoclaims.trials.integrity import verify
 from evoclaims.trials.result import TrialResult
@@ -154,8 +154,8 @@ def file_system(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch)
 
 def test_a_file_written_once_stays_as_the_first_has_written_it(tmp_path: Path, file_system: str) -> None:
     path = tmp_path / "folder" / "file"
-    assert once.write_once(path, b"first") is True
-    assert once.write_once(path, b"second") is False
+    assert first_writer.write_once(path, b"first") is True
+    assert first_writer.write_once(path, b"second") is False
     assert path.read_bytes() == b"first"
     assert list(path.parent.iterdir()) == [path]
 
@@ -165,7 +165,7 @@ def test_of_many_writers_at_once_exactly_one_writes(tmp_path: Path) -> None:
 
     def write(number: int) -> bool:
         start.wait(60)
-        return once.write_once(tmp_path / "file", bytes([number]))
+        return first_writer.write_once(tmp_path / "file", bytes([number]))
 
     with ThreadPoolExecutor(8) as pool:
         wrote = list(pool.map(write, range(8)))

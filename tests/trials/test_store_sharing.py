@@ -47,7 +47,7 @@ def test_a_store_copied_over_another_holds_the_trials_of_both(
 def test_processes_that_put_the_same_trials_at_once_leave_a_sound_store(store: Store, make_result: Make) -> None:
     script = (
         "import json, sys; import numpy as np; from pathlib import Path\n"
-        "from evoclaims.trials.store import Store; from evoclaims.trials.records import parse\n"
+        "from evoclaims.trials.store import Store; from evoclaims.trials.result_codec import parse\n"
         "store = Store(Path(sys.argv[1])); sys.stdin.readline()\n"
         "texts = json.loads(sys.argv[2])\n"
         "print([store.put(parse(text), {'w': np.arange(1000.0)}) for text in texts])\n"

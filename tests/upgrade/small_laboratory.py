@@ -34,7 +34,7 @@ from evoclaims.methods.map_elites import MapElites
 from evoclaims.methods.ppo import Ppo
 from evoclaims.methods.random_policy import RandomPolicy
 from evoclaims.networks.mlp import Mlp
-from evoclaims.suite.reproduction import Reproduction, Tier
+from evoclaims.paper.reproduction import Reproduction, Tier
 from evoclaims.trials.budget import Budget
 from evoclaims.trials.spec import Condition
 

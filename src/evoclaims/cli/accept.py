@@ -8,8 +8,8 @@ from datetime import UTC, datetime
 from evoclaims.cli.project import judge_stored, open_archive, open_project
 from evoclaims.cli.tiers import tiers_of
 from evoclaims.core.files import write_atomically
-from evoclaims.suite import history
-from evoclaims.suite.accepting import accept
+from evoclaims.verdicts import history
+from evoclaims.verdicts.acceptance import accept
 
 
 def main(options: argparse.Namespace) -> int:

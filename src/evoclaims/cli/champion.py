@@ -17,7 +17,7 @@ from evoclaims.core.errors import UnknownNameError, UserError
 from evoclaims.networks import export, picture
 from evoclaims.networks.genome import Genome
 from evoclaims.networks.graph import GraphNetwork
-from evoclaims.suite.console import PlainSpokenConsole
+from evoclaims.report.console import PlainSpokenConsole
 from evoclaims.trials import champions, devices
 from evoclaims.trials.champions import Replay
 

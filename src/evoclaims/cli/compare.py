@@ -12,15 +12,15 @@ from evoclaims.cli.tiers import tiers_of
 from evoclaims.core.errors import UserError
 from evoclaims.judging.baseline import DriftReport
 from evoclaims.judging.tripwire import DigestCheck
-from evoclaims.suite import history, sides, transitions
-from evoclaims.suite.config import SuiteConfig
-from evoclaims.suite.report import ClaimReport
-from evoclaims.suite.reproduction import Reproduction
-from evoclaims.suite.revision import Revision, find_revision
-from evoclaims.suite.sides import Side
-from evoclaims.suite.timeline import timeline
-from evoclaims.suite.transitions import Kind
+from evoclaims.paper.config import SuiteConfig
+from evoclaims.paper.reproduction import Reproduction
 from evoclaims.trials.store import Store
+from evoclaims.verdicts import comparison, history, transitions
+from evoclaims.verdicts.claim_report import ClaimReport
+from evoclaims.verdicts.comparison import Side
+from evoclaims.verdicts.git_revision import Revision, find_revision
+from evoclaims.verdicts.timeline import timeline
+from evoclaims.verdicts.transitions import Kind
 
 UNSAID = (Kind.SAME, Kind.NOT_RUN)
 """What is counted and not listed."""
@@ -44,7 +44,7 @@ def main(options: argparse.Namespace) -> int:
         return 0
     old, new = (side.of(tiers) for side in _Places(config, reproduction, tiers, options.storage).sides(options.places))
     found = transitions.compare(old.verdicts, new.verdicts)
-    drift, digests = sides.compare_trials(old, new)
+    drift, digests = comparison.compare_trials(old, new)
     for line in (
         f"old: {old.name}",
         f"new: {new.name}",
@@ -73,12 +73,12 @@ class _Places:
     def sides(self, places: Sequence[str]) -> tuple[Side, Side]:
         """Return old and new, as the names on the command line say."""
         if not places:
-            accepted = sides.working_tree(self.reproduction)
+            accepted = comparison.working_tree(self.reproduction)
             if not accepted.verdicts:
                 raise UserError("No verdict has been accepted yet: `evoclaims accept` accepts those of now.")
             store = open_store(self.storage)
             reports = self._judged(self.storage)
-            now = replace(sides.store(self.reproduction, store, reports), verdicts=transitions.standings(reports))
+            now = replace(comparison.store(self.reproduction, store, reports), verdicts=transitions.standings(reports))
             name = f"judged from the store {store.root}, and from reference trials where it has none"
             return replace(accepted, name="accepted verdicts, and reference trials"), replace(now, name=name)
         found = [self._place(place) for place in places]
@@ -89,8 +89,8 @@ class _Places:
                 f"{revisions[0].name} is a revision and {stores[0].root} a store: two of a kind can be compared."
             )
         if revisions:
-            read = [sides.revision(self.reproduction, place) for place in revisions]
-            return (read[0], read[1]) if len(read) == 2 else (read[0], sides.working_tree(self.reproduction))
+            read = [comparison.revision(self.reproduction, place) for place in revisions]
+            return (read[0], read[1]) if len(read) == 2 else (read[0], comparison.working_tree(self.reproduction))
         opened = [self._store(place) for place in (*stores, open_store(self.storage))[:2]]
         return opened[0], opened[1]
 
@@ -121,7 +121,7 @@ class _Places:
         """Judge a store from its own trials."""
         if not store.ids():
             raise UserError(f"The folder {store.root} holds no trials, so there is nothing to compare.")
-        return sides.store(self.reproduction, store, self._judged(str(store.root)))
+        return comparison.store(self.reproduction, store, self._judged(str(store.root)))
 
     def _judged(self, storage: str) -> list[ClaimReport]:
         """Judge all claims of the tiers."""

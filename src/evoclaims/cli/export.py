@@ -6,17 +6,18 @@ import argparse
 import sys
 from pathlib import Path
 
+from evoclaims.claims.fetching import StoredOnly
 from evoclaims.cli.project import judge_stored, open_archive, open_project
 from evoclaims.cli.stored import write
 from evoclaims.cli.tiers import ALL, tiers_of
 from evoclaims.core.canonical import content_hash
 from evoclaims.core.errors import UnknownNameError, UserError
-from evoclaims.suite import export, references
-from evoclaims.suite.modes import StoredOnly
-from evoclaims.suite.naming import names_of
-from evoclaims.suite.reproduction import Reproduction
+from evoclaims.paper import references
+from evoclaims.paper.condition_names import names_of
+from evoclaims.paper.reproduction import Reproduction
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.store import DamagedFileError
+from evoclaims.verdicts import export
 
 
 def main(options: argparse.Namespace) -> int:

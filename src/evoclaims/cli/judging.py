@@ -11,12 +11,13 @@ from typing import Final
 
 import pytest
 
+from evoclaims.claims import collected
+from evoclaims.claims.claim import claim_of
 from evoclaims.core.errors import UserError
 from evoclaims.core.raised import in_one_line
-from evoclaims.pytest_summary import ATTRIBUTE
-from evoclaims.suite import collected, history
-from evoclaims.suite.claim import claim_of
-from evoclaims.suite.report import ClaimReport
+from evoclaims.plugin.summary import ATTRIBUTE
+from evoclaims.verdicts import history
+from evoclaims.verdicts.claim_report import ClaimReport
 
 _ENVIRONMENT: Final = ("PYTEST_ADDOPTS", "PYTEST_PLUGINS", "PYTEST_DISABLE_PLUGIN_AUTOLOAD")
 """Variables that change which tests a run of pytest collects, and when it stops."""

@@ -11,7 +11,7 @@ from typing import Any, Final, get_args
 
 import numpy as np
 
-from evoclaims.cli.outings import Outings, run_again
+from evoclaims.cli.episodes import Outings, run_again
 from evoclaims.cli.project import open_project
 from evoclaims.cli.run import describe
 from evoclaims.cli.stored import Stored, load, write
@@ -22,7 +22,7 @@ from evoclaims.envs.ecorobot.views.marks import marks
 from evoclaims.envs.ecorobot.views.motion import Motion, motion
 from evoclaims.methods.map_elites import MapElites
 from evoclaims.networks.picture import Format
-from evoclaims.suite.reproduction import Tier
+from evoclaims.paper.reproduction import Tier
 from evoclaims.trials import devices
 
 PICTURE: Final = get_args(Format)

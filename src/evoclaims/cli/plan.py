@@ -11,15 +11,15 @@ from rich.table import Table
 from evoclaims.cli.project import judge_stored, open_project, open_store
 from evoclaims.cli.terminal import styled
 from evoclaims.core.errors import UserError
-from evoclaims.suite.console import PlainSpokenConsole
-from evoclaims.suite.cost import Pace, known_pace, measured_pace
-from evoclaims.suite.live import duration
-from evoclaims.suite.report import ClaimReport
-from evoclaims.suite.reproduction import Tier
+from evoclaims.paper.cost import Pace, known_pace, measured_pace
+from evoclaims.paper.reproduction import Tier
+from evoclaims.report.console import PlainSpokenConsole
+from evoclaims.report.live_line import duration
 from evoclaims.trials import devices
 from evoclaims.trials.spec import Condition, TrialSpec
 from evoclaims.trials.store import Store
 from evoclaims.trials.time_limit import answers
+from evoclaims.verdicts.claim_report import ClaimReport
 
 
 def main(options: argparse.Namespace) -> int:

@@ -5,12 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 
 from evoclaims.cli.judging import judge
-from evoclaims.suite.archive import Archive
-from evoclaims.suite.config import SuiteConfig, find_root, load_config, load_reproduction
-from evoclaims.suite.report import ClaimReport
-from evoclaims.suite.reproduction import Reproduction
+from evoclaims.paper.archive import Archive
+from evoclaims.paper.config import SuiteConfig, find_root, load_config, load_reproduction
+from evoclaims.paper.reproduction import Reproduction
 from evoclaims.trials import devices
 from evoclaims.trials.store import Store
+from evoclaims.verdicts.claim_report import ClaimReport
 
 
 def open_project() -> tuple[SuiteConfig, Reproduction]:

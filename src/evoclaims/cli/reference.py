@@ -10,11 +10,11 @@ from evoclaims.cli.project import judge_stored, open_project, open_store
 from evoclaims.core.errors import UserError
 from evoclaims.core.packages import agree, recorded
 from evoclaims.judging.baseline import MIN_REFERENCES
-from evoclaims.suite import references
-from evoclaims.suite.versions import change
+from evoclaims.paper import references
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.spec import Condition, TrialSpec
 from evoclaims.trials.time_limit import is_final
+from evoclaims.verdicts.versions import change
 
 
 def main(options: argparse.Namespace) -> int:

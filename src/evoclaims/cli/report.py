@@ -9,26 +9,27 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-from evoclaims.cli.outings import run_again
+from evoclaims.cli.episodes import run_again
 from evoclaims.cli.project import judge_stored, open_archive, open_project
 from evoclaims.cli.stored import Stored, write
 from evoclaims.core.errors import UnknownNameError
 from evoclaims.envs.ecorobot.robot_task import RobotTask
 from evoclaims.envs.ecorobot.views import pictures
+from evoclaims.paper.archive import Archive
+from evoclaims.paper.config import SuiteConfig
+from evoclaims.paper.reproduction import Reproduction
+from evoclaims.report import terminal_table
+from evoclaims.report.build import gather
 from evoclaims.report.champion import network
-from evoclaims.report.gather import gather
+from evoclaims.report.html import html
 from evoclaims.report.markdown import markdown
-from evoclaims.report.page import html
-from evoclaims.report.plates import plates
-from evoclaims.suite import history, table
-from evoclaims.suite.archive import Archive
-from evoclaims.suite.config import SuiteConfig
-from evoclaims.suite.report import ClaimReport
-from evoclaims.suite.reproduction import Reproduction
-from evoclaims.suite.robustness import Robustness, matrix
+from evoclaims.report.paper_figures import plates
 from evoclaims.trials import devices
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.spec import Condition
+from evoclaims.verdicts import history
+from evoclaims.verdicts.claim_report import ClaimReport
+from evoclaims.verdicts.robustness import Robustness, matrix
 
 ALL = "all"
 
@@ -66,7 +67,7 @@ def main(options: argparse.Namespace) -> int:
         write(folder / name, text.encode())
         print(f"wrote {folder / name}")
     for board in page.boards:
-        print(f"claims ({board.tier}): {table.totals(verdicts[board.tier])}")
+        print(f"claims ({board.tier}): {terminal_table.totals(verdicts[board.tier])}")
     return 0
 
 

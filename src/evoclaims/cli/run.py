@@ -7,21 +7,21 @@ import contextlib
 import sys
 from collections.abc import Mapping
 
+from evoclaims.claims.fetching import RunMissing
 from evoclaims.cli.project import judge_stored, open_project, open_store
 from evoclaims.cli.terminal import StdoutTerminal
 from evoclaims.core.errors import UnknownNameError, UserError
 from evoclaims.core.printable import printable
 from evoclaims.core.raised import in_one_line
 from evoclaims.judging.counting import MAX_TRIALS
-from evoclaims.suite.config import SuiteConfig
-from evoclaims.suite.live import LiveLine, duration
-from evoclaims.suite.modes import RunMissing
-from evoclaims.suite.reproduction import Tier
-from evoclaims.suite.robustness import matrix
-from evoclaims.suite.variant import Variant
+from evoclaims.paper.config import SuiteConfig
+from evoclaims.paper.reproduction import Tier
+from evoclaims.paper.variant import Variant
+from evoclaims.report.live_line import LiveLine, duration
 from evoclaims.trials.result import COMPLETE, TrialResult
 from evoclaims.trials.spec import TrialSpec
 from evoclaims.trials.time_limit import time_allowed
+from evoclaims.verdicts.robustness import matrix
 
 
 def main(options: argparse.Namespace) -> int:

@@ -8,7 +8,7 @@ from rich.console import Console
 
 from evoclaims.cli.project import judge_stored, open_project
 from evoclaims.cli.terminal import styled
-from evoclaims.suite import table
+from evoclaims.report import terminal_table
 
 
 def main(options: argparse.Namespace) -> int:
@@ -18,9 +18,9 @@ def main(options: argparse.Namespace) -> int:
     reports = judge_stored(config, options.storage, options.tier)
     console = Console(file=styled())
     for part in (
-        table.verdict_table(reports, console.width, console.is_terminal),
-        table.explanations(reports, console.width, console.is_terminal),
-        f"claims ({options.tier}): {table.totals(reports)}",
+        terminal_table.verdict_table(reports, console.width, console.is_terminal),
+        terminal_table.explanations(reports, console.width, console.is_terminal),
+        f"claims ({options.tier}): {terminal_table.totals(reports)}",
     ):
         if part:
             print(part, file=styled())

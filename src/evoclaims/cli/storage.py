@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Final
 
 from evoclaims.core.errors import UserError
-from evoclaims.suite.config import find_root
+from evoclaims.paper.config import find_root
 from evoclaims.trials.store_files import DEFAULT_ROOT
 
 BEGINNING: Final = frozenset({"run"})

@@ -9,7 +9,7 @@ from typing import Any
 from evoclaims.cli.project import open_store
 from evoclaims.core.errors import UserError
 from evoclaims.core.files import write_atomically
-from evoclaims.suite.reproduction import Tier
+from evoclaims.paper.reproduction import Tier
 from evoclaims.trials import champions
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.spec import Condition, TrialSpec

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Final
 
 from evoclaims.core.errors import UnknownNameError
-from evoclaims.suite.reproduction import Reproduction
+from evoclaims.paper.reproduction import Reproduction
 
 ALL: Final = "all"
 

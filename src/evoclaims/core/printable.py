@@ -1,8 +1,8 @@
 """Text that no terminal obeys: what files, users and other machines say is shown, and never acted upon.
 
 Text is made printable where it leaves the program: in the message of every `UserError`, in what commands print
-(`cli.terminal`), in rich tables (`suite.console`), and in what the pytest plugin adds to a run (`pytest_summary`). What
-is written into other files, such as Markdown, is made so for them where they are written.
+(`cli.terminal`), in rich tables (`report.console`), and in what the pytest plugin adds to a run (`plugin.summary`).
+What is written into other files, such as Markdown, is made so for them where they are written.
 """
 
 from __future__ import annotations

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from evoclaims.core.errors import UnknownNameError, UserError
 from evoclaims.figures.figure import Figure
-from evoclaims.suite.importing import import_module
-from evoclaims.suite.reproduction import Reproduction
+from evoclaims.paper.importing import import_module
+from evoclaims.paper.reproduction import Reproduction
 
 
 def names(reproduction: Reproduction) -> tuple[str, ...]:

@@ -6,9 +6,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
-from evoclaims.suite.archive import Archive
-from evoclaims.suite.group import TrialGroup
-from evoclaims.suite.reproduction import Reproduction, Tier
+from evoclaims.claims.trial_group import TrialGroup
+from evoclaims.paper.archive import Archive
+from evoclaims.paper.reproduction import Reproduction, Tier
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.spec import Condition
 

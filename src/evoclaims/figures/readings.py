@@ -8,11 +8,11 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from evoclaims.claims.trial_group import TrialGroup
 from evoclaims.core.printable import printable
 from evoclaims.figures.figure import Scope
 from evoclaims.judging.measure import Measure
 from evoclaims.judging.sample import MissingNumberError, UnreadableTrialError, checked, is_failed
-from evoclaims.suite.group import TrialGroup
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.spec import TrialSpec
 

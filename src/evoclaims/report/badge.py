@@ -10,7 +10,7 @@ from typing import Final
 
 from evoclaims.core.printable import printable
 from evoclaims.judging.verdict import Outcome
-from evoclaims.suite.report import ClaimReport
+from evoclaims.verdicts.claim_report import ClaimReport
 
 GREEN, BLUE, RED, GREY = "#2e7d32", "#1565c0", "#c62828", "#616161"
 _NARROW: Final = frozenset("fijlrtI.,:;|!'()[]{}/ ")

@@ -8,9 +8,9 @@ from typing import Any, Final
 
 from evoclaims.core.errors import UserError
 from evoclaims.networks import export, picture
-from evoclaims.report.glance import Glance
+from evoclaims.report.formatting import clean
 from evoclaims.report.model import Champion
-from evoclaims.report.words import clean
+from evoclaims.report.trial_summary import Glance
 from evoclaims.trials import champions
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.spec import Condition

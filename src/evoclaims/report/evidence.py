@@ -10,8 +10,8 @@ from statistics import median
 from typing import Any, Final
 
 from evoclaims.judging.verdict import Outcome
-from evoclaims.report.glance import Glance
-from evoclaims.report.words import clean, number
+from evoclaims.report.formatting import clean, number
+from evoclaims.report.trial_summary import Glance
 
 EVENT_KINDS: Final = frozenset({"solves", "stays", "exact"})
 """Kinds whose samples say whether something held: 1 or 0."""

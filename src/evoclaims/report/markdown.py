@@ -7,8 +7,8 @@ from collections.abc import Iterable, Iterator
 from typing import Final
 
 from evoclaims.judging.verdict import Outcome
+from evoclaims.report.formatting import clean, number, p_value, plural
 from evoclaims.report.model import Board, Page, Section
-from evoclaims.report.words import clean, number, p_value, plural
 
 _MARKS: Final = re.compile(r"([\\`*_\[\]#|~$@]|^[-+=]|:(?=[/\w]))")
 """What means something to Markdown, or to a forge that links names and addresses."""

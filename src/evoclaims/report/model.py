@@ -6,11 +6,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from evoclaims.judging.verdict import Outcome
-from evoclaims.report.curves import CurvePanel
 from evoclaims.report.evidence import Part
+from evoclaims.report.formatting import counted, place_key
 from evoclaims.report.origin import Made
-from evoclaims.report.words import counted, place_key
-from evoclaims.suite.robustness import Robustness
+from evoclaims.report.training_curves import CurvePanel
+from evoclaims.verdicts.robustness import Robustness
 
 
 @dataclass(frozen=True)

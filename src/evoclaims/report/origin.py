@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from evoclaims.core.packages import DEPENDS_ON
-from evoclaims.report.words import clean, counted, listed, plural
+from evoclaims.report.formatting import clean, counted, listed, plural
 
 SHORT: Final = 9
 """Digits of a revision that are shown."""

@@ -16,10 +16,10 @@ from evoclaims.core.provenance import what_fixes_bits
 from evoclaims.trials import checkpoint
 from evoclaims.trials.checkpoint import Header
 from evoclaims.trials.lanes import Lanes, Shares
-from evoclaims.trials.outcome import provenance
 from evoclaims.trials.program import TrialState
 from evoclaims.trials.progress import RunProgress, Watcher
 from evoclaims.trials.result import TrialResult
+from evoclaims.trials.result_making import provenance
 from evoclaims.trials.spec import Condition, TrialSpec
 from evoclaims.trials.store import DamagedFileError, Store
 from evoclaims.trials.time_limit import answers, is_final

@@ -18,7 +18,7 @@ from evoclaims.core.errors import UserError
 from evoclaims.core.files import write_atomically
 from evoclaims.trials.arrays import Packed, pack
 from evoclaims.trials.program import TrialState
-from evoclaims.trials.records import is_hash
+from evoclaims.trials.result_codec import is_hash
 from evoclaims.trials.store import DamagedFileError
 
 SCHEMA: Final = 1

@@ -22,7 +22,7 @@ from typing import Final
 from evoclaims.core.errors import UserError
 from evoclaims.core.files import read_file
 from evoclaims.trials.heartbeat import beating
-from evoclaims.trials.records import is_hash
+from evoclaims.trials.result_codec import is_hash
 
 FRESH_SECONDS: Final = 60.0
 """A notice from another host counts for this long after its last refresh; here its process can be asked. One that was

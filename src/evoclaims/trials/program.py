@@ -16,7 +16,7 @@ from evoclaims.core.pytree import pytree, strong
 from evoclaims.envs.base import Episode, Numbered, Task
 from evoclaims.methods.base import Progress
 from evoclaims.trials import curriculum
-from evoclaims.trials.fit import both_named, check_scores, traced_progress
+from evoclaims.trials.compatibility import both_named, check_scores, traced_progress
 from evoclaims.trials.rollout import score_every_level
 from evoclaims.trials.spec import Condition
 

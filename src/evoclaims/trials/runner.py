@@ -21,11 +21,11 @@ from evoclaims.trials.checkpoint import Header
 from evoclaims.trials.devices import single_threaded_linear_algebra
 from evoclaims.trials.lanes import Lanes
 from evoclaims.trials.notice import Notice, wait_while_others_run
-from evoclaims.trials.outcome import curve_point, make_result, make_timeout
 from evoclaims.trials.pacing import Rhythm, Strides
 from evoclaims.trials.program import Report
 from evoclaims.trials.progress import RunProgress, Watcher, ignore
 from evoclaims.trials.result import TrialResult
+from evoclaims.trials.result_making import curve_point, make_result, make_timeout
 from evoclaims.trials.spec import Condition, TrialSpec
 from evoclaims.trials.store import Store
 from evoclaims.trials.time_limit import is_final

@@ -24,9 +24,9 @@ from evoclaims.core.errors import UserError
 from evoclaims.core.files import read_file, write_atomically
 from evoclaims.core.packages import Versions, agree, depends_on, recorded
 from evoclaims.trials.arrays import pack, unpack
-from evoclaims.trials.once import write_once
-from evoclaims.trials.records import RecordError, dump, parse
+from evoclaims.trials.first_writer import write_once
 from evoclaims.trials.result import TrialResult
+from evoclaims.trials.result_codec import RecordError, dump, parse
 from evoclaims.trials.store_files import StoreFiles, record_id
 from evoclaims.trials.store_mark import check_store, mark
 from evoclaims.trials.time_limit import time_allowed

@@ -11,7 +11,7 @@ from typing import Final
 
 from evoclaims.core.errors import UserError
 from evoclaims.core.packages import SHORT_HASH, Versions, short_hash
-from evoclaims.trials.records import is_hash
+from evoclaims.trials.result_codec import is_hash
 
 DEFAULT_ROOT: Final = Path(".evoclaims")
 

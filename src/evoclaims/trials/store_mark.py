@@ -10,7 +10,7 @@ from typing import Any, Final
 
 from evoclaims.core.errors import UserError
 from evoclaims.core.files import read_file
-from evoclaims.trials.once import write_once
+from evoclaims.trials.first_writer import write_once
 
 MARK: Final = "store.json"
 SCHEMA: Final = 1

@@ -14,7 +14,6 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int, PRNGKeyArray
 
 from evoclaims.core.errors import UserError
-from evoclaims.core.kernels.one_kernel import has_gpu, one_kernel
 from evoclaims.core.keys import streams
 from evoclaims.core.pytree import pytree, select, strong
 from evoclaims.envs.base import Episode, PolicyFn, TaskState, fitting
@@ -25,6 +24,7 @@ from evoclaims.envs.ecorobot.pose import Pose, torso
 from evoclaims.envs.ecorobot.robots import SIMPLE_ROB, Robot
 from evoclaims.envs.ecorobot.scene import Places, Scene, scene
 from evoclaims.envs.ecorobot.sensors import Sensor
+from evoclaims.kernels.one_kernel import has_gpu, one_kernel
 
 PACKAGES: Final = ("mujoco", "mujoco-mjx")
 """What every robot's task depends on; a task of this kind declares it, and whatever else it needs."""

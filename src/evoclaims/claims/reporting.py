@@ -1,0 +1,89 @@
+"""Making the report of a claim: judged, broken before that, or skipped."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+from evoclaims.claims.claim import Claim, Expectation
+from evoclaims.claims.trial_group import TrialGroup
+from evoclaims.judging.assertion import Assertion
+from evoclaims.judging.judge import attainability
+from evoclaims.judging.protocol import Protocol
+from evoclaims.judging.verdict import Outcome, Verdict
+from evoclaims.trials.spec import TrialSpec
+from evoclaims.verdicts.claim_report import ClaimReport
+from evoclaims.verdicts.versions import found_in
+
+
+def judged(
+    claim: Claim,
+    case: str,
+    tier: str,
+    assertion: Assertion,
+    protocol: Protocol,
+    verdict: Verdict,
+    again: Mapping[str, Collection[int]],
+) -> ClaimReport:
+    """Build the report of a claim that was judged; `again` has the seeds that were run again by the condition's id."""
+    groups = [source for source in assertion.sources() if isinstance(source, TrialGroup)]
+    seeds = protocol.seeds(verdict.n)
+    return ClaimReport(
+        claim=claim.id,
+        case=case,
+        tier=tier,
+        statement=claim.statement(tier),
+        where=claim.where,
+        outcome=str(verdict.outcome),
+        reason=verdict.reason,
+        verdict=verdict.to_json(),
+        sources=tuple(_source(group, seeds, sorted(again.get(group.fingerprint, ()))) for group in groups),
+        attainable=tuple(
+            {"n": look.n, "alpha": look.alpha, "supported": p.supported, "refuted": p.refuted}
+            for look, p in attainability(assertion, protocol)
+        ),
+    )
+
+
+def broken(claim: Claim, case: str, tier: str, reason: str) -> ClaimReport:
+    """Build the report of a claim whose test broke before it was judged."""
+    return _unjudged(claim, case, tier, Outcome.ERROR, reason)
+
+
+def skipped(claim: Claim, case: str, tier: str, reason: str) -> ClaimReport:
+    """Build the report of a claim whose test was skipped, with pytest's words for why."""
+    return _unjudged(claim, case, tier, Outcome.NOT_RUN, f"its test was skipped ({reason or 'no reason given'})")
+
+
+def expecting(report: ClaimReport, expectation: Expectation | None) -> ClaimReport:
+    """Add an accepted outcome to a report; what is accepted of the protocol is not of its variants."""
+    if expectation is None or report.variant:
+        return report
+    return replace(report, expected=str(expectation.outcome), because=expectation.because)
+
+
+def _unjudged(claim: Claim, case: str, tier: str, outcome: Outcome, reason: str) -> ClaimReport:
+    """Build the report of a claim without a verdict of the judge."""
+    return ClaimReport(
+        claim=claim.id,
+        case=case,
+        tier=tier,
+        statement=claim.statement(tier),
+        where=claim.where,
+        outcome=str(outcome),
+        reason=reason,
+    )
+
+
+def _source(group: TrialGroup, seeds: Sequence[int], again: Sequence[int]) -> dict[str, Any]:
+    """Describe one condition of a report."""
+    condition = group.condition
+    return {
+        "method": group.method,
+        "task": group.task,
+        "condition": group.fingerprint,
+        "trials": [TrialSpec(condition, seed).id for seed in seeds],
+        "versions": found_in(group.fetch(seeds), condition.packages) if len(seeds) else {},
+        "again": [*again],
+    }

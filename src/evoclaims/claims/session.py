@@ -1,0 +1,164 @@
+"""A session over a project's claims: its reproduction, its store, and the judging of one claim after another."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+from evoclaims.claims.claim import Claim
+from evoclaims.claims.fetching import NotStoredError
+from evoclaims.claims.reporting import judged
+from evoclaims.claims.trial_group import Fetch, TrialGroup
+from evoclaims.core.errors import UserError
+from evoclaims.core.packages import agree, recorded
+from evoclaims.judging.assertion import Assertion
+from evoclaims.judging.baseline import DriftReport
+from evoclaims.judging.fingerprint import fingerprint
+from evoclaims.judging.judge import judge
+from evoclaims.judging.protocol import Look, Protocol
+from evoclaims.judging.tripwire import DigestCheck
+from evoclaims.judging.verdict import Outcome, Verdict
+from evoclaims.paper import references
+from evoclaims.paper.reproduction import Reproduction
+from evoclaims.trials.result import TrialResult
+from evoclaims.trials.spec import Condition, TrialSpec
+from evoclaims.trials.store import Store
+from evoclaims.verdicts.claim_report import ClaimReport
+from evoclaims.verdicts.upgrade import Succession, Upgrade, predecessors, upgrade
+
+
+@dataclass(frozen=True)
+class _Used:
+    """A condition that claims of a tier are about: the ids of its trials, and the seeds that were run again."""
+
+    tier: str
+    method: str
+    task: str
+    condition: Condition
+    ids: set[str] = field(default_factory=set)
+    again: set[int] = field(default_factory=set)
+
+
+@dataclass(frozen=True)
+class Session:
+    """What claims are judged with.
+
+    Attributes:
+        reproduction: the paper under test.
+        store: where trials are kept.
+        fetch: how trials are had.
+        trials: a fixed number of trials in place of the tier's looks; None keeps the tier's protocol.
+        variant: name of a variant of the protocol; empty for the protocol itself.
+        again: seeds that were run again, since stored trials were made with other versions, by the condition's id.
+    """
+
+    reproduction: Reproduction
+    store: Store
+    fetch: Fetch
+    trials: int | None = None
+    variant: str = ""
+    again: Mapping[str, Collection[int]] = field(default_factory=dict)
+
+    def group(self, method: str, on: str, tier: str) -> TrialGroup:
+        """Return the trials of a method on a task, not yet run."""
+        return TrialGroup(method, on, self.reproduction.tier(tier, self.variant).condition(method, on), self.fetch)
+
+    def protocol(self, tier: str) -> Protocol:
+        """Return how claims of a tier are judged; with a fixed number of trials, by one look at the whole α."""
+        protocol = self.reproduction.tier(tier).protocol
+        if self.trials is None:
+            return protocol
+        return replace(protocol, looks=(Look(self.trials, protocol.alpha),))
+
+    def settle(self, claim: Claim, case: str, tier: str, assertion: Assertion) -> ClaimReport:
+        """Judge an assertion; trials that may not be run make the verdict "not run"."""
+        protocol = self.protocol(tier)
+        name = f"{claim.id}[{case}]" if case else claim.id
+        try:
+            if self.variant and self._untouched(tier, assertion):
+                raise NotStoredError(f"the variant {self.variant} changes none of its trials")
+            verdict = judge(assertion, protocol, claim=name, tier=tier)
+        except NotStoredError as error:
+            mark = fingerprint(assertion, protocol, claim=name, tier=tier)
+            verdict = Verdict(Outcome.NOT_RUN, str(error), assertion.describe(), mark)
+        return replace(judged(claim, case, tier, assertion, protocol, verdict, self.again), variant=self.variant)
+
+    def _untouched(self, tier: str, assertion: Assertion) -> bool:
+        """Whether the protocol itself has all conditions that an assertion is about."""
+        plain = self.reproduction.tier(tier)
+        groups = [source for source in assertion.sources() if isinstance(source, TrialGroup)]
+        return all(plain.condition(group.method, group.task).id == group.fingerprint for group in groups)
+
+    def drift(self, reports: Sequence[ClaimReport]) -> tuple[DriftReport, DigestCheck]:
+        """Compare the trials behind `reports` with the committed reference trials of their tiers."""
+        folder = self.reproduction.references_of(self.variant)
+        cases = [
+            references.drift_case(folder, used.tier, used.method, used.task, trials)
+            for used in self._used(reports)
+            if (trials := self._trials(used))
+        ]
+        return references.compare(cases)
+
+    def upgrade(self, reports: Sequence[ClaimReport]) -> Upgrade:
+        """Compare the trials behind `reports` with those that the store holds of other versions.
+
+        Conditions that are judged from other versions' trials themselves are left out.
+        """
+        successions = []
+        for used in self._used(reports):
+            condition, trials = used.condition, self._trials(used)
+            here = condition.versions
+            now = tuple(trial for trial in trials if agree(trial.provenance, here))
+            protocol = self.reproduction.tier(used.tier).protocol
+            seeds = {*protocol.seeds(protocol.last.n), *(trial.seed for trial in now)}
+            others = (self.store.others(TrialSpec(condition, seed).id, here) for seed in seeds)
+            before = predecessors([record for several in others for record in several], condition.packages)
+            if now and before and len(now) == len(trials):
+                old = recorded(before[0].provenance, condition.packages)
+                label = f"{used.method} on {used.task} ({used.tier})"
+                successions.append(Succession(label, old, here, before, now, len(used.again)))
+        return upgrade(successions)
+
+    def _used(self, reports: Sequence[ClaimReport]) -> list[_Used]:
+        """Return the conditions that `reports` are about, each once, with all trials that were looked at."""
+        found: dict[tuple[str, str, str], _Used] = {}
+        for report in reports:
+            if self.variant and not report.n:  # most claims are not about what a variant changes
+                continue
+            for source in report.sources:
+                names = report.tier, source["method"], source["task"]
+                if names not in found:
+                    tier = self.reproduction.tier(report.tier, self.variant)
+                    found[names] = _Used(*names, tier.condition(*names[1:]))
+                found[names].ids.update(source["trials"])
+                found[names].again.update(source.get("again", ()))
+        return [used for _, used in sorted(found.items())]
+
+    def _trials(self, used: _Used) -> list[TrialResult]:
+        """Return the stored trials that a condition's claims were judged from."""
+        stored = (self.store.get(trial, used.condition.versions) for trial in sorted(used.ids))
+        return [trial for trial in stored if trial is not None]
+
+
+class Verdicts:
+    """The `verdict` fixture: takes exactly one assertion per test and keeps what became of it."""
+
+    def __init__(self, settle: Callable[[Assertion], ClaimReport]) -> None:
+        """Remember how to judge."""
+        self._settle = settle
+        self.report: ClaimReport | None = None
+
+    def __call__(self, assertion: Assertion) -> None:
+        """Judge the claim's assertion.
+
+        Raises:
+            UserError: for a second assertion, or something that is none.
+        """
+        if not isinstance(assertion, Assertion):
+            raise UserError(
+                f"verdict(...) takes an assertion about trials, such as verdict(a.mean_success > b.mean_success), "
+                f"not {assertion!r}."
+            )
+        if self.report is not None:
+            raise UserError("A claim has one verdict: join several assertions with & (and) or | (or).")
+        self.report = self._settle(assertion)

@@ -1,0 +1,1 @@
+"""A paper under test: its conditions at every tier, the variants of its protocol, its committed reference trials."""

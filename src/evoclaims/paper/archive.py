@@ -1,0 +1,69 @@
+"""All trials at hand: those of the store, and the committed reference trials of a reproduction."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+from evoclaims.core.packages import Versions, agree
+from evoclaims.paper import references
+from evoclaims.trials.result import TrialResult
+from evoclaims.trials.spec import Condition, TrialSpec
+from evoclaims.trials.store import Store, newest
+from evoclaims.trials.time_limit import is_final
+
+
+@dataclass(frozen=True)
+class Archive:
+    """Trials by id, wherever they are kept and whatever versions they were made with: what is there to be judged.
+
+    Of several records of a trial the one made with the versions asked for comes first, from the store or committed;
+    then the store's newest, then the committed one.
+
+    Attributes:
+        store: looked into first; what ran out of time there may still be among the reference trials.
+        references: folder of the committed reference trials; None for none.
+    """
+
+    store: Store
+    references: Path | None = None
+
+    def get(self, trial: str, versions: Versions | None = None) -> TrialResult | None:
+        """Return the record of the trial with this id, or None.
+
+        Args:
+            trial: its id.
+            versions: what it would best have been made with; None for no preference.
+
+        Raises:
+            UserError: when a record, or a file of reference trials, is torn or edited.
+        """
+        here = None if versions is None else self.store.made_with(trial, versions)
+        if is_final(here):
+            return here
+        committed = self._committed.get(trial, ())
+        agreeing = next((one for one in committed if versions is not None and agree(one.provenance, versions)), None)
+        if here is not None or agreeing is not None:
+            return agreeing or newest(committed) or here
+        records = self.store.records(trial)
+        return newest(filter(is_final, records)) or newest(committed) or newest(records)
+
+    def trials(self, condition: Condition, seeds: Sequence[int]) -> tuple[TrialResult | None, ...]:
+        """Return a condition's trial for each seed, None where there is none; this environment's come first."""
+        return tuple(self.get(TrialSpec(condition, seed).id, condition.versions) for seed in seeds)
+
+    @cached_property
+    def _committed(self) -> dict[str, list[TrialResult]]:
+        """Reference trials by id."""
+        found: dict[str, list[TrialResult]] = defaultdict(list)
+        for trial in self._read():
+            found[trial.id].append(trial)
+        return dict(found)
+
+    def _read(self) -> Iterator[TrialResult]:
+        """Read every file of reference trials."""
+        for path in sorted(self.references.rglob("*.jsonl")) if self.references is not None else ():
+            yield from references.load(path)

@@ -1,0 +1,45 @@
+"""What stored trials are of: the names that a reproduction has for their conditions."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from evoclaims.paper.reproduction import Reproduction
+from evoclaims.trials.spec import Condition
+
+
+@dataclass(frozen=True)
+class Name:
+    """A name of a condition.
+
+    Attributes:
+        tier: "smoke" or "full".
+        variant: of the protocol; empty for the protocol itself.
+        method, task: as claims say.
+    """
+
+    tier: str
+    variant: str
+    method: str
+    task: str
+
+
+def names_of(reproduction: Reproduction) -> dict[str, tuple[Name, ...]]:
+    """Return the names of every condition by its id; several, where tiers or methods share it.
+
+    A variant names only what the protocol itself does not have: of trials that both use, the protocol's name counts.
+    """
+    found: dict[str, tuple[Name, ...]] = {}
+
+    def note(tier: str, variant: str, conditions: Mapping[tuple[str, str], Condition]) -> None:
+        for (method, task), condition in conditions.items():
+            found[condition.id] = (*found.get(condition.id, ()), Name(tier, variant, method, task))
+
+    for tier, plan in reproduction.tiers.items():
+        note(tier, "", plan.conditions)
+    plain = set(found)
+    for variant, changes in reproduction.variants.items():
+        for tier, conditions in changes.conditions.items():
+            note(tier, variant, {names: one for names, one in conditions.items() if one.id not in plain})
+    return found

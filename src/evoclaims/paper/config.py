@@ -1,0 +1,95 @@
+"""Where a project keeps its reproduction and its claims: `[tool.evoclaims]` in its pyproject.toml."""
+
+from __future__ import annotations
+
+import sys
+import tomllib
+from dataclasses import dataclass
+from pathlib import Path
+
+from evoclaims.core.errors import UserError
+from evoclaims.paper.importing import import_module
+from evoclaims.paper.reproduction import Reproduction
+from evoclaims.trials.time_limit import DEFAULT_LIMIT, seconds_of
+
+
+@dataclass(frozen=True)
+class SuiteConfig:
+    """The project's settings.
+
+    Attributes:
+        root: the project's folder, put on the import path.
+        reproduction: module that holds `REPRODUCTION`.
+        claims: folder of claim tests, relative to `root`.
+        time_limit: time that a batch of trials may take, such as "90s" or "24h" (see `trials.time_limit`).
+    """
+
+    root: Path
+    reproduction: str
+    claims: str = "claims"
+    time_limit: str = DEFAULT_LIMIT
+
+    def seconds(self, option: str | None) -> float:
+        """Return the time that a batch of trials may take: what an option says, or else these settings.
+
+        Raises:
+            UserError: when that is no length of time.
+        """
+        return seconds_of(self.time_limit if option is None else option)
+
+
+def find_root(start: Path) -> Path:
+    """Return the nearest folder at or above `start` whose pyproject.toml has `[tool.evoclaims]`.
+
+    Raises:
+        UserError: when there is none.
+    """
+    for folder in (start, *start.parents):
+        if "evoclaims" in _tool_tables(folder / "pyproject.toml"):
+            return folder
+    raise UserError(
+        f"No pyproject.toml at or above {start} has a [tool.evoclaims] table. Go to a project with claims, or add the "
+        'table: reproduction = "package.module" (which holds REPRODUCTION) and claims = "folder".'
+    )
+
+
+def load_config(root: Path) -> SuiteConfig:
+    """Read the settings of the project in `root`.
+
+    Raises:
+        UserError: when the table is missing, has other keys, or a value that is no text.
+    """
+    table = _tool_tables(root / "pyproject.toml").get("evoclaims")
+    known = isinstance(table, dict) and {"reproduction"} <= set(table) <= {"reproduction", "claims", "time_limit"}
+    if not isinstance(table, dict) or not known or not all(isinstance(value, str) for value in table.values()):
+        raise UserError(
+            f'{root / "pyproject.toml"} needs a [tool.evoclaims] table with reproduction = "package.module" and, if '
+            'it is not "claims", claims = "folder"; time_limit = "24h" if trials may take another time; no other keys.'
+        )
+    return SuiteConfig(root=root, **table)
+
+
+def load_reproduction(config: SuiteConfig) -> Reproduction:
+    """Import the project's reproduction.
+
+    Raises:
+        UserError: when the module or its `REPRODUCTION` is missing, or the module does not import.
+    """
+    if str(config.root) not in sys.path:
+        sys.path.insert(0, str(config.root))
+    module = import_module(config.reproduction, config.root, "[tool.evoclaims]")
+    found = getattr(module, "REPRODUCTION", None)
+    if not isinstance(found, Reproduction):
+        raise UserError(f"The module {config.reproduction!r} has no REPRODUCTION = Reproduction(...).")
+    return found
+
+
+def _tool_tables(path: Path) -> dict[str, object]:
+    """Return the tables under [tool] in a pyproject.toml; empty when there is no such file."""
+    try:
+        tool = tomllib.loads(path.read_text(encoding="utf-8")).get("tool", {})
+    except FileNotFoundError:
+        return {}
+    except (OSError, ValueError) as error:
+        raise UserError(f"Cannot read {path}: {error}.") from error
+    return tool if isinstance(tool, dict) else {}

@@ -1,0 +1,85 @@
+"""What a condition costs on this machine, from trials that have run on such a device, or from a few steps."""
+
+from __future__ import annotations
+
+import time
+from collections import defaultdict
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import jax
+import numpy as np
+
+from evoclaims.paper import references
+from evoclaims.trials.devices import layout_on, usable_cores
+from evoclaims.trials.lanes import Lanes
+from evoclaims.trials.result import COMPLETE, TrialResult
+from evoclaims.trials.spec import Condition, TrialSpec
+from evoclaims.trials.store import Store
+from evoclaims.trials.time_limit import is_final
+
+SEEDS_LOOKED_AT = 64
+
+
+@dataclass(frozen=True)
+class Pace:
+    """How fast a condition runs.
+
+    Attributes:
+        per_step: seconds of one step: of one trial where each is a call of its own, else of the whole batch.
+        compile: seconds of compilation.
+        layout: see `program.over_trials`.
+    """
+
+    per_step: float
+    compile: float
+    layout: str
+
+    def seconds(self, condition: Condition, trials: int) -> float:
+        """Return the time of `trials` trials that spend the whole budget."""
+        return self.compile + self.per_step * condition.steps * (trials if self.layout == "alone" else 1)
+
+
+def known_pace(
+    condition: Condition,
+    store: Store,
+    folder: Path,
+    tier: str,
+    method: str,
+    task: str,
+    kind: str,
+) -> Pace | None:
+    """Return the pace of stored or reference trials of this condition on this kind of device; None without any."""
+    versions = condition.versions
+    stored = (store.get(TrialSpec(condition, seed).id, versions) for seed in range(SEEDS_LOOKED_AT))
+    trials = [trial for trial in stored if trial is not None and is_final(trial)]
+    committed = references.load(references.path_of(folder, tier, method, task))
+    trials += [trial for trial in committed if trial.condition == condition.id]
+    batches: dict[str, list[TrialResult]] = defaultdict(list)
+    for trial in trials:
+        if trial.status in COMPLETE and (trial.provenance.get("device") or {}).get("kind") == kind:
+            batches[str(trial.timing["started"])].append(trial)
+    if not batches:
+        return None
+    batch = max(batches.values(), key=len)
+    layout = layout_on(str(batch[0].provenance["device"]["platform"]))
+    steps = [trial.metrics["steps"] for trial in batch]
+    seconds = max(float(trial.timing["run"]) for trial in batch)
+    work = sum(steps) if layout == "alone" else max(steps)
+    return Pace(seconds / max(work, 1), max(float(trial.timing["compile"]) for trial in batch), layout)
+
+
+def measured_pace(condition: Condition, devices: Sequence[jax.Device]) -> Pace:
+    """Compile, and time a few steps of one trial per core or device."""
+    lanes = Lanes(condition, devices)
+    width = usable_cores() if lanes.layout == "alone" else len(lanes.devices)
+    state = lanes.start(list(range(width)), width)
+    state, _ = lanes.advance(state, 1, width)
+    until = min(4, condition.steps)
+    began = time.perf_counter()
+    _, report = lanes.advance(state, until, width)
+    took = time.perf_counter() - began
+    steps = max(int(np.max(report.steps)) - 1, 1)
+    share = width if lanes.layout == "alone" else 1
+    return Pace(took / steps / share, lanes.seconds, lanes.layout)

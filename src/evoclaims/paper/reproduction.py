@@ -1,0 +1,77 @@
+"""What a paper's reproduction consists of: which trials each tier runs, and how many decide."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from evoclaims.core.errors import UnknownNameError
+from evoclaims.judging.protocol import Protocol
+from evoclaims.paper.variant import Variant
+from evoclaims.trials.spec import Condition
+
+
+@dataclass(frozen=True)
+class Tier:
+    """One size at which the paper's claims are run.
+
+    Attributes:
+        conditions: by method and task, as claims name them: `{("ppo", "n_parity"): Condition(...)}`.
+        protocol: how many trials are looked at, with which error rates.
+    """
+
+    conditions: Mapping[tuple[str, str], Condition]
+    protocol: Protocol
+
+    def condition(self, method: str, task: str) -> Condition:
+        """Return the condition of a method on a task; an `UnknownNameError` lists the known ones."""
+        methods = {m for m, _ in self.conditions}
+        if method not in methods:
+            raise UnknownNameError("method", method, methods)
+        tasks = {t for m, t in self.conditions if m == method}
+        if task not in tasks:
+            raise UnknownNameError(f"task for {method}", task, tasks)
+        return self.conditions[method, task]
+
+
+@dataclass(frozen=True)
+class Reproduction:
+    """A paper under test.
+
+    Attributes:
+        name: a short name, such as "nisioti2025".
+        title: the paper's title.
+        folder: where the reproduction lies; its reference trials are in folder/reference.
+        tiers: by name; "smoke" and "full".
+        variants: by name, of the protocol; claims are re-judged under them.
+        figures: modules that redraw the paper's figures and tables, in its order; each holds FIGURE, an
+            `evoclaims.figures.Figure` with the module's last name, and is imported only when it is drawn.
+    """
+
+    name: str
+    title: str
+    folder: Path
+    tiers: Mapping[str, Tier]
+    figures: tuple[str, ...] = ()
+    variants: Mapping[str, Variant] = field(default_factory=dict)
+
+    def tier(self, name: str, variant: str = "") -> Tier:
+        """Return a tier, as a variant changes it if one is named; an `UnknownNameError` lists the known ones."""
+        if name not in self.tiers:
+            raise UnknownNameError("tier", name, self.tiers)
+        if not variant:
+            return self.tiers[name]
+        if variant not in self.variants:
+            raise UnknownNameError("variant", variant, self.variants or {"(none)"})
+        tier, changes = self.tiers[name], self.variants[variant].conditions.get(name, {})
+        return replace(tier, conditions={**tier.conditions, **changes})
+
+    @property
+    def references(self) -> Path:
+        """The folder of committed reference trials, those of variants included."""
+        return self.folder / "reference"
+
+    def references_of(self, variant: str) -> Path:
+        """The folder of the reference trials that only a variant has; without a name, of the protocol's own."""
+        return self.references / "variants" / variant if variant else self.references

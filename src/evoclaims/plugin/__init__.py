@@ -1,0 +1,1 @@
+"""The pytest plugin: claims as tests, tiers as markers, verdicts as outcomes."""

@@ -1,0 +1,330 @@
+"""The pytest plugin: claims as tests, tiers as markers, verdicts as outcomes.
+
+Nothing heavy is imported here at the top: pytest loads this file in every run of an environment that has evoclaims.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Callable, Generator
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from evoclaims.core.errors import UnknownNameError, UserError
+from evoclaims.core.printable import shown
+from evoclaims.plugin import options
+from evoclaims.plugin.options import TIERS
+from evoclaims.plugin.summary import ATTRIBUTE, TROUBLE, Summary
+from evoclaims.trials.allowance import end_without
+
+if TYPE_CHECKING:
+    from evoclaims.claims.session import Session, Verdicts
+    from evoclaims.claims.trial_group import TrialGroup
+    from evoclaims.report.live_line import LiveLine
+    from evoclaims.verdicts.claim_report import ClaimReport
+
+_session: pytest.StashKey[Session] = pytest.StashKey()
+_line: pytest.StashKey[LiveLine] = pytest.StashKey()
+_verdicts: pytest.StashKey[Verdicts] = pytest.StashKey()
+_ended: pytest.StashKey[pytest.Session] = pytest.StashKey()
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Add the options."""
+    options.add(parser)
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Register the markers."""
+    for line in (
+        "smoke: claims at reduced budgets",
+        "full: claims at the paper's budgets; only run when asked for",
+        "claim(claim): the claim that a test checks (set by @claim)",
+        "claim_expect(expectation): an accepted outcome (set by expected(...))",
+    ):
+        config.addinivalue_line("markers", line)
+    if not hasattr(config, "workerinput"):  # an xdist worker leaves the summary to its controller
+        config.pluginmanager.register(Summary(config, make_session), "claims-summary")
+    options.check(config)
+
+
+@pytest.hookimpl(wrapper=True, tryfirst=True)
+def pytest_generate_tests(metafunc: pytest.Metafunc) -> Generator[None, object, object]:
+    """Run each claim once per tier, which comes before all other parameters in a test's id."""
+    if metafunc.definition.get_closest_marker("claim") is not None:
+        if "claim_tier" not in metafunc.fixturenames:
+            raise pytest.UsageError(
+                f"{metafunc.definition.nodeid} is a claim but takes neither the fixture `trials` nor `verdict`."
+            )
+        metafunc.parametrize("claim_tier", [pytest.param(tier, marks=getattr(pytest.mark, tier)) for tier in TIERS])
+    return (yield)
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Leave out other tiers and claims; the full tier is only kept when it was asked for by name."""
+    marked = [item for item in items if item.get_closest_marker("claim")]
+    claims: dict[pytest.Item, tuple[str, str]] = {}
+    try:
+        if marked:
+            from evoclaims.claims.collected import checked
+
+            claims = checked(marked)
+        wanted = _wanted_claims(config, {claim for claim, _ in claims.values()})
+    except UserError as error:
+        _refuse(config, items, error)
+        return
+    tiers = _wanted_tiers(config)
+    dropped = [item for item, (claim, tier) in claims.items() if claim not in wanted or tier not in tiers]
+    if dropped:
+        config.hook.pytest_deselected(items=dropped)
+        items[:] = [item for item in items if item not in set(dropped)]
+
+
+def _wanted_tiers(config: pytest.Config) -> set[str]:
+    """Return the tiers that the options leave; "full" only when --claims-tier or -m names it positively."""
+    tier = config.getoption("claims_tier")
+    if tier is not None:
+        return {tier}
+    named = re.sub(r"\bnot\s+full\b", "", config.getoption("markexpr") or "")
+    return set(TIERS) if re.search(r"\bfull\b", named) else {"smoke"}
+
+
+def _wanted_claims(config: pytest.Config, known: set[str]) -> set[str]:
+    """Return the ids that --claims-only leaves."""
+    option = config.getoption("claims_only")
+    if option is None:
+        return known
+    wanted = {name.strip() for name in option.split(",") if name.strip()}
+    for name in sorted(wanted - known):
+        raise UnknownNameError("claim", name, known or {"(none collected)"})
+    return wanted
+
+
+def _refuse(config: pytest.Config, items: list[pytest.Item], error: UserError) -> None:
+    """End the run with a sentence; a worker of xdist can only pass it on to its controller, and run nothing."""
+    output: dict[str, Any] | None = getattr(config, "workeroutput", None)
+    if output is None:
+        raise pytest.UsageError(str(error)) from error
+    output[TROUBLE] = str(error)
+    items.clear()
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_finish(session: pytest.Session) -> None:
+    """Find out before the first trial whether anything is in the way."""
+    config = session.config
+    if not any(item.get_closest_marker("claim") for item in session.items) or config.option.collectonly:
+        return
+    try:
+        make_session(config)
+    except UserError as error:
+        _refuse(config, session.items, error)
+
+
+def make_session(config: pytest.Config) -> Session:
+    """Load the project's reproduction and check store, device and sizes."""
+    if _session in config.stash:
+        return config.stash[_session]
+    from evoclaims.claims.fetching import RunMissing, StoredOnly
+    from evoclaims.claims.session import Session
+    from evoclaims.paper.archive import Archive
+    from evoclaims.paper.config import load_config, load_reproduction
+    from evoclaims.plugin.terminal import Uncaptured
+    from evoclaims.report.live_line import LiveLine
+    from evoclaims.trials import devices
+    from evoclaims.trials.progress import ignore
+    from evoclaims.trials.store import Store
+
+    devices.configure()
+    store = Store(_storage(config))
+    line = LiveLine(Uncaptured(config)) if config.pluginmanager.has_plugin("terminalreporter") else None
+    project = load_config(config.rootpath)
+    limit, any_version = project.seconds(config.getoption("claims_time_limit")), config.getoption("claims_any_version")
+    mode: Any = RunMissing(store, config.getoption("claims_device"), line or ignore, limit, any_version)
+    again = mode.again
+    reproduction = load_reproduction(project)
+    if config.getoption("claims_stored"):
+        mode = StoredOnly(Archive(store, reproduction.references if config.getoption("claims_committed") else None))
+    trials, variant = config.getoption("claims_trials"), config.getoption("claims_variant")
+    made = Session(reproduction, store, mode, trials, variant, again)
+    reproduction.tier("smoke", made.variant)
+    made.protocol("smoke")
+    mode.check()
+    config.stash[_session] = made
+    if line is not None:
+        config.stash[_line] = line
+    return made
+
+
+def _storage(config: pytest.Config) -> Path:
+    """Return the store's folder: the project's own, or the one that is named, relative to the current folder."""
+    from evoclaims.trials.store_files import DEFAULT_ROOT
+
+    named = config.getoption("claims_storage")
+    if named is None:
+        return config.rootpath / DEFAULT_ROOT
+    if not named:
+        raise UserError("--claims-storage names no folder; leave it out for the project's own store.")
+    folder = Path(config.invocation_params.dir, named)
+    if config.getoption("claims_stored") and not os.path.lexists(folder):
+        raise UserError(
+            f"There is no trial store {folder}: the folder does not exist. Check its name, or leave --claims-storage "
+            "out for the project's own store."
+        )
+    return folder
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_sessionfinish(session: pytest.Session) -> None:
+    """Keep the session, which knows the exit status, for `pytest_unconfigure`."""
+    session.config.stash[_ended] = session
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_unconfigure(config: pytest.Config) -> None:
+    """End the process if trials that did not return in time still run in it."""
+    if _ended in config.stash:
+        end_without(int(config.stash[_ended].exitstatus))
+
+
+@pytest.fixture
+def claim_tier() -> str:
+    """The tier that a claim is judged at; parametrized for every claim."""
+    raise UserError("The fixtures `trials` and `verdict` are for tests marked with @claim(...).")
+
+
+@pytest.fixture
+def trials(request: pytest.FixtureRequest, claim_tier: str) -> Callable[..., TrialGroup]:
+    """Return `trials(method, on=task)`: a condition's trials, run when a verdict needs them."""
+    session = make_session(request.config)
+
+    def group(method: str, *, on: str) -> TrialGroup:
+        return session.group(method, on, claim_tier)
+
+    return group
+
+
+@pytest.fixture
+def verdict(request: pytest.FixtureRequest, claim_tier: str) -> Verdicts:
+    """Return `verdict(assertion)`, which judges the claim."""
+    from evoclaims.claims.claim import claim_of
+    from evoclaims.claims.collected import case_of
+    from evoclaims.claims.session import Verdicts
+
+    session, claim = make_session(request.config), claim_of(request.node)
+    assert claim is not None  # claim_tier exists for claims alone
+    case = case_of(request.node)
+    line = request.config.stash.get(_line, None)
+
+    def settle(assertion: Any) -> ClaimReport:
+        try:
+            return session.settle(claim, case, claim_tier, assertion)
+        finally:
+            if line is not None:
+                line.close()
+
+    verdicts = request.node.stash[_verdicts] = Verdicts(settle)
+    return verdicts
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(
+    item: pytest.Item, call: pytest.CallInfo[None]
+) -> Generator[None, pytest.TestReport, pytest.TestReport]:
+    """Turn what became of a claim into the test's outcome, without a traceback."""
+    report = yield
+    if item.get_closest_marker("claim") is None or (report.when != "call" and report.passed):
+        return report
+    if call.excinfo and call.excinfo.errisinstance(KeyboardInterrupt):
+        return report
+    if report.skipped:
+        if report.when == "teardown":  # the claim has been reported
+            return report
+        setattr(report, ATTRIBUTE, _skipped_report(item, report).to_json())
+        return report
+    claimed = _claim_report(item, call)
+    setattr(report, ATTRIBUTE, claimed.to_json())
+    undecided = claimed.outcome == "inconclusive" and item.config.getoption("claims_undecided") == "fail"
+    failed = claimed.failed or (undecided and not claimed.as_expected)
+    report.outcome = "failed" if failed else "passed"
+    expected_failure = call.excinfo is None or call.excinfo.errisinstance(UserError)
+    if expected_failure:
+        said = f"{claimed.name} ({claimed.tier}) is {claimed.outcome}: {claimed.reason}"
+        report.longrepr = shown(said) if failed else None
+    properties: list[tuple[str, object]] = [
+        ("claim", claimed.claim),
+        ("tier", claimed.tier),
+        ("verdict", claimed.outcome),
+        ("reason", claimed.reason),
+        ("n", claimed.n),
+        ("p", (claimed.verdict or {}).get("p")),
+        ("evidence", claimed.evidence),
+    ]
+    item.user_properties += properties  # JUnit's file takes them from the report of the teardown
+    report.user_properties += properties
+    return report
+
+
+def _claim_report(item: pytest.Item, call: pytest.CallInfo[None]) -> ClaimReport:
+    """Return what became of a claim test: its verdict, or the error in the way of one."""
+    from evoclaims.claims.claim import claim_of, expectation_of
+    from evoclaims.claims.collected import case_of, tier_of
+    from evoclaims.claims.reporting import broken, expecting
+    from evoclaims.verdicts.claim_report import located, save, succeeding
+
+    claim, case, tier = claim_of(item), case_of(item), tier_of(item)
+    assert claim is not None
+    verdicts = item.stash.get(_verdicts, None)
+    report = verdicts.report if verdicts else None
+    if call.excinfo is not None:
+        report = broken(claim, case, tier, _sentence(call.excinfo))
+    elif report is None:
+        report = broken(claim, case, tier, "the test ended without calling verdict(...), so it judged nothing")
+    report = replace(report, variant=item.config.getoption("claims_variant"))
+    report = expecting(report, expectation_of(item, tier))
+    session = item.config.stash.get(_session, None)
+    if session is None:
+        return report
+    if item.config.getoption("claims_stored"):
+        return located(report, session.store.root)
+    return save(succeeding(report, session.store.root), session.store.root)
+
+
+def _skipped_report(item: pytest.Item, report: pytest.TestReport) -> ClaimReport:
+    """Return what the summary says of a claim whose test was skipped, or failed as an xfail mark expects."""
+    from evoclaims.claims.claim import claim_of
+    from evoclaims.claims.collected import case_of, tier_of
+    from evoclaims.claims.reporting import skipped
+
+    claim = claim_of(item)
+    assert claim is not None
+    words = report.longrepr[2] if isinstance(report.longrepr, tuple) else f"xfail: {getattr(report, 'wasxfail', '')}"
+    return skipped(claim, case_of(item), tier_of(item), words.removeprefix("Skipped: "))
+
+
+def _sentence(excinfo: pytest.ExceptionInfo[BaseException]) -> str:
+    """Return an exception as one line."""
+    text = str(excinfo.value).strip().splitlines()
+    return text[0] if text and excinfo.errisinstance(UserError) else f"{excinfo.typename}: {text[0] if text else ''}"
+
+
+def pytest_report_teststatus(
+    report: pytest.CollectReport | pytest.TestReport, config: pytest.Config
+) -> tuple[str, str, str | tuple[str, dict[str, bool]]] | None:
+    """Show a claim's verdict in place of passed and failed."""
+    plain = getattr(report, ATTRIBUTE, None)
+    if plain is None or report.skipped:
+        return None
+    from evoclaims.judging.verdict import Outcome
+    from evoclaims.verdicts.claim_report import ClaimReport
+
+    claimed = ClaimReport.from_json(plain)
+    outcome = Outcome(claimed.outcome)
+    words = f"{outcome}, as accepted" if claimed.as_expected else str(outcome)
+    colour = {"red": True} if report.failed else {"green": True} if outcome == Outcome.SUPPORTED else {"yellow": True}
+    return words, outcome.symbol, (words.upper(), colour)

@@ -1,0 +1,85 @@
+"""The options of the pytest plugin, and what is wrong with their values before anything is collected."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import pytest
+
+from evoclaims.core.errors import UnknownNameError, UserError
+
+TIERS: Final = ("smoke", "full")
+
+
+def add(parser: pytest.Parser) -> None:
+    """Add the options."""
+    group = parser.getgroup("claims", "claims of a paper (evoclaims)")
+    group.addoption("--claims-storage", metavar="DIR", help="folder of trials (.evoclaims in the project's root)")
+    group.addoption("--claims-tier", metavar="TIER", help="judge this tier's claims: smoke or full; as -m TIER")
+    group.addoption("--claims-trials", metavar="N", type=int, help="judge by one look at N trials a condition")
+    group.addoption("--claims-only", metavar="IDS", help="judge only these claims, such as G1,G7")
+    group.addoption("--claims-device", metavar="DEVICE", default="auto", help="auto (default), cpu or gpu")
+    group.addoption(
+        "--claims-time-limit",
+        metavar="TIME",
+        help="time that a batch of trials may take, such as 90s, 30min, 24h or none (24h, or what pyproject.toml says)",
+    )
+    group.addoption("--claims-json", metavar="FILE", help="write all verdicts to FILE, also when there are none")
+    group.addoption(
+        "--claims-undecided",
+        choices=("report", "fail"),
+        default="report",
+        help="fail: inconclusive claims, or a run that has judged none of its claims, end with status 1 (report)",
+    )
+    group.addoption(
+        "--claims-compare-fail",
+        metavar="CHANGES",
+        help="end with status 1 when a verdict differs from the accepted one like this: 'supported->refuted', "
+        "'*->error,supported->*'",
+    )
+    group.addoption("--claims-stored", action="store_true", help="judge from stored trials alone; run nothing")
+    group.addoption(
+        "--claims-any-version",
+        action="store_true",
+        help="judge stored trials whatever versions they were made with; run only what is missing",
+    )
+    group.addoption("--claims-variant", metavar="NAME", default="", help="judge under a variant of the protocol")
+    group.addoption(
+        "--claims-committed",
+        action="store_true",
+        help="with --claims-stored: take what the store lacks from the committed reference trials, and compare the "
+        "rest with them",
+    )
+
+
+def check(config: pytest.Config) -> None:
+    """Refuse values that no run can be made with.
+
+    Raises:
+        pytest.UsageError: with a sentence.
+    """
+    tier, changes = config.getoption("claims_tier"), config.getoption("claims_compare_fail")
+    try:
+        if tier is not None and tier not in TIERS:
+            raise UnknownNameError("tier", tier, TIERS)
+        if changes is not None:
+            _check_changes(config, changes)
+        if config.getoption("claims_committed") and not config.getoption("claims_stored"):
+            raise UserError(
+                "--claims-committed says what --claims-stored takes where the store has no trial, and does nothing by "
+                "itself: add --claims-stored, or leave it out."
+            )
+    except UserError as error:
+        raise pytest.UsageError(str(error)) from error
+
+
+def _check_changes(config: pytest.Config, changes: str) -> None:
+    """Refuse changes of verdicts that never happen, or that a run would never see."""
+    from evoclaims.verdicts.transitions import parse_patterns
+
+    parse_patterns(changes)
+    if config.getoption("claims_variant"):
+        raise UserError(
+            "--claims-compare-fail compares verdicts under the protocol itself, and --claims-variant judges under "
+            "another one: leave one of them out."
+        )

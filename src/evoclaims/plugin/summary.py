@@ -1,0 +1,224 @@
+"""The end of a run: verdict table, comparison with the reference trials, JSON report, exit status."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+import pytest
+
+from evoclaims.core.errors import UserError
+from evoclaims.core.printable import shown, spelled
+from evoclaims.plugin.options import TIERS
+
+if TYPE_CHECKING:
+    from evoclaims.claims.session import Session
+    from evoclaims.judging.baseline import DriftReport
+    from evoclaims.judging.tripwire import DigestCheck
+    from evoclaims.verdicts.claim_report import ClaimReport
+    from evoclaims.verdicts.regression import Regression
+    from evoclaims.verdicts.upgrade import Upgrade
+
+ATTRIBUTE: Final = "claim_report"
+"""Name under which a test's report carries the claim's, also from an xdist worker to its controller."""
+
+TROUBLE: Final = "claims_trouble"
+"""Name under which an xdist worker tells its controller why it runs nothing."""
+
+
+class Summary:
+    """Gathers the claims' reports of a run, in the process that talks to the user, and ends the run with them."""
+
+    def __init__(self, config: pytest.Config, make_session: Callable[[pytest.Config], Session]) -> None:
+        """Start empty."""
+        self._config = config
+        self._make_session = make_session
+        self.reports: list[ClaimReport] = []
+        self._drift: tuple[DriftReport, DigestCheck] | None = None
+        self._upgrade: Upgrade | None = None
+        self._regression: Regression | None = None
+        self._troubles: list[str] = []
+        self._died: list[str] = []
+
+    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
+        """Note what became of a claim."""
+        from evoclaims.verdicts.claim_report import ClaimReport
+
+        plain = getattr(report, ATTRIBUTE, None)
+        if plain is not None:
+            self.reports.append(ClaimReport.from_json(plain))
+
+    @pytest.hookimpl(optionalhook=True)
+    def pytest_testnodedown(self, node: Any, error: object) -> None:
+        """Note why an xdist worker ran nothing; they all give the same reason."""
+        trouble = getattr(node, "workeroutput", {}).get(TROUBLE)
+        if trouble is not None and trouble not in self._troubles:
+            self._troubles.append(trouble)
+
+    @pytest.hookimpl(optionalhook=True)
+    def pytest_handlecrashitem(self, crashitem: str) -> None:
+        """Note that xdist's worker died over a claim, which has no report then: it must not be missing unsaid."""
+        parameters = crashitem.rpartition("[")[2].removesuffix("]").split("-")
+        if not set(TIERS).isdisjoint(parameters):  # what is no claim is in pytest's own summary
+            self._died.append(
+                f"The process that judged {crashitem} died (it was killed, crashed, or found no memory), so that this "
+                "claim has no verdict here. Its trials are kept as far as they are, and the same command goes on from "
+                "there."
+            )
+
+    @pytest.hookimpl(tryfirst=True)
+    def pytest_sessionfinish(self, session: pytest.Session) -> None:
+        """Compare with the reference trials, write the JSON report and settle the exit status.
+
+        0: nothing refuted, nothing drifted. 1: something was refuted without being accepted, broke, or drifted; or a
+        verdict changed as --claims-compare-fail names it; or, with --claims-undecided=fail, no claim was judged.
+        4: xdist's workers refused to begin. 5 (pytest's "no tests"): claims were selected, but no trial was looked at
+        (all are skipped, say), so that nothing was measured.
+        """
+        refused = bool(self._troubles)
+        for finish in (
+            self._compare,
+            self._compare_with_predecessors,
+            self._compare_with_accepted,
+            self._write_json,
+        ):
+            try:
+                finish()
+            except UserError as error:
+                self._troubles.append(str(error))
+        if refused and not self.reports:
+            session.exitstatus = pytest.ExitCode.USAGE_ERROR
+        elif session.exitstatus == pytest.ExitCode.OK:
+            session.exitstatus = self._status()
+
+    def _compare(self) -> None:
+        """Compare the store's trials behind the claims with the reference trials."""
+        if self.reports:
+            self._drift = self._make_session(self._config).drift(self.reports)
+
+    def _compare_with_predecessors(self) -> None:
+        """Compare the trials of this environment with those that other versions have left in the store."""
+        if self.reports:
+            self._upgrade = self._make_session(self._config).upgrade(self.reports)
+
+    def _compare_with_accepted(self) -> None:
+        """Compare the verdicts with those last accepted, which are of the protocol itself and not of a variant."""
+        from evoclaims.verdicts.regression import regression
+
+        if self.reports and not self._config.getoption("claims_variant"):
+            folder = self._make_session(self._config).reproduction.folder
+            self._regression = regression(folder, self.reports, self._config.getoption("claims_compare_fail"))
+
+    def _status(self) -> pytest.ExitCode:
+        """Return the exit status of a run in which no test failed."""
+        if self._troubles or (self._drift is not None and self._drift[0].drifted):
+            return pytest.ExitCode.TESTS_FAILED
+        if self._upgrade is not None and self._upgrade.drifted:
+            return pytest.ExitCode.TESTS_FAILED
+        if self._regression is not None and self._regression.matched:
+            return pytest.ExitCode.TESTS_FAILED
+        if self.reports and not self._judged and self._config.getoption("claims_undecided") == "fail":
+            return pytest.ExitCode.TESTS_FAILED
+        if self.reports and not any(report.n for report in self.reports):
+            return pytest.ExitCode.NO_TESTS_COLLECTED
+        return pytest.ExitCode.OK
+
+    @property
+    def _judged(self) -> bool:
+        """Whether any claim has a verdict, be it that it is undecided or broken."""
+        return any(report.outcome != "not run" for report in self.reports)
+
+    def pytest_terminal_summary(self, terminalreporter: Any) -> None:
+        """Print the verdict table and what lies behind it."""
+        if not self.reports:
+            for trouble in [*self._troubles, *self._died]:
+                terminalreporter.write_line(self._said(f"ERROR: {trouble}"), red=True)
+            return
+        from evoclaims.report import terminal_table
+
+        writer = self._config.get_terminal_writer()
+        width, colour = writer.fullwidth, writer.hasmarkup
+        terminalreporter.section("claims")
+        terminalreporter.write_line(self._drawn(terminal_table.verdict_table(self.reports, width, colour)))
+        terminalreporter.write_line("")
+        explained = terminal_table.explanations(self.reports, width, colour)
+        if explained:
+            terminalreporter.write_line(self._drawn(explained))
+            terminalreporter.write_line("")
+        notes = self._notes()
+        for note in notes:
+            terminalreporter.write_line(self._said(note))
+        for trouble in [*self._troubles, *self._died]:
+            terminalreporter.write_line(self._said(f"error: {trouble}"), red=True)
+        unsaved = sorted({report.unsaved for report in self.reports} - {""})
+        warnings = [f"The files of evidence could not be written. {reason}" for reason in unsaved[:1]]
+        for warning in (*warnings, self._write_step_summary(notes)):
+            if warning:
+                terminalreporter.write_line(self._said(f"warning: {warning}"), yellow=True)
+        terminalreporter.write_line(f"claims: {terminal_table.totals(self.reports)}", bold=True)
+        if not any(report.n for report in self.reports):
+            what = "No trial was looked at" if self._judged else "No claim was judged"
+            terminalreporter.write_line(f"{what}: nothing was measured.", red=True)
+
+    def _said(self, text: str) -> str:
+        """Return a line for the terminal, whoever the words are from."""
+        return self._drawn(shown(text))
+
+    def _drawn(self, text: str) -> str:
+        """Return what rich has drawn in characters that the terminal has."""
+        file: Any = getattr(self._config.get_terminal_writer(), "_file", None)
+        return spelled(text, getattr(file, "encoding", None))
+
+    def _notes(self) -> list[str]:
+        """Return in lines what comparisons found: with reference trials, trials of other versions, and verdicts."""
+        from evoclaims.report import terminal_table
+        from evoclaims.verdicts.upgrade import verdict_changes
+
+        notes = []
+        if self._drift is not None:
+            drift, digests = self._drift
+            notes += terminal_table.drift_lines(drift, len(digests.changed), digests.compared).splitlines()
+        if self._upgrade is not None:
+            notes += self._upgrade.lines
+        notes += verdict_changes(self.reports)
+        return [*notes, *(self._regression.lines if self._regression else ())]
+
+    def _write_json(self) -> None:
+        """Write all verdicts to the file that --claims-json names; none, too, are said, and no old file is left."""
+        from evoclaims.core.files import write_atomically
+
+        name = self._config.getoption("claims_json")
+        if name is None or self._config.option.collectonly:
+            return
+        drift = self._drift[0].to_json() if self._drift else None
+        upgrade = self._upgrade.to_json() if self._upgrade else None
+        claims = [report.to_json() for report in self.reports]
+        plain = {"schema": 1, "claims": claims, "drift": drift, "upgrade": upgrade}
+        path = Path(self._config.invocation_params.dir) / name
+        try:
+            write_atomically(path, (json.dumps(plain, indent=1, sort_keys=True) + "\n").encode())
+        except UserError as error:  # its advice is about the store
+            reason = getattr(error.__cause__, "strerror", None) or error.__cause__
+            raise UserError(
+                f"Cannot write the verdicts to {path}: {reason}. Name a file that can be written with --claims-json."
+            ) from error
+
+    def _write_step_summary(self, notes: Sequence[str]) -> str:
+        """Append the verdicts to the page that GitHub shows of a step; return why it cannot be written, if it cannot.
+
+        This is called where a terminal is talked to, so that the runs within commands of `evoclaims` add nothing.
+        """
+        from evoclaims.report.run_summary import run_summary
+
+        name = os.environ.get("GITHUB_STEP_SUMMARY")
+        if not name:
+            return ""
+        try:
+            with open(name, "a", encoding="utf-8") as page:
+                page.write(run_summary(self.reports, [*notes, *self._troubles, *self._died]))
+        except OSError as error:
+            return f"Cannot write the verdicts to GitHub's summary {name}: {error.strerror or error}."
+        return ""

@@ -1,0 +1,237 @@
+"""Making a report's data from verdicts, trials and the history of accepted verdicts."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from evoclaims.core.errors import UserError
+from evoclaims.judging.protocol import Protocol
+from evoclaims.judging.verdict import Outcome
+from evoclaims.paper.archive import Archive
+from evoclaims.paper.reproduction import Reproduction
+from evoclaims.report import accepted_history, origin, training_curves
+from evoclaims.report.champion import Draw, champion_of, network
+from evoclaims.report.evidence import Part, judged_part, unjudged_part
+from evoclaims.report.formatting import Anchors, clean, counted, listed, place_key, places, plural
+from evoclaims.report.model import Board, Champion, Conditions, Look, Page, Plate, Section
+from evoclaims.report.trial_summary import Glance, Reader
+from evoclaims.verdicts.claim_report import ClaimReport
+from evoclaims.verdicts.history import History, key_of
+from evoclaims.verdicts.robustness import Robustness
+from evoclaims.verdicts.versions import installed_for
+
+Verdicts = Mapping[str, Sequence[ClaimReport]]
+"""Reports by tier, in the order in which tiers are shown."""
+
+
+def gather(
+    reproduction: Reproduction,
+    verdicts: Verdicts,
+    archive: Archive,
+    history: History,
+    *,
+    sentences: Mapping[str, str],
+    draws: Sequence[Draw] = (network,),
+    plates: Sequence[Plate] = (),
+    missing: Sequence[str] = (),
+    robustness: Sequence[Robustness] = (),
+    generated: str = "",
+) -> Page:
+    """Return the data of a whole report.
+
+    Args:
+        reproduction: the paper under test.
+        verdicts: what became of its claims.
+        archive: where trials are read; each is read once.
+        history: accepted verdicts.
+        sentences: the paper's own sentences by claim, such as "G1[n_parity]".
+        draws: ways of drawing a champion, in the order in which they are tried.
+        plates: figures of the paper.
+        missing: sentences about figures that are not among them.
+        robustness: how claims end under variants of the protocol.
+        generated: when, and by which version.
+    """
+    gathered = _Gathering(reproduction, archive, history, sentences, draws)
+    boards = tuple(
+        Board(tier, tuple(gathered.section(report) for report in sorted(reports, key=_order)))
+        for tier, reports in verdicts.items()
+    )
+    return Page(
+        title=clean(reproduction.title),
+        name=clean(reproduction.name),
+        boards=boards,
+        conditions=gathered.conditions,
+        notices=tuple(_notices(boards, gathered.reader)),
+        plates=tuple(plates),
+        missing=tuple(missing),
+        variants={name: clean(variant.says) for name, variant in reproduction.variants.items()},
+        robustness=tuple(robustness),
+        generated=generated,
+    )
+
+
+def _order(report: ClaimReport) -> tuple[Any, ...]:
+    """Order claims as the paper does, within a section as the terminal's table does: G2 before G10."""
+    return place_key(places(report.where)[0]), report.claim[:1], len(report.claim), report.claim, report.case
+
+
+def _notices(boards: Sequence[Board], reader: Reader) -> list[str]:
+    """Say what concerns the report as a whole."""
+    sections = [section for board in boards for section in board.sections]
+    notices = []
+    if not sections:
+        notices.append("There are no claims to report on.")
+    elif all(section.outcome is Outcome.NOT_RUN for section in sections):
+        notices.append(
+            "No claim has been judged: neither the store nor the committed reference trials hold the trials that the "
+            "claims need. `pytest -m smoke` runs those of the smoke tier."
+        )
+    notices += [clean(sentence) for sentence in reader.troubles]
+    errors = [section for section in sections if section.outcome is Outcome.ERROR]
+    reasons = dict.fromkeys(section.reason for section in errors)
+    if errors:
+        notices.append(f"{plural(len(errors), 'claim')} ended in error. {listed(reasons, most=3)}")
+    return notices
+
+
+class _Gathering:
+    """What is shared by the sections of a report while it is made."""
+
+    def __init__(
+        self,
+        reproduction: Reproduction,
+        archive: Archive,
+        history: History,
+        sentences: Mapping[str, str],
+        draws: Sequence[Draw],
+    ) -> None:
+        self._reproduction, self._archive, self._history = reproduction, archive, history
+        self._sentences, self._draws, self._anchors = sentences, draws, Anchors()
+        self.reader = Reader(archive)
+        self.conditions: dict[str, Conditions] = {}
+
+    def section(self, report: ClaimReport) -> Section:
+        """Return one claim's section."""
+        verdict = report.verdict or {}
+        read = {_label(source): self._trials(source) for source in report.sources}
+        every = [trial for trials in read.values() for trial in trials]
+        made = origin.grouped(trial.origin for trial in every)
+        sentence = clean(self._sentences.get(report.name, ""))
+        statement = clean(report.statement)
+        entries = self._history.get(key_of(report), ())
+        return Section(
+            anchor=self._anchors.new(report.claim, report.case, report.tier),
+            name=clean(report.name),
+            tier=clean(report.tier),
+            methods=tuple(dict.fromkeys(clean(source["method"]) for source in report.sources)),
+            statement=statement,
+            paper=sentence if sentence != statement else "",
+            where=clean(report.where),
+            places=places(report.where),
+            outcome=Outcome(report.outcome),
+            reason=clean(report.reason),
+            expected=report.expected,
+            because=clean(report.because),
+            describe=clean(verdict.get("describe", "")),
+            fingerprint=clean(verdict.get("fingerprint", "")),
+            n=report.n,
+            **{key: verdict.get(key) for key in ("alpha", "p", "attainable_p", "p_refuted")},
+            a12=next((float(e["a12"]) for e in verdict.get("evidence", ()) if e["a12"] is not None), None),
+            looks=tuple(Look(**look) for look in report.attainable),
+            protocol=self._protocol(report),
+            parts=tuple(_parts(verdict, read)),
+            conditions=tuple(self._condition(report.tier, source) for source in report.sources if source["trials"]),
+            made=made,
+            warnings=(*_broken(every), *origin.warnings(made)),
+            history=accepted_history.accepted(entries),
+            change=accepted_history.change(entries, report),
+        )
+
+    def _protocol(self, report: ClaimReport) -> str:
+        """Say what was fixed beforehand."""
+        tier = self._reproduction.tiers.get(report.tier)
+        return "" if tier is None else _in_words(tier.protocol)
+
+    def _condition(self, tier: str, source: Mapping[str, Any]) -> str:
+        """Return the key of a condition with so many trials, after gathering what is shown of it."""
+        key = f"{source['condition']}-{len(source['trials'])}"
+        if key not in self.conditions:
+            trials = self._trials(source)
+            panels, rest = training_curves.panels(trials)
+            settings = _flat(self.reader.settings.get(source["condition"], {}))
+            says = f"{plural(len(trials), 'trial')}. {rest}".strip()
+            self.conditions[key] = Conditions(
+                _label(source), says, settings, panels, self._champion(tier, source, trials)
+            )
+        return key
+
+    def _trials(self, source: Mapping[str, Any]) -> tuple[Glance, ...]:
+        """Read the trials of one condition of a claim: the records that were judged."""
+        return self.reader.read(source["trials"], installed_for(source))
+
+    def _champion(self, tier: str, source: Mapping[str, Any], trials: Sequence[Glance]) -> Champion:
+        """Return a condition's champion; the condition itself is known by its names."""
+        try:
+            condition = self._reproduction.tier(tier).condition(source["method"], source["task"])
+        except UserError as error:
+            return Champion(clean(error))
+        return champion_of(self._archive.store, condition, trials, self._draws)
+
+
+def _label(source: Mapping[str, Any]) -> str:
+    """Return a condition's short name, as in `TrialGroup.label`."""
+    return clean(f"{source['method']} on {source['task']}")
+
+
+def _parts(verdict: Mapping[str, Any], read: Mapping[str, Sequence[Glance]]) -> Sequence[Part]:
+    """Return the evidence; where there is none, the trials as they are."""
+    statuses = {label: {trial.seed: trial.status for trial in trials} for label, trials in read.items()}
+    if verdict.get("evidence"):
+        return [judged_part(evidence, statuses) for evidence in verdict["evidence"]]
+    return [unjudged_part(label, trials) for label, trials in read.items() if trials]
+
+
+def _broken(trials: Sequence[Glance]) -> tuple[str, ...]:
+    """Say which trials have not come to a result of their own."""
+    failed = [trial for trial in trials if trial.status != "done"]
+    found = []
+    if failed:
+        seeds = listed(sorted({trial.seed for trial in failed}))
+        found.append(
+            f"{len(failed)} of {plural(len(trials), 'trial')} did not run to their end "
+            f"({counted(trial.status for trial in failed)}; seeds {seeds}). They take the worst rank."
+        )
+    without = [t for t in trials if t.status == "done" and t.score is not None and math.isnan(t.score)]
+    if without:
+        found.append(f"The mean success of finished trials is NaN (seeds {listed(t.seed for t in without)}).")
+    return tuple(found)
+
+
+def _in_words(protocol: Protocol) -> str:
+    """Return a protocol in a sentence."""
+    looks = ", then ".join(f"{look.n} trials a side at α = {look.alpha:g}" for look in protocol.looks)
+    return (
+        f"Looks at {looks}; seeds from {protocol.first_seed} up; p0 = {protocol.p0:g} for “most trials”; "
+        f"A12 margin {protocol.a12_margin:g}."
+    )
+
+
+def _flat(plain: Mapping[str, Any], prefix: str = "") -> tuple[tuple[str, str], ...]:
+    """Return nested settings as rows: "method.parameters.sigma" becomes "method sigma"."""
+    rows: list[tuple[str, str]] = []
+    for key, value in plain.items():
+        name = f"{prefix} {clean(key)}".strip() if key != "parameters" else prefix
+        if isinstance(value, dict) and value:
+            rows += _flat(value, name)
+        else:
+            rows.append((name, _setting(value)))
+    return tuple(rows)
+
+
+def _setting(value: Any) -> str:
+    """Return one setting as text."""
+    if isinstance(value, list):
+        return listed(map(_setting, value), most=20) or "none"
+    return "–" if value is None else clean(value)

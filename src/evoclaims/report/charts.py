@@ -1,0 +1,302 @@
+"""Small SVG drawings for the page; colours come from the page's style sheet, so that light and dark both work."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from typing import Final
+
+import numpy as np
+from markupsafe import Markup, escape
+
+from evoclaims.report.evidence import Dot, Part, Strip
+from evoclaims.report.formatting import large, number, plural
+from evoclaims.report.training_curves import CurvePanel, Line
+
+WIDTH, HEIGHT, EDGE, APART = 340.0, 44.0, 24.0, 70.0
+"""Of a strip of dots; `APART` is the width of the column of trials without a finite value."""
+
+AXIS: Final = 30.0
+MOST_DOTS: Final = 200
+"""Most trials that are drawn one by one; beyond, quantiles stand for them."""
+
+MOST: Final = 1e300
+"""The largest number that an axis shows, so that differences stay finite."""
+
+LEAST: Final = 1e-300
+"""The smallest difference that ticks tell apart: below, floats run out of digits."""
+
+DOT, BLOCK = 7.0, 44.0
+"""Room for a dot, and the widest block of near values, which the edges have room for."""
+
+PANEL, LEFT, RIGHT, TOP, BOTTOM = (240.0, 132.0), 34.0, 8.0, 8.0, 20.0
+"""Size and margins of a panel of curves."""
+
+
+def part_scale(part: Part) -> tuple[float, float]:
+    """Return the ends of the axis that all strips of a part share: everything drawn lies between them."""
+    if part.event:
+        return 0.0, 1.0
+    values = [dot.value for strip in part.strips for dot in strip.dots] + [value for _, value in part.bounds]
+    if not values:
+        return 0.0, 1.0
+    low, high = _shown(min(values)), _shown(max(values))
+    if low >= 0 and high <= 1:
+        return 0.0, 1.0
+    room = 0.03 * (high - low) or 0.5
+    return low - room, high + room
+
+
+def strip_svg(part: Part, strip: Strip) -> Markup:
+    """Draw a strip: a dot a trial, the median, what the assertion compares with, and broken trials apart."""
+    scale = _Scale(*part_scale(part), right=_right(part))
+    pieces: list[Markup] = [Markup('<path class="rule" d="M{} {}H{}"/>').format(EDGE, HEIGHT - 1, scale.right)]
+    for name, value in part.bounds:
+        pieces.append(
+            Markup('<path class="bound" d="M{0} 1V{1}"><title>{2}: {3}</title></path>').format(
+                _at(scale(value)), HEIGHT - 1, name, number(value)
+            )
+        )
+    for span in part.spans:
+        pieces.append(
+            Markup('<path class="span" d="M{} {}H{}"><title>{}: {} to {}</title></path>').format(
+                _at(scale(span.low)), HEIGHT - 4, _at(scale(span.high)), span.of, number(span.low), number(span.high)
+            )
+        )
+    if part.event and strip.n:
+        share = sum(dot.value for dot in strip.dots) / strip.n
+        pieces.append(
+            Markup('<path class="share" d="M{} {}l4 4l-4 4l-4 -4z"><title>holds in {} of trials</title></path>').format(
+                _at(scale(share)), HEIGHT - 8, f"{share:.0%}"
+            )
+        )
+    elif strip.median is not None and math.isfinite(strip.median):
+        pieces.append(
+            Markup('<path class="median" d="M{} 4V{}"><title>median {}</title></path>').format(
+                _at(scale(strip.median)), HEIGHT - 4, number(strip.median)
+            )
+        )
+    if len(strip.dots) <= MOST_DOTS:
+        pieces.append(Markup('<g class="dots">{}</g>').format(Markup("").join(_dots(strip.dots, scale))))
+    else:
+        pieces += _quantiles(strip.dots, scale)
+    if _right(part) < WIDTH - EDGE:
+        pieces.append(Markup('<path class="wall" d="M{0} 1V{1}"/>').format(WIDTH - APART + 3, HEIGHT))
+        pieces += _apart(strip.apart)
+    name = f"{strip.label}, {plural(strip.n, 'trial')}, median {number(strip.median)}"
+    return _svg(WIDTH, HEIGHT, pieces, name)
+
+
+def axis_svg(part: Part) -> Markup:
+    """Draw the axis below a part's strips."""
+    low, high = part_scale(part)
+    scale = _Scale(low, high, right=_right(part))
+    pieces = []
+    for value, label in (
+        ((0.0, "no"), (1.0, "yes")) if part.event else ((tick, number(tick)) for tick in ticks(low, high))
+    ):
+        pieces.append(Markup('<path class="rule" d="M{} 0v4"/>').format(_at(scale(value))))
+        pieces.append(
+            Markup('<text class="tick" x="{}" y="14" text-anchor="middle">{}</text>').format(_at(scale(value)), label)
+        )
+    for name, value in part.bounds:
+        pieces.append(
+            Markup('<text class="named" x="{}" y="27" text-anchor="middle">{} {}</text>').format(
+                _at(scale(value)), name, number(value)
+            )
+        )
+    if _right(part) < WIDTH - EDGE:
+        pieces.append(
+            Markup('<text class="tick" x="{}" y="14" text-anchor="middle">no number</text>').format(WIDTH - APART / 2)
+        )
+    return _svg(WIDTH, AXIS if part.bounds else 18.0, pieces, "")
+
+
+def curve_symbol(panel: CurvePanel, name: str) -> Markup:
+    """Draw a panel of training curves as a symbol that is put on the page under `name`."""
+    width, height = PANEL
+    lines = [*panel.lines, *(panel.band or ())]
+    xs = _ends([line.x for line in lines])
+    ys = _ends([line.y for line in lines])
+    x = _Scale(0.0, xs[1] or 1.0, LEFT, width - RIGHT)
+    y = _Scale(*ys, height - BOTTOM, TOP)
+    pieces = [Markup('<path class="rule" d="M{0} {1}V{2}H{3}"/>').format(LEFT, TOP, height - BOTTOM, width - RIGHT)]
+    for value in ticks(*ys, most=3):
+        pieces.append(
+            Markup('<text class="small" x="{}" y="{}" text-anchor="end">{}</text>').format(
+                LEFT - 4, _at(y(value) + 3), large(value)
+            )
+        )
+    for value, anchor in ((0.0, "start"), (xs[1], "end")):
+        pieces.append(
+            Markup('<text class="small" x="{}" y="{}" text-anchor="{}">{}</text>').format(
+                _at(x(value)), height - 8, anchor, large(value)
+            )
+        )
+    if panel.band is not None:
+        pieces += _band(*panel.band, x, y)
+    pieces += [
+        Markup('<path class="line" d="{}"><title>{}</title></path>').format(path, line.label)
+        for line in panel.lines
+        if (path := _path(line, x, y))
+    ]
+    inside = Markup("").join(pieces)
+    return Markup('<symbol id="{}" viewBox="0 0 {} {}">{}</symbol>').format(name, width, height, inside)
+
+
+def ticks(low: float, high: float, most: int = 5) -> list[float]:
+    """Return at most `most` + 1 round values from `low` to `high`; one, where they are too near for floats between."""
+    if high - low < max(LEAST, 1e-9 * max(abs(low), abs(high))):
+        return [low]
+    rough = (high - low) / most
+    power = 10.0 ** math.floor(math.log10(rough))
+    step = next(factor * power for factor in (1, 2, 5, 10) if factor * power >= rough * (1 - 1e-9))
+    first, last = math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9)
+    return [step * index for index in range(first, last + 1)]
+
+
+class _Scale:
+    """A linear map from values to places."""
+
+    def __init__(self, low: float, high: float, left: float = EDGE, right: float = WIDTH - EDGE) -> None:
+        self.low, self.high, self.left, self.right = low, high, left, right
+
+    def __call__(self, value: float) -> float:
+        """Return the place of a value; one beyond the ends is put at the end."""
+        shown = min(max(value, self.low), self.high)  # before any arithmetic, which an enormous value would overflow
+        return self.left + (shown - self.low) / ((self.high - self.low) or 1.0) * (self.right - self.left)
+
+
+def _shown(value: float) -> float:
+    """Return the end of an axis for an extreme value."""
+    return min(max(value, -MOST), MOST)
+
+
+def _right(part: Part) -> float:
+    """Return where the axis ends: before the column of trials without a finite value, if there are any."""
+    return WIDTH - EDGE - (APART if any(strip.apart for strip in part.strips) else 0.0)
+
+
+def _dots(dots: Sequence[Dot], scale: _Scale) -> Iterator[Markup]:
+    """Draw a dot a trial; values too near each other for two dots side by side share a block around their mean."""
+    ordered = sorted(dots, key=lambda dot: (dot.value, dot.seed))
+    places = [scale(dot.value) for dot in ordered]
+    start = 0
+    while start < len(ordered):
+        end, total = start + 1, places[start]
+        left, right, room, rows = _block(total, 1)
+        while end < len(ordered) and places[end] < right:
+            total += places[end]
+            end += 1
+            left, right, room, rows = _block(total, end - start)
+        radius = _at(room * 0.43)
+        for index, dot in enumerate(ordered[start:end]):
+            column, row = divmod(index, rows)
+            deep = min(rows, end - start - column * rows)
+            x, y = left + (column + 0.5) * room, (HEIGHT - 8) / 2 + (row - (deep - 1) / 2) * room
+            says = f"seed {dot.seed:d}: {number(dot.value)}"
+            yield _numbers_alone(f'<circle cx="{_at(x)}" cy="{_at(y)}" r="{radius}"><title>{says}</title></circle>')
+        start = end
+
+
+def _block(total: float, count: int) -> tuple[float, float, float, int]:
+    """Return where a block of dots begins and where the next dot may, the room for a dot, and the number of rows.
+
+    Args:
+        total: sum of the dots' places.
+        count: of the dots.
+    """
+    room = min(DOT, math.sqrt((HEIGHT - 12) * BLOCK / count))
+    columns = math.ceil(count / max(int((HEIGHT - 9) / room), 1))
+    rows, width = math.ceil(count / columns), columns * room
+    centre = total / count
+    return centre - width / 2, centre + width / 2 + room / 2, room, rows
+
+
+def _numbers_alone(drawn: str) -> Markup:
+    """Take a drawing in which no text but numbers was filled in, and which so needs no escaping."""
+    return Markup(drawn)  # noqa: S704
+
+
+def _quantiles(dots: Sequence[Dot], scale: _Scale) -> Iterator[Markup]:
+    """Draw quantiles in place of very many dots."""
+    low, first, third, high = np.quantile([dot.value for dot in dots], [0.05, 0.25, 0.75, 0.95])
+    middle = (HEIGHT - 8) / 2
+    for name, ends, half in (("5th to 95th", (low, high), 4.0), ("25th to 75th", (first, third), 9.0)):
+        x = [scale(float(end)) for end in ends]
+        yield Markup(
+            '<rect class="band" x="{}" y="{}" width="{}" height="{}"><title>'
+            "{} percentile of {} trials: {} to {}</title></rect>"
+        ).format(
+            _at(x[0]),
+            middle - half,
+            _at(max(x[1] - x[0], 1.0)),
+            2 * half,
+            name,
+            len(dots),
+            *map(number, map(float, ends)),
+        )
+
+
+def _apart(trials: Sequence[tuple[int, str]]) -> Iterator[Markup]:
+    """Draw trials without a finite value as crosses in a column of their own; a count where there are many."""
+    if len(trials) > MOST_DOTS // 4:
+        yield Markup('<text class="tick" x="{}" y="{}" text-anchor="middle">{}</text>').format(
+            WIDTH - APART / 2, HEIGHT / 2, plural(len(trials), "trial")
+        )
+        return
+    room = min(9.0, math.sqrt((HEIGHT - 10) * (APART - 12) / max(len(trials), 1)))
+    across = max(int((APART - 12) / room), 1)
+    for index, (seed, why) in enumerate(trials):
+        row, column = divmod(index, across)
+        yield Markup(
+            '<path class="broken" d="M{} {}l{r} {r}m0 -{r}l-{r} {r}"><title>seed {}: {}</title></path>'
+        ).format(_at(WIDTH - APART + 9 + column * room), _at(5 + row * room), seed, why, r=_at(0.6 * room))
+
+
+def _ends(series: Sequence[np.ndarray[tuple[int, ...], np.dtype[np.float64]]]) -> tuple[float, float]:
+    """Return the lowest and the highest finite value; 0 and 1 without any."""
+    finite = np.concatenate([values[np.isfinite(values)] for values in series])
+    if not len(finite):
+        return 0.0, 1.0
+    low, high = _shown(float(finite.min())), _shown(float(finite.max()))
+    return (low, high) if high > low else (low - 0.5, high + 0.5)
+
+
+def _path(line: Line, x: _Scale, y: _Scale) -> str:
+    """Return a curve as path data, with a gap where a value is no finite number; flat stretches take two points."""
+    path, pen = [], "M"
+    values = line.y
+    for index, (across, up) in enumerate(zip(line.x, values, strict=True)):
+        if not math.isfinite(up):
+            pen = "M"
+            continue
+        flat = 0 < index < len(values) - 1 and values[index - 1] == up == values[index + 1]
+        if flat and pen == "L":
+            continue
+        path.append(f"{pen}{_at(x(across))} {_at(y(up))}")
+        pen = "L"
+    return "".join(path)
+
+
+def _band(low: Line, high: Line, x: _Scale, y: _Scale) -> Iterator[Markup]:
+    """Draw the area between two quantiles where both are finite."""
+    good = np.isfinite(low.y) & np.isfinite(high.y)
+    if good.any():
+        there = [f"{_at(x(a))} {_at(y(b))}" for a, b in zip(low.x[good], low.y[good], strict=True)]
+        back = [f"{_at(x(a))} {_at(y(b))}" for a, b in zip(high.x[good][::-1], high.y[good][::-1], strict=True)]
+        yield Markup('<path class="band" d="M{}Z"><title>lower to upper decile</title></path>').format(
+            "L".join([*there, *back])
+        )
+
+
+def _at(place: float) -> str:
+    """Return a coordinate with at most one decimal."""
+    return f"{place:.1f}".removesuffix(".0")
+
+
+def _svg(width: float, height: float, pieces: Sequence[Markup], name: str) -> Markup:
+    """Return a drawing; one without a name is decoration."""
+    role = Markup('role="img" aria-label="{}"').format(name) if name else Markup('aria-hidden="true"')
+    inside = Markup("").join(pieces)
+    return Markup('<svg viewBox="0 0 {} {}" {}>{}</svg>').format(_at(width), _at(height), role, escape(inside))

@@ -1,0 +1,137 @@
+"""The report as one HTML page that needs no network: style, script and pictures are in it."""
+
+from __future__ import annotations
+
+import base64
+import functools
+import hashlib
+import json
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from importlib import resources
+from typing import Final
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup
+
+from evoclaims.judging.verdict import Outcome
+from evoclaims.report import charts, formatting
+from evoclaims.report.model import Page
+
+_VIEW_BOX: Final = re.compile(rb'viewBox="[-\d.]+ [-\d.]+ ([\d.]+) ([\d.]+)"')
+
+
+@dataclass(frozen=True)
+class Shown:
+    """A drawing that is kept once and shown in several places.
+
+    Attributes:
+        name: its id in the page.
+        width, height: in the drawing's own units.
+        label: in words.
+    """
+
+    name: str
+    width: float
+    height: float
+    label: str
+
+
+def html(page: Page) -> str:
+    """Return the whole page."""
+    style, script = _asset("report.css"), _asset("report.js")
+    shelf, curves, champions = _shelf(page)
+    return (
+        _environment()
+        .get_template("page.html.j2")
+        .render(
+            page=page,
+            outcomes=list(Outcome),
+            style=style,
+            script=script,
+            policy=policy(style, script),
+            shelf=shelf,
+            curves=curves,
+            champions=champions,
+            places=_choices(place for section in page.sections for place in section.places),
+            methods=_choices(method for section in page.sections for method in section.methods),
+        )
+    )
+
+
+@functools.cache
+def _environment() -> Environment:
+    """Return the templates, with what they call."""
+    environment = Environment(
+        loader=PackageLoader("evoclaims.report"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters |= {
+        "number": formatting.number,
+        "p_value": formatting.p_value,
+        "json": _json,
+        "data_uri": data_uri,
+    }
+    environment.globals |= {"strip_svg": charts.strip_svg, "axis_svg": charts.axis_svg, "plural": formatting.plural}
+    return environment
+
+
+def policy(style: str, script: str) -> str:
+    """Return the page's Content-Security-Policy: nothing from outside, and no script or style but its own."""
+    return (
+        f"default-src 'none'; img-src data:; style-src {_digest(style)}; script-src {_digest(script)}; "
+        "base-uri 'none'; form-action 'none'"
+    )
+
+
+def data_uri(svg: bytes) -> str:
+    """Return an SVG as an address that holds it; as an image it can neither run scripts nor load anything."""
+    return f"data:image/svg+xml;base64,{base64.b64encode(svg).decode()}"
+
+
+def _shelf(page: Page) -> tuple[Markup, Mapping[str, list[Shown]], Mapping[str, Shown]]:
+    """Return all drawings that sections share, and which of them belong to each condition."""
+    kept: list[Markup] = []
+    curves: dict[str, list[Shown]] = {}
+    champions: dict[str, Shown] = {}
+    for number, (key, condition) in enumerate(page.conditions.items()):
+        curves[key] = []
+        for index, panel in enumerate(condition.curves):
+            name = f"curves-{number}-{index}"
+            kept.append(charts.curve_symbol(panel, name))
+            curves[key].append(Shown(name, *charts.PANEL, f"{panel.name} over training, {condition.label}"))
+        picture = condition.champion.picture
+        size = _VIEW_BOX.search(picture)
+        if size is not None:
+            shown = Shown(f"champion-{number}", float(size[1]), float(size[2]), condition.champion.says)
+            champions[key] = shown
+            kept.append(
+                Markup('<image id="{}" width="{}" height="{}" href="{}"/>').format(
+                    shown.name, shown.width, shown.height, data_uri(picture)
+                )
+            )
+    return Markup("\n").join(kept), curves, champions
+
+
+def _choices(values: Iterator[str]) -> list[str]:
+    """Return each value once, sections of the paper first and in their order."""
+    return sorted(set(values), key=formatting.place_key)
+
+
+def _json(value: object) -> str:
+    """Return a value as JSON for an attribute, which the template then escapes."""
+    return json.dumps(value)
+
+
+def _asset(name: str) -> Markup:
+    """Return a file of the package as it is."""
+    return Markup((resources.files("evoclaims.report") / "assets" / name).read_text(encoding="utf-8"))  # noqa: S704
+
+
+def _digest(text: str) -> str:
+    """Return the source expression that allows exactly this text."""
+    return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"

@@ -1,1 +1,0 @@
-"""A paper under test: its conditions, its claims, and what became of them."""

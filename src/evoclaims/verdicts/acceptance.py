@@ -1,0 +1,132 @@
+"""Accepting verdicts: which of now differ from the last accepted ones, and what is written down of them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from evoclaims.core.canonical import content_hash
+from evoclaims.core.printable import printable
+from evoclaims.judging.verdict import Outcome
+from evoclaims.paper.archive import Archive
+from evoclaims.trials.result import TrialResult
+from evoclaims.verdicts.claim_report import ClaimReport
+from evoclaims.verdicts.history import Entry, History, key_of
+from evoclaims.verdicts.versions import installed_for
+
+UNDECIDED = (Outcome.NOT_RUN, Outcome.ERROR)
+"""Outcomes that say nothing of a claim, and so are never accepted."""
+
+
+@dataclass(frozen=True)
+class Acceptance:
+    """What accepting the verdicts of now comes to.
+
+    Attributes:
+        history: with the new entries.
+        accepted: a line for each new entry.
+        left: a line for each claim whose verdict of now is not accepted.
+    """
+
+    history: History
+    accepted: tuple[str, ...]
+    left: tuple[str, ...]
+
+
+def accept(history: History, reports: Sequence[ClaimReport], archive: Archive, today: str) -> Acceptance:
+    """Append an entry for every claim whose outcome, fingerprint, versions or device is not the last accepted one.
+
+    Args:
+        history: accepted before.
+        reports: verdicts of now.
+        archive: where their trials are.
+        today: ISO 8601 date.
+    """
+    grown, accepted, left = dict(history), [], []
+    for report in reports:
+        key = key_of(report)
+        name = f"{key[1]} ({key[0]})"
+        past = history.get(key, ())
+        if report.outcome in UNDECIDED:
+            kept = f"it stays {past[-1].outcome}, accepted on {past[-1].accepted}" if past else "nothing is accepted"
+            left.append(f"{name} is {report.outcome} now ({printable(report.reason)}): {kept}")
+            continue
+        entry = entry_of(report, archive, today)
+        said = difference(past[-1] if past else None, entry)
+        if said:
+            grown[key] = (*past, entry)
+            accepted.append(f"{name}: {said}")
+    return Acceptance(grown, tuple(accepted), tuple(left))
+
+
+def entry_of(report: ClaimReport, archive: Archive, today: str) -> Entry:
+    """Return what is written down of a judged claim.
+
+    Raises:
+        UserError: when a trial behind it is damaged.
+    """
+    verdict: dict[str, Any] = report.verdict or {}
+    preferred = {trial: installed_for(source) for source in report.sources for trial in source["trials"]}
+    found = (archive.get(trial, versions) for trial, versions in preferred.items())
+    trials = [trial for trial in found if trial is not None]
+    return Entry(
+        outcome=Outcome(report.outcome),
+        reason=printable(report.reason),
+        n=report.n,
+        p=verdict["p"],
+        fingerprint=verdict["fingerprint"],
+        accepted=today,
+        versions=versions_of(trials),
+        device=_joined((trial.provenance.get("device") or {}).get("kind") for trial in trials),
+        revision=_joined(_revision(trial) for trial in trials),
+        trials=content_hash(sorted(trial.digest for trial in trials)),
+    )
+
+
+def versions_of(trials: Sequence[TrialResult]) -> dict[str, str]:
+    """Return the versions that trials were made with, by package; CUDA's where a GPU made them."""
+    made_with = [_packages(trial) for trial in trials]
+    names = sorted({name for packages in made_with for name in packages})
+    return {printable(name): _joined(packages.get(name) for packages in made_with) for name in names}
+
+
+def difference(old: Entry | None, new: Entry) -> str:
+    """Return in words what a new entry changes; empty when it need not be written down."""
+    if old is None:
+        return f"{new.outcome}, the first verdict"
+    moved = [f"{name} {versions}" for name, versions in changed_versions(old, new).items()]
+    if old.device != new.device:
+        moved.append(f"device {old.device or 'unknown'} -> {new.device or 'unknown'}")
+    by = f" (by {', '.join(moved)})" if moved else ""
+    if old.fingerprint != new.fingerprint:
+        return f"{new.outcome}; a new history begins, since what is judged has changed (it was {old.outcome}){by}"
+    if old.outcome != new.outcome:
+        return f"{old.outcome} -> {new.outcome}{by}"
+    return f"still {new.outcome}{by}" if moved else ""
+
+
+def changed_versions(old: Entry, new: Entry) -> dict[str, str]:
+    """Return the packages whose versions differ, such as {"jax": "0.10.2 -> 0.11.2"}."""
+    names = sorted(old.versions.keys() | new.versions.keys())
+    pairs = {name: (old.versions.get(name, "none"), new.versions.get(name, "none")) for name in names}
+    return {name: f"{was} -> {now}" for name, (was, now) in pairs.items() if was != now}
+
+
+def _packages(trial: TrialResult) -> dict[str, str]:
+    """Return the versions of one trial; a package that was not installed is left out."""
+    device = trial.provenance.get("device") or {}
+    cuda = trial.provenance.get("cuda") if device.get("platform") == "gpu" else None
+    found = {**(trial.provenance.get("versions") or {}), **(cuda or {})}
+    return {str(name): str(version) for name, version in found.items() if version is not None}
+
+
+def _revision(trial: TrialResult) -> str | None:
+    """Return the git revision of a trial, as `git describe --dirty` would."""
+    git = trial.provenance.get("git") or {}
+    return f"{git['sha']}-dirty" if git.get("sha") and git.get("dirty") else git.get("sha")
+
+
+def _joined(values: Iterable[Any]) -> str:
+    """Return the different values as one text; what is unknown is left out."""
+    return ", ".join(sorted({printable(value) for value in values if value}))

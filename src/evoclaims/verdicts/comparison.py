@@ -1,0 +1,166 @@
+"""The two sides of a comparison: verdicts, and trials by condition, of a store, of a working tree, or of a revision."""
+
+from __future__ import annotations
+
+import itertools
+from collections import defaultdict
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path, PurePosixPath
+
+from evoclaims.core.errors import UserError
+from evoclaims.core.packages import Versions, agree
+from evoclaims.judging.baseline import DriftCase, DriftReport
+from evoclaims.judging.tripwire import DigestCheck
+from evoclaims.judging.verdict import Outcome
+from evoclaims.paper import references
+from evoclaims.paper.condition_names import names_of
+from evoclaims.paper.reproduction import Reproduction
+from evoclaims.trials.result import TrialResult
+from evoclaims.trials.result_codec import RecordError, parse
+from evoclaims.trials.store import DamagedFileError, Store, newest
+from evoclaims.verdicts import history, transitions
+from evoclaims.verdicts.claim_report import ClaimReport
+from evoclaims.verdicts.git_revision import Revision
+from evoclaims.verdicts.transitions import Standings
+
+Trials = Mapping[str, Sequence[TrialResult]]
+"""Trials by condition, named as its file of reference trials is: "smoke/cma_es-n_parity"."""
+
+
+@dataclass(frozen=True)
+class Side:
+    """What is compared.
+
+    Attributes:
+        name: in words, such as "the revision HEAD~3".
+        verdicts: by tier and claim.
+        trials: by condition.
+        troubles: a line for each file that could not be read.
+    """
+
+    name: str
+    verdicts: Standings
+    trials: Trials
+    troubles: tuple[str, ...] = ()
+
+    def of(self, tiers: Iterable[str]) -> Side:
+        """Return the part of this side that belongs to some tiers."""
+        kept = set(tiers)
+        return replace(
+            self,
+            verdicts={key: standing for key, standing in self.verdicts.items() if key[0] in kept},
+            trials={name: trials for name, trials in self.trials.items() if PurePosixPath(name).parent.name in kept},
+        )
+
+
+def working_tree(reproduction: Reproduction) -> Side:
+    """Return the accepted verdicts and the reference trials as they lie in the reproduction's folder.
+
+    Raises:
+        UserError: when one of the files is torn.
+    """
+    top = reproduction.references
+    trials = {_named(path.relative_to(top)): references.load(path) for path in sorted(top.rglob("*.jsonl"))}
+    accepted = transitions.accepted(history.load(reproduction.folder / history.FILE))
+    return Side("the working tree", accepted, trials)
+
+
+def revision(reproduction: Reproduction, at: Revision) -> Side:
+    """Return the accepted verdicts and the reference trials that are committed at a revision.
+
+    Args:
+        reproduction: of now; only its folders are used.
+        at: read in the reproduction's folder.
+
+    Raises:
+        UserError: when the revision has neither, or one of the files is torn.
+    """
+    top = reproduction.references.relative_to(reproduction.folder).as_posix()
+    verdicts = at.read(history.FILE)
+    files = [path for path in at.files(top) if path.endswith(".jsonl")]
+    if verdicts is None and not files:
+        raise UserError(
+            f"The revision {at.name} has neither {history.FILE} nor reference trials in {reproduction.folder}."
+        )
+    accepted = history.parse(verdicts, f"{history.FILE} at {at.name}") if verdicts is not None else {}
+    trials = {_named(PurePosixPath(path).relative_to(top)): _records(at, path) for path in files}
+    return Side(f"the revision {at.name} ({at.sha[:12]})", transitions.accepted(accepted), trials)
+
+
+def store(reproduction: Reproduction, of: Store, reports: Iterable[ClaimReport]) -> Side:
+    """Return verdicts and trials of a store; claims whose trials it does not hold itself are not run.
+
+    Args:
+        reproduction: whose conditions are looked for; trials of others are left out.
+        of: the store.
+        reports: verdicts judged from it, and from committed reference trials where it has none.
+    """
+    names, damaged = names_of(reproduction), list[DamagedFileError]()
+    trials: dict[str, list[TrialResult]] = defaultdict(list)
+    versions = {
+        condition: reproduction.tier(known[0].tier, known[0].variant).condition(known[0].method, known[0].task).versions
+        for condition, known in names.items()
+    }
+    for trial in _one_of_each(of.results(damaged), versions):
+        for name in names[trial.condition]:
+            folder = reproduction.references_of(name.variant)
+            path = references.path_of(folder, name.tier, name.method, name.task)
+            trials[_named(path.relative_to(reproduction.references))].append(trial)
+    held = {trial.id for kept in trials.values() for trial in kept}
+    own = [
+        report
+        if all(held.issuperset(source["trials"]) for source in report.sources)
+        else replace(report, outcome=str(Outcome.NOT_RUN))
+        for report in reports
+    ]
+    troubles = tuple(f"not read: {error}" for error in damaged)
+    return Side(f"the store {of.root}", transitions.standings(own), trials, troubles)
+
+
+def _one_of_each(records: Iterable[TrialResult], versions: Mapping[str, Versions]) -> Iterator[TrialResult]:
+    """Return one record of each trial of known conditions: this environment's, or else the newest, as it is judged.
+
+    Args:
+        records: those of a trial one after the other.
+        versions: what this environment has of the packages that a condition depends on, by the condition's id.
+    """
+    for _, several in itertools.groupby(records, key=lambda record: record.id):
+        found = [record for record in several if record.condition in versions]
+        here = [record for record in found if agree(record.provenance, versions[record.condition])]
+        chosen = newest(here or found)
+        if chosen is not None:
+            yield chosen
+
+
+def compare_trials(old: Side, new: Side) -> tuple[DriftReport, DigestCheck]:
+    """Check the conditions that both sides have for drift, and CPU trials for being the same to the bit."""
+    both = sorted(name for name in old.trials.keys() & new.trials.keys() if new.trials[name])
+    return references.compare(
+        [
+            DriftCase(
+                name,
+                new.trials[name][0].condition,
+                tuple(new.trials[name]),
+                tuple(old.trials[name]),
+                references.METRICS,
+            )
+            for name in both
+        ]
+    )
+
+
+def _named(path: PurePosixPath | Path) -> str:
+    """Return a condition's name from where its reference trials lie."""
+    return path.with_suffix("").as_posix()
+
+
+def _records(at: Revision, path: str) -> tuple[TrialResult, ...]:
+    """Read the reference trials in a file of a revision."""
+    results = []
+    for number, line in enumerate((at.read(path) or b"").splitlines(), start=1):
+        try:
+            results.append(parse(line))
+        except RecordError as error:
+            raise UserError(f"Line {number} of {path} at {at.name} is no reference trial: {error.reason}.") from error
+    return tuple(results)

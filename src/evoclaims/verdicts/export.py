@@ -1,0 +1,176 @@
+"""Trials and verdicts as flat tables, for people who go on with pandas."""
+
+from __future__ import annotations
+
+import csv
+import importlib
+import io
+import json
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any, Final
+
+from evoclaims.core.canonical import as_plain
+from evoclaims.core.errors import UserError
+from evoclaims.core.printable import printable
+from evoclaims.paper.condition_names import Name
+from evoclaims.trials.result import TrialResult
+from evoclaims.verdicts.claim_report import ClaimReport
+
+SCHEMA: Final = 1
+"""Of the JSON form; raised when a column changes its meaning."""
+
+Row = Mapping[str, Any]
+"""One line of a table: values by column. None where there is nothing; a column may be missing for it."""
+
+_FORMULA: Final = ("=", "+", "-", "@")
+"""How a text begins that spreadsheets calculate (a tab or a carriage return before it has been escaped by then)."""
+
+
+def trial_rows(trials: Iterable[TrialResult], names: Mapping[str, Sequence[Name]]) -> list[Row]:
+    """Return one row per trial.
+
+    Columns: "id", "condition", "tier", "variant", "method", "task" (as the reproduction names them; several names are
+    joined by commas; of a condition that it does not have, tier and variant are None and the others the record's own
+    names), "seed", "status", "digest", then "metrics.…" (numbers), "levels.…" (one number per level), "timing.…" and
+    "provenance.…" ("provenance.versions.jax", …). Training curves are left to the records themselves.
+    """
+    return [_trial_row(trial, names.get(trial.condition, ())) for trial in trials]
+
+
+def verdict_rows(reports: Iterable[ClaimReport]) -> list[Row]:
+    """Return one row per claim and tier: what was judged, how it ended, and the numbers of the whole assertion."""
+    return [
+        {
+            "claim": report.claim,
+            "case": report.case,
+            "tier": report.tier,
+            "outcome": report.outcome,
+            "reason": report.reason,
+            "n": report.n,
+            **{
+                name: (report.verdict or {}).get(name)
+                for name in ("p", "attainable_p", "p_refuted", "attainable_p_refuted", "alpha", "fingerprint")
+            },
+            "expected": report.expected,
+            "because": report.because,
+            "statement": report.statement,
+            "where": report.where,
+        }
+        for report in reports
+    ]
+
+
+def as_json(rows: Sequence[Row]) -> bytes:
+    """Return {"schema": 1, "rows": […]} as strict JSON: NaN and the infinities are the texts "nan", "inf", "-inf"."""
+    plain = as_plain({"schema": SCHEMA, "rows": [dict(row) for row in rows]})
+    return (json.dumps(plain, indent=1, allow_nan=False) + "\n").encode("ascii")
+
+
+def as_csv(rows: Sequence[Row]) -> bytes:
+    """Return comma-separated values: empty for None, "nan" for NaN, JSON for lists.
+
+    In texts and headings, control characters are escaped, and an apostrophe stands before what a spreadsheet would take
+    for a formula; numbers are left as they are.
+    """
+    text = io.StringIO(newline="")
+    columns = columns_of(rows)
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow([_cell(name) for name in columns])
+    writer.writerows([_cell(row.get(name)) for name in columns] for row in rows)
+    return text.getvalue().encode()
+
+
+def as_parquet(rows: Sequence[Row]) -> bytes:
+    """Return an Apache Parquet file: null for None, which is not NaN.
+
+    Raises:
+        UserError: when pyarrow is not installed.
+    """
+    try:
+        arrow: Any = importlib.import_module("pyarrow")
+        parquet: Any = importlib.import_module("pyarrow.parquet")
+    except ImportError as error:
+        raise UserError(
+            "Parquet files are written by pyarrow, which is not installed: pip install evoclaims[parquet], or take "
+            "--as json or csv."
+        ) from error
+    columns = {name: _uniform([row.get(name) for row in rows]) for name in columns_of(rows)}
+    file = io.BytesIO()
+    parquet.write_table(arrow.table({name: arrow.array(values) for name, values in columns.items()}), file)
+    return file.getvalue()
+
+
+FORMS: Final[Mapping[str, Callable[[Sequence[Row]], bytes]]] = {
+    "json": as_json,
+    "csv": as_csv,
+    "parquet": as_parquet,
+}
+"""Writers by the names of their forms."""
+
+
+def columns_of(rows: Sequence[Row]) -> list[str]:
+    """Return the columns of all rows; each group (before the dot) in one piece, in the order of first appearance."""
+    names = dict.fromkeys(name for row in rows for name in row)
+    groups = list(dict.fromkeys(name.partition(".")[0] for name in names))
+    return sorted(names, key=lambda name: groups.index(name.partition(".")[0]))
+
+
+def _trial_row(trial: TrialResult, names: Sequence[Name]) -> Row:
+    """Return one trial."""
+    of = trial.spec
+    return {
+        "id": trial.id,
+        "condition": trial.condition,
+        "tier": _joined(name.tier for name in names),
+        "variant": _joined(name.variant for name in names),
+        "method": _joined(name.method for name in names) or (of.get("method") or {}).get("name"),
+        "task": _joined(name.task for name in names) or (of.get("task") or {}).get("name"),
+        "seed": trial.seed,
+        "status": trial.status,
+        "digest": trial.digest,
+        **{f"metrics.{name}": value for name, value in trial.metrics.items()},
+        **{f"levels.{name}": list(values) for name, values in trial.levels.items()},
+        **_flat("timing", trial.timing),
+        **_flat("provenance", trial.provenance),
+    }
+
+
+def _joined(values: Iterable[str]) -> str | None:
+    """Return different texts as one; None for none at all."""
+    different = list(dict.fromkeys(values))
+    return ", ".join(different) if different else None
+
+
+def _flat(name: str, value: Any) -> dict[str, Any]:
+    """Return nested mappings as columns with dotted names."""
+    if not isinstance(value, Mapping):
+        return {name: value}
+    return {column: leaf for key, part in value.items() for column, leaf in _flat(f"{name}.{key}", part).items()}
+
+
+def _cell(value: Any) -> Any:
+    """Return a value as a cell of comma-separated values."""
+    if isinstance(value, list | tuple | dict):
+        return json.dumps(as_plain(value))
+    if not isinstance(value, str):
+        return value
+    text = printable(value)
+    return f"'{text}" if text.startswith(_FORMULA) else text
+
+
+def _uniform(values: list[Any]) -> list[Any]:
+    """Return a column of one type: as it is, numbers as floats where some are, anything else mixed as text."""
+    kinds = {type(value) for value in values if value is not None}
+    if kinds <= {bool} or kinds == {int}:
+        return values
+    if kinds <= {int, float}:
+        return [None if value is None else float(value) for value in values]
+    if kinds == {list} and all(isinstance(x, int | float) for value in values for x in value or ()):
+        return [None if value is None else [float(x) for x in value] for value in values]
+    return [None if value is None else _text(value) for value in values]
+
+
+def _text(value: Any) -> str:
+    """Return a value as text that a file can hold: stray surrogates are escaped."""
+    text = value if isinstance(value, str) else json.dumps(as_plain(value))
+    return text.encode("utf-8", errors="backslashreplace").decode()

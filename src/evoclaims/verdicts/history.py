@@ -1,0 +1,169 @@
+"""Verdicts as they were last accepted, and before: `verdicts.toml` beside a reproduction, written by machine."""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+import tomllib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields
+from datetime import date
+from pathlib import Path
+from typing import Any, Final
+
+import tomli_w
+
+from evoclaims.core.canonical import content_hash
+from evoclaims.core.errors import UserError
+from evoclaims.core.files import read_file
+from evoclaims.core.printable import printable
+from evoclaims.judging.verdict import Outcome
+from evoclaims.verdicts.claim_report import ClaimReport
+
+SCHEMA: Final = 1
+FILE: Final = "verdicts.toml"
+_MEND: Final = "Restore the file from version control; `evoclaims accept` goes on with it."
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A verdict that was accepted.
+
+    Attributes:
+        outcome: as judged: supported, refuted or inconclusive.
+        reason: why, in a sentence.
+        n: trials a side that were looked at.
+        p: of the whole assertion; None where nothing was tested.
+        fingerprint: of everything that was fixed beforehand.
+        accepted: when (ISO 8601 date).
+        versions: of the packages that the trials were made with, by name; several are joined by commas.
+        device: kind of device that made the trials; several are joined by commas.
+        revision: git revision that made them, with "-dirty" where files differed; several are joined by commas.
+        trials: hash of the digests of all trials behind the verdict.
+    """
+
+    outcome: Outcome
+    reason: str
+    n: int
+    p: float | None
+    fingerprint: str
+    accepted: str
+    versions: Mapping[str, str]
+    device: str
+    revision: str
+    trials: str
+
+
+History = Mapping[tuple[str, str], tuple[Entry, ...]]
+"""Accepted verdicts by tier and claim, such as ("full", "G1[n_parity]"); oldest first, so that the last one counts."""
+
+_TEXTS: Final = ("outcome", "reason", "fingerprint", "accepted", "environment", "device", "revision", "trials")
+
+
+def key_of(report: ClaimReport) -> tuple[str, str]:
+    """Return what a claim's verdicts are kept under; without characters that a file cannot hold."""
+    return report.tier, printable(report.name)
+
+
+def in_order(key: tuple[str, str]) -> tuple[str, str, int, str]:
+    """Sort claims by tier, and as people count: G9 before G10."""
+    tier, claim = key
+    return tier, claim[:1], len(claim.partition("[")[0]), claim
+
+
+def eras(entries: Sequence[Entry]) -> tuple[tuple[Entry, ...], ...]:
+    """Split entries where the fingerprint changes: what was judged before is another question."""
+    return tuple(tuple(group) for _, group in itertools.groupby(entries, key=lambda entry: entry.fingerprint))
+
+
+def load(path: Path) -> History:
+    """Read accepted verdicts; none when there is no such file.
+
+    Raises:
+        UserError: when the file is torn, of another schema, or has an entry that is none.
+    """
+    try:
+        data = read_file(path)
+    except FileNotFoundError:
+        return {}
+    except OSError as error:
+        raise UserError(f"Cannot read {path}: {error.strerror or error}.") from error
+    return parse(data, str(path))
+
+
+def parse(data: bytes, name: str) -> History:
+    """Return the history in the text of a file called `name`; the inverse of `dump`.
+
+    Raises:
+        UserError: as `load` does.
+    """
+    try:
+        plain = tomllib.loads(data.decode())
+    except (ValueError, RecursionError) as error:
+        raise _torn(name, f"it is no whole TOML file ({error})") from error
+    if plain.get("schema") != SCHEMA or isinstance(plain["schema"], bool):
+        raise _torn(name, f"its schema is {plain.get('schema')!r} and this version of evoclaims reads schema {SCHEMA}")
+    environments, verdicts = (_table(plain.get(part, {}), name, part) for part in ("environments", "verdicts"))
+    history: dict[tuple[str, str], tuple[Entry, ...]] = {}
+    for tier, claims in verdicts.items():
+        for claim, rows in _table(claims, name, tier).items():
+            if not isinstance(rows, list) or not rows:
+                raise _torn(name, f"{claim} ({tier}) has no list of verdicts")
+            history[tier, claim] = tuple(_entry(row, environments, name, f"{claim} ({tier})") for row in rows)
+    return history
+
+
+def dump(history: History) -> str:
+    """Return a history as TOML; versions are written once for all that share them, so that an entry is a few lines."""
+    environments: dict[str, dict[str, str]] = {}
+    verdicts: dict[str, dict[str, list[dict[str, Any]]]] = {}
+    for (tier, claim), entries in sorted(history.items()):
+        rows = verdicts.setdefault(tier, {}).setdefault(claim, [])
+        for entry in entries:
+            versions = dict(sorted(entry.versions.items()))
+            environment = content_hash(versions)[:12]
+            environments[environment] = versions
+            row = {**dataclasses.asdict(entry), "outcome": str(entry.outcome), "environment": environment}
+            rows.append({name: value for name, value in row.items() if name != "versions" and value is not None})
+    plain = {"schema": SCHEMA, "environments": dict(sorted(environments.items())), "verdicts": verdicts}
+    return "# Written by `evoclaims accept`: verdicts as last accepted, oldest first.\n" + tomli_w.dumps(plain)
+
+
+def _entry(row: object, environments: Mapping[str, Any], name: str, claim: str) -> Entry:
+    """Return one accepted verdict, with every field checked."""
+    plain = _table(row, name, claim)
+    expected = {field.name for field in fields(Entry)} - {"versions"} | {"environment"}
+    if plain.keys() | {"p"} != expected:
+        strange = ", ".join(sorted((plain.keys() | {"p"}) ^ expected))
+        raise _torn(name, f"{claim} lacks these entries, or has them beyond the known ones: {strange}")
+    for word in _TEXTS:
+        if not isinstance(plain[word], str):
+            raise _torn(name, f"{word} of {claim} is no text")
+    if plain["outcome"] not in set(Outcome):
+        raise _torn(name, f"{claim} has the outcome {plain['outcome']!r}; known: {', '.join(Outcome)}")
+    if isinstance(plain["n"], bool) or not isinstance(plain["n"], int):
+        raise _torn(name, f"n of {claim} is no whole number")
+    p = plain.get("p")
+    if p is not None and (isinstance(p, bool) or not isinstance(p, int | float) or not 0 <= p <= 1):
+        raise _torn(name, f"p of {claim} is no number from 0 to 1")
+    try:
+        date.fromisoformat(plain["accepted"])
+    except ValueError as error:
+        raise _torn(name, f"{claim} was accepted on {plain['accepted']!r}, which is no date") from error
+    versions = _table(environments.get(plain["environment"]), name, f"the environment {plain['environment']}")
+    if not all(isinstance(version, str) for version in versions.values()):
+        raise _torn(name, f"a version in the environment {plain['environment']} is no text")
+    kept = {word: value for word, value in plain.items() if word != "environment"}
+    return Entry(**{**kept, "p": p, "outcome": Outcome(plain["outcome"]), "versions": versions})
+
+
+def _table(value: object, name: str, part: str) -> dict[str, Any]:
+    """Return a TOML table."""
+    if not isinstance(value, dict):
+        raise _torn(name, f"{part} is no table")
+    return value
+
+
+def _torn(name: str, reason: str) -> UserError:
+    """Return the error of a file that holds no history."""
+    return UserError(f"{name} holds no accepted verdicts: {reason}. {_MEND}")

@@ -1,0 +1,57 @@
+"""Claims whose trials were made with mixed versions of a package, or with others than are installed: said in lines."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Sequence
+from typing import Final
+
+from evoclaims.core.packages import installed
+from evoclaims.core.printable import printable
+from evoclaims.verdicts.claim_report import ClaimReport
+from evoclaims.verdicts.versions import different, in_words, of_sources
+
+MARK: Final = "†"
+"""Stands beside a verdict whose trials were made with mixed versions."""
+
+MOST_NAMES: Final = 6
+"""Most names of claims that a line lists."""
+
+
+def is_mixed(report: ClaimReport) -> bool:
+    """Whether some package behind a claim's trials has more than one version."""
+    return any(len(versions) > 1 for versions in of_sources(report.sources).values())
+
+
+def lines(reports: Sequence[ClaimReport]) -> list[str]:
+    """Say which claims are judged from mixed versions, and which from others than are installed; nothing otherwise."""
+    mixed: dict[str, list[str]] = defaultdict(list)
+    foreign: dict[str, list[str | None]] = defaultdict(list)
+    elsewhere = []
+    for report in reports:
+        versions = of_sources(report.sources)
+        several = [f"{name} {in_words(those)}" for name, those in versions.items() if len(those) > 1]
+        if several:
+            mixed[", ".join(several)].append(f"{report.name} ({report.tier})")
+            continue
+        here = installed(tuple(versions))
+        other = {name: those for name, those in versions.items() if those and those != [here[name]]}
+        if other:
+            elsewhere.append(f"{report.name} ({report.tier})")
+        for name, those in other.items():
+            foreign[name] += those
+    said = [f"{MARK} versions are mixed: {what}: {_listed(names)}" for what, names in mixed.items()]
+    if elsewhere:
+        here = installed(tuple(foreign))
+        packages = (
+            f"{name} {in_words(different(those))} (here {here[name] or 'none'})"
+            for name, those in sorted(foreign.items())
+        )
+        said.append(f"not made with the installed versions: {', '.join(packages)}: {_listed(elsewhere)}")
+    return [printable(line) for line in said]
+
+
+def _listed(names: Sequence[str]) -> str:
+    """Return some of the names, and how many more there are."""
+    rest = len(names) - MOST_NAMES
+    return ", ".join(names[:MOST_NAMES]) + (f" and {rest} more" if rest > 0 else "")

@@ -1,0 +1,62 @@
+"""The verdicts of a run against those last accepted."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from evoclaims.core.errors import UserError
+from evoclaims.verdicts import history, transitions
+from evoclaims.verdicts.claim_report import ClaimReport
+from evoclaims.verdicts.transitions import Kind, Transition
+
+
+@dataclass(frozen=True)
+class Regression:
+    """What became of the verdicts of the claims that a run was about.
+
+    Attributes:
+        transitions: one for each claim of the run; none where nothing has been accepted yet.
+        matched: those that the run was told to fail on.
+    """
+
+    transitions: tuple[Transition, ...]
+    matched: tuple[Transition, ...]
+
+    @property
+    def lines(self) -> list[str]:
+        """The counts, and a line for each verdict that is not as accepted; nothing where nothing has been accepted."""
+        if not self.transitions:
+            return []
+        said = [one for one in self.transitions if one.kind in (Kind.CHANGED, Kind.NEW_HISTORY)]
+        return [
+            f"against the accepted verdicts: {transitions.counts(self.transitions)}",
+            *(f"{'REGRESSION ' * (one in self.matched)}{transitions.describe(one)}" for one in said),
+        ]
+
+
+def regression(folder: Path, reports: Sequence[ClaimReport], changes: str | None) -> Regression:
+    """Compare the verdicts of a run with the accepted ones of the same claims.
+
+    Args:
+        folder: of the reproduction.
+        reports: of the run.
+        changes: the changes of verdicts to fail on (see `transitions.parse_patterns`); None for none.
+
+    Raises:
+        UserError: when the accepted verdicts are torn; when a run shall fail on changes of them and there are none.
+    """
+    path = folder / history.FILE
+    patterns = transitions.parse_patterns(changes) if changes is not None else ()
+    accepted = transitions.accepted(history.load(path))
+    if patterns and not accepted:
+        raise UserError(
+            f"There are no accepted verdicts to compare with, since {path} does not exist: "
+            "`evoclaims accept` writes it."
+        )
+    if not accepted:
+        return Regression((), ())
+    now = transitions.standings(reports)
+    found = transitions.compare({key: accepted[key] for key in accepted.keys() & now.keys()}, now)
+    return Regression(found, transitions.matched(found, patterns))

@@ -1,0 +1,67 @@
+"""A claim's accepted verdicts by date, with what changed behind each: library versions, device, the rules."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from evoclaims.core.errors import UnknownNameError, UserError
+from evoclaims.core.printable import printable
+from evoclaims.verdicts.acceptance import changed_versions
+from evoclaims.verdicts.history import Entry, History, eras, in_order
+
+SHORT = 12
+"""Digits of a hash that are shown."""
+
+
+def timeline(history: History, claim: str = "") -> str:
+    """Return the entries of a claim ("G1", or one case of it, "G1[n_parity]"), or of all, a line each.
+
+    Raises:
+        UserError: when nothing has been accepted yet.
+        UnknownNameError: when the claim has no accepted verdict.
+    """
+    if not history:
+        raise UserError("No verdict has been accepted yet: `evoclaims accept` accepts those of now.")
+    chosen = [key for key in sorted(history, key=in_order) if claim in ("", key[1], key[1].partition("[")[0])]
+    if not chosen:
+        raise UnknownNameError("accepted claim", claim, {name for _, name in history})
+    return "\n".join(line for key in chosen for line in _claim(*key, history[key]))
+
+
+def _claim(tier: str, claim: str, entries: Sequence[Entry]) -> Iterator[str]:
+    """Yield the lines of one claim."""
+    yield f"{printable(claim)} ({printable(tier)})"
+    before: Entry | None = None
+    for era in eras(entries):
+        if before is not None:
+            yield (
+                "  a new history: what is judged has changed "
+                f"(fingerprint {before.fingerprint[:SHORT]} -> {era[0].fingerprint[:SHORT]})"
+            )
+        for entry in era:
+            p = "" if entry.p is None else f", p = {entry.p:.2g}"
+            behind = _first(entry) if before is None else _changes(before, entry)
+            yield printable(f"  {entry.accepted}  {entry.outcome} (n = {entry.n}{p}){behind and '  '}{behind}")
+            before = entry
+
+
+def _first(entry: Entry) -> str:
+    """Return what made the first verdict's trials."""
+    made_by = [f"{name} {entry.versions[name]}" for name in ("python", "jax") if name in entry.versions]
+    return ", ".join([*made_by, *filter(None, [entry.device])])
+
+
+def _changes(before: Entry, entry: Entry) -> str:
+    """Return what differs from the entry before."""
+    moved = [f"{name} {change}" for name, change in changed_versions(before, entry).items()]
+    if before.device != entry.device:
+        moved.append(f"device {before.device or 'unknown'} -> {entry.device or 'unknown'}")
+    if before.revision != entry.revision:
+        moved.append(f"revision {_short(before.revision)} -> {_short(entry.revision)}")
+    return ", ".join(moved)
+
+
+def _short(revisions: str) -> str:
+    """Return revisions with hashes that are short enough for a line."""
+    short = ("-".join(part[:SHORT] for part in revision.split("-")) for revision in revisions.split(", "))
+    return "+".join(short) or "unknown"

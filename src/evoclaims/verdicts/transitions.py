@@ -1,0 +1,162 @@
+"""Two sets of verdicts compared: what stayed, what turned, and what can no longer be compared."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Final
+
+from evoclaims.core.errors import UnknownNameError, UserError
+from evoclaims.core.printable import printable
+from evoclaims.judging.verdict import Outcome
+from evoclaims.verdicts.claim_report import ClaimReport
+from evoclaims.verdicts.history import History, in_order, key_of
+
+ANY: Final = "*"
+ARROW: Final = "->"
+
+
+class Kind(StrEnum):
+    """What became of a claim's verdict; the values complete "12 …" in a line of counts."""
+
+    SAME = "the same"
+    CHANGED = "changed"
+    NEW_HISTORY = "under changed rules"
+    NEW = "new"
+    NOT_RUN = "not run, then or now"
+    GONE = "gone"
+
+
+@dataclass(frozen=True)
+class Standing:
+    """A verdict as far as it is compared.
+
+    Attributes:
+        outcome: how the claim ended.
+        fingerprint: of what was fixed beforehand; empty for a test that ended before its claim was known.
+    """
+
+    outcome: Outcome
+    fingerprint: str
+
+
+Standings = Mapping[tuple[str, str], Standing]
+"""Verdicts by tier and claim."""
+
+
+@dataclass(frozen=True)
+class Transition:
+    """One claim at one tier, then and now.
+
+    Attributes:
+        tier, claim: whose verdict.
+        kind: what became of it.
+        old, new: the verdicts; None where there is none.
+    """
+
+    tier: str
+    claim: str
+    kind: Kind
+    old: Standing | None
+    new: Standing | None
+
+
+@dataclass(frozen=True)
+class Pattern:
+    """A change of verdict to look for; None stands for every outcome."""
+
+    old: Outcome | None
+    new: Outcome | None
+
+    def matches(self, transition: Transition) -> bool:
+        """Whether a transition is such a change; verdicts that cannot be compared are none."""
+        if transition.kind is not Kind.CHANGED or transition.old is None or transition.new is None:
+            return False
+        return self.old in (None, transition.old.outcome) and self.new in (None, transition.new.outcome)
+
+
+def parse_patterns(text: str) -> tuple[Pattern, ...]:
+    """Return the patterns in a list such as "supported->refuted,*->error".
+
+    Raises:
+        UserError: for no pattern, a part that is none, or a change that is none.
+        UnknownNameError: for an outcome that there is not.
+    """
+    patterns = []
+    for part in filter(None, (part.strip() for part in text.split(","))):
+        sides = [side.strip() for side in part.split(ARROW)]
+        if len(sides) != 2:
+            raise UserError(
+                f"{part!r} is no change of a verdict: write OLD{ARROW}NEW, such as 'supported{ARROW}refuted' or "
+                f"'{ANY}{ARROW}refuted', and commas between several."
+            )
+        for side in sides:
+            if side != ANY and side not in set(Outcome):
+                raise UnknownNameError("outcome", side, (*map(str, Outcome), ANY))
+        old, new = (None if side == ANY else Outcome(side) for side in sides)
+        if old is not None and old == new:
+            raise UserError(f"{part!r} never happens: a verdict that stays {old} has not changed.")
+        patterns.append(Pattern(old, new))
+    if not patterns:
+        raise UserError(f"No change of a verdict is named: write such as 'supported{ARROW}refuted'.")
+    return tuple(patterns)
+
+
+def matched(transitions: Iterable[Transition], patterns: Sequence[Pattern]) -> tuple[Transition, ...]:
+    """Return the transitions that some pattern matches."""
+    return tuple(one for one in transitions if any(pattern.matches(one) for pattern in patterns))
+
+
+def standings(reports: Iterable[ClaimReport]) -> Standings:
+    """Return verdicts of now."""
+    return {key_of(r): Standing(Outcome(r.outcome), (r.verdict or {}).get("fingerprint", "")) for r in reports}
+
+
+def accepted(history: History) -> Standings:
+    """Return the verdicts last accepted."""
+    return {key: Standing(entries[-1].outcome, entries[-1].fingerprint) for key, entries in history.items()}
+
+
+def compare(old: Standings, new: Standings) -> tuple[Transition, ...]:
+    """Return a transition for every claim of either side, in the order in which people count."""
+    keys = sorted(old.keys() | new.keys(), key=in_order)
+    return tuple(Transition(*key, _kind(old.get(key), new.get(key)), old.get(key), new.get(key)) for key in keys)
+
+
+def _kind(old: Standing | None, new: Standing | None) -> Kind:
+    """Return what became of a verdict; a fingerprint that is not known is taken for the same."""
+    if new is not None and new.outcome is Outcome.NOT_RUN and (old is None or old.outcome is Outcome.NOT_RUN):
+        return Kind.NOT_RUN
+    if old is None:
+        return Kind.NEW
+    if new is None:
+        return Kind.GONE
+    if old.fingerprint != new.fingerprint and old.fingerprint and new.fingerprint:
+        return Kind.NEW_HISTORY
+    return Kind.SAME if old.outcome == new.outcome else Kind.CHANGED
+
+
+def counts(transitions: Sequence[Transition]) -> str:
+    """Return how many verdicts are what, such as "22 the same, 1 changed"."""
+    found = Counter(one.kind for one in transitions)
+    return ", ".join(f"{found[kind]} {kind}" for kind in Kind if found[kind]) or "no verdicts"
+
+
+def describe(transition: Transition) -> str:
+    """Return a transition in one line, without what would steer a terminal."""
+    said = _said(transition.old, transition.new, transition.kind)
+    return f"{printable(transition.claim)} ({printable(transition.tier)}): {said}"
+
+
+def _said(old: Standing | None, new: Standing | None, kind: Kind) -> str:
+    """Return what became of a verdict."""
+    if old is None or new is None:
+        return f"{new.outcome}, new" if new else f"gone; it was {old.outcome}" if old else "no verdict"
+    if kind is Kind.NEW_HISTORY:
+        return (
+            f"a new history begins, since what is judged has changed (fingerprint {old.fingerprint[:12]} {ARROW} "
+            f"{new.fingerprint[:12]}): {new.outcome} now, {old.outcome} under the old rules"
+        )
+    return f"{old.outcome} {ARROW} {new.outcome}" if kind is Kind.CHANGED else str(new.outcome)

@@ -1,0 +1,165 @@
+"""What other versions of the packages have changed: trials of this environment against those that came before them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from evoclaims.core.packages import Versions, agree, recorded
+from evoclaims.core.printable import printable
+from evoclaims.core.provenance import what_fixes_bits
+from evoclaims.judging.baseline import DriftCase, DriftReport, check_drift
+from evoclaims.judging.verdict import Outcome
+from evoclaims.paper.references import METRICS
+from evoclaims.trials.result import TrialResult
+from evoclaims.trials.store import newest
+from evoclaims.verdicts import versions
+from evoclaims.verdicts.claim_report import ClaimReport
+
+
+@dataclass(frozen=True)
+class Succession:
+    """A condition whose stored trials of this environment have predecessors that other versions have made.
+
+    Attributes:
+        label: names the condition.
+        old, new: versions of the packages that it depends on.
+        before, now: its trials; of several older environments those of the newest.
+        again: how many trials this run has run again for their versions.
+    """
+
+    label: str
+    old: Versions
+    new: Versions
+    before: tuple[TrialResult, ...]
+    now: tuple[TrialResult, ...]
+    again: int
+
+    @property
+    def change(self) -> str:
+        """Which versions differ, in words."""
+        return versions.change(self.old, self.new)
+
+    @property
+    def pairs(self) -> list[tuple[TrialResult, TrialResult]]:
+        """Trials of the same seed, before and now, that nothing but the versions tells apart."""
+        now = {trial.seed: trial for trial in self.now}
+        both = [(old, now[old.seed]) for old in self.before if old.seed in now]
+        return [(old, new) for old, new in both if _same_machine(old, new)]
+
+
+@dataclass(frozen=True)
+class Upgrade:
+    """All conditions of a run whose trials have predecessors.
+
+    Attributes:
+        successions: one for each condition.
+        drift: its trials against their predecessors, judged together.
+    """
+
+    successions: tuple[Succession, ...]
+    drift: DriftReport
+
+    @property
+    def again(self) -> int:
+        """Trials that this run has run again for their versions."""
+        return sum(one.again for one in self.successions)
+
+    @property
+    def drifted(self) -> bool:
+        """Whether this run has run trials again and some have drifted; later runs tell of it and do not fail by it."""
+        drifted = {row.label for row in self.drift.rows if row.drifted}
+        return any(one.again and one.label in drifted for one in self.successions)
+
+    @property
+    def lines(self) -> list[str]:
+        """What changed, which conditions were run again, how many trials differ, and what has drifted how far."""
+        said: list[str] = []
+        for change in dict.fromkeys(one.change for one in self.successions):
+            those = [one for one in self.successions if one.change == change]
+            said.append(f"versions changed: {change}")
+            said += [f"  {_told(one)}" for one in those]
+            rows = [row for one in those for row in self.drift.rows if row.label == one.label]
+            said += [f"  DRIFT in {row.in_words}" for row in rows if row.drifted]
+            unchecked = [row for row in rows if row in self.drift.unchecked]
+            said += list(dict.fromkeys(f"  not checked: {row.label}: {row.detail or row.status}" for row in unchecked))
+            tested, drifted = len(rows) - len(unchecked), sum(row.drifted for row in rows)
+            said.append(f"  {tested} comparisons with the trials made before, {drifted} drifted")
+        return [printable(line) for line in said]
+
+    def to_json(self) -> dict[str, Any]:
+        """Return what happened as strict JSON."""
+        conditions = [
+            {
+                "condition": one.label,
+                "old": dict(one.old),
+                "new": dict(one.new),
+                "again": one.again,
+                "compared": len(one.pairs),
+                "changed": _changed(one),
+            }
+            for one in self.successions
+        ]
+        return {"conditions": conditions, "drift": self.drift.to_json()}
+
+
+def upgrade(successions: Sequence[Succession]) -> Upgrade:
+    """Check all successions for drift, with one correction over all."""
+    cases = [DriftCase(one.label, one.now[0].condition, one.now, one.before, METRICS) for one in successions]
+    return Upgrade(tuple(successions), check_drift(cases))
+
+
+def predecessors(records: Sequence[TrialResult], packages: tuple[str, ...]) -> tuple[TrialResult, ...]:
+    """Return the records that the newest environment has made.
+
+    Args:
+        records: of trials of one condition, made with other versions than this environment's.
+        packages: what the condition depends on.
+    """
+    last = newest(records)
+    if last is None:
+        return ()
+    made_with = recorded(last.provenance, packages)
+    return tuple(record for record in records if agree(record.provenance, made_with))
+
+
+def verdict_changes(reports: Iterable[ClaimReport]) -> list[str]:
+    """Say which verdicts are not those that the store's last run has come to under the same rules."""
+    said = []
+    for report in reports:
+        before: Mapping[str, Any] = report.before or {}
+        outcome, mark = before.get("outcome"), (report.verdict or {}).get("fingerprint")
+        if outcome in (None, Outcome.NOT_RUN, report.outcome) or before.get("fingerprint") != mark:
+            continue
+        was, now = before.get("versions") or {}, versions.of_sources(report.sources)
+        moved = ", ".join(
+            f"{name} {versions.in_words(was[name])} -> {versions.in_words(now[name])}"
+            for name in sorted(was.keys() & now.keys())
+            if was[name] != now[name]
+        )
+        by = f" ({moved})" if moved else ""
+        said.append(printable(f"verdict changed: {report.name} ({report.tier}): {outcome} -> {report.outcome}{by}"))
+    return said
+
+
+def _told(one: Succession) -> str:
+    """Return what became of one condition."""
+    ran = f"{one.again} trials run again" if one.again else "run again before"
+    pairs = one.pairs
+    if not pairs:
+        return f"{one.label}: {ran}, none of which can be compared to the bit (another machine or device)"
+    return f"{one.label}: {ran}, {_changed(one)} of {len(pairs)} not the same to the bit as before"
+
+
+def _changed(one: Succession) -> int:
+    """Count the trials whose digest is not what it was."""
+    return sum(old.digest != new.digest for old, new in one.pairs)
+
+
+def _same_machine(old: TrialResult, new: TrialResult) -> bool:
+    """Whether two trials were made on one class of machine, on a CPU and with the same settings."""
+    if any((trial.provenance.get("device") or {}).get("platform") != "cpu" for trial in (old, new)):
+        return False
+    before, now = what_fixes_bits(old.provenance), what_fixes_bits(new.provenance)
+    return all(before[name] == now[name] for name in (before.keys() & now.keys()) - {"versions"})

@@ -1,0 +1,163 @@
+"""Claims and accepted outcomes: what they must say, and which acceptance holds."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from evoclaims import Outcome, claim, expected
+from evoclaims.claims.claim import Claim, Expectation, claim_of, expectation_of
+from evoclaims.claims.reporting import broken, expecting
+from evoclaims.core.errors import UserError
+from evoclaims.verdicts.claim_report import ClaimReport, save
+
+TEXTS = {"says": "So it is", "where": "§1", "smoke": "So it is, in small"}
+
+
+class Item:
+    """Stands for a pytest item with marks, the closest first."""
+
+    def __init__(self, *marks: Any) -> None:
+        self.marks = [getattr(mark, "mark", mark) for mark in marks]
+
+    def get_closest_marker(self, name: str) -> Any:
+        return next((mark for mark in self.marks if mark.name == name), None)
+
+
+def test_a_claim_is_attached_to_its_test() -> None:
+    @claim("T1", **TEXTS)
+    def test_it() -> None: ...
+
+    found = claim_of(Item(*test_it.pytestmark))  # type: ignore[arg-type,attr-defined]
+    assert found == Claim("T1", **TEXTS)
+    assert claim_of(Item()) is None  # type: ignore[arg-type]
+    assert (found.statement("smoke"), found.statement("full")) == (TEXTS["smoke"], TEXTS["says"])
+
+
+@pytest.mark.parametrize("lacking", ["id", "says", "where", "smoke"])
+def test_a_claim_that_lacks_a_text_says_which(lacking: str) -> None:
+    texts = {"id": "T1", **TEXTS, lacking: "  "}
+    with pytest.raises(UserError, match=f"lacks its {lacking}"):
+        claim(texts.pop("id"), **texts)
+
+
+def test_an_accepted_outcome_must_be_known_and_have_a_reason() -> None:
+    with pytest.raises(UserError, match="There is no outcome 'rejected'; known: supported, refuted"):
+        expected("rejected", because="it is")
+    with pytest.raises(UserError, match="says because="):
+        expected(Outcome.REFUTED, because=" ")
+    with pytest.raises(UserError, match="says because="):
+        claim("T1", **TEXTS, expect=Outcome.REFUTED)
+
+
+CLAIMS = """
+    import pytest
+    from evoclaims import claim
+    from evoclaims import expected
+
+    TEXTS = {"says": "So it is", "where": "§1", "smoke": "So it is, in small"}
+    pytestmark = expected("error", because="module")
+
+    @pytest.mark.parametrize("task", ["plain", pytest.param("marked", marks=expected("refuted", because="case"))])
+    @claim("wide", **TEXTS, expect="inconclusive", because="claim")
+    def test_wide(task, claim_tier): ...
+
+    @pytest.mark.parametrize("task", ["plain", pytest.param("marked", marks=expected("refuted", because="case"))])
+    @expected("inconclusive", because="claim, full", tier="full")
+    @claim("fine", **TEXTS)
+    def test_fine(task, claim_tier): ...
+
+    @pytest.mark.parametrize(
+        "task",
+        [
+            pytest.param(
+                "both",
+                marks=[expected("refuted", because="every tier"), expected("error", because="full", tier="full")],
+            ),
+            pytest.param("other", marks=expected("refuted", because="full alone", tier="full")),
+        ],
+    )
+    @expected("supported", because="claim")
+    @claim("tiers", **TEXTS)
+    def test_tiers(task, claim_tier): ...
+
+    @expected("error", because="every tier")
+    @expected("refuted", because="full", tier="full")
+    @claim("above", **TEXTS)
+    def test_above(claim_tier): ...
+
+    @expected("refuted", because="full", tier="full")
+    @expected("error", because="every tier")
+    @claim("below", **TEXTS)
+    def test_below(claim_tier): ...
+"""
+
+CLOSEST = {
+    "wide plain": ("claim", "claim"),
+    "wide marked": ("case", "case"),
+    "fine plain": ("module", "claim, full"),
+    "fine marked": ("case", "case"),
+    "tiers both": ("every tier", "full"),
+    "tiers other": ("claim", "full alone"),
+    "above": ("every tier", "full"),
+    "below": ("every tier", "full"),
+}
+
+
+def test_the_closest_acceptance_holds_and_beside_it_the_one_for_the_tier_alone(pytester: pytest.Pytester) -> None:
+    items, _ = pytester.inline_genitems(pytester.makepyfile(CLAIMS), "-pno:cacheprovider")
+    found = {}
+    for item in (item for item in items if item.callspec.params["claim_tier"] == "full"):  # type: ignore[attr-defined]
+        name = " ".join([item.originalname.removeprefix("test_"), *filter(None, [item.callspec.params.get("task")])])  # type: ignore[attr-defined]
+        found[name] = tuple(getattr(expectation_of(item, tier), "because", None) for tier in ("smoke", "full"))
+    assert found == CLOSEST
+
+
+def test_without_an_acceptance_for_its_tier_a_test_has_none(pytester: pytest.Pytester) -> None:
+    text = CLAIMS.replace('pytestmark = expected("error", because="module")', "")
+    items, _ = pytester.inline_genitems(pytester.makepyfile(text), "-pno:cacheprovider")
+    (item,) = (item for item in items if item.name == "test_fine[full-plain]")
+    assert expectation_of(item, "smoke") is None
+    assert expectation_of(item, "full") == Expectation(Outcome.INCONCLUSIVE, "claim, full", "full")
+
+
+REPORT = broken(Claim("T1", **TEXTS), "n_parity", "smoke", "it broke")
+
+
+@pytest.mark.parametrize(
+    ("outcome", "accepted", "failed"),
+    [
+        ("supported", None, False),
+        ("inconclusive", None, False),
+        ("not run", None, False),
+        ("refuted", None, True),
+        ("error", None, True),
+        ("refuted", Outcome.REFUTED, False),
+        ("error", Outcome.REFUTED, True),
+        ("supported", Outcome.REFUTED, False),
+    ],
+)
+def test_a_claim_fails_when_it_is_refuted_or_breaks_without_being_accepted(
+    outcome: str, accepted: Outcome | None, failed: bool
+) -> None:
+    expectation = None if accepted is None else Expectation(accepted, "known")
+    report = expecting(replace(REPORT, outcome=outcome), expectation)
+    assert report.failed is failed
+    assert report.as_expected is (accepted == outcome)
+
+
+def test_a_report_crosses_processes_as_json_unchanged() -> None:
+    report = replace(REPORT, sources=({"method": "a", "trials": ["b"]},), attainable=({"n": 3, "alpha": 0.05},))
+    assert ClaimReport.from_json(json.loads(json.dumps(report.to_json()))) == report
+
+
+@pytest.mark.parametrize("case", ["n_parity", "../../etc", "a b/c", "", "é[x]"])
+def test_the_evidence_lies_below_the_store_under_a_plain_name(case: str, tmp_path: Path) -> None:
+    saved = save(replace(REPORT, case=case), tmp_path)
+    path = Path(saved.evidence)
+    assert path.parent == tmp_path / "verdicts" / "smoke"
+    assert ClaimReport.from_json(json.loads(path.read_text())) == saved

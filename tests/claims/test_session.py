@@ -1,0 +1,183 @@
+"""A session judges claims with trials that are run, or read, and compares them with the committed ones."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from evoclaims.claims.claim import Claim
+from evoclaims.claims.fetching import NotStoredError, RunMissing, StoredOnly
+from evoclaims.claims.session import Session, Verdicts
+from evoclaims.core.errors import UserError
+from evoclaims.paper import references
+from evoclaims.paper.archive import Archive
+from evoclaims.paper.reproduction import Reproduction
+from evoclaims.trials.progress import ignore
+from evoclaims.trials.result import TrialResult
+from evoclaims.trials.spec import Condition
+from evoclaims.trials.store import Store
+
+Made = Callable[..., TrialResult]
+
+
+def _value(condition: Condition, seed: int) -> float:
+    return 0.5 + seed / 100 if condition.method.name == "hand_built" else seed / 100
+
+
+@pytest.fixture
+def session(reproduction: Reproduction, store: Store, served: Any) -> Session:
+    """A session in which "better" is better."""
+    return Session(reproduction, store, served(_value))
+
+
+def _pair(session: Session, tier: str = "smoke") -> tuple[Any, Any]:
+    return session.group("better", "small", tier), session.group("worse", "small", tier)
+
+
+def test_a_claim_ends_supported_or_refuted_and_names_its_trials(session: Session, says: Claim) -> None:
+    better, worse = _pair(session)
+    report = session.settle(says, "small", "smoke", better.mean_success > worse.mean_success)
+    assert (report.name, report.outcome, report.n, report.tier) == ("T1[small]", "supported", 6, "smoke")
+    assert report.statement == says.smoke
+    assert [(s["method"], s["task"], len(s["trials"])) for s in report.sources] == [
+        ("better", "small", 6),
+        ("worse", "small", 6),
+    ]
+    assert report.sources[0]["trials"][3] == session.fetch(better.condition, [3])[0].id
+    other = session.settle(says, "small", "smoke", worse.mean_success > better.mean_success)
+    assert other.outcome == "refuted"
+    assert other.failed
+
+
+def test_the_full_tier_judges_the_papers_own_sentence_with_its_own_protocol(session: Session, says: Claim) -> None:
+    better, worse = _pair(session, "full")
+    report = session.settle(says, "", "full", better.mean_success > worse.mean_success)
+    assert (report.name, report.n, report.statement) == ("T1", 10, says.says)
+    assert [look["n"] for look in report.attainable] == [10]
+
+
+def test_a_fixed_number_of_trials_takes_the_place_of_the_looks(session: Session, says: Claim) -> None:
+    fixed = replace(session, trials=4)
+    assert [(look.n, look.alpha) for look in fixed.protocol("full").looks] == [(4, pytest.approx(0.05))]
+    better, worse = _pair(fixed)
+    assert fixed.settle(says, "", "smoke", better.mean_success > worse.mean_success).n == 4
+    report = replace(session, trials=1).settle(says, "", "smoke", better.mean_success > worse.mean_success)
+    assert (report.outcome, report.n) == ("inconclusive", 0)
+    assert "underpowered: needs n = 3" in report.reason
+
+
+def test_a_number_of_trials_that_no_test_can_take_is_a_sentence(session: Session) -> None:
+    with pytest.raises(UserError, match="A look takes 1 to"):
+        replace(session, trials=0).protocol("smoke")
+
+
+@pytest.mark.parametrize(
+    ("names", "sentence"),
+    [
+        (("bettr", "small", "smoke"), "no method named 'bettr'. Did you mean 'better'? Known: better, worse."),
+        (("better", "smal", "smoke"), "no task for better named 'smal'. Did you mean 'small'? Known: large, small."),
+        (("better", "small", "fulll"), "no tier named 'fulll'. Did you mean 'full'? Known: full, smoke."),
+    ],
+)
+def test_an_unknown_name_is_a_sentence_with_the_known_ones(
+    session: Session, names: tuple[str, str, str], sentence: str
+) -> None:
+    with pytest.raises(UserError) as caught:
+        session.group(*names)
+    assert str(caught.value) == f"There is {sentence}"
+
+
+def test_trials_that_may_not_be_run_end_a_claim_as_not_run(
+    reproduction: Reproduction, store: Store, says: Claim, made: Made
+) -> None:
+    stored = Session(reproduction, store, StoredOnly(Archive(store)))
+    better, worse = _pair(stored)
+    for seed in range(6):
+        store.put(made(better.condition, seed, 1.0), {})
+    report = stored.settle(says, "", "smoke", better.mean_success > worse.mean_success)
+    assert (report.outcome, report.n, report.failed) == ("not run", 0, False)
+    assert report.reason.startswith("6 of 6 trials of hand_built_negated on n_parity are missing")
+    assert report.verdict is not None
+    assert len(report.verdict["fingerprint"]) == 64
+    for seed in range(6):
+        store.put(made(worse.condition, seed, 0.0), {})
+    assert stored.settle(says, "", "smoke", better.mean_success > worse.mean_success).outcome == "supported"
+
+
+def test_stored_trials_are_read_in_the_order_of_the_seeds(store: Store, made: Made, session: Session) -> None:
+    condition = session.group("better", "small", "smoke").condition
+    for seed in (0, 1, 2):
+        store.put(made(condition, seed, 1.0), {})
+    assert [trial.seed for trial in StoredOnly(Archive(store))(condition, [2, 0])] == [2, 0]
+    with pytest.raises(NotStoredError, match="1 of 3 trials"):
+        StoredOnly(Archive(store))(condition, [1, 2, 3])
+
+
+def test_missing_trials_are_run_and_a_bad_store_or_device_is_found_before(tmp_path: Path, session: Session) -> None:
+    condition = session.group("better", "small", "smoke").condition
+    mode = RunMissing(Store(tmp_path / "new"), "cpu", ignore)
+    mode.check()
+    assert [trial.metrics["mean_success"] for trial in mode(condition, [1, 0])] == [1.0, 1.0]
+    (tmp_path / "file").write_text("")
+    for bad in (RunMissing(Store(tmp_path / "file"), "cpu", ignore), StoredOnly(Archive(Store(tmp_path / "file")))):
+        with pytest.raises(UserError, match="is a file, not a folder"):
+            bad.check()
+    with pytest.raises(UserError, match="There is no device named 'tpu'"):
+        RunMissing(Store(tmp_path / "new"), "tpu", ignore).check()
+
+
+def test_a_test_gives_exactly_one_verdict(session: Session, says: Claim) -> None:
+    better, worse = _pair(session)
+    verdict = Verdicts(lambda assertion: session.settle(says, "", "smoke", assertion))
+    with pytest.raises(UserError, match=r"takes an assertion about trials.*not True"):
+        verdict(True)  # type: ignore[arg-type]
+    assert verdict.report is None
+    verdict(better.mean_success > worse.mean_success)
+    assert verdict.report is not None
+    with pytest.raises(UserError, match="A claim has one verdict: join several assertions with &"):
+        verdict(better.mean_success > worse.mean_success)
+
+
+def _committed(session: Session, made: Made, value: Callable[[int], float]) -> None:
+    """Write ten reference trials of "better on small" at the smoke tier."""
+    better, _ = _pair(session)
+    path = references.path_of(session.reproduction.references, "smoke", "better", "small")
+    references.write(path, [made(better.condition, seed, value(seed)) for seed in range(10)])
+
+
+def _settled(session: Session, made: Made, says: Claim, value: Callable[[int], float]) -> Sequence[Any]:
+    """Store new trials and judge a claim about them."""
+    better, _ = _pair(session)
+    for seed in range(6):
+        session.store.put(made(better.condition, seed, value(seed)), {})
+    return [session.settle(says, "", "smoke", better.solves_every_level.in_most_trials())]
+
+
+def test_the_same_trials_have_not_drifted(session: Session, says: Claim, made: Made) -> None:
+    _committed(session, made, lambda seed: seed / 10)
+    drift, digests = session.drift(_settled(session, made, says, lambda seed: seed / 10))
+    assert not drift.drifted
+    assert [(row.metric, row.status, row.n_new, row.n_ref) for row in drift.rows] == [
+        ("mean_success", "no drift", 6, 10),
+        ("last_fitness", "no drift", 6, 10),
+        ("environment_steps", "no drift", 6, 10),
+    ]
+    assert digests.compared == 0  # these records do not say where they were made
+
+
+def test_shifted_trials_have_drifted(session: Session, says: Claim, made: Made) -> None:
+    _committed(session, made, lambda seed: seed / 100)
+    drift, _ = session.drift(_settled(session, made, says, lambda seed: 0.5 + seed / 100))
+    assert drift.drifted
+    assert [row.metric for row in drift.rows if row.drifted] == ["mean_success", "last_fitness"]
+
+
+def test_without_reference_trials_nothing_is_said_to_be_unchanged(session: Session, says: Claim, made: Made) -> None:
+    drift, _ = session.drift(_settled(session, made, says, lambda seed: 1.0))
+    assert {row.status for row in drift.rows} == {"no reference"}
+    assert not drift.drifted
+    assert len(drift.unchecked) == 3

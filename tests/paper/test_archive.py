@@ -1,0 +1,51 @@
+"""Trials are found in the store, else among the committed reference trials."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from evoclaims.core.errors import UserError
+from evoclaims.paper import references
+from evoclaims.paper.archive import Archive
+from evoclaims.paper.reproduction import Reproduction
+from evoclaims.trials.store import Store
+
+
+def test_the_store_comes_first_and_the_committed_trials_fill_in(
+    tmp_path: Path, store: Store, made: Any, reproduction: Reproduction
+) -> None:
+    condition = reproduction.tier("smoke").condition("better", "small")
+    ours, theirs = made(condition, 0, 1.0), made(condition, 0, 0.0)
+    committed = [replace(theirs, provenance={"from": "file"}), made(condition, 1, 0.5)]
+    store.put(ours, {})
+    references.write(references.path_of(tmp_path / "reference", "smoke", "better", "small"), committed)
+    archive = Archive(store, tmp_path / "reference")
+    found = archive.trials(condition, [1, 0, 2])
+    assert [trial and trial.metrics["mean_success"] for trial in found] == [0.5, 1.0, None]
+    assert Archive(store).trials(condition, [1, 0])[0] is None
+
+
+def test_a_committed_trial_comes_before_one_that_ran_out_of_time(
+    tmp_path: Path, store: Store, made: Any, reproduction: Reproduction
+) -> None:
+    condition = reproduction.tier("smoke").condition("better", "small")
+    for seed in (0, 1):
+        store.put(made(condition, seed, 0.0, "timeout"), {})
+    references.write(references.path_of(tmp_path / "reference", "smoke", "better", "small"), [made(condition, 0, 1.0)])
+    found = Archive(store, tmp_path / "reference").trials(condition, [0, 1])
+    assert [trial and trial.status for trial in found] == ["done", "timeout"]
+
+
+def test_a_torn_file_of_reference_trials_is_said(
+    tmp_path: Path, store: Store, made: Any, reproduction: Reproduction
+) -> None:
+    condition = reproduction.tier("smoke").condition("better", "small")
+    path = references.path_of(tmp_path, "smoke", "better", "small")
+    references.write(path, [made(condition, 0, 1.0)])
+    path.write_bytes(path.read_bytes()[:-20])
+    with pytest.raises(UserError, match="is no reference trial"):
+        Archive(store, tmp_path).trials(condition, [0])

@@ -1,0 +1,133 @@
+"""Small drawings: sound SVG in which every trial is found, whatever the values and names are."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import replace
+from itertools import pairwise
+from statistics import median_low
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+from hypothesis import example, given
+from hypothesis import strategies as st
+
+from evoclaims.report.charts import MOST_DOTS, WIDTH, axis_svg, curve_symbol, strip_svg, ticks
+from evoclaims.report.evidence import Dot, Part, Span, Strip
+from evoclaims.report.training_curves import CurvePanel, Line
+
+finite = st.floats(allow_nan=False, allow_infinity=False)
+
+
+def _part(*values: float, **changes: object) -> Part:
+    middle = median_low(values) if values else None
+    strip = Strip("a on b: x", tuple(Dot(seed, value) for seed, value in enumerate(values)), (), middle)
+    return replace(Part("a", None, (), "", False, (strip,)), **changes)  # type: ignore[arg-type]
+
+
+def _drawn(part: Part) -> ElementTree.Element:
+    axis_svg(part)
+    return ElementTree.fromstring(strip_svg(part, part.strips[0]))
+
+
+def _titles(svg: ElementTree.Element, tag: str) -> list[str]:
+    return [element.findtext("title", "") for element in svg.iter(tag)]
+
+
+def test_every_trial_is_a_dot_with_its_seed_and_value() -> None:
+    svg = _drawn(_part(0.25, 0.5, 0.5))
+    assert _titles(svg, "circle") == ["seed 0: 0.25", "seed 1: 0.5", "seed 2: 0.5"]
+    places = {(circle.get("cx"), circle.get("cy")) for circle in svg.iter("circle")}
+    assert len(places) == 3
+    assert svg.get("aria-label") == "a on b: x, 3 trials, median 0.5"
+
+
+def test_dots_lie_where_their_values_are_on_the_axis() -> None:
+    part = _part(0.0, 0.5, 1.0)
+    places = [float(circle.get("cx", "")) for circle in _drawn(part).iter("circle")]
+    assert places == pytest.approx([24.0, WIDTH / 2, WIDTH - 24.0], abs=0.1)
+
+
+def test_equal_values_share_a_block_around_their_place_and_overlap_nowhere() -> None:
+    circles = list(_drawn(_part(*[1.0] * 40)).iter("circle"))
+    x = [float(circle.get("cx", "")) for circle in circles]
+    assert (min(x) + max(x)) / 2 == pytest.approx(WIDTH - 24.0, abs=0.2)
+    radius = float(circles[0].get("r", ""))
+    spots = [(a, float(circle.get("cy", ""))) for a, circle in zip(x, circles, strict=True)]
+    nearest = min(np.hypot(a[0] - b[0], a[1] - b[1]) for i, a in enumerate(spots) for b in spots[:i])
+    assert nearest > 2 * radius
+
+
+def test_very_many_trials_are_drawn_as_quantiles() -> None:
+    assert len(_titles(_drawn(_part(*np.linspace(0, 1, MOST_DOTS))), "circle")) == MOST_DOTS
+    svg = _drawn(_part(*np.linspace(0, 1, MOST_DOTS + 1)))
+    assert _titles(svg, "circle") == []
+    assert _titles(svg, "rect") == [
+        f"{name} percentile of {MOST_DOTS + 1} trials: {ends}"
+        for name, ends in (("5th to 95th", "0.05 to 0.95"), ("25th to 75th", "0.25 to 0.75"))
+    ]
+
+
+def test_trials_without_a_number_stand_in_a_column_of_their_own() -> None:
+    part = _part(0.5, 0.75)
+    part = replace(part, strips=(replace(part.strips[0], apart=((7, "diverged"), (8, "NaN"))),))
+    svg = _drawn(part)
+    crosses = [path for path in svg.iter("path") if path.get("class") == "broken"]
+    assert [path.findtext("title") for path in crosses] == ["seed 7: diverged", "seed 8: NaN"]
+    wall = next(float(path.get("d", "")[1:].split()[0]) for path in svg.iter("path") if path.get("class") == "wall")
+    assert max(float(circle.get("cx", "")) for circle in svg.iter("circle")) < wall
+    assert min(float(path.get("d", "")[1:].split()[0]) for path in crosses) > wall
+    assert "no number" in axis_svg(part)
+
+
+def test_bounds_and_intervals_of_an_event_are_drawn() -> None:
+    part = _part(1.0, 1.0, 0.0, 1.0, event=True, bounds=(("p0", 0.7),), spans=(Span("P", 0.3, 0.9),))
+    said = _titles(_drawn(part), "path")
+    assert "p0: 0.7" in said
+    assert "P: 0.3 to 0.9" in said
+    assert "holds in 75% of trials" in said
+    assert [word in axis_svg(part) for word in (">no<", ">yes<", ">p0 0.7<")] == [True] * 3
+
+
+@given(st.lists(finite, max_size=30), st.text(), st.text())
+def test_any_values_and_names_make_a_sound_drawing(values: list[float], label: str, why: str) -> None:
+    visible = "".join(c for c in label if c.isprintable())
+    reason = "".join(c for c in why if c.isprintable())
+    part = _part(*values)
+    part = replace(part, strips=(replace(part.strips[0], label=visible, apart=((1, reason),), median=None),))
+    svg = _drawn(part)
+    assert svg.get("aria-label", "").startswith(f"{visible}, ")
+    assert f"seed 1: {reason}" in _titles(svg, "path")
+    places = [float(circle.get("cx", "")) for circle in svg.iter("circle")]
+    assert len(places) == len(values)
+    assert all(0 <= place <= WIDTH for place in places)
+
+
+@given(finite, finite)
+@example(-1.7976931348623155e308, -1.7976931348623157e308)
+def test_ticks_are_few_rising_and_within_the_axis(one: float, other: float) -> None:
+    low, high = sorted((one / 4, other / 4))
+    found = ticks(low, high)
+    room = 1e-6 * max(high - low, abs(low), abs(high))
+    assert 1 <= len(found) <= 6
+    assert all(low - room <= tick <= high + room for tick in found)
+    assert all(a < b for a, b in pairwise(found)) or high - low <= room
+
+
+def test_a_curve_has_a_gap_where_it_has_no_value_and_two_points_for_a_flat_stretch() -> None:
+    x = np.arange(7.0)
+    line = Line("seed <0>", x, np.array([0, 1, np.nan, 1, 1, 1, 0]))
+    svg = ElementTree.fromstring(curve_symbol(CurvePanel("success", (line,), None, 1), "curves-0-0"))
+    (path,) = [path for path in svg.iter("path") if path.get("class") == "line"]
+    d = path.get("d", "")
+    assert (d.count("M"), d.count("L")) == (2, 3)
+    assert path.findtext("title") == "seed <0>"
+
+
+@example([sys.float_info.max, -1e292])
+@given(st.lists(st.floats(width=64), min_size=2, max_size=20))
+def test_any_curve_makes_a_sound_drawing(values: list[float]) -> None:
+    line = Line("seed 0", np.arange(len(values), dtype=float), np.array(values))
+    ends = Line("low", line.x, line.y), Line("high", line.x, line.y)
+    ElementTree.fromstring(curve_symbol(CurvePanel("success", (line,), ends, 0), "curves-0-0"))

@@ -1,0 +1,122 @@
+"""The progress line: rewritten in place on a terminal, now and then in a log."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from evoclaims.report.live_line import LOG_SECONDS, LiveLine, describe, duration
+from evoclaims.trials.progress import RunProgress
+
+WAITING = RunProgress("ppo on n_parity", "compiling", trials=3)
+TRAINING = RunProgress("ppo on n_parity", "training", 3, 1, 2000, 4000, 0.75, 1, 5, 200.0)
+
+
+class Screen:
+    """Where the line goes, and the time on its wall."""
+
+    def __init__(self, hasmarkup: bool, fullwidth: int = 120) -> None:
+        self.hasmarkup = hasmarkup
+        self.fullwidth = fullwidth
+        self.text = ""
+        self.now = 0.0
+
+    def write(self, msg: str, *, flush: bool = False) -> None:
+        self.text += msg
+
+    def shown(self, *reports: RunProgress) -> str:
+        line = LiveLine(self, lambda: self.now)
+        for report in reports:
+            line(report)
+        return self.text
+
+
+def test_the_line_says_condition_trials_step_level_best_and_time_left() -> None:
+    assert describe(TRAINING) == (
+        "ppo on n_parity: 1/3 trials ended, step 2,000/4,000, level 1 of 4, best 0.750, 3 min 20 s left"
+    )
+    assert describe(replace(TRAINING, seconds_left=None)).endswith("best 0.750")
+    assert describe(WAITING) == "ppo on n_parity: compiling (3 trials)"
+
+
+def test_a_terminal_shows_one_line_of_its_own_that_is_rewritten_and_wiped_at_the_end() -> None:
+    screen = Screen(hasmarkup=True)
+    line = LiveLine(screen, lambda: 0.0)
+    for report in (WAITING, TRAINING):
+        line(report)
+    assert screen.text[0] == "\n"
+    assert "\n" not in screen.text[1:]
+    frames = screen.text[1:].split("\r")
+    assert [frame.strip() for frame in frames] == [describe(WAITING), describe(TRAINING)]
+    assert {len(frame) for frame in frames} == {119}
+    line.close()
+    assert screen.text.endswith("\r" + " " * 119 + "\r")
+
+
+@given(st.integers(1, 200), st.text(max_size=200))
+def test_the_line_never_wraps(width: int, name: str) -> None:
+    screen = Screen(hasmarkup=True, fullwidth=width)
+    LiveLine(screen, lambda: 0.0)(replace(WAITING, condition=name.replace("\r", "")))
+    assert len(screen.text) - 1 == max(width - 1, 20)
+
+
+def test_closing_a_line_twice_or_before_it_opened_writes_nothing() -> None:
+    for hasmarkup in (True, False):
+        screen = Screen(hasmarkup)
+        line = LiveLine(screen, lambda: 0.0)
+        line.close()
+        assert screen.text == ""
+        line(TRAINING)
+        line.close()
+        before = screen.text
+        line.close()
+        assert screen.text == before
+
+
+def test_a_log_gets_a_line_for_each_step_of_a_run_and_then_one_every_few_seconds() -> None:
+    screen = Screen(hasmarkup=False)
+    line = LiveLine(screen, lambda: screen.now)
+    for now, report, lines in (
+        (0.0, WAITING, 1),
+        (0.0, TRAINING, 2),
+        (1.0, TRAINING, 2),
+        (LOG_SECONDS - 0.1, TRAINING, 2),
+        (LOG_SECONDS, TRAINING, 3),
+        (LOG_SECONDS + 1, replace(TRAINING, ended=3), 4),
+        (LOG_SECONDS + 1, replace(TRAINING, condition="another"), 5),
+    ):
+        screen.now = now
+        line(report)
+        assert screen.text.strip().count("\n") == lines - 1
+    assert "\r" not in screen.text
+    assert screen.text.endswith("\n")
+
+
+def test_a_log_begins_on_a_line_of_its_own() -> None:
+    assert Screen(hasmarkup=False).shown(WAITING, TRAINING).split("\n") == [
+        "",
+        f"  {describe(WAITING)}",
+        f"  {describe(TRAINING)}",
+        "",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("seconds", "words"),
+    [
+        (0, "0 s"),
+        (0.4, "0 s"),
+        (59.4, "59 s"),
+        (59.6, "1 min 00 s"),
+        (200, "3 min 20 s"),
+        (3599, "59 min 59 s"),
+        (3600, "1 h 00 min"),
+        (7505, "2 h 05 min"),
+        (360000, "100 h 00 min"),
+    ],
+)
+def test_a_length_of_time_is_written_as_people_write_it(seconds: float, words: str) -> None:
+    assert duration(seconds) == words

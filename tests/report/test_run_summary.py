@@ -1,0 +1,87 @@
+"""Verdicts as Markdown: complete, in order, and no text of a claim is taken for markup."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from evoclaims.report.run_summary import literal, run_summary
+from evoclaims.verdicts.claim_report import ClaimReport
+
+HOSTILE = "a | b `c` <script>alert(1)</script> & *d* _e_ [f](http://g) \n| new row |\r\n# heading \x1b[2J www.h.i @all"
+
+
+def _report(claim: str = "G1", outcome: str = "refuted", **fields: Any) -> ClaimReport:
+    basis = {
+        "case": "",
+        "tier": "smoke",
+        "statement": "All levels are solved",
+        "where": "§5.1",
+        "reason": "for a reason",
+        "verdict": {"n": 10, "p": 0.0283},
+    }
+    return ClaimReport(claim=claim, outcome=outcome, **{**basis, **fields})
+
+
+def _rows(text: str) -> list[list[str]]:
+    """Return the cells of the table's body, as a reader of GitHub's Markdown sees its bars."""
+    lines = [line for line in text.splitlines() if line.startswith("|")]
+    return [[cell.strip() for cell in re.split(r"(?<!\\)\|", line)[1:-1]] for line in lines[2:]]
+
+
+def test_a_row_shows_claim_sentence_verdict_n_p_and_why() -> None:
+    (row,) = _rows(run_summary([_report(case="n_parity")]))
+    assert row == [
+        r"G1\[n\_parity\] \(smoke\)",
+        r"All levels are solved \(§5.1\)",
+        "✗ refuted",
+        "10",
+        "0.028",
+        "for a reason",
+    ]
+
+
+def test_totals_and_notes_stand_above_and_below() -> None:
+    lines = run_summary([_report(), _report("G2", "supported")], ["1 changed", "a*b"]).splitlines()
+    assert lines[:3] == ["## Claims", "", "**1 supported, 1 refuted**"]
+    assert lines[-2:] == ["* 1 changed", r"* a\*b"]
+
+
+def test_an_accepted_verdict_says_why_it_is_accepted() -> None:
+    (row,) = _rows(run_summary([_report(expected="refuted", because="known")]))
+    assert row[2] == r"✗ refuted\*"
+    assert row[5] == r"for a reason; looked into and accepted\: known"
+
+
+def test_rows_come_in_the_order_in_which_people_count() -> None:
+    rows = _rows(run_summary([_report(name) for name in ("G10", "C1", "G9")]))
+    assert [row[0].split()[0] for row in rows] == ["C1", "G9", "G10"]
+
+
+def test_what_was_not_measured_is_a_dash() -> None:
+    (row,) = _rows(run_summary([_report(outcome="error", verdict=None)]))
+    assert row[3:5] == ["–", "–"]
+
+
+@pytest.mark.parametrize("field", ["case", "statement", "where", "reason", "because", "tier"])
+def test_a_hostile_sentence_stays_in_its_cell(field: str) -> None:
+    text = run_summary([_report(expected="refuted", **{field: HOSTILE}), _report("G2")], [HOSTILE])
+    assert len(_rows(text)) == 2
+    assert {len(row) for row in _rows(text)} == {6}
+    assert "<" not in text
+    assert "\x1b" not in text
+    assert not re.search(r"(?<!\\)[`\[\]]", text)
+    assert not re.search(r"&(?!(amp|lt|gt);)", text)
+    assert len(text.splitlines()) == 10
+
+
+@given(st.text(st.characters(exclude_categories=()), max_size=40))
+def test_any_text_becomes_one_line_without_live_marks(text: str) -> None:
+    shown = literal(text)
+    assert len(shown.splitlines()) <= 1
+    assert not re.search(r"(?<!\\)(?:\\\\)*[|`*_\[\]<>#]", shown)
+    shown.encode()

@@ -1,0 +1,241 @@
+"""Where a method meets a task: whatever has another shape or type than the other side takes is a sentence."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, ClassVar
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from trial_toys import Walker
+
+from evoclaims.core.errors import UserError
+from evoclaims.envs.base import Episode
+from evoclaims.envs.gates.parity import NParity
+from evoclaims.envs.gates.truth_table import TruthTable
+from evoclaims.envs.probes import CURRICULUM
+from evoclaims.methods.base import Policy, Progress
+from evoclaims.methods.hand_built import threshold_network
+from evoclaims.trials.budget import Budget
+from evoclaims.trials.compatibility import traced_progress
+from evoclaims.trials.program import Program
+from evoclaims.trials.runner import run
+from evoclaims.trials.spec import Condition
+from evoclaims.trials.store import Store
+
+TASK = NParity(3)
+BOTH = "The method 'walker' does not fit the task 'n_parity': "
+
+
+BENDS: dict[str, Any] = {
+    "shape ()": lambda answer: answer[0],
+    "shape (7,)": lambda answer: jnp.repeat(answer, 7),
+    "shape (1, 1)": lambda answer: answer[None],
+    "type int32": lambda answer: answer.astype(jnp.int32),
+    "type bool": lambda answer: answer > 0,
+}
+
+
+@dataclass(frozen=True)
+class Answering(Walker):
+    """A right network whose answer is bent into another shape or type; it is trained by its examination."""
+
+    bend: str = ""
+
+    def best(self, task: Any, state: Any) -> Policy:
+        right = threshold_network(task, 1.0)
+        return Policy(right.parameters, lambda parameters, bits: BENDS[self.bend](right.function(parameters, bits)))
+
+
+@pytest.mark.parametrize("what", BENDS)
+def test_a_policy_whose_answer_is_bent_is_refused_with_both_names(what: str, tmp_path: Any, cpus: list[Any]) -> None:
+    condition = Condition(Answering(bend=what), TASK, "direct", Budget(generations=1))
+    with pytest.raises(UserError) as caught:
+        run(condition, [0], Store(tmp_path), cpus)
+    text = str(caught.value)
+    assert text.startswith(f"{BOTH}an action has shape ")
+    assert what in text
+    assert text.endswith("and 'n_parity' takes shape (1,) and type float32.")
+
+
+@pytest.mark.parametrize("task", [TASK, NParity(3, "sampled"), CURRICULUM], ids=["exhaustive", "sampled", "probe"])
+@pytest.mark.parametrize("act", ["examine", "episode", "step"])
+def test_a_bent_answer_is_refused_wherever_a_task_takes_one(task: Any, act: str) -> None:
+    """So that candidates are checked while they are trained, and not the champion alone."""
+
+    def take(key: Any) -> Any:
+        level = jnp.zeros((), jnp.int32)
+        if act == "step":
+            return task.step(task.reset(key, level), jnp.zeros(()))
+        return getattr(task, act)(lambda seen: jnp.zeros(()), key, level)
+
+    with pytest.raises(UserError, match=r"An action has shape \(\) and type float32, and .* takes shape \(1,\)"):
+        jax.eval_shape(take, jax.random.key(0))
+
+
+@dataclass(frozen=True)
+class Stepping(Walker):
+    """A walker whose step gives something else than it should."""
+
+    give: Any = None
+
+    def step(self, key: Any, task: Any, level: Any, state: Any) -> Any:
+        return self.give(*super().step(key, task, level, state))
+
+
+STEPS: dict[str, Any] = {
+    "a step of 'walker' reports a fitness of shape (1,) and type float32, not of shape () and type float32.": (
+        lambda state, told: (state, replace(told, fitness=told.fitness[None]))
+    ),
+    "a step of 'walker' reports a success of shape () and type bool, not of shape () and type float32.": (
+        lambda state, told: (state, replace(told, success=told.success > 0))
+    ),
+    "a step of 'walker' reports a mark `healthy` of shape () and type float32, not of shape () and type bool.": (
+        lambda state, told: (state, replace(told, healthy=jnp.ones(())))
+    ),
+    "a step of 'walker' reports a metric 'first' of shape (4,) and type float32, not a real number of shape ().": (
+        lambda state, told: (state, replace(told, metrics={"first": state}))
+    ),
+    "a step of 'walker' reports a metric 'z' of shape () and type complex64, not a real number of shape ().": (
+        lambda state, told: (state, replace(told, metrics={"z": jnp.zeros((), jnp.complex64)}))
+    ),
+    "a step of 'walker' reports a tuple, and the engine takes a Progress.": (
+        lambda state, told: (state, (told.fitness, told.success))
+    ),
+    "'walker' changes its state by a step: it is of shape (4,) and type float32 before and of shape (5,) and type "
+    "float32 afterwards.": lambda state, told: (jnp.zeros(5), told),
+    "'walker' changes its state by a step: it is of shape (4,) and type float32 before and of shape (4,) and type "
+    "int32 afterwards.": lambda state, told: (jnp.zeros(4, jnp.int32), told),
+    "'walker' changes its state by a step: its structure is another one afterwards.": (
+        lambda state, told: ((state, state), told)
+    ),
+}
+
+
+@pytest.mark.parametrize("sentence", STEPS)
+def test_a_step_that_gives_something_else_is_refused(sentence: str) -> None:
+    with pytest.raises(UserError) as caught:
+        traced_progress(Stepping(give=STEPS[sentence]), TASK)
+    assert str(caught.value) == BOTH + sentence
+
+
+def test_metrics_that_are_whole_numbers_fit() -> None:
+    counts = {"n": jnp.int32(3), "b": jnp.array(True)}
+    method = Stepping(give=lambda state, told: (state, replace(told, metrics=counts)))
+    assert traced_progress(method, TASK).metrics.keys() == {"n", "b"}
+
+
+@dataclass(frozen=True)
+class Bent(NParity):
+    """4-parity whose states are bent."""
+
+    bend: Any = None
+    only: str = ""
+
+    def reset(self, key: Any, level: Any) -> Any:
+        made = super().reset(key, level)
+        return self.bend(made) if self.only == "reset" else made
+
+    def step(self, state: Any, action: Any) -> Any:
+        made = super().step(state, action)
+        return self.bend(made) if self.only == "step" else made
+
+
+STATES: dict[str, Any] = {
+    "an observation of shape (1, 3) and type float32, not of shape (3,) and type float32.": (
+        lambda made: replace(made, observation=made.observation[None])
+    ),
+    "a reward of shape () and type int32, not of shape () and type float32.": (
+        lambda made: replace(made, reward=jnp.zeros((), jnp.int32))
+    ),
+    "a mark `terminated` of shape () and type float32, not of shape () and type bool.": (
+        lambda made: replace(made, terminated=jnp.zeros(()))
+    ),
+    "a mark `truncated` of shape (1,) and type bool, not of shape () and type bool.": (
+        lambda made: replace(made, truncated=made.truncated[None])
+    ),
+}
+
+
+@pytest.mark.parametrize("only", ["reset", "step"])
+@pytest.mark.parametrize("what", STATES)
+def test_a_task_that_gives_something_else_is_refused(what: str, only: str) -> None:
+    with pytest.raises(UserError) as caught:
+        traced_progress(Walker(), Bent(3, bend=STATES[what], only=only))
+    assert str(caught.value) == f"{BOTH}the {only} of 'n_parity' gives {what}"
+
+
+def test_a_task_whose_step_changes_its_state_is_refused() -> None:
+    task = Bent(3, bend=lambda made: replace(made, inner=replace(made.inner, level=made.reward)), only="step")
+    with pytest.raises(UserError, match=r"'n_parity' changes its state by a step: \.level is of shape \(\) and type"):
+        traced_progress(Walker(), task)
+
+
+@dataclass(frozen=True)
+class Examining(NParity):
+    """3-parity whose examination gives something else."""
+
+    give: Any = None
+
+    def examine(self, policy: Any, key: Any, level: Any) -> Episode:
+        episode: Episode = self.give(super().examine(policy, key, level))
+        return episode
+
+
+@pytest.mark.parametrize(
+    ("give", "what"),
+    [
+        (lambda e: replace(e, fitness=e.fitness[None]), "a fitness of shape (2, 1) and type float32, not"),
+        (lambda e: replace(e, success=e.success > 0), "a success of shape (2,) and type bool, not of shape (2,)"),
+        (lambda e: replace(e, metrics={"x": jnp.zeros(3)}), "a metric 'x' of shape (2, 3) and type float32"),
+    ],
+)
+def test_an_examination_that_gives_something_else_is_refused(give: Any, what: str, cpus: list[Any]) -> None:
+    program = Program(Condition(Walker(), Examining(3, give=give), "direct", Budget(generations=1)))
+    number, mark = jax.ShapeDtypeStruct((), jnp.int32), jax.ShapeDtypeStruct((), bool)
+    trial = jax.eval_shape(program.start, number, mark)
+    with pytest.raises(UserError) as caught:
+        jax.eval_shape(program.score, trial)
+    assert str(caught.value).startswith(f"{BOTH}the examination by 'n_parity' gives {what}")
+
+
+YES = np.ones((4, 1), bool)
+BITS = np.ones((4, 2), np.float32)
+
+
+@pytest.mark.parametrize(
+    ("table", "what"),
+    [
+        ((BITS.astype(np.int64), YES, YES, (4,)), "table's inputs have shape (4, 2) and type int64"),
+        ((BITS[0], YES[:2], YES[:2], (1,)), "table's inputs have shape (2,) and type float32"),
+        ((BITS, YES[:3], YES[:3], (3,)), "table's targets have shape (3, 1) and type bool"),
+        ((BITS, YES.astype(np.float32), YES, (4,)), "table's targets have shape (4, 1) and type float32"),
+        ((BITS, YES, np.ones((4, 2), bool), (4,)), "table's active outputs have shape (4, 2), and its targets (4, 1)"),
+        ((BITS, YES, YES, (2, 5)), "table's levels ask for (2, 5) rows, not for ever more of its 4"),
+        ((BITS, YES, YES, (3, 2)), "table's levels ask for (3, 2) rows, not for ever more of its 4"),
+        ((BITS, YES, YES, ()), "table's levels ask for () rows, not for ever more of its 4"),
+    ],
+)
+def test_a_truth_table_whose_parts_do_not_belong_together_is_refused(table: Any, what: str) -> None:
+    @dataclass(frozen=True)
+    class Odd(NParity):
+        name: ClassVar[str] = "odd"
+
+        @cached_property
+        def table(self) -> TruthTable:
+            return TruthTable(*table)
+
+    with pytest.raises(UserError) as caught:
+        traced_progress(Walker(), Odd(3))
+    assert str(caught.value).startswith(f"The method 'walker' does not fit the task 'odd': a truth {what}")
+
+
+def test_what_fits_is_told_as_it_is() -> None:
+    progress = traced_progress(Walker(), TASK)
+    assert isinstance(progress, Progress)
+    assert jax.tree.map(lambda leaf: (leaf.shape, str(leaf.dtype)), progress) == Progress(
+        fitness=((), "float32"), success=((), "float32"), healthy=((), "bool"), metrics={"first": ((), "float32")}
+    )

@@ -1,0 +1,153 @@
+"""Verdicts then and now: each claim of either side is said once, and only what can be compared counts as a change."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from evoclaims.core.errors import UnknownNameError, UserError
+from evoclaims.judging.verdict import Outcome
+from evoclaims.verdicts.claim_report import ClaimReport
+from evoclaims.verdicts.transitions import (
+    Kind,
+    Standing,
+    Transition,
+    compare,
+    counts,
+    describe,
+    matched,
+    parse_patterns,
+    standings,
+)
+
+OUTCOMES = st.sampled_from(Outcome)
+STANDINGS = st.dictionaries(
+    st.tuples(st.sampled_from(["smoke", "full"]), st.sampled_from(["G1", "G2[a]", "G10"])),
+    st.builds(Standing, OUTCOMES, st.sampled_from(["", "f1", "f2"])),
+)
+KEY = ("smoke", "G1")
+EVERY = parse_patterns("*->*")
+
+
+def _one(old: Standing | None, new: Standing | None) -> Transition:
+    (found,) = compare({KEY: old} if old else {}, {KEY: new} if new else {})
+    return found
+
+
+@given(STANDINGS, STANDINGS)
+def test_every_claim_of_either_side_has_exactly_one_transition(
+    old: dict[tuple[str, str], Standing], new: dict[tuple[str, str], Standing]
+) -> None:
+    found = compare(old, new)
+    assert sorted((one.tier, one.claim) for one in found) == sorted(old.keys() | new.keys())
+    for one in found:
+        assert (one.old, one.new) == (old.get((one.tier, one.claim)), new.get((one.tier, one.claim)))
+        assert describe(one).isprintable()
+
+
+@given(STANDINGS)
+def test_verdicts_have_not_changed_against_themselves(verdicts: dict[tuple[str, str], Standing]) -> None:
+    assert {one.kind for one in compare(verdicts, verdicts)} <= {Kind.SAME, Kind.NOT_RUN}
+
+
+@given(STANDINGS, STANDINGS)
+def test_what_changed_one_way_changes_back_the_other_way(
+    old: dict[tuple[str, str], Standing], new: dict[tuple[str, str], Standing]
+) -> None:
+    there, back = compare(old, new), compare(new, old)
+    for kind in (Kind.SAME, Kind.CHANGED, Kind.NEW_HISTORY):
+        assert [one.claim for one in there if one.kind is kind] == [one.claim for one in back if one.kind is kind]
+
+
+@given(OUTCOMES, OUTCOMES, OUTCOMES, OUTCOMES)
+def test_a_pattern_matches_its_own_change_and_no_other(a: Outcome, b: Outcome, c: Outcome, d: Outcome) -> None:
+    if a == b:
+        return
+    transition = _one(Standing(c, "f"), Standing(d, "f"))
+    found = matched([transition], parse_patterns(f"{a}->{b}"))
+    assert bool(found) == ((a, b) == (c, d))
+
+
+@given(OUTCOMES, OUTCOMES)
+def test_a_star_stands_for_every_outcome_of_a_verdict_that_changed(old: Outcome, new: Outcome) -> None:
+    transition = _one(Standing(old, "f"), Standing(new, "f"))
+    for pattern in (f"*->{new}", f"{old}->*", "*->*"):
+        assert bool(matched([transition], parse_patterns(pattern))) == (old != new)
+
+
+@given(OUTCOMES, OUTCOMES)
+def test_verdicts_under_other_rules_are_not_compared(old: Outcome, new: Outcome) -> None:
+    transition = _one(Standing(old, "a" * 64), Standing(new, "b" * 64))
+    assert transition.kind is Kind.NEW_HISTORY or old == new == Outcome.NOT_RUN
+    assert matched([transition], EVERY) == ()
+
+
+def test_a_new_history_says_so_with_both_fingerprints_and_verdicts() -> None:
+    transition = _one(Standing(Outcome.SUPPORTED, "a" * 64), Standing(Outcome.REFUTED, "b" * 64))
+    assert describe(transition) == (
+        "G1 (smoke): a new history begins, since what is judged has changed (fingerprint aaaaaaaaaaaa -> "
+        "bbbbbbbbbbbb): refuted now, supported under the old rules"
+    )
+
+
+def test_a_test_that_broke_before_its_rules_were_known_has_changed_its_verdict() -> None:
+    transition = _one(Standing(Outcome.SUPPORTED, "a" * 64), Standing(Outcome.ERROR, ""))
+    assert describe(transition) == "G1 (smoke): supported -> error"
+    assert matched([transition], parse_patterns("*->error")) == (transition,)
+
+
+def test_new_and_gone_claims_are_no_changes() -> None:
+    new, gone = _one(None, Standing(Outcome.REFUTED, "f")), _one(Standing(Outcome.REFUTED, "f"), None)
+    assert (describe(new), describe(gone)) == ("G1 (smoke): refuted, new", "G1 (smoke): gone; it was refuted")
+    assert matched([new, gone], EVERY) == ()
+    assert counts([new, gone, gone]) == "1 new, 2 gone"
+
+
+def test_a_claim_never_run_is_neither_new_nor_changed() -> None:
+    waiting = Standing(Outcome.NOT_RUN, "f")
+    assert {_one(None, waiting).kind, _one(waiting, waiting).kind} == {Kind.NOT_RUN}
+    assert _one(Standing(Outcome.SUPPORTED, "f"), waiting).kind is Kind.CHANGED
+
+
+def test_several_patterns_are_parted_by_commas() -> None:
+    text = " supported -> refuted, *->error ,not run->*,"
+    assert parse_patterns(text) == parse_patterns("supported->refuted,*->error,not run->*")
+    assert len(parse_patterns(text)) == 3
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("", "No change of a verdict is named"),
+        (" , ", "No change of a verdict is named"),
+        ("refuted", "'refuted' is no change of a verdict: write OLD->NEW"),
+        ("supported->refuted->error", "is no change of a verdict"),
+        ("supported->supported", "never happens: a verdict that stays supported has not changed"),
+    ],
+)
+def test_a_pattern_that_cannot_match_is_one_sentence(text: str, said: str) -> None:
+    with pytest.raises(UserError, match=said):
+        parse_patterns(text)
+
+
+@pytest.mark.parametrize("text", ["suported->refuted", "*->refutd", "->refuted", "*->failed"])
+def test_an_unknown_outcome_is_a_sentence_with_the_known_ones(text: str) -> None:
+    with pytest.raises(UnknownNameError, match="There is no outcome named .* Known: .*inconclusive.*supported"):
+        parse_patterns(text)
+
+
+@given(st.text(max_size=20), st.text(max_size=20))
+def test_no_name_can_steer_the_terminal(tier: str, claim: str) -> None:
+    for kind, new in ((Kind.CHANGED, Outcome.REFUTED), (Kind.SAME, Outcome.SUPPORTED)):
+        old = Standing(Outcome.SUPPORTED, "f")
+        assert describe(Transition(tier, claim, kind, old, Standing(new, "f"))).isprintable()
+
+
+def test_a_report_stands_under_its_name_with_its_fingerprint() -> None:
+    judged = ClaimReport("G1", "a", "smoke", "s", "w", "refuted", "r", verdict={"fingerprint": "f1", "n": 10})
+    broken = ClaimReport("G2", "", "full", "s", "w", "error", "r")
+    assert standings([judged, broken]) == {
+        ("smoke", "G1[a]"): Standing(Outcome.REFUTED, "f1"),
+        ("full", "G2"): Standing(Outcome.ERROR, ""),
+    }
