@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import jax
@@ -11,6 +12,7 @@ import pytest
 from evoclaims.core.errors import UserError
 from evoclaims.envs.gates.alu import SimpleAlu
 from evoclaims.envs.gates.parity import NParity
+from evoclaims.envs.gates.truth_table import TruthTable
 from evoclaims.envs.probes import COPY
 from evoclaims.methods.hand_built import HandBuilt
 from evoclaims.trials.rollout import score_every_level
@@ -38,6 +40,21 @@ def test_it_is_exactly_right_at_every_level_and_its_negation_exactly_wrong(
     np.testing.assert_array_equal(final.fitness, np.full(task.levels, fitness, np.float32))
 
 
+class DeafParity(NParity):
+    """Parity as a bug might have it: the first bit is ignored."""
+
+    @property
+    def table(self) -> TruthTable:
+        right = NParity(self.bits).table
+        return replace(right, targets=right.inputs[:, 1:].sum(axis=1, keepdims=True) % 2 == 1)
+
+
+def test_a_wrong_truth_table_does_not_make_it_wrong_alike() -> None:
+    task = DeafParity(4)
+    final = score_every_level(task, HandBuilt().best(task, jax.numpy.int32(0)), jax.random.key(0))
+    np.testing.assert_array_equal(final.success, [1.0, 1.0, 0.5])
+
+
 def test_a_step_tells_the_examination_and_counts() -> None:
     task, method = NParity(3), HandBuilt()
     state, progress = method.step(jax.random.key(1), task, jax.numpy.int32(1), method.init(jax.random.key(0), task))
@@ -50,5 +67,5 @@ def test_the_network_and_its_negation_have_different_names() -> None:
 
 
 def test_a_task_without_a_truth_table_is_one_sentence() -> None:
-    with pytest.raises(UserError, match="from a truth table, which the task 'probe_copy' does not have"):
+    with pytest.raises(UserError, match="by hand for N-parity and Simple ALU, and not for the task 'probe_copy'"):
         HandBuilt().best(COPY, jax.numpy.int32(0))

@@ -1,42 +1,45 @@
-"""A network written down by hand, one neuron per row of the truth table: the positive control of the gates.
+"""Circuits written down by hand from the definitions of the gates: the positive control (C2).
 
-It learns nothing; it goes through the same engine and the same judging as every method, so that a harness in which a
-right circuit fails, or a wrong one passes, gives itself away (control C2).
+They learn nothing; they go through the same engine and the same judging as every method, so that a harness in which a
+right circuit fails, or a wrong one passes, gives itself away. They never look at the task's own truth table, so that a
+wrong one gives itself away as well.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Final
 
+import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float, Int, PRNGKeyArray
+from numpy.typing import NDArray
 
 from evoclaims.core.errors import UserError
 from evoclaims.envs.base import Task
-from evoclaims.envs.gates.circuit import Circuit
+from evoclaims.envs.gates.alu import SimpleAlu
+from evoclaims.envs.gates.parity import NParity
 from evoclaims.methods.base import Policy, Progress
 
 
 @dataclass(frozen=True)
 class HandBuilt:
-    """A two-layer threshold network that answers every row rightly.
-
-    Hidden neuron r fires on row r alone: x · (2 row_r − 1) exceeds Σ row_r − ½ for no other bits x. Output o sums the
-    firing neurons with weight +1 where the wanted bit is 1, else −1.
+    """A circuit that answers every row rightly, or its negation.
 
     Attributes:
         negated: whether the outputs are negated: wrong on every active output of every row.
     """
 
-    revision: ClassVar[int] = 1
+    revision: ClassVar[int] = 2
     packages: ClassVar[tuple[str, ...]] = ()
 
     negated: bool = False
 
     @property
     def name(self) -> str:
-        """The registered name, which tells the network from its negation."""
+        """The registered name, which tells the circuit from its negation."""
         return "hand_built_negated" if self.negated else "hand_built"
 
     def init(self, key: PRNGKeyArray, task: Task) -> Int[Array, ""]:
@@ -46,35 +49,106 @@ class HandBuilt:
     def step(
         self, key: PRNGKeyArray, task: Task, level: Int[Array, ""], state: Int[Array, ""]
     ) -> tuple[Int[Array, ""], Progress]:
-        """Examine the network and change nothing."""
+        """Examine the circuit and change nothing."""
         episode = task.examine(self.best(task, state), key, level)
         progress = Progress(fitness=episode.fitness, success=episode.success, healthy=jnp.ones((), bool), metrics={})
         return state + 1, progress
 
     def best(self, task: Task, state: Int[Array, ""]) -> Policy:
-        """Return the network."""
-        return threshold_network(task, -1.0 if self.negated else 1.0)
+        """Return the circuit."""
+        return circuit_for(task).policy(-1.0 if self.negated else 1.0)
 
     def cost(self, task: Task) -> int:
         """Return the environment steps of one examination."""
         return task.horizon
 
 
-def threshold_network(task: Task, sign: float) -> Policy:
-    """Build the network for a circuit's truth table; its outputs are ±1 times `sign`.
+@dataclass(frozen=True)
+class ThresholdCircuit:
+    """Two layers of threshold neurons: neuron h fires where weights_h · x > thresholds_h, outputs sum what fires.
+
+    Attributes:
+        weights: shape [neurons, inputs].
+        thresholds: shape [neurons].
+        readout: shape [neurons, outputs].
+    """
+
+    weights: NDArray[np.float32]
+    thresholds: NDArray[np.float32]
+    readout: NDArray[np.float32]
+
+    def policy(self, sign: float) -> Policy:
+        """Return the circuit as a policy whose outputs are multiplied by `sign`."""
+
+        def function(parameters: Any, observation: Float[Array, " inputs"]) -> Float[Array, " outputs"]:
+            weights, thresholds, readout = parameters
+            return (weights @ observation > thresholds).astype(jnp.float32) @ readout
+
+        parts = self.weights, self.thresholds, sign * self.readout
+        return Policy(parameters=jax.tree.map(jnp.asarray, parts), function=function)
+
+
+def parity_circuit(bits: int) -> ThresholdCircuit:
+    """Return the circuit that counts ones: neuron k fires at k ones or more, and the signs alternate (§3.1.1).
+
+    The sum of what fires is 1 for an odd number of ones and 0 for an even one; a neuron that always fires takes off ½.
+    """
+    counts = np.arange(bits + 1, dtype=np.float32)  # at least 0, 1, ..., bits ones
+    readout = np.where(counts % 2 == 1, 1.0, -1.0).astype(np.float32)
+    readout[0] = -0.5
+    return ThresholdCircuit(np.ones((bits + 1, bits), np.float32), counts - 0.5, readout[:, None])
+
+
+_ANSWERS: Final[dict[str, str]] = {
+    "multiplexer": "0 1 0 1 0 0 1 1",  # (select, a, b): b where select is 0, a where it is 1
+    "multiplexer that ignores its select bit": "0 0 1 1 0 0 1 1",
+    "nand": "1 1 1 0",
+    "not": "1 0",
+    "and": "0 0 0 1",
+    "xor": "0 1 1 0",
+    "xax": "0 0 1 0 0 1 0 0",  # 1 where both pairs of neighbours differ
+    "increment": "0001 0010 0011 0100 0101 0110 0111 1000 1001 1010 1011 1100 1101 1110 1111 0000",
+    "decrement": "1111 0000 0001 0010 0011 0100 0101 0110 0111 1000 1001 1010 1011 1100 1101 1110",
+    "shift left": "0000 0010 0100 0110 1000 1010 1100 1110 0000 0010 0100 0110 1000 1010 1100 1110",
+    "shift right": "0000 0000 0001 0001 0010 0010 0011 0011 0100 0100 0101 0101 0110 0110 0111 0111",
+}
+"""Each operation's outputs for its inputs in counting order, written down from §3.1.2 and not computed by the task."""
+
+_LISTS: Final = {
+    "paper": ("multiplexer", "nand", "not", "and", "xor", "increment", "decrement", "shift left", "shift right"),
+    "published_code": ("multiplexer", "nand", "not", "and", "xor", "xax", "increment", "decrement", "shift left"),
+}
+_MULTIPLEXERS: Final = {"paper": "multiplexer", "published_code": "multiplexer that ignores its select bit"}
+
+
+def alu_circuit(operations: Sequence[str]) -> ThresholdCircuit:
+    """Return the circuit with a neuron for every operation and every value of its inputs (§3.1.2).
+
+    A neuron fires on its own eight bits alone: x · (2 bits − 1) exceeds Σ bits − ½ for no others. It puts +1 on the
+    outputs that are to be 1, and −1 on the others.
+
+    Args:
+        operations: names, in the order of their indices in the four control bits.
+    """
+    shown, wanted = [], []
+    for index, operation in enumerate(operations):
+        for number, answer in enumerate(_ANSWERS[operation].split()):
+            shown.append(f"{index:04b}{number:04b}")
+            wanted.append(answer.ljust(4, "0"))
+    bits = np.array([[int(bit) for bit in row] for row in shown], np.float32)
+    readout = np.array([[2 * int(bit) - 1 for bit in row] for row in wanted], np.float32)
+    return ThresholdCircuit(2 * bits - 1, bits.sum(axis=1) - 0.5, readout)
+
+
+def circuit_for(task: Task) -> ThresholdCircuit:
+    """Return the circuit that somebody has built by hand for a task.
 
     Raises:
-        UserError: for a task without a truth table.
+        UserError: when nobody has.
     """
-    if not isinstance(task, Circuit):
-        raise UserError(f"A network is built by hand from a truth table, which the task {task.name!r} does not have.")
-    table = task.table
-    weights = jnp.asarray(2 * table.inputs - 1)
-    thresholds = jnp.asarray(table.inputs.sum(axis=1) - 0.5)
-    readout = jnp.where(jnp.asarray(table.targets), sign, -sign)
-
-    def function(parameters: Any, observation: Float[Array, " inputs"]) -> Float[Array, " outputs"]:
-        weights, thresholds, readout = parameters
-        return (weights @ observation > thresholds).astype(jnp.float32) @ readout
-
-    return Policy(parameters=(weights, thresholds, readout), function=function)
+    if isinstance(task, NParity):
+        return parity_circuit(task.bits)
+    if isinstance(task, SimpleAlu):
+        names = (_MULTIPLEXERS[task.multiplexer], *_LISTS[task.operations][1:])
+        return alu_circuit(names[: task.level_count])
+    raise UserError(f"Circuits are built by hand for N-parity and Simple ALU, and not for the task {task.name!r}.")
