@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
-from typing import Any
 
 from evoclaims.claims.claim import Claim, Expectation
 from evoclaims.claims.trial_group import TrialGroup
@@ -13,7 +12,8 @@ from evoclaims.judging.judge import attainability
 from evoclaims.judging.protocol import Protocol
 from evoclaims.judging.verdict import Outcome, Verdict
 from evoclaims.trials.spec import TrialSpec
-from evoclaims.verdicts.claim_report import ClaimReport
+from evoclaims.verdicts.claim_report import Attainable, ClaimReport
+from evoclaims.verdicts.source_trials import SourceTrials
 from evoclaims.verdicts.versions import found_in
 
 
@@ -35,13 +35,12 @@ def judged(
         tier=tier,
         statement=claim.statement(tier),
         where=claim.where,
-        outcome=str(verdict.outcome),
+        outcome=verdict.outcome,
         reason=verdict.reason,
-        verdict=verdict.to_json(),
-        sources=tuple(_source(group, seeds, sorted(again.get(group.fingerprint, ()))) for group in groups),
+        verdict=verdict,
+        sources=tuple(_source(group, seeds, again.get(group.fingerprint, ())) for group in groups),
         attainable=tuple(
-            {"n": look.n, "alpha": look.alpha, "supported": p.supported, "refuted": p.refuted}
-            for look, p in attainability(assertion, protocol)
+            Attainable(look.n, look.alpha, p.supported, p.refuted) for look, p in attainability(assertion, protocol)
         ),
     )
 
@@ -60,7 +59,7 @@ def expecting(report: ClaimReport, expectation: Expectation | None) -> ClaimRepo
     """Add an accepted outcome to a report; what is accepted of the protocol is not of its variants."""
     if expectation is None or report.variant:
         return report
-    return replace(report, expected=str(expectation.outcome), because=expectation.because)
+    return replace(report, expected=expectation.outcome, because=expectation.because)
 
 
 def _unjudged(claim: Claim, case: str, tier: str, outcome: Outcome, reason: str) -> ClaimReport:
@@ -71,19 +70,19 @@ def _unjudged(claim: Claim, case: str, tier: str, outcome: Outcome, reason: str)
         tier=tier,
         statement=claim.statement(tier),
         where=claim.where,
-        outcome=str(outcome),
+        outcome=outcome,
         reason=reason,
     )
 
 
-def _source(group: TrialGroup, seeds: Sequence[int], again: Sequence[int]) -> dict[str, Any]:
+def _source(group: TrialGroup, seeds: Sequence[int], again: Collection[int]) -> SourceTrials:
     """Describe one condition of a report."""
     condition = group.condition
-    return {
-        "method": group.method,
-        "task": group.task,
-        "condition": group.fingerprint,
-        "trials": [TrialSpec(condition, seed).id for seed in seeds],
-        "versions": found_in(group.fetch(seeds), condition.packages) if len(seeds) else {},
-        "again": [*again],
-    }
+    return SourceTrials(
+        method=group.method,
+        task=group.task,
+        condition=group.fingerprint,
+        trials=tuple(TrialSpec(condition, seed).id for seed in seeds),
+        versions=found_in(group.fetch(seeds), condition.packages) if seeds else {},
+        again=tuple(sorted(again)),
+    )

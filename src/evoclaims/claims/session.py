@@ -126,12 +126,12 @@ class Session:
             if self.variant and not report.n:  # most claims are not about what a variant changes
                 continue
             for source in report.sources:
-                names = report.tier, source["method"], source["task"]
+                names = report.tier, source.method, source.task
                 if names not in found:
                     tier = self.reproduction.tier(report.tier, self.variant)
                     found[names] = _Used(*names, tier.condition(*names[1:]))
-                found[names].ids.update(source["trials"])
-                found[names].again.update(source.get("again", ()))
+                found[names].ids.update(source.trials)
+                found[names].again.update(source.again)
         return [used for _, used in sorted(found.items())]
 
     def _trials(self, used: _Used) -> list[TrialResult]:

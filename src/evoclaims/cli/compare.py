@@ -18,7 +18,7 @@ from evoclaims.trials.store import Store
 from evoclaims.verdicts import comparison, history, transitions
 from evoclaims.verdicts.claim_report import ClaimReport
 from evoclaims.verdicts.comparison import Side
-from evoclaims.verdicts.git_revision import Revision, find_revision
+from evoclaims.verdicts.git_revision import GitRevision, find_revision
 from evoclaims.verdicts.timeline import timeline
 from evoclaims.verdicts.transitions import Kind
 
@@ -82,7 +82,7 @@ class _Places:
             name = f"judged from the store {store.root}, and from reference trials where it has none"
             return replace(accepted, name="accepted verdicts, and reference trials"), replace(now, name=name)
         found = [self._place(place) for place in places]
-        revisions = [place for place in found if isinstance(place, Revision)]
+        revisions = [place for place in found if isinstance(place, GitRevision)]
         stores = [place for place in found if isinstance(place, Store)]
         if revisions and stores:
             raise UserError(
@@ -94,7 +94,7 @@ class _Places:
         opened = [self._store(place) for place in (*stores, open_store(self.storage))[:2]]
         return opened[0], opened[1]
 
-    def _place(self, name: str) -> Revision | Store:
+    def _place(self, name: str) -> GitRevision | Store:
         """Return what a name stands for."""
         path = Path(name)
         if path.is_absolute() or name.startswith("."):  # git knows no revision of such a name

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, fields
 from typing import Any, ClassVar, NoReturn
 
 from evoclaims.core.errors import UserError
+from evoclaims.judging.effect import a12, a12_interval, cliffs_delta
 from evoclaims.judging.multiplicity import holm
 from evoclaims.judging.protocol import Look, Protocol
-from evoclaims.judging.sample import Source, Trials
-from evoclaims.judging.verdict import Evidence, PValues
+from evoclaims.judging.reading import Reading
+from evoclaims.judging.sample import Sample, Source, Trials
+from evoclaims.judging.verdict import Bound, Direction, Evidence, Interval, PValues
 
 
 @dataclass(frozen=True)
@@ -22,15 +24,22 @@ class Finding:
         p: for and against the assertion.
         attainable: the smallest that n and the ties allow of each.
         evidence: one entry for each part.
+        deciding: for each direction, the index in `evidence` of the part that the p value rests on.
     """
 
     p: PValues
     attainable: PValues
     evidence: tuple[Evidence, ...]
+    deciding: Mapping[Direction, int]
 
 
+@dataclass(frozen=True)
 class Assertion(ABC):
-    """One checkable sentence about trials; each kind is a frozen dataclass that fills in the abstract methods."""
+    """One checkable sentence about trials.
+
+    Each kind is a frozen dataclass that fills in the abstract methods. Its fields are readings of trials, and the
+    numbers and words that are fixed beforehand; all of them are in the claim's fingerprint.
+    """
 
     kind: ClassVar[str]
 
@@ -38,13 +47,14 @@ class Assertion(ABC):
     def describe(self) -> str:
         """Return the assertion in plain English."""
 
-    @abstractmethod
     def sources(self) -> tuple[Source, ...]:
         """Return the conditions it needs, each once."""
+        values = (getattr(self, field.name) for field in fields(self))
+        return _unique(value.source for value in values if isinstance(value, Reading))
 
-    @abstractmethod
     def plain(self) -> dict[str, Any]:
         """Return the canonical description that the claim's fingerprint hashes, with the conditions' ids."""
+        return {"kind": self.kind, **{field.name: _plain(getattr(self, field.name)) for field in fields(self)}}
 
     @abstractmethod
     def attainable(self, n: int, protocol: Protocol) -> PValues:
@@ -70,6 +80,60 @@ class Assertion(ABC):
         """
         return self.attainable(n, protocol), PValues(1.0, 1.0)
 
+    def found(
+        self,
+        p: PValues,
+        attainable: PValues,
+        alpha: float,
+        samples: tuple[Sample, ...],
+        *,
+        detail: str = "",
+        bounds: tuple[Bound, ...] = (),
+        intervals: tuple[Interval, ...] = (),
+        events: bool = False,
+        effect: bool = False,
+        tested: bool = True,
+    ) -> Finding:
+        """Return what this assertion has found, with one entry of evidence.
+
+        Args:
+            p: for and against the assertion.
+            attainable: the smallest that n and the ties allow of each.
+            alpha: significance level of the look.
+            samples: what was read from the trials.
+            detail: what else the reader should know.
+            bounds: what the trials are compared with.
+            intervals: description only.
+            events: whether values say that something held.
+            effect: whether to describe how far the two samples lie apart.
+            tested: whether p comes of a test; a fact's, 0 for what is so and 1 for what is not, is not reported.
+        """
+        first, last = samples[0].values, samples[-1].values
+        evidence = Evidence(
+            kind=self.kind,
+            describe=self.describe(),
+            outcome=p.outcome(alpha),
+            samples=samples,
+            n=len(first),
+            alpha=alpha,
+            p=p.supported if tested else None,
+            attainable_p=attainable.supported if tested else None,
+            p_refuted=p.refuted if tested else None,
+            attainable_p_refuted=attainable.refuted if tested else None,
+            a12=a12(first, last) if effect else None,
+            cliffs_delta=cliffs_delta(first, last) if effect else None,
+            intervals=(Interval("A12, 95% percentile bootstrap", *a12_interval(first, last)),) if effect else intervals,
+            detail=detail,
+            bounds=bounds,
+            events=events,
+        )
+        return Finding(p, attainable, (evidence,), dict.fromkeys(Direction, 0))
+
+    def fact(self, holds: bool, alpha: float, sample: Sample, detail: str, *, events: bool = False) -> Finding:
+        """Return the finding of an assertion that is so or not, without a test."""
+        p = PValues(0.0, 1.0) if holds else PValues(1.0, 0.0)
+        return self.found(p, PValues(0.0, 0.0), alpha, (sample,), detail=detail, events=events, tested=False)
+
     def __and__(self, other: Assertion) -> AllOf:
         """Assert both."""
         return AllOf((*_parts(self, AllOf), *_parts(other, AllOf)))
@@ -94,17 +158,30 @@ def _parts(value: object, joined_by: type[Compound]) -> tuple[Assertion, ...]:
     return value.parts if isinstance(value, joined_by) else (value,)
 
 
-def unique_sources(sources: Iterable[Source]) -> tuple[Source, ...]:
+def _unique(sources: Iterable[Source]) -> tuple[Source, ...]:
     """Return the sources without repeated fingerprints, in order."""
     return tuple({source.fingerprint: source for source in sources}.values())
 
 
+def _plain(value: object) -> object:
+    """Return a kind's field as the fingerprint hashes it: 1 and 1.0 are the same number."""
+    if isinstance(value, Reading):
+        return value.plain()
+    return float(value) if isinstance(value, int) else value
+
+
 @dataclass(frozen=True)
 class Compound(Assertion):
-    """Several assertions that are judged as one; a subclass says how their p values combine."""
+    """Several assertions that are judged as one; a subclass says how their p values combine.
+
+    Attributes:
+        joint: the word between the parts.
+        weakest: the direction in which the part with the largest p decides; in the other it is the smallest.
+    """
 
     parts: tuple[Assertion, ...]
     joint: ClassVar[str]
+    weakest: ClassVar[Direction]
 
     @staticmethod
     @abstractmethod
@@ -117,7 +194,7 @@ class Compound(Assertion):
 
     def sources(self) -> tuple[Source, ...]:
         """Return the parts' conditions."""
-        return unique_sources(source for part in self.parts for source in part.sources())
+        return _unique(source for part in self.parts for source in part.sources())
 
     def plain(self) -> dict[str, Any]:
         """Return the kind and the parts."""
@@ -143,7 +220,15 @@ class Compound(Assertion):
             p=self.combine([finding.p for finding in findings]),
             attainable=self.combine([finding.attainable for finding in findings]),
             evidence=tuple(entry for finding in findings for entry in finding.evidence),
+            deciding={direction: self._deciding(findings, direction) for direction in Direction},
         )
+
+    def _deciding(self, findings: Sequence[Finding], direction: Direction) -> int:
+        """Return the index, among all parts' evidence, of the one that the compound's p rests on."""
+        choose = max if direction is self.weakest else min
+        chosen = choose(range(len(findings)), key=lambda index: findings[index].p.toward(direction))
+        before = sum(len(finding.evidence) for finding in findings[:chosen])
+        return before + findings[chosen].deciding[direction]
 
 
 @dataclass(frozen=True)
@@ -152,6 +237,7 @@ class AllOf(Compound):
 
     kind: ClassVar[str] = "all of"
     joint: ClassVar[str] = "and"
+    weakest: ClassVar[Direction] = Direction.FOR
 
     @staticmethod
     def combine(parts: Sequence[PValues]) -> PValues:
@@ -165,6 +251,7 @@ class AnyOf(Compound):
 
     kind: ClassVar[str] = "any of"
     joint: ClassVar[str] = "or"
+    weakest: ClassVar[Direction] = Direction.AGAINST
 
     @staticmethod
     def combine(parts: Sequence[PValues]) -> PValues:

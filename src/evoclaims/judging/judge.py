@@ -196,4 +196,5 @@ def _verdict(
         attainable_p_refuted=finding.attainable.refuted if tested else None,
         evidence=finding.evidence,
         without_result=broken,
+        deciding=finding.deciding[outcome.direction],
     )

@@ -12,10 +12,10 @@ from typing import Literal, get_args
 from evoclaims.judging.counting import digit_width, unpack, upper_tails
 from evoclaims.judging.exact import ExactTest
 
-Direction = Literal["falls", "rises"]
+Slope = Literal["falls", "rises"]
 
 
-def trend_test(profiles: Sequence[Sequence[float]], direction: Direction) -> ExactTest:
+def trend_test(profiles: Sequence[Sequence[float]], direction: Slope) -> ExactTest:
     """Test whether values fall (or rise) with the level, within trials.
 
     The statistic is the sum over trials of Kendall's S against the level index. Under the null a trial's values are
@@ -30,8 +30,8 @@ def trend_test(profiles: Sequence[Sequence[float]], direction: Direction) -> Exa
     Raises:
         ValueError: without trials, for rows of unequal length or fewer than two levels, or for NaN.
     """
-    if direction not in get_args(Direction):
-        raise ValueError(f"No direction {direction!r}; known: {', '.join(get_args(Direction))}.")
+    if direction not in get_args(Slope):
+        raise ValueError(f"No direction {direction!r}; known: {', '.join(get_args(Slope))}.")
     if len({len(row) for row in profiles}) != 1 or len(profiles[0]) < 2:
         raise ValueError("A trend test needs at least one trial, and the same two or more levels in each.")
     if any(math.isnan(value) for row in profiles for value in row):

@@ -55,6 +55,7 @@ class Sample:
         values: one number a trial, shape [n]; an event that held is 1.0. A failed trial has the worst value.
         median: median of `values`.
         failed: seeds of the diverged or timed-out trials.
+        endings: how each of these ended, such as "diverged".
     """
 
     label: str
@@ -62,6 +63,7 @@ class Sample:
     values: tuple[float, ...]
     median: float
     failed: tuple[int, ...]
+    endings: tuple[str, ...] = ()
 
 
 def is_failed(trial: TrialResult) -> bool:
@@ -132,10 +134,12 @@ def ranked(value: float, trial: TrialResult, what: str) -> float:
 
 def sample(label: str, trials: Sequence[TrialResult], values: Sequence[float]) -> Sample:
     """Return the record of `values`, one for each of `trials`."""
+    failed = [trial for trial in trials if is_failed(trial)]
     return Sample(
         label=label,
         seeds=tuple(trial.seed for trial in trials),
         values=tuple(float(value) for value in values),
         median=median(values),
-        failed=tuple(trial.seed for trial in trials if is_failed(trial)),
+        failed=tuple(trial.seed for trial in failed),
+        endings=tuple(trial.status for trial in failed),
     )

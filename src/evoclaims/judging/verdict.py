@@ -4,10 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Any
 
-from evoclaims.core.canonical import as_plain
 from evoclaims.judging.sample import Sample
+
+
+class Direction(StrEnum):
+    """What a p value speaks for: the claim, or its opposite."""
+
+    FOR = "for"
+    AGAINST = "against"
 
 
 class Outcome(StrEnum):
@@ -23,6 +28,11 @@ class Outcome(StrEnum):
     def symbol(self) -> str:
         """One character for tables."""
         return _SYMBOLS[self]
+
+    @property
+    def direction(self) -> Direction:
+        """Which p value a reader wants to see first: the one against what is refuted, else the one for the claim."""
+        return Direction.AGAINST if self is Outcome.REFUTED else Direction.FOR
 
 
 _SYMBOLS = {
@@ -48,14 +58,55 @@ class PValues:
             return Outcome.INCONCLUSIVE
         return Outcome.SUPPORTED if supported else Outcome.REFUTED
 
+    def toward(self, direction: Direction) -> float:
+        """Return the p value of one direction."""
+        return self.supported if direction is Direction.FOR else self.refuted
+
 
 @dataclass(frozen=True)
 class Interval:
-    """An interval that describes; `of` says what it covers and how it was made."""
+    """An interval that describes.
+
+    Attributes:
+        of: what it covers, and how it was made.
+        low, high: its ends.
+        on_axis: whether its ends can be drawn on the axis of the samples' values.
+    """
 
     of: str
     low: float
     high: float
+    on_axis: bool = False
+
+
+@dataclass(frozen=True)
+class Bound:
+    """A number that was fixed beforehand for trials to be compared with, such as the highest value of a band.
+
+    Attributes:
+        name: such as "highest".
+        value: the number.
+        on_axis: whether it can be drawn on the axis of the samples' values.
+    """
+
+    name: str
+    value: float
+    on_axis: bool = True
+
+
+@dataclass(frozen=True)
+class Decision:
+    """The p value that a verdict rests on.
+
+    Attributes:
+        direction: whether it speaks for the claim or against it.
+        p: of the whole assertion.
+        attainable_p: the smallest p that n and the ties allowed in this direction.
+    """
+
+    direction: Direction
+    p: float
+    attainable_p: float | None
 
 
 @dataclass(frozen=True)
@@ -77,6 +128,8 @@ class Evidence:
         cliffs_delta: Cliff's delta; None without two samples.
         intervals: description only.
         detail: what else the reader should know.
+        bounds: what the trials are compared with.
+        events: whether values say that something held (1) or did not (0).
     """
 
     kind: str
@@ -93,6 +146,13 @@ class Evidence:
     cliffs_delta: float | None = None
     intervals: tuple[Interval, ...] = ()
     detail: str = ""
+    bounds: tuple[Bound, ...] = ()
+    events: bool = False
+
+    @property
+    def direction(self) -> Direction:
+        """What this part speaks for by itself."""
+        return self.outcome.direction
 
 
 @dataclass(frozen=True)
@@ -112,6 +172,7 @@ class Verdict:
         attainable_p_refuted: the smallest p against it that n and the ties allowed.
         evidence: one entry for each part of the assertion.
         without_result: which trials ended without a result of their own, and how; they took the worst rank.
+        deciding: index in `evidence` of the part whose p value the whole assertion's rests on; None without evidence.
     """
 
     outcome: Outcome
@@ -126,8 +187,17 @@ class Verdict:
     attainable_p_refuted: float | None = None
     evidence: tuple[Evidence, ...] = ()
     without_result: str = ""
+    deciding: int | None = None
 
-    def to_json(self) -> dict[str, Any]:
-        """Return the verdict as strict JSON: an infinity becomes the string "inf" or "-inf"."""
-        plain: dict[str, Any] = as_plain(self)
-        return plain
+    @property
+    def decision(self) -> Decision | None:
+        """The p value that the outcome rests on; None where nothing was tested."""
+        direction = self.outcome.direction
+        against = direction is Direction.AGAINST
+        p, attainable_p = (self.p_refuted, self.attainable_p_refuted) if against else (self.p, self.attainable_p)
+        return None if p is None else Decision(direction, p, attainable_p)
+
+    @property
+    def deciding_part(self) -> Evidence | None:
+        """The part that decided."""
+        return None if self.deciding is None else self.evidence[self.deciding]

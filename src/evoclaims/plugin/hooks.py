@@ -259,10 +259,10 @@ def pytest_runtest_makereport(
     properties: list[tuple[str, object]] = [
         ("claim", claimed.claim),
         ("tier", claimed.tier),
-        ("verdict", claimed.outcome),
+        ("verdict", str(claimed.outcome)),
         ("reason", claimed.reason),
         ("n", claimed.n),
-        ("p", (claimed.verdict or {}).get("p")),
+        ("p", claimed.p),
         ("evidence", claimed.evidence),
     ]
     item.user_properties += properties  # JUnit's file takes them from the report of the teardown

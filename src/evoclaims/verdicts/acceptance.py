@@ -13,7 +13,6 @@ from evoclaims.paper.archive import Archive
 from evoclaims.trials.result import TrialResult
 from evoclaims.verdicts.claim_report import ClaimReport
 from evoclaims.verdicts.history import Entry, History, key_of
-from evoclaims.verdicts.versions import installed_for
 
 UNDECIDED = (Outcome.NOT_RUN, Outcome.ERROR)
 """Outcomes that say nothing of a claim, and so are never accepted."""
@@ -66,16 +65,15 @@ def entry_of(report: ClaimReport, archive: Archive, today: str) -> Entry:
     Raises:
         UserError: when a trial behind it is damaged.
     """
-    verdict: dict[str, Any] = report.verdict or {}
-    preferred = {trial: installed_for(source) for source in report.sources for trial in source["trials"]}
+    preferred = {trial: source.installed for source in report.sources for trial in source.trials}
     found = (archive.get(trial, versions) for trial, versions in preferred.items())
     trials = [trial for trial in found if trial is not None]
     return Entry(
-        outcome=Outcome(report.outcome),
+        outcome=report.outcome,
         reason=printable(report.reason),
         n=report.n,
-        p=verdict["p"],
-        fingerprint=verdict["fingerprint"],
+        p=report.p,
+        fingerprint=report.fingerprint,
         accepted=today,
         versions=versions_of(trials),
         device=_joined((trial.provenance.get("device") or {}).get("kind") for trial in trials),

@@ -1,4 +1,4 @@
-"""What became of one claim test, as plain data that crosses processes and goes into files."""
+"""What became of one claim test, and the one place where that is turned into JSON and back."""
 
 from __future__ import annotations
 
@@ -8,12 +8,40 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from msgspec import convert
+
 from evoclaims.core.canonical import as_plain
 from evoclaims.core.errors import UserError
 from evoclaims.core.file_names import file_name
 from evoclaims.core.files import write_atomically
-from evoclaims.judging.verdict import Outcome
-from evoclaims.verdicts.versions import of_sources
+from evoclaims.judging.verdict import Outcome, Verdict
+from evoclaims.verdicts.source_trials import SourceTrials, versions_of
+from evoclaims.verdicts.versions import Several
+
+
+@dataclass(frozen=True)
+class Attainable:
+    """One look at the data, and the smallest p that it can give for and against the claim."""
+
+    n: int
+    alpha: float
+    supported: float
+    refuted: float
+
+
+@dataclass(frozen=True)
+class LastVerdict:
+    """The verdict that a store held of a claim before a run.
+
+    Attributes:
+        outcome: how the claim ended.
+        fingerprint: of what was fixed beforehand; None where the test broke before judging.
+        versions: that its trials were made with.
+    """
+
+    outcome: Outcome
+    fingerprint: str | None
+    versions: Several
 
 
 @dataclass(frozen=True)
@@ -28,15 +56,13 @@ class ClaimReport:
         where: place in the paper.
         outcome, reason: the verdict in short.
         expected, because: an accepted outcome, if there is one.
-        verdict: the whole verdict as JSON; None when the test broke before judging.
-        sources: for each condition: "method", "task", "condition" (id), "trials" (ids), "versions" (of the packages
-            that it depends on: the different ones that the trials were made with) and "again" (seeds that this run has
-            run again, since the store's trials were made with other versions).
-        attainable: for each look: "n", "alpha", and the smallest p for ("supported") and against ("refuted").
+        verdict: the whole verdict; None when the test broke before judging.
+        sources: the trials behind it, by condition.
+        attainable: one entry a look.
         evidence: path of the file that holds all this.
         variant: name of the variant of the protocol; empty for the protocol itself.
         unsaved: why that file could not be written; empty when it was, or was not to be.
-        before: "outcome", "fingerprint" and "versions" of the verdict that the store held before this run, if any.
+        before: the verdict that the store held before this run, if any.
     """
 
     claim: str
@@ -44,17 +70,17 @@ class ClaimReport:
     tier: str
     statement: str
     where: str
-    outcome: str
+    outcome: Outcome
     reason: str
-    expected: str | None = None
+    expected: Outcome | None = None
     because: str = ""
-    verdict: dict[str, Any] | None = None
-    sources: tuple[dict[str, Any], ...] = ()
-    attainable: tuple[dict[str, Any], ...] = ()
+    verdict: Verdict | None = None
+    sources: tuple[SourceTrials, ...] = ()
+    attainable: tuple[Attainable, ...] = ()
     evidence: str = ""
     variant: str = ""
     unsaved: str = ""
-    before: dict[str, Any] | None = None
+    before: LastVerdict | None = None
 
     @property
     def name(self) -> str:
@@ -75,17 +101,31 @@ class ClaimReport:
     @property
     def n(self) -> int:
         """Trials a side that were looked at."""
-        return int(self.verdict["n"]) if self.verdict else 0
+        return self.verdict.n if self.verdict else 0
+
+    @property
+    def p(self) -> float | None:
+        """For the claim; None where nothing was tested."""
+        return self.verdict.p if self.verdict else None
+
+    @property
+    def fingerprint(self) -> str:
+        """Hash of what was fixed beforehand; empty where the test broke before judging."""
+        return self.verdict.fingerprint if self.verdict else ""
 
     def to_json(self) -> dict[str, Any]:
-        """Return the report as plain JSON, with no enumerations left in it: xdist passes on built-in types alone."""
+        """Return the report as strict JSON, an infinity as "inf" or "-inf": xdist passes on built-in types alone."""
         plain: dict[str, Any] = json.loads(json.dumps(as_plain(self)))
         return plain
 
     @staticmethod
     def from_json(plain: dict[str, Any]) -> ClaimReport:
-        """Return the report that `to_json` gave."""
-        return ClaimReport(**{**plain, "sources": tuple(plain["sources"]), "attainable": tuple(plain["attainable"])})
+        """Return the report that `to_json` gave.
+
+        Raises:
+            ValueError: for anything else.
+        """
+        return convert(plain, ClaimReport, strict=False)  # not strictly, since infinities are texts
 
 
 def named(claim_id: str, case: str) -> str:
@@ -107,10 +147,9 @@ def succeeding(report: ClaimReport, root: Path) -> ClaimReport:
     """Return the report with what the file of the claim's last verdict, which it takes the place of, says of that."""
     try:
         last = ClaimReport.from_json(json.loads(_path(report, root).read_bytes()))
-        mark = (last.verdict or {}).get("fingerprint")
-        before = {"outcome": last.outcome, "fingerprint": mark, "versions": of_sources(last.sources)}
-    except (OSError, ValueError, TypeError, KeyError, AttributeError):
+    except (OSError, ValueError):
         return report  # none, or one that another release has written: nothing is judged from it
+    before = LastVerdict(last.outcome, last.fingerprint or None, versions_of(last.sources))
     return replace(report, before=before)
 
 

@@ -21,7 +21,7 @@ from evoclaims.trials.result_codec import RecordError, parse
 from evoclaims.trials.store import DamagedFileError, Store, newest
 from evoclaims.verdicts import history, transitions
 from evoclaims.verdicts.claim_report import ClaimReport
-from evoclaims.verdicts.git_revision import Revision
+from evoclaims.verdicts.git_revision import GitRevision
 from evoclaims.verdicts.transitions import Standings
 
 Trials = Mapping[str, Sequence[TrialResult]]
@@ -66,7 +66,7 @@ def working_tree(reproduction: Reproduction) -> Side:
     return Side("the working tree", accepted, trials)
 
 
-def revision(reproduction: Reproduction, at: Revision) -> Side:
+def revision(reproduction: Reproduction, at: GitRevision) -> Side:
     """Return the accepted verdicts and the reference trials that are committed at a revision.
 
     Args:
@@ -110,8 +110,8 @@ def store(reproduction: Reproduction, of: Store, reports: Iterable[ClaimReport])
     held = {trial.id for kept in trials.values() for trial in kept}
     own = [
         report
-        if all(held.issuperset(source["trials"]) for source in report.sources)
-        else replace(report, outcome=str(Outcome.NOT_RUN))
+        if all(held.issuperset(source.trials) for source in report.sources)
+        else replace(report, outcome=Outcome.NOT_RUN)
         for report in reports
     ]
     troubles = tuple(f"not read: {error}" for error in damaged)
@@ -155,7 +155,7 @@ def _named(path: PurePosixPath | Path) -> str:
     return path.with_suffix("").as_posix()
 
 
-def _records(at: Revision, path: str) -> tuple[TrialResult, ...]:
+def _records(at: GitRevision, path: str) -> tuple[TrialResult, ...]:
     """Read the reference trials in a file of a revision."""
     results = []
     for number, line in enumerate((at.read(path) or b"").splitlines(), start=1):

@@ -48,7 +48,7 @@ def verdict_rows(reports: Iterable[ClaimReport]) -> list[Row]:
             "reason": report.reason,
             "n": report.n,
             **{
-                name: (report.verdict or {}).get(name)
+                name: getattr(report.verdict, name, None)
                 for name in ("p", "attainable_p", "p_refuted", "attainable_p_refuted", "alpha", "fingerprint")
             },
             "expected": report.expected,

@@ -16,7 +16,7 @@ GIT_SECONDS: Final = 60.0
 
 
 @dataclass(frozen=True)
-class Revision:
+class GitRevision:
     """A commit of the repository that a folder lies in.
 
     Attributes:
@@ -55,7 +55,7 @@ class Revision:
         return done.stdout
 
 
-def find_revision(name: str, folder: Path) -> Revision | None:
+def find_revision(name: str, folder: Path) -> GitRevision | None:
     """Return the commit that a name means (a branch, a tag, HEAD~3, …); None when it means none.
 
     Raises:
@@ -73,7 +73,7 @@ def find_revision(name: str, folder: Path) -> Revision | None:
     found = run_git(folder, "rev-parse", "--verify", "--quiet", "--end-of-options", f"{name}^{{commit}}")
     sha = found.stdout.decode(errors="replace").strip()
     known = found.returncode == 0 and re.fullmatch(r"[0-9a-f]{40,64}", sha) is not None
-    return Revision(name, sha, folder) if known else None
+    return GitRevision(name, sha, folder) if known else None
 
 
 def run_git(folder: Path, *arguments: str) -> subprocess.CompletedProcess[bytes]:

@@ -9,7 +9,8 @@ from typing import Final
 from evoclaims.core.packages import installed
 from evoclaims.core.printable import printable
 from evoclaims.verdicts.claim_report import ClaimReport
-from evoclaims.verdicts.versions import different, in_words, of_sources
+from evoclaims.verdicts.source_trials import versions_of
+from evoclaims.verdicts.versions import different, in_words
 
 MARK: Final = "†"
 """Stands beside a verdict whose trials were made with mixed versions."""
@@ -20,7 +21,7 @@ MOST_NAMES: Final = 6
 
 def is_mixed(report: ClaimReport) -> bool:
     """Whether some package behind a claim's trials has more than one version."""
-    return any(len(versions) > 1 for versions in of_sources(report.sources).values())
+    return any(len(versions) > 1 for versions in versions_of(report.sources).values())
 
 
 def lines(reports: Sequence[ClaimReport]) -> list[str]:
@@ -29,13 +30,13 @@ def lines(reports: Sequence[ClaimReport]) -> list[str]:
     foreign: dict[str, list[str | None]] = defaultdict(list)
     elsewhere = []
     for report in reports:
-        versions = of_sources(report.sources)
+        versions = versions_of(report.sources)
         several = [f"{name} {in_words(those)}" for name, those in versions.items() if len(those) > 1]
         if several:
             mixed[", ".join(several)].append(f"{report.name} ({report.tier})")
             continue
         here = installed(tuple(versions))
-        other = {name: those for name, those in versions.items() if those and those != [here[name]]}
+        other = {name: those for name, those in versions.items() if those and those != (here[name],)}
         if other:
             elsewhere.append(f"{report.name} ({report.tier})")
         for name, those in other.items():

@@ -40,7 +40,7 @@ def matrix(plain: Sequence[ClaimReport], variants: Mapping[str, Sequence[ClaimRe
         variants: reports by variant.
     """
     found = {
-        (report.tier, report.name, name): Outcome(report.outcome)
+        (report.tier, report.name, name): report.outcome
         for name, reports in variants.items()
         for report in reports
         if report.outcome != Outcome.NOT_RUN
@@ -49,7 +49,7 @@ def matrix(plain: Sequence[ClaimReport], variants: Mapping[str, Sequence[ClaimRe
         Robustness(
             report.name,
             report.tier,
-            Outcome(report.outcome),
+            report.outcome,
             {name: found[key] for name in variants if (key := (report.tier, report.name, name)) in found},
         )
         for report in plain

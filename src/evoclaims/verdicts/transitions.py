@@ -111,7 +111,7 @@ def matched(transitions: Iterable[Transition], patterns: Sequence[Pattern]) -> t
 
 def standings(reports: Iterable[ClaimReport]) -> Standings:
     """Return verdicts of now."""
-    return {key_of(r): Standing(Outcome(r.outcome), (r.verdict or {}).get("fingerprint", "")) for r in reports}
+    return {key_of(r): Standing(r.outcome, r.fingerprint) for r in reports}
 
 
 def accepted(history: History) -> Standings:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,6 +16,7 @@ from evoclaims.trials.result import TrialResult
 from evoclaims.trials.store import newest
 from evoclaims.verdicts import versions
 from evoclaims.verdicts.claim_report import ClaimReport
+from evoclaims.verdicts.source_trials import versions_of
 
 
 @dataclass(frozen=True)
@@ -128,18 +129,21 @@ def verdict_changes(reports: Iterable[ClaimReport]) -> list[str]:
     """Say which verdicts are not those that the store's last run has come to under the same rules."""
     said = []
     for report in reports:
-        before: Mapping[str, Any] = report.before or {}
-        outcome, mark = before.get("outcome"), (report.verdict or {}).get("fingerprint")
-        if outcome in (None, Outcome.NOT_RUN, report.outcome) or before.get("fingerprint") != mark:
+        before = report.before
+        if before is None or before.outcome in (Outcome.NOT_RUN, report.outcome):
             continue
-        was, now = before.get("versions") or {}, versions.of_sources(report.sources)
+        if (before.fingerprint or "") != report.fingerprint:
+            continue
+        was, now = before.versions, versions_of(report.sources)
         moved = ", ".join(
             f"{name} {versions.in_words(was[name])} -> {versions.in_words(now[name])}"
             for name in sorted(was.keys() & now.keys())
             if was[name] != now[name]
         )
         by = f" ({moved})" if moved else ""
-        said.append(printable(f"verdict changed: {report.name} ({report.tier}): {outcome} -> {report.outcome}{by}"))
+        said.append(
+            printable(f"verdict changed: {report.name} ({report.tier}): {before.outcome} -> {report.outcome}{by}")
+        )
     return said
 
 

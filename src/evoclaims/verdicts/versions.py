@@ -2,35 +2,19 @@
 
 from __future__ import annotations
 
-from collections import defaultdict
-from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+from collections.abc import Iterable, Mapping
 
-from evoclaims.core.packages import Versions, differences, installed, recorded
+from evoclaims.core.packages import Versions, differences, recorded
 from evoclaims.trials.result import TrialResult
 
+Several = Mapping[str, tuple[str | None, ...]]
+"""Different versions by package; None for what was not installed."""
 
-def found_in(trials: Iterable[TrialResult], packages: tuple[str, ...]) -> dict[str, list[str | None]]:
-    """Return the different versions of packages that trials were made with; None for what was not installed."""
+
+def found_in(trials: Iterable[TrialResult], packages: tuple[str, ...]) -> Several:
+    """Return the different versions of packages that trials were made with."""
     made_with = [recorded(trial.provenance, packages) for trial in trials]
     return {name: different(versions[name] for versions in made_with) for name in packages}
-
-
-def of_sources(sources: Sequence[Mapping[str, Any]]) -> dict[str, list[str | None]]:
-    """Return the different versions, by package, that the sources of a claim's report tell of."""
-    found: dict[str, list[str | None]] = defaultdict(list)
-    for source in sources:
-        for name, versions in (source.get("versions") or {}).items():
-            found[name] += versions
-    return {name: different(versions) for name, versions in sorted(found.items())}
-
-
-def installed_for(source: Mapping[str, Any]) -> dict[str, str | None]:
-    """Return the installed versions of the packages that a source of a claim's report depends on.
-
-    Of several records of its trials the one with these versions is the one that was judged.
-    """
-    return installed(tuple(source.get("versions") or ()))
 
 
 def change(old: Versions, new: Versions) -> str:
@@ -44,6 +28,6 @@ def in_words(versions: Iterable[str | None]) -> str:
     return " and ".join(version or "none" for version in versions)
 
 
-def different(versions: Iterable[str | None]) -> list[str | None]:
+def different(versions: Iterable[str | None]) -> tuple[str | None, ...]:
     """Return different versions in order; what was not installed comes first."""
-    return sorted(set(versions), key=lambda version: (version is not None, str(version)))
+    return tuple(sorted(set(versions), key=lambda version: (version is not None, str(version))))

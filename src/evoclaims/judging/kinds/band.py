@@ -5,18 +5,16 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import ClassVar
 
 from evoclaims.core.errors import UserError
 from evoclaims.judging.assertion import Assertion, Finding
 from evoclaims.judging.effect import median_interval
 from evoclaims.judging.exact import sign_test
 from evoclaims.judging.protocol import Protocol
-from evoclaims.judging.sample import Source, Trials
-from evoclaims.judging.verdict import Evidence, Interval, PValues
-
-if TYPE_CHECKING:
-    from evoclaims.judging.measure import Measure
+from evoclaims.judging.reading import NumberReading
+from evoclaims.judging.sample import Trials
+from evoclaims.judging.verdict import Bound, Interval, PValues
 
 
 @dataclass(frozen=True)
@@ -27,7 +25,7 @@ class Band(Assertion):
     9 <= hi). Refuted when a sign test puts the median below lo or above hi, each at alpha / 2.
     """
 
-    measure: Measure
+    measure: NumberReading
     lo: float
     hi: float
     kind: ClassVar[str] = "band"
@@ -43,14 +41,6 @@ class Band(Assertion):
     def describe(self) -> str:
         """Return "the median of A lies in [lo, hi]"."""
         return f"the median of {self.measure.describe()} lies in [{self.lo:g}, {self.hi:g}]"
-
-    def sources(self) -> tuple[Source, ...]:
-        """Return the condition."""
-        return (self.measure.source,)
-
-    def plain(self) -> dict[str, Any]:
-        """Return the kind, the measure and the ends."""
-        return {"kind": self.kind, "measure": self.measure.plain(), "lo": float(self.lo), "hi": float(self.hi)}
 
     def attainable(self, n: int, protocol: Protocol) -> PValues:
         """Return the p of all trials inside, and of all trials beyond one end."""
@@ -73,21 +63,15 @@ class Band(Assertion):
         below, above = self._outside(sample.values)
         n = len(sample.values)
         p, attainable = _p(below, above, n), self.attainable(n, protocol)
-        evidence = Evidence(
-            kind=self.kind,
-            describe=self.describe(),
-            outcome=p.outcome(alpha),
-            samples=(sample,),
-            n=n,
-            alpha=alpha,
-            p=p.supported,
-            attainable_p=attainable.supported,
-            p_refuted=p.refuted,
-            attainable_p_refuted=attainable.refuted,
-            intervals=(Interval("median, 95% percentile bootstrap", *median_interval(sample.values)),),
+        return self.found(
+            p,
+            attainable,
+            alpha,
+            (sample,),
             detail=f"{below} below, {n - below - above} inside, {above} above",
+            bounds=(Bound("lowest", float(self.lo)), Bound("highest", float(self.hi))),
+            intervals=(Interval("median, 95% percentile bootstrap", *median_interval(sample.values), on_axis=True),),
         )
-        return Finding(p, attainable, (evidence,))
 
     def _outside(self, values: Sequence[float]) -> tuple[int, int]:
         """Return how many values lie below and above the band."""

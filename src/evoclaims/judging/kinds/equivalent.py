@@ -4,19 +4,16 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import ClassVar
 
 from evoclaims.core.errors import UserError
 from evoclaims.judging.assertion import Assertion, Finding
-from evoclaims.judging.effect import a12, a12_interval, cliffs_delta
 from evoclaims.judging.exact import rank_attainable, rank_test
 from evoclaims.judging.kinds.greater import require_independent
 from evoclaims.judging.protocol import Protocol
-from evoclaims.judging.sample import Source, Trials
-from evoclaims.judging.verdict import Evidence, Interval, PValues
-
-if TYPE_CHECKING:
-    from evoclaims.judging.measure import Measure
+from evoclaims.judging.reading import NumberReading
+from evoclaims.judging.sample import Trials
+from evoclaims.judging.verdict import Bound, PValues
 
 
 @dataclass(frozen=True)
@@ -27,8 +24,8 @@ class Equivalent(Assertion):
     test finds one beyond the margin of the other; there are two such tests, so each is taken at alpha / 2.
     """
 
-    left: Measure
-    right: Measure
+    left: NumberReading
+    right: NumberReading
     margin: float
     kind: ClassVar[str] = "equivalent"
 
@@ -41,15 +38,6 @@ class Equivalent(Assertion):
     def describe(self) -> str:
         """Return "A is within m of B"."""
         return f"{self.left.describe()} is within {self.margin:g} of {self.right.describe()}"
-
-    def sources(self) -> tuple[Source, ...]:
-        """Return both conditions."""
-        return (self.left.source, self.right.source)
-
-    def plain(self) -> dict[str, Any]:
-        """Return the kind, both measures and the margin."""
-        measures = {"left": self.left.plain(), "right": self.right.plain()}
-        return {"kind": self.kind, **measures, "margin": float(self.margin)}
 
     def attainable(self, n: int, protocol: Protocol) -> PValues:
         """Return the p of complete separations; against, doubled for two tests."""
@@ -69,19 +57,5 @@ class Equivalent(Assertion):
             max(test.attainable_p for test in inside),
             min(1.0, 2 * min(test.attainable_p for test in outside)),
         )
-        evidence = Evidence(
-            kind=self.kind,
-            describe=self.describe(),
-            outcome=p.outcome(alpha),
-            samples=(left, right),
-            n=len(a),
-            alpha=alpha,
-            p=p.supported,
-            attainable_p=attainable.supported,
-            p_refuted=p.refuted,
-            attainable_p_refuted=attainable.refuted,
-            a12=a12(a, b),
-            cliffs_delta=cliffs_delta(a, b),
-            intervals=(Interval("A12, 95% percentile bootstrap", *a12_interval(a, b)),),
-        )
-        return Finding(p, attainable, (evidence,))
+        bounds = (Bound("margin", float(self.margin), on_axis=False),)
+        return self.found(p, attainable, alpha, (left, right), bounds=bounds, effect=True)

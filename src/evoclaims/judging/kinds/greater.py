@@ -5,22 +5,19 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import ClassVar
 
 from evoclaims.core.errors import UserError
 from evoclaims.judging.assertion import Assertion, Finding
-from evoclaims.judging.effect import a12, a12_interval, cliffs_delta
 from evoclaims.judging.exact import ExactTest, binomial_test, rank_attainable, rank_test
 from evoclaims.judging.protocol import Protocol
-from evoclaims.judging.sample import Source, Trials
-from evoclaims.judging.verdict import Evidence, Interval, PValues
-
-if TYPE_CHECKING:
-    from evoclaims.judging.measure import Measure
+from evoclaims.judging.reading import NumberReading
+from evoclaims.judging.sample import Trials
+from evoclaims.judging.verdict import Bound, PValues
 
 
 @dataclass(frozen=True)
-class Comparison:
+class GreaterTests:
     """The three exact tests that decide whether A lies above B.
 
     Attributes:
@@ -48,7 +45,7 @@ class Comparison:
         return PValues(self.above.attainable_p, min(self.below.attainable_p, self.margin.attainable_p))
 
 
-def compare(a: Sequence[float], b: Sequence[float], margin: float) -> Comparison:
+def compare(a: Sequence[float], b: Sequence[float], margin: float) -> GreaterTests:
     """Compare A with B exactly.
 
     Args:
@@ -61,7 +58,7 @@ def compare(a: Sequence[float], b: Sequence[float], margin: float) -> Comparison
     # However the pooled values were paired, a pair of equal values is a win: so ties bound the losses.
     commonest = Counter((*a, *b)).most_common(1)[0][1]
     most_losses = min(len(pairs), len(a) + len(b) - commonest)
-    return Comparison(
+    return GreaterTests(
         above=rank_test(a, b),
         below=rank_test(b, a),
         margin=ExactTest(
@@ -73,7 +70,7 @@ def compare(a: Sequence[float], b: Sequence[float], margin: float) -> Comparison
     )
 
 
-def require_independent(left: Measure, right: Measure) -> None:
+def require_independent(left: NumberReading, right: NumberReading) -> None:
     """Reject two measures of the same trials: a rank test takes its two samples as independent.
 
     Raises:
@@ -94,8 +91,8 @@ class Greater(Assertion):
     binomial test on disjoint seed pairs, ties counted as wins.
     """
 
-    above: Measure
-    below: Measure
+    above: NumberReading
+    below: NumberReading
     kind: ClassVar[str] = "greater"
 
     def __post_init__(self) -> None:
@@ -106,14 +103,6 @@ class Greater(Assertion):
         """Return "A > B"."""
         return f"{self.above.describe()} > {self.below.describe()}"
 
-    def sources(self) -> tuple[Source, ...]:
-        """Return both conditions."""
-        return (self.above.source, self.below.source)
-
-    def plain(self) -> dict[str, Any]:
-        """Return the kind and both measures."""
-        return {"kind": self.kind, "above": self.above.plain(), "below": self.below.plain()}
-
     def attainable(self, n: int, protocol: Protocol) -> PValues:
         """Return the p of a complete separation; against, also of no win in any pair."""
         separated = rank_attainable(n, n)
@@ -122,26 +111,11 @@ class Greater(Assertion):
     def find(self, trials: Trials, protocol: Protocol, alpha: float) -> Finding:
         """Run the three exact tests."""
         above, below = self.above.sample(trials), self.below.sample(trials)
-        a, b = above.values, below.values
-        comparison = compare(a, b, protocol.a12_margin)
-        p, attainable = comparison.p, comparison.attainable
-        evidence = Evidence(
-            kind=self.kind,
-            describe=self.describe(),
-            outcome=p.outcome(alpha),
-            samples=(above, below),
-            n=len(a),
-            alpha=alpha,
-            p=p.supported,
-            attainable_p=attainable.supported,
-            p_refuted=p.refuted,
-            attainable_p_refuted=attainable.refuted,
-            a12=a12(a, b),
-            cliffs_delta=cliffs_delta(a, b),
-            intervals=(Interval("A12, 95% percentile bootstrap", *a12_interval(a, b)),),
-            detail=(
-                f"at least as high in {comparison.wins} of {comparison.pairs} seed pairs "
-                f"(p = {comparison.margin.p:.3g} against A12 >= {protocol.a12_margin:g})"
-            ),
+        tests = compare(above.values, below.values, protocol.a12_margin)
+        detail = (
+            f"at least as high in {tests.wins} of {tests.pairs} seed pairs "
+            f"(p = {tests.margin.p:.3g} against A12 >= {protocol.a12_margin:g})"
         )
-        return Finding(p, attainable, (evidence,))
+        bounds = (Bound("A12 margin", protocol.a12_margin, on_axis=False),)
+        samples = (above, below)
+        return self.found(tests.p, tests.attainable, alpha, samples, detail=detail, bounds=bounds, effect=True)

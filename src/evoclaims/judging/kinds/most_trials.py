@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import ClassVar
 
 from evoclaims.core.errors import UserError
 from evoclaims.judging.assertion import Assertion, Finding
 from evoclaims.judging.exact import binomial_test, clopper_pearson
 from evoclaims.judging.protocol import Protocol
-from evoclaims.judging.sample import Source, Trials
-from evoclaims.judging.verdict import Evidence, Interval, PValues
-
-if TYPE_CHECKING:
-    from evoclaims.judging.measure import Event
+from evoclaims.judging.reading import EventReading
+from evoclaims.judging.sample import Trials
+from evoclaims.judging.verdict import Bound, Interval, PValues
 
 
 @dataclass(frozen=True)
@@ -25,7 +23,7 @@ class MostTrials(Assertion):
         p0: overrides the protocol's p0 when it is not None.
     """
 
-    event: Event
+    event: EventReading
     p0: float | None = None
 
     def __post_init__(self) -> None:
@@ -36,14 +34,6 @@ class MostTrials(Assertion):
     def describe(self) -> str:
         """Return "E in most trials"."""
         return f"{self.event.describe()} in most trials"
-
-    def sources(self) -> tuple[Source, ...]:
-        """Return the condition."""
-        return (self.event.source,)
-
-    def plain(self) -> dict[str, Any]:
-        """Return the kind, the event and the overriding p0."""
-        return {"kind": self.kind, "event": self.event.plain(), "p0": self.p0}
 
     def attainable(self, n: int, protocol: Protocol) -> PValues:
         """Return the p of n successes, and of none."""
@@ -61,21 +51,16 @@ class MostTrials(Assertion):
         sample = self.event.sample(trials)
         n, k = len(sample.values), round(sum(sample.values))
         p, attainable = self._p(k, n, protocol), self.attainable(n, protocol)
-        evidence = Evidence(
-            kind=self.kind,
-            describe=self.describe(),
-            outcome=p.outcome(alpha),
-            samples=(sample,),
-            n=n,
-            alpha=alpha,
-            p=p.supported,
-            attainable_p=attainable.supported,
-            p_refuted=p.refuted,
-            attainable_p_refuted=attainable.refuted,
-            intervals=(Interval("P(event), Clopper-Pearson, each end at 0.05", *clopper_pearson(k, n)),),
+        return self.found(
+            p,
+            attainable,
+            alpha,
+            (sample,),
             detail=f"holds in {k} of {n} trials, against p0 = {self._null(protocol):g}",
+            bounds=(Bound("p0", self._null(protocol)),),
+            intervals=(Interval("P(event), Clopper-Pearson, each end at 0.05", *clopper_pearson(k, n), on_axis=True),),
+            events=True,
         )
-        return Finding(p, attainable, (evidence,))
 
     def _null(self, protocol: Protocol) -> float:
         """Return the p0 in force."""

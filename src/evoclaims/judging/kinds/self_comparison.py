@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import combinations
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
@@ -14,11 +14,9 @@ from evoclaims.judging.assertion import Assertion, Finding
 from evoclaims.judging.exact import binomial_test, rank_attainable
 from evoclaims.judging.kinds.greater import compare
 from evoclaims.judging.protocol import Look, Protocol
-from evoclaims.judging.sample import Source, Trials
-from evoclaims.judging.verdict import Evidence, Outcome, PValues
-
-if TYPE_CHECKING:
-    from evoclaims.judging.measure import Measure
+from evoclaims.judging.reading import NumberReading
+from evoclaims.judging.sample import Trials
+from evoclaims.judging.verdict import Outcome, PValues
 
 MOST_SPLITS = math.comb(10, 5)
 SPLIT_SEED = 20250714
@@ -34,20 +32,12 @@ class SelfComparison(Assertion):
     says that the share of all splits exceeds alpha.
     """
 
-    measure: Measure
+    measure: NumberReading
     kind: ClassVar[str] = "self-comparison"
 
     def describe(self) -> str:
         """Return "A is never judged above itself"."""
         return f"{self.measure.describe()} is never judged above itself"
-
-    def sources(self) -> tuple[Source, ...]:
-        """Return the condition."""
-        return (self.measure.source,)
-
-    def plain(self) -> dict[str, Any]:
-        """Return the kind and the measure."""
-        return {"kind": self.kind, "measure": self.measure.plain()}
 
     def looks(self, protocol: Protocol) -> tuple[Look, ...]:
         """Return the last look alone: the control has no trial to save."""
@@ -72,21 +62,8 @@ class SelfComparison(Assertion):
         excessive = above / judged > alpha
         if math.comb(n, n // 2) > MOST_SPLITS:
             excessive = binomial_test(above, judged, alpha, "greater").p <= alpha
-        p = PValues(1.0, 0.0) if excessive else PValues(0.0, 1.0)
-        evidence = Evidence(
-            kind=self.kind,
-            describe=self.describe(),
-            outcome=p.outcome(alpha),
-            samples=(sample,),
-            n=n,
-            alpha=alpha,
-            p=None,
-            attainable_p=None,
-            p_refuted=None,
-            attainable_p_refuted=None,
-            detail=f"{above} of {judged} splits into halves came out supported (share {above / judged:.3g})",
-        )
-        return Finding(p, PValues(0.0, 0.0), (evidence,))
+        detail = f"{above} of {judged} splits into halves came out supported (share {above / judged:.3g})"
+        return self.fact(not excessive, alpha, sample, detail)
 
 
 def _halves(n: int) -> Iterator[tuple[int, ...]]:

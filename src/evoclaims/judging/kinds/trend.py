@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import ClassVar
 
 from evoclaims.core.errors import UnknownNameError
 from evoclaims.judging.assertion import Assertion, Finding
-from evoclaims.judging.kendall import Direction, trend_attainable, trend_test
+from evoclaims.judging.kendall import Slope, trend_attainable, trend_test
 from evoclaims.judging.protocol import Protocol
-from evoclaims.judging.sample import Source, Trials
-from evoclaims.judging.verdict import Evidence, PValues
+from evoclaims.judging.reading import LevelsReading
+from evoclaims.judging.sample import Trials
+from evoclaims.judging.verdict import PValues
 
-if TYPE_CHECKING:
-    from evoclaims.judging.measure import Profile
-
-_OPPOSITE: dict[Direction, Direction] = {"falls": "rises", "rises": "falls"}
+_OPPOSITE: dict[Slope, Slope] = {"falls": "rises", "rises": "falls"}
 
 
 @dataclass(frozen=True)
@@ -25,8 +23,8 @@ class Trend(Assertion):
     Refuted by the same test the other way.
     """
 
-    profile: Profile
-    direction: Direction
+    profile: LevelsReading
+    direction: Slope
     kind: ClassVar[str] = "trend"
 
     def __post_init__(self) -> None:
@@ -37,14 +35,6 @@ class Trend(Assertion):
     def describe(self) -> str:
         """Return "P falls with the level"."""
         return f"{self.profile.describe()} {self.direction} with the level"
-
-    def sources(self) -> tuple[Source, ...]:
-        """Return the condition."""
-        return (self.profile.source,)
-
-    def plain(self) -> dict[str, Any]:
-        """Return the kind, the profile and the direction."""
-        return {"kind": self.kind, "profile": self.profile.plain(), "direction": self.direction}
 
     def attainable(self, n: int, protocol: Protocol) -> PValues:
         """Return the p of a strict trend in every trial, either way."""
@@ -70,16 +60,4 @@ class Trend(Assertion):
         rows = self.profile.rows(trials)
         test, reverse = trend_test(rows, self.direction), trend_test(rows, _OPPOSITE[self.direction])
         p, attainable = PValues(test.p, reverse.p), PValues(test.attainable_p, reverse.attainable_p)
-        evidence = Evidence(
-            kind=self.kind,
-            describe=self.describe(),
-            outcome=p.outcome(alpha),
-            samples=self.profile.samples(trials),
-            n=len(rows),
-            alpha=alpha,
-            p=p.supported,
-            attainable_p=attainable.supported,
-            p_refuted=p.refuted,
-            attainable_p_refuted=attainable.refuted,
-        )
-        return Finding(p, attainable, (evidence,))
+        return self.found(p, attainable, alpha, self.profile.samples(trials))

@@ -1,0 +1,156 @@
+"""What is read from each trial of a condition, lazily: a number, an event, or a vector over levels."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Literal, get_args
+
+from evoclaims.core.errors import UnknownNameError, UserError
+from evoclaims.judging.sample import (
+    Sample,
+    Source,
+    Trials,
+    UnreadableTrialError,
+    checked,
+    is_failed,
+    ranked,
+    read_number,
+    sample,
+)
+from evoclaims.trials.result import TrialResult
+
+Better = Literal["higher", "lower"]
+
+
+@dataclass(frozen=True, eq=False)
+class Reading:
+    """Something that can be read from every trial of a condition.
+
+    Attributes:
+        source: the condition.
+        name: what is read, such as "mean success"; part of the claim's fingerprint, since a function has no canonical
+            form.
+    """
+
+    source: Source
+    name: str
+
+    def describe(self) -> str:
+        """Return "condition: name"."""
+        return f"{self.source.label}: {self.name}"
+
+    def plain(self) -> dict[str, Any]:
+        """Return what the fingerprint hashes."""
+        return {"condition": self.source.fingerprint, "name": self.name}
+
+
+@dataclass(frozen=True, eq=False)
+class NumberReading(Reading):
+    """One number a trial.
+
+    Attributes:
+        read: finds the number in a finished trial.
+        better: "higher" or "lower"; a failed trial takes the worst value, -inf or +inf.
+    """
+
+    read: Callable[[TrialResult], float]
+    better: Better = "higher"
+
+    def __post_init__(self) -> None:
+        """Reject an unknown direction."""
+        _worst(self.better)
+
+    def plain(self) -> dict[str, Any]:
+        """Return what the fingerprint hashes."""
+        return {**super().plain(), "better": self.better}
+
+    def sample(self, trials: Trials) -> Sample:
+        """Read the number from every trial of the condition.
+
+        Raises:
+            UnreadableTrialError: when a finished trial holds NaN.
+        """
+        mine, worst = trials[self.source.fingerprint], _worst(self.better)
+        return sample(self.describe(), mine, [read_number(t, self.describe(), self.read, worst) for t in mine])
+
+
+@dataclass(frozen=True, eq=False)
+class EventReading(Reading):
+    """Something that holds in a trial or does not; never in a failed trial, which supports nothing.
+
+    Attributes:
+        holds: looks whether it holds in a finished trial.
+    """
+
+    holds: Callable[[TrialResult], bool]
+
+    def sample(self, trials: Trials) -> Sample:
+        """Return 1.0 for every trial in which the event holds, 0.0 for the others.
+
+        Raises:
+            UnreadableTrialError: when the event looks at a NaN of a finished trial.
+        """
+        mine = trials[self.source.fingerprint]
+        return sample(self.describe(), mine, [float(not is_failed(t) and bool(self.holds(checked(t)))) for t in mine])
+
+
+@dataclass(frozen=True, eq=False)
+class LevelsReading(Reading):
+    """One vector over levels a trial.
+
+    Attributes:
+        read: finds the vector in a finished trial, shape [size].
+        size: number of levels, at least 2; known beforehand, so that the attainable p is too.
+        better: "higher" or "lower"; a failed trial has the worst value at every level.
+    """
+
+    read: Callable[[TrialResult], tuple[float, ...]]
+    size: int
+    better: Better = "higher"
+
+    def __post_init__(self) -> None:
+        """Reject an unknown direction and a vector without levels to compare."""
+        _worst(self.better)
+        if self.size < 2:
+            raise UserError(f"A profile has at least 2 levels; {self.describe()!r} has {self.size}.")
+
+    def plain(self) -> dict[str, Any]:
+        """Return what the fingerprint hashes."""
+        return {**super().plain(), "size": self.size, "better": self.better}
+
+    def rows(self, trials: Trials) -> tuple[tuple[float, ...], ...]:
+        """Read the vector from every trial of the condition, shape [n, size].
+
+        Raises:
+            UnreadableTrialError: when a finished trial holds NaN, or a vector of another length.
+        """
+        return tuple(self.row(trial) for trial in trials[self.source.fingerprint])
+
+    def samples(self, trials: Trials) -> tuple[Sample, ...]:
+        """Return one record a level."""
+        mine, columns = trials[self.source.fingerprint], zip(*self.rows(trials), strict=True)
+        return tuple(sample(f"{self.describe()} at level {at}", mine, column) for at, column in enumerate(columns))
+
+    def row(self, trial: TrialResult) -> tuple[float, ...]:
+        """Return the vector of one trial; a failed trial is worst everywhere."""
+        if is_failed(trial):
+            return (_worst(self.better),) * self.size
+        row = tuple(ranked(float(value), trial, self.describe()) for value in self.read(checked(trial)))
+        if len(row) != self.size:
+            raise UnreadableTrialError(
+                f"{self.describe()} has {len(row)} levels instead of {self.size} in the trial of seed {trial.seed}."
+            )
+        return row
+
+
+def _worst(better: Better) -> float:
+    """Return the value of a failed trial.
+
+    Raises:
+        UnknownNameError: for another direction.
+    """
+    if better not in get_args(Better):
+        raise UnknownNameError("direction of better", better, get_args(Better))
+    return -math.inf if better == "higher" else math.inf
