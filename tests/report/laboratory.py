@@ -25,7 +25,7 @@ from evoclaims.methods.neat.settings import Settings, Species
 from evoclaims.paper.archive import Archive
 from evoclaims.paper.reproduction import Reproduction, Tier
 from evoclaims.report.build import gather
-from evoclaims.report.model import Page, Plate, Section
+from evoclaims.report.model import Page, PaperFigure, Section
 from evoclaims.trials.budget import Budget
 from evoclaims.trials.result import TrialResult, digest
 from evoclaims.trials.result_making import named_leaves
@@ -131,7 +131,7 @@ class Laboratory:
         self,
         *reports: ClaimReport,
         history: History | None = None,
-        plates: Sequence[Plate] = (),
+        figures: Sequence[PaperFigure] = (),
         sentences: dict[str, str] | None = None,
     ) -> Page:
         """Gather reports by their tiers."""
@@ -142,7 +142,7 @@ class Laboratory:
             self.archive,
             history or {},
             sentences=sentences or {},
-            plates=plates,
+            figures=figures,
             generated="Written by a test.",
         )
 

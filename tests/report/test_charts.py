@@ -14,7 +14,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from evoclaims.report.charts import MOST_DOTS, WIDTH, axis_svg, curve_symbol, strip_svg, ticks
-from evoclaims.report.evidence import Dot, Part, Span, Strip
+from evoclaims.report.evidence import Dot, Part, Strip
 from evoclaims.report.training_curves import CurvePanel, Line
 
 finite = st.floats(allow_nan=False, allow_infinity=False)

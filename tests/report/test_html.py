@@ -15,9 +15,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from laboratory import HERE, Laboratory, better_solves, better_wins
 
+from evoclaims.judging.verdict import Outcome
 from evoclaims.report.formatting import clean
 from evoclaims.report.html import html
-from evoclaims.report.model import Page, Plate
+from evoclaims.report.model import Page, PaperFigure
 from evoclaims.verdicts.claim_report import ClaimReport
 
 HOSTILE = '</section><script>alert(1)</script><img src=x onerror="alert(2)">\'"&amp;{{ 7 * 7 }}\x00\ud800\u202e'
@@ -61,13 +62,10 @@ def bench(tmp_path_factory: pytest.TempPathFactory) -> tuple[Laboratory, ClaimRe
 def _page(lab: Laboratory, report: ClaimReport, text: str) -> Page:
     """Return a page in which a text stands wherever texts come from files."""
     assert report.verdict is not None
-    (evidence,) = report.verdict["evidence"]
-    samples = [{**sample, "label": f"{sample['label']} {text}"} for sample in evidence["samples"]]
-    verdict = {
-        **report.verdict,
-        "describe": text,
-        "evidence": [{**evidence, "describe": text, "detail": text, "samples": samples}],
-    }
+    (evidence,) = report.verdict.evidence
+    samples = tuple(replace(sample, label=f"{sample.label} {text}") for sample in evidence.samples)
+    parts = (replace(evidence, describe=text, detail=text, samples=samples),)
+    verdict = replace(report.verdict, describe=text, evidence=parts)
     changed = replace(
         report,
         claim=f"T {text}",
@@ -76,9 +74,9 @@ def _page(lab: Laboratory, report: ClaimReport, text: str) -> Page:
         where=f"§1 {text}",
         reason=text,
         because=text,
-        expected="supported",
+        expected=Outcome.SUPPORTED,
         verdict=verdict,
-        sources=({**report.sources[0], "method": f"better {text}"}, report.sources[1]),
+        sources=(replace(report.sources[0], method=f"better {text}"), report.sources[1]),
     )
     return lab.page(changed, sentences={changed.name: f"paper {text}"})
 
@@ -137,8 +135,8 @@ def test_the_policy_allows_this_script_and_this_style_alone(bench: tuple[Laborat
 
 
 def test_nothing_comes_from_outside(bench: tuple[Laboratory, ClaimReport]) -> None:
-    plate = Plate("Fig. 1", "says", b'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 1 1"/>')
-    parsed = Parsed(html(bench[0].page(bench[1], plates=[plate])))
+    figure = PaperFigure("Fig. 1", "says", b'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 1 1"/>')
+    parsed = Parsed(html(bench[0].page(bench[1], figures=[figure])))
     addresses = [value for name in ("src", "href", "action", "srcset", "data") for value in parsed.values(name)]
     assert len(addresses) >= 10
     assert all(address.startswith(("#", "data:")) for address in addresses)

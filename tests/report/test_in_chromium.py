@@ -10,7 +10,7 @@ from chromium import NAMES, Chromium, found
 from laboratory import Laboratory, better_solves, better_wins
 
 from evoclaims.report.html import html
-from evoclaims.report.model import Plate
+from evoclaims.report.model import PaperFigure
 
 PLATE = (
     b'<svg xmlns="http://www.w3.org/2000/svg" width="40" height="30" viewBox="0 0 40 30">'
@@ -67,7 +67,7 @@ def address(tmp_path_factory: pytest.TempPathFactory) -> str:
     ]
     empty = Laboratory(folder / "empty")
     reports.append(empty.judge(better_solves, id="C1", where="control"))
-    page = lab.page(*reports, plates=[Plate("Fig. 3", "says", PLATE)])
+    page = lab.page(*reports, figures=[PaperFigure("Fig. 3", "says", PLATE)])
     path = folder / "index.html"
     path.write_text(html(page), encoding="utf-8")
     return path.as_uri()

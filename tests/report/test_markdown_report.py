@@ -11,7 +11,8 @@ from laboratory import HERE, Laboratory, better_solves, better_wins
 from markdown_it import MarkdownIt
 
 from evoclaims.report.formatting import clean
-from evoclaims.report.markdown import literal, markdown
+from evoclaims.report.markdown import markdown
+from evoclaims.report.markdown_text import literal
 
 READER = MarkdownIt("commonmark").enable(["table", "strikethrough"])
 
@@ -40,7 +41,7 @@ def test_the_report_has_the_scoreboard_and_every_claim(filled: Laboratory) -> No
     text = markdown(filled.page(*reports, sentences={"T2": "It is solved"}))
     assert text.startswith("# A Tiny Paper\n")
     assert "| full | 1 | 0 | 0 | 0 | 0 | 0 |" in text
-    assert "| [T1](#T1-full) | §1.2, Fig. 3 | ✓ supported | 6 | 1 | 0.0011 (0.0011) |" in text
+    assert "| [T1](#T1-full) | §1.2, Fig. 3 | ✓ supported | 6 | 1.00 | 0.0011 (0.0011) |" in text
     assert "> It is solved\n>\n> §1.2, Fig. 3\n\nJudged at this tier: In small" in text
     assert "Made by: 12 trials on cpu, aaaaaaaaa, clean" in text
     assert text.count("<a id=") == 2

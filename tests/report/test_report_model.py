@@ -17,7 +17,7 @@ from evoclaims.paper.archive import Archive
 from evoclaims.report.build import gather
 from evoclaims.report.champion import typical
 from evoclaims.report.formatting import Anchors
-from evoclaims.report.model import Champion
+from evoclaims.report.model import ShownChampion
 from evoclaims.report.trial_summary import Reader
 from evoclaims.verdicts.history import Entry
 
@@ -26,11 +26,8 @@ def test_a_section_holds_what_was_claimed_judged_and_looked_at(filled: Laborator
     report = filled.judge(better_wins, case="small")
     page = filled.page(report)
     section = page.sections[0]
-    assert (section.anchor, section.name, section.places) == ("T1-small-full", "T1[small]", ("§1.2",))
-    assert (section.outcome, section.n, section.methods) == (Outcome.SUPPORTED, 6, ("better", "worse"))
-    assert section.p == section.attainable_p == pytest.approx(1 / 924)
-    assert section.a12 == 1.0
-    assert [(look.n, look.alpha) for look in section.looks] == [(6, 0.05)]
+    assert section.report == report
+    assert (section.anchor, section.places, section.methods) == ("T1-small-full", ("§1.2",), ("better", "worse"))
     (part,) = section.parts
     labels = [f"{method} on small: mean success over levels" for method in ("better", "worse")]
     assert [strip.label for strip in part.strips] == labels
@@ -60,16 +57,16 @@ def test_claims_stand_in_the_order_of_the_paper(filled: Laboratory) -> None:
         for name, where in (("C1", "control"), ("G10", "§5.2"), ("G2", "§5.2"), ("A1", "§5.10"), ("Z1", "§4"))
     ]
     page = filled.page(*reports)
-    assert [section.name for section in page.sections] == ["Z1", "G2", "G10", "A1", "C1"]
+    assert [section.report.name for section in page.sections] == ["Z1", "G2", "G10", "A1", "C1"]
     assert list(page.boards[0].by_place) == ["§4", "§5.2", "§5.10", "control"]
 
 
 def test_a_smaller_tier_shows_the_papers_own_sentence_too(filled: Laboratory) -> None:
     report = filled.judge(better_wins, tier="smoke")
     section = filled.section(report, sentences={"T1": "Better is better"})
-    assert (section.paper, section.statement) == ("Better is better", "In small")
+    assert (section.paper, section.report.statement) == ("Better is better", "In small")
     full = filled.section(filled.judge(better_wins), sentences={"T1": "Better is better"})
-    assert (full.paper, full.statement) == ("", "Better is better")
+    assert (full.paper, full.report.statement) == ("", "Better is better")
 
 
 def test_diverged_trials_stand_apart_and_are_said(lab: Laboratory) -> None:
@@ -99,11 +96,11 @@ def test_a_nan_is_an_error_that_shows_which_trial_holds_it(lab: Laboratory) -> N
     lab.put("worse", [0.1] * 6)
     page = lab.page(lab.judge(better_wins))
     section = page.sections[0]
-    assert section.outcome is Outcome.ERROR
-    assert "NaN in the finished trial of seed 2" in section.reason
+    assert section.report.outcome is Outcome.ERROR
+    assert "NaN in the finished trial of seed 2" in section.report.reason
     assert section.parts[0].strips[0].apart == ((2, "NaN"),)
     assert "The mean success of finished trials is NaN (seeds 2)." in section.warnings
-    assert page.notices == (f"1 claim ended in error. {section.reason}",)
+    assert page.notices == (f"1 claim ended in error. {section.report.reason}",)
 
 
 def test_trials_from_mixed_devices_and_changed_code_are_said(lab: Laboratory) -> None:
@@ -135,8 +132,8 @@ def test_a_claim_without_trials_says_why(lab: Laboratory) -> None:
     lab.put("better", [1.0] * 2)
     page = lab.page(lab.judge(better_solves))
     section = page.sections[0]
-    assert section.outcome is Outcome.NOT_RUN
-    assert section.reason == "4 of 6 trials of hand_built on n_parity are missing"
+    assert section.report.outcome is Outcome.NOT_RUN
+    assert section.report.reason == "4 of 6 trials of hand_built on n_parity are missing"
     assert (section.parts, section.conditions, section.made) == ((), (), ())
     assert page.notices[0].startswith("No claim has been judged: neither the store nor the committed reference trials")
 
@@ -149,7 +146,7 @@ def test_a_store_of_another_schema_version_is_said(filled: Laboratory) -> None:
     path = next(filled.store.record_paths())
     path.write_text(json.dumps({**json.loads(path.read_text()), "schema": 2}))
     page = filled.page(filled.judge(better_wins))
-    assert page.sections[0].outcome is Outcome.ERROR
+    assert page.sections[0].report.outcome is Outcome.ERROR
     assert "its schema is 2 and this version of evoclaims reads schema 1" in page.notices[0]
 
 
@@ -163,8 +160,7 @@ def test_a_record_that_breaks_after_judging_is_said_and_left_out(filled: Laborat
 
 def test_the_history_says_when_rules_changed_and_what_differs_now(filled: Laboratory) -> None:
     report = filled.judge(better_wins)
-    assert report.verdict is not None
-    now = report.verdict["fingerprint"]
+    now = report.fingerprint
 
     def entry(outcome: Outcome, fingerprint: str, date: str) -> Entry:
         return Entry(outcome, "why", 6, 0.5, fingerprint, date, {"jax": "0.10.2"}, "cpu", "a" * 40 + "-dirty", "")
@@ -175,7 +171,7 @@ def test_the_history_says_when_rules_changed_and_what_differs_now(filled: Labora
         return filled.section(report, history={("full", "T1"): entries})
 
     section = shown(old, same)
-    assert [(one.date, one.outcome, one.new_rules) for one in section.history] == [
+    assert [(one.entry.accepted, one.entry.outcome, one.new_rules) for one in section.history] == [
         ("2026-01-01", "supported", False),
         ("2026-02-02", "refuted", True),
     ]
@@ -230,7 +226,7 @@ def test_the_first_drawing_of_a_champion_that_can_be_made_is_taken(lab: Laborato
     lab.put_genomes([1.0] * 6)
     report = lab.judge(neat_solves)
 
-    def champion(*draws: Any) -> Champion:
+    def champion(*draws: Any) -> ShownChampion:
         page = gather(lab.reproduction, {"full": [report]}, lab.archive, {}, sentences={}, draws=draws)
         (condition,) = page.conditions.values()
         return condition.champion

@@ -11,7 +11,7 @@ import pytest
 from laboratory import CONDITIONS, Laboratory, record
 
 from evoclaims.report.training_curves import MOST_LINES, CurvePanel, panels
-from evoclaims.report.trial_summary import POINTS, Glance, Reader
+from evoclaims.report.trial_summary import POINTS, TrialSummary, Reader
 
 
 @pytest.fixture
@@ -19,7 +19,7 @@ def read(tmp_path: Path) -> Any:
     """A function that stores one trial for each set of curves, each time afresh, and looks at them."""
     times = itertools.count()
 
-    def look(*curves: dict[str, Any]) -> tuple[Glance, ...]:
+    def look(*curves: dict[str, Any]) -> tuple[TrialSummary, ...]:
         lab = Laboratory(tmp_path / str(next(times)))
         made = [record(CONDITIONS["better", "small"], seed, 1.0, curves=one) for seed, one in enumerate(curves)]
         for trial in made:

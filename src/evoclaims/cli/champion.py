@@ -17,13 +17,14 @@ from evoclaims.core.errors import UnknownNameError, UserError
 from evoclaims.networks import export, picture
 from evoclaims.networks.genome import Genome
 from evoclaims.networks.graph import GraphNetwork
+from evoclaims.report.champion import network_panels
 from evoclaims.report.console import PlainSpokenConsole
 from evoclaims.trials import champions, devices
 from evoclaims.trials.champions import Replay
 
 
 @dataclass(frozen=True)
-class Subject:
+class ExportedGenome:
     """A champion that is a genome, as the forms of export take it.
 
     Attributes:
@@ -64,7 +65,7 @@ def main(options: argparse.Namespace) -> int:
                 f"write as {options.form}. Leave --as out to replay it; its arrays are in "
                 f"{trial.file}."
             )
-        made = FORMS[options.form](Subject(trial, network))
+        made = FORMS[options.form](ExportedGenome(trial, network))
     replay = champions.replay(trial.condition, trial.result, trial.parameters, chosen)
     print(f"{trial.title}\n  {describe(trial.result)}")
     PlainSpokenConsole(file=styled()).print(_table(replay))
@@ -77,31 +78,19 @@ def main(options: argparse.Namespace) -> int:
     return int(not replay.exact)
 
 
-def _json(subject: Subject) -> bytes:
+def _json(exported: ExportedGenome) -> bytes:
     """Return the genome as JSON."""
-    return export.to_json(subject.genome, subject.network).encode()
+    return export.to_json(exported.genome, exported.network).encode()
 
 
-def _picture(file_format: picture.Format) -> Callable[[Subject], bytes]:
-    """Return the function that draws a subject's network, and beside it the one that it draws on a substrate."""
-
-    def drawn(subject: Subject) -> bytes:
-        graph = export.to_networkx(subject.genome, subject.network)
-        drawing = champions.substrate_of(subject.trial.condition, subject.genome)
-        if drawing is None:
-            panel = picture.network_panel(graph, subject.network, "the network that evolved")
-            return picture.draw([panel], subject.title, file_format)
-        ends = ("x₁", "y₁", "x₂", "y₂"), ("q",)
-        panels = [
-            picture.network_panel(graph, subject.network, "the CPPN that evolved", *ends),
-            picture.substrate_panel(*drawing, "the network that it draws"),
-        ]
-        return picture.draw(panels, subject.title, file_format)
-
-    return drawn
+def _picture(file_format: picture.Format) -> Callable[[ExportedGenome], bytes]:
+    """Return the function that draws a champion's network, and beside it the one that it draws on a substrate."""
+    return lambda exported: picture.draw(
+        network_panels(exported.trial.condition, exported.network, exported.genome), exported.title, file_format
+    )
 
 
-FORMS: Mapping[str, Callable[[Subject], bytes]] = {"json": _json, "svg": _picture("svg"), "png": _picture("png")}
+FORMS: Mapping[str, Callable[[ExportedGenome], bytes]] = {"json": _json, "svg": _picture("svg"), "png": _picture("png")}
 
 
 def _table(replay: Replay) -> Table:

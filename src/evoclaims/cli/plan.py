@@ -11,6 +11,7 @@ from rich.table import Table
 from evoclaims.cli.project import judge_stored, open_project, open_store
 from evoclaims.cli.terminal import styled
 from evoclaims.core.errors import UserError
+from evoclaims.judging.verdict import Outcome
 from evoclaims.paper.cost import Pace, known_pace, measured_pace
 from evoclaims.paper.reproduction import Tier
 from evoclaims.report.console import PlainSpokenConsole
@@ -29,7 +30,7 @@ def main(options: argparse.Namespace) -> int:
     chosen = devices.choose(options.device)
     kind = options.like or chosen[0].device_kind
     reports = judge_stored(config, options.storage, options.tier)
-    used = sorted({(source["method"], source["task"]) for report in reports for source in report.sources})
+    used = sorted({(source.method, source.task) for report in reports for source in report.sources})
 
     def pace(condition: Condition, method: str, task: str) -> Pace | None:
         known = known_pace(condition, store, reproduction.references, options.tier, method, task, kind)
@@ -92,13 +93,14 @@ def _claims(reports: Sequence[ClaimReport]) -> Table:
         table.add_column(heading, justify="left" if heading == "claim" else "right")
     for report in reports:
         for look in report.attainable:
-            reach = [word for word in ("supported", "refuted") if look[word] <= look["alpha"]]
+            smallest = {Outcome.SUPPORTED: look.supported, Outcome.REFUTED: look.refuted}
+            reach = [outcome for outcome, p in smallest.items() if p <= look.alpha]
             table.add_row(
                 escape(report.name),
-                str(look["n"]),
-                f"{look['alpha']:g}",
-                f"{look['supported']:.2g}",
-                f"{look['refuted']:.2g}",
+                str(look.n),
+                f"{look.alpha:g}",
+                f"{look.supported:.2g}",
+                f"{look.refuted:.2g}",
                 " or ".join(reach) or "no",
             )
     return table

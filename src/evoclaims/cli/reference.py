@@ -22,7 +22,7 @@ def main(options: argparse.Namespace) -> int:
     config, reproduction = open_project()
     tier, store = reproduction.tier(options.tier, options.variant), open_store(options.storage)
     reports = judge_stored(config, options.storage, options.tier, options.variant)
-    used = sorted({(source["method"], source["task"]) for report in reports for source in report.sources})
+    used = sorted({(source.method, source.task) for report in reports for source in report.sources})
     if options.variant:
         changes = reproduction.variants[options.variant].conditions.get(options.tier, {})
         used = [names for names in used if names in changes]

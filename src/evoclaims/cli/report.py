@@ -18,12 +18,12 @@ from evoclaims.envs.ecorobot.views import pictures
 from evoclaims.paper.archive import Archive
 from evoclaims.paper.config import SuiteConfig
 from evoclaims.paper.reproduction import Reproduction
-from evoclaims.report import terminal_table
+from evoclaims.report import table_cells
 from evoclaims.report.build import gather
 from evoclaims.report.champion import network
 from evoclaims.report.html import html
 from evoclaims.report.markdown import markdown
-from evoclaims.report.paper_figures import plates
+from evoclaims.report.paper_figures import paper_figures
 from evoclaims.trials import devices
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.spec import Condition
@@ -49,7 +49,7 @@ def main(options: argparse.Namespace) -> int:
         for tier in shown
         for row in _robustness(config, reproduction, options.storage, tier, verdicts[tier], archive)
     ]
-    drawn, missing = plates(reproduction, archive, shown[0])
+    drawn, missing = paper_figures(reproduction, archive, shown[0])
     page = gather(
         reproduction,
         {tier: verdicts[tier] for tier in shown},
@@ -57,7 +57,7 @@ def main(options: argparse.Namespace) -> int:
         history.load(reproduction.folder / history.FILE),
         sentences={report.name: report.statement for report in verdicts[tiers[0]]},
         draws=(trajectory, network) if options.trajectories else (network,),
-        plates=drawn,
+        figures=drawn,
         missing=missing,
         robustness=robustness,
         generated=f"Written on {datetime.now(UTC):%Y-%m-%d %H:%M} UTC by evoclaims {metadata.version('evoclaims')}.",
@@ -67,7 +67,7 @@ def main(options: argparse.Namespace) -> int:
         write(folder / name, text.encode())
         print(f"wrote {folder / name}")
     for board in page.boards:
-        print(f"claims ({board.tier}): {terminal_table.totals(verdicts[board.tier])}")
+        print(f"claims ({board.tier}): {table_cells.totals(verdicts[board.tier])}")
     return 0
 
 

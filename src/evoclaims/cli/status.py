@@ -8,7 +8,7 @@ from rich.console import Console
 
 from evoclaims.cli.project import judge_stored, open_project
 from evoclaims.cli.terminal import styled
-from evoclaims.report import terminal_table
+from evoclaims.report import table_cells, terminal_table
 
 
 def main(options: argparse.Namespace) -> int:
@@ -20,7 +20,7 @@ def main(options: argparse.Namespace) -> int:
     for part in (
         terminal_table.verdict_table(reports, console.width, console.is_terminal),
         terminal_table.explanations(reports, console.width, console.is_terminal),
-        f"claims ({options.tier}): {terminal_table.totals(reports)}",
+        f"claims ({options.tier}): {table_cells.totals(reports)}",
     ):
         if part:
             print(part, file=styled())

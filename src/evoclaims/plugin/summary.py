@@ -137,7 +137,7 @@ class Summary:
             for trouble in [*self._troubles, *self._died]:
                 terminalreporter.write_line(self._said(f"ERROR: {trouble}"), red=True)
             return
-        from evoclaims.report import terminal_table
+        from evoclaims.report import table_cells, terminal_table
 
         writer = self._config.get_terminal_writer()
         width, colour = writer.fullwidth, writer.hasmarkup
@@ -158,7 +158,7 @@ class Summary:
         for warning in (*warnings, self._write_step_summary(notes)):
             if warning:
                 terminalreporter.write_line(self._said(f"warning: {warning}"), yellow=True)
-        terminalreporter.write_line(f"claims: {terminal_table.totals(self.reports)}", bold=True)
+        terminalreporter.write_line(f"claims: {table_cells.totals(self.reports)}", bold=True)
         if not any(report.n for report in self.reports):
             what = "No trial was looked at" if self._judged else "No claim was judged"
             terminalreporter.write_line(f"{what}: nothing was measured.", red=True)

@@ -4,26 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from evoclaims.judging.verdict import Outcome
-from evoclaims.report.formatting import clean
-from evoclaims.report.model import Accepted
+from evoclaims.report.model import AcceptedVerdict
+from evoclaims.verdicts.acceptance import UNDECIDED
 from evoclaims.verdicts.claim_report import ClaimReport
 from evoclaims.verdicts.history import Entry, eras
 
 
-def accepted(entries: Sequence[Entry]) -> tuple[Accepted, ...]:
+def accepted(entries: Sequence[Entry]) -> tuple[AcceptedVerdict, ...]:
     """Return accepted verdicts as they are shown, oldest first."""
     return tuple(
-        Accepted(
-            date=clean(entry.accepted),
-            outcome=entry.outcome,
-            n=entry.n,
-            p=entry.p,
-            reason=clean(entry.reason),
-            fingerprint=clean(entry.fingerprint),
+        AcceptedVerdict(
+            entry,
             new_rules=number > 0 and index == 0,
-            made=clean(f"{entry.device}, revision {_short(entry.revision)}"),
-            versions=clean(", ".join(f"{name} {version}" for name, version in sorted(entry.versions.items()))),
+            made=f"{entry.device}, revision {_short(entry.revision)}",
+            versions=", ".join(f"{name} {version}" for name, version in sorted(entry.versions.items())),
         )
         for number, era in enumerate(eras(entries))
         for index, entry in enumerate(era)
@@ -32,13 +26,13 @@ def accepted(entries: Sequence[Entry]) -> tuple[Accepted, ...]:
 
 def change(entries: Sequence[Entry], report: ClaimReport) -> str:
     """Say what differs from the verdict that was accepted last; nothing where that cannot be told."""
-    if not entries or report.verdict is None or report.outcome in (Outcome.NOT_RUN, Outcome.ERROR):
+    if not entries or report.verdict is None or report.outcome in UNDECIDED:
         return ""
     last = entries[-1]
-    if last.fingerprint != report.verdict["fingerprint"]:
-        return f"What was fixed beforehand has changed since {clean(last.accepted)}: a new history begins."
+    if last.fingerprint != report.fingerprint:
+        return f"What was fixed beforehand has changed since {last.accepted}: a new history begins."
     if last.outcome != report.outcome:
-        return f"Accepted on {clean(last.accepted)} as {last.outcome}; now {report.outcome}."
+        return f"Accepted on {last.accepted} as {last.outcome}; now {report.outcome}."
     return ""
 
 

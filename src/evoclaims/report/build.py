@@ -15,12 +15,12 @@ from evoclaims.report import accepted_history, origin, training_curves
 from evoclaims.report.champion import Draw, champion_of, network
 from evoclaims.report.evidence import Part, judged_part, unjudged_part
 from evoclaims.report.formatting import Anchors, clean, counted, listed, place_key, places, plural
-from evoclaims.report.model import Board, Champion, Conditions, Look, Page, Plate, Section
-from evoclaims.report.trial_summary import Glance, Reader
+from evoclaims.report.model import Board, ConditionTrials, Page, PaperFigure, Section, ShownChampion
+from evoclaims.report.trial_summary import Reader, TrialSummary
 from evoclaims.verdicts.claim_report import ClaimReport
-from evoclaims.verdicts.history import History, key_of
+from evoclaims.verdicts.history import History, in_order, key_of
 from evoclaims.verdicts.robustness import Robustness
-from evoclaims.verdicts.versions import installed_for
+from evoclaims.verdicts.source_trials import SourceTrials
 
 Verdicts = Mapping[str, Sequence[ClaimReport]]
 """Reports by tier, in the order in which tiers are shown."""
@@ -34,7 +34,7 @@ def gather(
     *,
     sentences: Mapping[str, str],
     draws: Sequence[Draw] = (network,),
-    plates: Sequence[Plate] = (),
+    figures: Sequence[PaperFigure] = (),
     missing: Sequence[str] = (),
     robustness: Sequence[Robustness] = (),
     generated: str = "",
@@ -48,7 +48,7 @@ def gather(
         history: accepted verdicts.
         sentences: the paper's own sentences by claim, such as "G1[n_parity]".
         draws: ways of drawing a champion, in the order in which they are tried.
-        plates: figures of the paper.
+        figures: of the paper.
         missing: sentences about figures that are not among them.
         robustness: how claims end under variants of the protocol.
         generated: when, and by which version.
@@ -59,14 +59,14 @@ def gather(
         for tier, reports in verdicts.items()
     )
     return Page(
-        title=clean(reproduction.title),
-        name=clean(reproduction.name),
+        title=reproduction.title,
+        name=reproduction.name,
         boards=boards,
         conditions=gathered.conditions,
         notices=tuple(_notices(boards, gathered.reader)),
-        plates=tuple(plates),
+        figures=tuple(figures),
         missing=tuple(missing),
-        variants={name: clean(variant.says) for name, variant in reproduction.variants.items()},
+        variants={name: variant.says for name, variant in reproduction.variants.items()},
         robustness=tuple(robustness),
         generated=generated,
     )
@@ -74,7 +74,7 @@ def gather(
 
 def _order(report: ClaimReport) -> tuple[Any, ...]:
     """Order claims as the paper does, within a section as the terminal's table does: G2 before G10."""
-    return place_key(places(report.where)[0]), report.claim[:1], len(report.claim), report.claim, report.case
+    return place_key(places(report.where)[0]), in_order(key_of(report))
 
 
 def _notices(boards: Sequence[Board], reader: Reader) -> list[str]:
@@ -83,14 +83,14 @@ def _notices(boards: Sequence[Board], reader: Reader) -> list[str]:
     notices = []
     if not sections:
         notices.append("There are no claims to report on.")
-    elif all(section.outcome is Outcome.NOT_RUN for section in sections):
+    elif all(section.report.outcome is Outcome.NOT_RUN for section in sections):
         notices.append(
             "No claim has been judged: neither the store nor the committed reference trials hold the trials that the "
             "claims need. `pytest -m smoke` runs those of the smoke tier."
         )
-    notices += [clean(sentence) for sentence in reader.troubles]
-    errors = [section for section in sections if section.outcome is Outcome.ERROR]
-    reasons = dict.fromkeys(section.reason for section in errors)
+    notices += reader.troubles
+    errors = [section.report for section in sections if section.report.outcome is Outcome.ERROR]
+    reasons = dict.fromkeys(report.reason for report in errors)
     if errors:
         notices.append(f"{plural(len(errors), 'claim')} ended in error. {listed(reasons, most=3)}")
     return notices
@@ -110,90 +110,64 @@ class _Gathering:
         self._reproduction, self._archive, self._history = reproduction, archive, history
         self._sentences, self._draws, self._anchors = sentences, draws, Anchors()
         self.reader = Reader(archive)
-        self.conditions: dict[str, Conditions] = {}
+        self.conditions: dict[str, ConditionTrials] = {}
 
     def section(self, report: ClaimReport) -> Section:
         """Return one claim's section."""
-        verdict = report.verdict or {}
-        read = {_label(source): self._trials(source) for source in report.sources}
+        read = {source.label: self._trials(source) for source in report.sources}
         every = [trial for trials in read.values() for trial in trials]
         made = origin.grouped(trial.origin for trial in every)
-        sentence = clean(self._sentences.get(report.name, ""))
-        statement = clean(report.statement)
+        sentence = self._sentences.get(report.name, "")
         entries = self._history.get(key_of(report), ())
+        tier = self._reproduction.tiers.get(report.tier)
         return Section(
+            report=report,
             anchor=self._anchors.new(report.claim, report.case, report.tier),
-            name=clean(report.name),
-            tier=clean(report.tier),
-            methods=tuple(dict.fromkeys(clean(source["method"]) for source in report.sources)),
-            statement=statement,
-            paper=sentence if sentence != statement else "",
-            where=clean(report.where),
+            methods=tuple(dict.fromkeys(clean(source.method) for source in report.sources)),
             places=places(report.where),
-            outcome=Outcome(report.outcome),
-            reason=clean(report.reason),
-            expected=report.expected,
-            because=clean(report.because),
-            describe=clean(verdict.get("describe", "")),
-            fingerprint=clean(verdict.get("fingerprint", "")),
-            n=report.n,
-            **{key: verdict.get(key) for key in ("alpha", "p", "attainable_p", "p_refuted")},
-            a12=next((float(e["a12"]) for e in verdict.get("evidence", ()) if e["a12"] is not None), None),
-            looks=tuple(Look(**look) for look in report.attainable),
-            protocol=self._protocol(report),
-            parts=tuple(_parts(verdict, read)),
-            conditions=tuple(self._condition(report.tier, source) for source in report.sources if source["trials"]),
+            paper=sentence if sentence != report.statement else "",
+            protocol="" if tier is None else _in_words(tier.protocol),
+            parts=_parts(report, read),
+            conditions=tuple(self._condition(report.tier, source) for source in report.sources if source.trials),
             made=made,
             warnings=(*_broken(every), *origin.warnings(made)),
             history=accepted_history.accepted(entries),
             change=accepted_history.change(entries, report),
         )
 
-    def _protocol(self, report: ClaimReport) -> str:
-        """Say what was fixed beforehand."""
-        tier = self._reproduction.tiers.get(report.tier)
-        return "" if tier is None else _in_words(tier.protocol)
-
-    def _condition(self, tier: str, source: Mapping[str, Any]) -> str:
+    def _condition(self, tier: str, source: SourceTrials) -> str:
         """Return the key of a condition with so many trials, after gathering what is shown of it."""
-        key = f"{source['condition']}-{len(source['trials'])}"
+        key = f"{source.condition}-{len(source.trials)}"
         if key not in self.conditions:
             trials = self._trials(source)
             panels, rest = training_curves.panels(trials)
-            settings = _flat(self.reader.settings.get(source["condition"], {}))
+            settings = _flat(self.reader.settings.get(source.condition, {}))
             says = f"{plural(len(trials), 'trial')}. {rest}".strip()
-            self.conditions[key] = Conditions(
-                _label(source), says, settings, panels, self._champion(tier, source, trials)
-            )
+            champion = self._champion(tier, source, trials)
+            self.conditions[key] = ConditionTrials(source.label, says, settings, panels, champion)
         return key
 
-    def _trials(self, source: Mapping[str, Any]) -> tuple[Glance, ...]:
+    def _trials(self, source: SourceTrials) -> tuple[TrialSummary, ...]:
         """Read the trials of one condition of a claim: the records that were judged."""
-        return self.reader.read(source["trials"], installed_for(source))
+        return self.reader.read(source.trials, source.installed)
 
-    def _champion(self, tier: str, source: Mapping[str, Any], trials: Sequence[Glance]) -> Champion:
+    def _champion(self, tier: str, source: SourceTrials, trials: Sequence[TrialSummary]) -> ShownChampion:
         """Return a condition's champion; the condition itself is known by its names."""
         try:
-            condition = self._reproduction.tier(tier).condition(source["method"], source["task"])
+            condition = self._reproduction.tier(tier).condition(source.method, source.task)
         except UserError as error:
-            return Champion(clean(error))
+            return ShownChampion(str(error))
         return champion_of(self._archive.store, condition, trials, self._draws)
 
 
-def _label(source: Mapping[str, Any]) -> str:
-    """Return a condition's short name, as in `TrialGroup.label`."""
-    return clean(f"{source['method']} on {source['task']}")
-
-
-def _parts(verdict: Mapping[str, Any], read: Mapping[str, Sequence[Glance]]) -> Sequence[Part]:
+def _parts(report: ClaimReport, read: Mapping[str, Sequence[TrialSummary]]) -> tuple[Part, ...]:
     """Return the evidence; where there is none, the trials as they are."""
-    statuses = {label: {trial.seed: trial.status for trial in trials} for label, trials in read.items()}
-    if verdict.get("evidence"):
-        return [judged_part(evidence, statuses) for evidence in verdict["evidence"]]
-    return [unjudged_part(label, trials) for label, trials in read.items() if trials]
+    if report.verdict is not None and report.verdict.evidence:
+        return tuple(map(judged_part, report.verdict.evidence))
+    return tuple(unjudged_part(label, trials) for label, trials in read.items() if trials)
 
 
-def _broken(trials: Sequence[Glance]) -> tuple[str, ...]:
+def _broken(trials: Sequence[TrialSummary]) -> tuple[str, ...]:
     """Say which trials have not come to a result of their own."""
     failed = [trial for trial in trials if trial.status != "done"]
     found = []

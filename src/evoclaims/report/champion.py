@@ -8,9 +8,9 @@ from typing import Any, Final
 
 from evoclaims.core.errors import UserError
 from evoclaims.networks import export, picture
-from evoclaims.report.formatting import clean
-from evoclaims.report.model import Champion
-from evoclaims.report.trial_summary import Glance
+from evoclaims.networks.graph import GraphNetwork
+from evoclaims.report.model import ShownChampion
+from evoclaims.report.trial_summary import TrialSummary
 from evoclaims.trials import champions
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.spec import Condition
@@ -30,11 +30,15 @@ def network(condition: Condition, result: TrialResult, parameters: Any, title: s
     Raises:
         UserError: when matplotlib or networkx is not installed.
     """
-    panels = network_panels(condition, parameters)
-    return None if panels is None else picture.draw(panels, title, "svg")
+    graph = champions.network_of(condition, parameters)
+    if graph is None:
+        return None
+    return picture.draw(network_panels(condition, graph, parameters), title, "svg")
 
 
-def champion_of(store: Store, condition: Condition, trials: Sequence[Glance], draws: Sequence[Draw]) -> Champion:
+def champion_of(
+    store: Store, condition: Condition, trials: Sequence[TrialSummary], draws: Sequence[Draw]
+) -> ShownChampion:
     """Return the champion of the median trial, with the first drawing that can be made of it.
 
     Args:
@@ -45,24 +49,26 @@ def champion_of(store: Store, condition: Condition, trials: Sequence[Glance], dr
     """
     chosen = typical(trials)
     if chosen is None:
-        return Champion("No trial has run to its end, so there is no champion to show.")
+        return ShownChampion("No trial has run to its end, so there is no champion to show.")
     trial, which = chosen
     try:
         result = next((one for one in store.records(trial.trial) if one.champion == trial.champion), None)
         if result is None or not store.champion_file(result).exists():
-            return Champion(f"The champion’s parameters ({which}) are not in the store: records alone are kept here.")
+            return ShownChampion(
+                f"The champion’s parameters ({which}) are not in the store: records alone are kept here."
+            )
         parameters, title = champions.load(store, condition, result), f"{condition.label}, {which}"
         drawn = next((made for draw in draws if (made := draw(condition, result, parameters, title))), None)
     except UserError as error:
-        return Champion(f"The champion ({which}) cannot be drawn: {clean(error)}")
+        return ShownChampion(f"The champion ({which}) cannot be drawn: {error}")
     if drawn is None:
-        return Champion(f"The champion ({which}) is no graph but arrays of weights, of which there is no drawing.")
+        return ShownChampion(f"The champion ({which}) is no graph but arrays of weights, of which there is no drawing.")
     if len(drawn) > LARGEST:
-        return Champion(f"The champion’s drawing ({which}) is too large for this page: {len(drawn) // 1000} kB.")
-    return Champion(f"The champion: {which}.", drawn)
+        return ShownChampion(f"The champion’s drawing ({which}) is too large for this page: {len(drawn) // 1000} kB.")
+    return ShownChampion(f"The champion: {which}.", drawn)
 
 
-def typical(trials: Sequence[Glance]) -> tuple[Glance, str] | None:
+def typical(trials: Sequence[TrialSummary]) -> tuple[TrialSummary, str] | None:
     """Return the trial whose mean success is the median (the lower one of two), and words that say so.
 
     Only finished trials count; of equals the one with the lowest seed is taken.
@@ -76,17 +82,14 @@ def typical(trials: Sequence[Glance]) -> tuple[Glance, str] | None:
     return trial, f"seed {trial.seed}, the median of {len(ranked)} by mean success"
 
 
-def network_panels(condition: Condition, parameters: Any) -> list[picture.Panel] | None:
-    """Return the network of a champion, beside it the one that it draws on a substrate; None for one without a graph.
+def network_panels(condition: Condition, network: GraphNetwork, genome: Any) -> list[picture.Panel]:
+    """Return the network that a genome describes, beside it the one that this draws on a substrate, if it does.
 
     Raises:
         UserError: when networkx is not installed.
     """
-    network = champions.network_of(condition, parameters)
-    if network is None:
-        return None
-    graph = export.to_networkx(parameters, network)
-    drawing = champions.substrate_of(condition, parameters)
+    graph = export.to_networkx(genome, network)
+    drawing = champions.substrate_of(condition, genome)
     if drawing is None:
         return [picture.network_panel(graph, network, "the network that evolved")]
     ends = ("x₁", "y₁", "x₂", "y₂"), ("q",)

@@ -37,7 +37,7 @@ def part_scale(part: Part) -> tuple[float, float]:
     """Return the ends of the axis that all strips of a part share: everything drawn lies between them."""
     if part.event:
         return 0.0, 1.0
-    values = [dot.value for strip in part.strips for dot in strip.dots] + [value for _, value in part.bounds]
+    values = [dot.value for strip in part.strips for dot in strip.dots] + [bound.value for bound in part.bounds]
     if not values:
         return 0.0, 1.0
     low, high = _shown(min(values)), _shown(max(values))
@@ -51,10 +51,10 @@ def strip_svg(part: Part, strip: Strip) -> Markup:
     """Draw a strip: a dot a trial, the median, what the assertion compares with, and broken trials apart."""
     scale = _Scale(*part_scale(part), right=_right(part))
     pieces: list[Markup] = [Markup('<path class="rule" d="M{} {}H{}"/>').format(EDGE, HEIGHT - 1, scale.right)]
-    for name, value in part.bounds:
+    for bound in part.bounds:
         pieces.append(
             Markup('<path class="bound" d="M{0} 1V{1}"><title>{2}: {3}</title></path>').format(
-                _at(scale(value)), HEIGHT - 1, name, number(value)
+                _at(scale(bound.value)), HEIGHT - 1, bound.name, number(bound.value)
             )
         )
     for span in part.spans:
@@ -99,10 +99,10 @@ def axis_svg(part: Part) -> Markup:
         pieces.append(
             Markup('<text class="tick" x="{}" y="14" text-anchor="middle">{}</text>').format(_at(scale(value)), label)
         )
-    for name, value in part.bounds:
+    for bound in part.bounds:
         pieces.append(
             Markup('<text class="named" x="{}" y="27" text-anchor="middle">{} {}</text>').format(
-                _at(scale(value)), name, number(value)
+                _at(scale(bound.value)), bound.name, number(bound.value)
             )
         )
     if _right(part) < WIDTH - EDGE:

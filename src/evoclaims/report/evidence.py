@@ -1,29 +1,20 @@
-"""A verdict's evidence as it is shown: each part of the assertion with its numbers and its trials as dots."""
+"""A verdict's evidence laid out for readers: each part of the assertion with its numbers and its trials as dots."""
 
 from __future__ import annotations
 
 import math
-import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from statistics import median
-from typing import Any, Final
+from typing import Final
 
-from evoclaims.judging.verdict import Outcome
-from evoclaims.report.formatting import clean, number
-from evoclaims.report.trial_summary import Glance
-
-EVENT_KINDS: Final = frozenset({"solves", "stays", "exact"})
-"""Kinds whose samples say whether something held: 1 or 0."""
+from evoclaims.judging.sample import Sample
+from evoclaims.judging.verdict import Bound, Evidence, Interval, Outcome
+from evoclaims.report.formatting import clean, number, p_value
+from evoclaims.report.trial_summary import TrialSummary
 
 MOST_ROWS: Final = 50
 """Most trials whose values are written out."""
-
-Statuses = Mapping[str, Mapping[int, str]]
-"""How trials ended, by the condition's label and the seed."""
-
-_BAND: Final = re.compile(r"lies in \[(\S+), (\S+)\]$")
-_P0: Final = re.compile(r"against p0 = (\S+)$")
 
 
 @dataclass(frozen=True)
@@ -57,15 +48,6 @@ class Strip:
 
 
 @dataclass(frozen=True)
-class Span:
-    """An interval that describes; `of` says what it covers."""
-
-    of: str
-    low: float
-    high: float
-
-
-@dataclass(frozen=True)
 class Part:
     """One part of an assertion, or trials that no verdict came of.
 
@@ -76,7 +58,7 @@ class Part:
         detail: what else is known.
         event: whether values say that something held (1) or did not (0).
         strips: the trials.
-        bounds: what the assertion compares with: names and values on the strips' axis.
+        bounds: what the assertion compares with, on the strips' axis.
         spans: intervals on the strips' axis.
     """
 
@@ -86,8 +68,8 @@ class Part:
     detail: str
     event: bool
     strips: tuple[Strip, ...]
-    bounds: tuple[tuple[str, float], ...] = ()
-    spans: tuple[Span, ...] = ()
+    bounds: tuple[Bound, ...] = ()
+    spans: tuple[Interval, ...] = ()
 
     @property
     def rows(self) -> tuple[tuple[int, tuple[str, ...]], ...]:
@@ -101,28 +83,21 @@ class Part:
         return tuple((seed, tuple(column.get(seed, "–") for column in columns)) for seed in seeds)
 
 
-def judged_part(evidence: Mapping[str, Any], statuses: Statuses) -> Part:
-    """Return a part of a verdict, from its JSON.
-
-    Args:
-        evidence: as in `Verdict.to_json`.
-        statuses: how trials ended, by condition's label and seed.
-    """
-    event = evidence["kind"] in EVENT_KINDS
-    spans = tuple(Span(clean(one["of"]), float(one["low"]), float(one["high"])) for one in evidence["intervals"])
+def judged_part(evidence: Evidence) -> Part:
+    """Return a part of a verdict as it is shown."""
     return Part(
-        describe=clean(evidence["describe"]),
-        outcome=Outcome(evidence["outcome"]),
-        numbers=_numbers(evidence, spans),
-        detail=clean(evidence["detail"]),
-        event=event,
-        strips=tuple(_strip(sample, statuses) for sample in evidence["samples"]),
-        bounds=_bounds(evidence),
-        spans=tuple(span for span in spans if event or span.of.startswith("median")),
+        describe=evidence.describe,
+        outcome=evidence.outcome,
+        numbers=_numbers(evidence),
+        detail=evidence.detail,
+        event=evidence.events,
+        strips=tuple(map(_strip, evidence.samples)),
+        bounds=tuple(bound for bound in evidence.bounds if bound.on_axis),
+        spans=tuple(interval for interval in evidence.intervals if interval.on_axis),
     )
 
 
-def unjudged_part(label: str, trials: Sequence[Glance]) -> Part:
+def unjudged_part(label: str, trials: Sequence[TrialSummary]) -> Part:
     """Return the mean success of trials that no verdict came of, so that a reader sees which of them is broken."""
     dots = tuple(Dot(t.seed, t.score) for t in trials if t.score is not None and math.isfinite(t.score))
     shown = {dot.seed for dot in dots}
@@ -132,57 +107,35 @@ def unjudged_part(label: str, trials: Sequence[Glance]) -> Part:
     return Part("the trials at hand, not judged", None, (), "", False, (strip,))
 
 
-def _why(trial: Glance) -> str:
+def _why(trial: TrialSummary) -> str:
     """Say why a trial has no finite score."""
     if trial.status != "done":
         return trial.status
     return "no mean success" if trial.score is None else number(trial.score)
 
 
-def _strip(sample: Mapping[str, Any], statuses: Statuses) -> Strip:
+def _strip(sample: Sample) -> Strip:
     """Return a sample with failed trials set apart."""
-    ended = statuses.get(sample["label"].partition(": ")[0], {})
-    failed, values = set(sample["failed"]), [float(value) for value in sample["values"]]
-    pairs = list(zip(sample["seeds"], values, strict=True))
-    return Strip(
-        label=clean(sample["label"]),
-        dots=tuple(Dot(seed, value) for seed, value in pairs if seed not in failed and math.isfinite(value)),
-        apart=tuple(
-            (seed, ended.get(seed, "failed") if seed in failed else number(value))
-            for seed, value in pairs
-            if seed in failed or not math.isfinite(value)
-        ),
-        median=float(sample["median"]),
-    )
+    failed = dict(zip(sample.failed, sample.endings, strict=True))
+    pairs = list(zip(sample.seeds, sample.values, strict=True))
+    dots = tuple(Dot(seed, value) for seed, value in pairs if seed not in failed and math.isfinite(value))
+    shown = {dot.seed for dot in dots}
+    apart = tuple((seed, failed.get(seed, number(value))) for seed, value in pairs if seed not in shown)
+    return Strip(clean(sample.label), dots, apart, sample.median)
 
 
-def _numbers(evidence: Mapping[str, Any], spans: Sequence[Span]) -> tuple[tuple[str, str], ...]:
+def _numbers(evidence: Evidence) -> tuple[tuple[str, str], ...]:
     """Return what was computed, without what the kind does not have."""
-    shown = [
-        ("n a side", str(evidence["n"])),
-        ("α", f"{evidence['alpha']:g}"),
-        *(
-            (name, f"{evidence[key]:.2g} (smallest attainable {evidence[least]:.2g})")
-            for name, key, least in (
-                ("p for", "p", "attainable_p"),
-                ("p against", "p_refuted", "attainable_p_refuted"),
-            )
-            if evidence[key] is not None
-        ),
-        *(
-            (name, number(float(evidence[key])))
-            for name, key in (("A12", "a12"), ("Cliff’s δ", "cliffs_delta"))
-            if evidence[key] is not None
-        ),
-        *((span.of, f"{number(span.low)} to {number(span.high)}") for span in spans),
-    ]
-    return tuple(shown)
-
-
-def _bounds(evidence: Mapping[str, Any]) -> tuple[tuple[str, float], ...]:
-    """Return what the assertion's own sentences say that values are compared with."""
-    if (band := _BAND.search(evidence["describe"])) is not None:
-        return ("lowest", float(band[1])), ("highest", float(band[2]))
-    if (null := _P0.search(evidence["detail"])) is not None:
-        return (("p0", float(null[1])),)
-    return ()
+    tests = (
+        ("p for", evidence.p, evidence.attainable_p),
+        ("p against", evidence.p_refuted, evidence.attainable_p_refuted),
+    )
+    effects = (("A12", evidence.a12), ("Cliff’s δ", evidence.cliffs_delta))
+    return (
+        ("n a side", str(evidence.n)),
+        ("α", f"{evidence.alpha:g}"),
+        *((name, f"{p_value(p)} (smallest attainable {p_value(least)})") for name, p, least in tests if p is not None),
+        *((name, number(value)) for name, value in effects if value is not None),
+        *((interval.of, f"{number(interval.low)} to {number(interval.high)}") for interval in evidence.intervals),
+        *((bound.name, number(bound.value)) for bound in evidence.bounds if not bound.on_axis),
+    )

@@ -67,6 +67,7 @@ def _environment() -> Environment:
         loader=PackageLoader("evoclaims.report"),
         autoescape=True,
         undefined=StrictUndefined,
+        finalize=_cleaned,
         trim_blocks=True,
         lstrip_blocks=True,
     )
@@ -78,6 +79,11 @@ def _environment() -> Environment:
     }
     environment.globals |= {"strip_svg": charts.strip_svg, "axis_svg": charts.axis_svg, "plural": formatting.plural}
     return environment
+
+
+def _cleaned(value: object) -> object:
+    """Return what a template shows without characters that steer a display; markup is taken as it is."""
+    return formatting.clean(value) if isinstance(value, str) and not isinstance(value, Markup) else value
 
 
 def policy(style: str, script: str) -> str:

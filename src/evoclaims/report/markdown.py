@@ -2,19 +2,13 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Iterable, Iterator
-from typing import Final
+from collections.abc import Iterator
 
 from evoclaims.judging.verdict import Outcome
-from evoclaims.report.formatting import clean, number, p_value, plural
+from evoclaims.report import table_cells
+from evoclaims.report.formatting import p_value, plural
+from evoclaims.report.markdown_text import literal, table
 from evoclaims.report.model import Board, Page, Section
-
-_MARKS: Final = re.compile(r"([\\`*_\[\]#|~$@]|^[-+=]|:(?=[/\w]))")
-"""What means something to Markdown, or to a forge that links names and addresses."""
-
-_ENTITIES: Final = {"&": "&amp;", "<": "&lt;", ">": "&gt;"}
-_ITEM: Final = re.compile(r"^(\d+)([.)])(?=\s|$)")
 
 
 def markdown(page: Page) -> str:
@@ -31,23 +25,10 @@ def markdown(page: Page) -> str:
     return "\n\n".join(block for block in blocks if block) + "\n"
 
 
-def literal(text: str) -> str:
-    """Return a text that Markdown shows as it is, on one line."""
-    entities = "".join(_ENTITIES.get(character, character) for character in _MARKS.sub(r"\\\1", clean(text)))
-    return _ITEM.sub(r"\1\\\2", entities).replace("www.", "www\\.")
-
-
-def _table(header: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
-    """Return a table of cells that are Markdown already."""
-    head = list(header)
-    lines = [head, ["---"] * len(head), *map(list, rows)]
-    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
-
-
 def _scoreboard(page: Page) -> str:
     """Count verdicts by tier."""
     boards = [board for board in page.boards if board.sections]
-    return _table(
+    return table(
         ("tier", *map(str, Outcome), "looked into and accepted"),
         ((literal(b.tier), *(str(b.count(outcome)) for outcome in Outcome), str(b.accepted)) for b in boards),
     )
@@ -60,7 +41,7 @@ def _details(page: Page) -> str:
 
 def _robustness(page: Page) -> str:
     """Return one line a claim, and a column a variant."""
-    return _table(
+    return table(
         ("claim", "tier", "the protocol", *map(literal, page.tried)),
         (
             (
@@ -79,40 +60,36 @@ def _robustness(page: Page) -> str:
     )
 
 
-def _verdict(section: Section) -> str:
-    """Return a verdict with its symbol; an asterisk for one that was looked into and accepted."""
-    return literal(f"{section.outcome.symbol} {section.outcome}" + ("*" if section.as_expected else ""))
-
-
 def _overview(board: Board) -> str:
     """Return one line a claim."""
-    return _table(
+    cells = (table_cells.verdict, table_cells.trials, table_cells.effect, table_cells.p)
+    return table(
         ("claim", "place", "verdict", "n", "A12", "p (attainable)"),
         (
             (
-                f"[{literal(s.name)}](#{s.anchor})",
-                literal(s.where),
-                _verdict(s),
-                str(s.n) if s.n else "–",
-                number(s.a12),
-                "–" if s.p is None else literal(f"{p_value(s.p)} ({p_value(s.attainable_p)})"),
+                f"[{literal(s.report.name)}](#{s.anchor})",
+                literal(s.report.where),
+                *(literal(cell(s.report)) for cell in cells),
             )
             for s in board.sections
         ),
+        numbers=("n", "A12"),
     )
 
 
 def _section(section: Section, page: Page) -> Iterator[str]:
     """Yield the blocks of one claim."""
-    yield f'<a id="{section.anchor}"></a>\n\n### {literal(section.name)} ({literal(section.tier)}): {_verdict(section)}'
-    yield f"> {literal(section.paper or section.statement)}\n>\n> {literal(section.where)}"
+    report = section.report
+    heading = literal(f"{report.name} ({report.tier}): {table_cells.verdict(report)}")
+    yield f'<a id="{section.anchor}"></a>\n\n### {heading}'
+    yield f"> {literal(section.paper or report.statement)}\n>\n> {literal(report.where)}"
     if section.paper:
-        yield f"Judged at this tier: {literal(section.statement)}"
+        yield f"Judged at this tier: {literal(report.statement)}"
     for warning in (*section.warnings, section.change):
         yield f"**{literal(warning)}**" if warning else ""
-    yield literal(section.reason)
-    if section.because:
-        yield f"Accepted as {literal(section.expected or '')}: {literal(section.because)}"
+    yield literal(report.reason)
+    if report.because:
+        yield f"Accepted as {literal(report.expected or '')}: {literal(report.because)}"
     parts = [part for part in section.parts if part.numbers]
     if parts:
         yield "\n".join(
@@ -130,15 +107,11 @@ def _section(section: Section, page: Page) -> Iterator[str]:
             literal(f"{plural(one.count, 'trial')} on {one.origin.device}, {one.origin.code}") for one in section.made
         )
     if section.history:
-        yield _table(
+        yield table(
             ("accepted", "verdict", "n", "p", "rules"),
             (
-                tuple(
-                    map(
-                        literal, (e.date, e.outcome, str(e.n), p_value(e.p), e.fingerprint[:9] + " (new)" * e.new_rules)
-                    )
-                )
-                for e in section.history
+                map(literal, (e.accepted, e.outcome, str(e.n), p_value(e.p), e.fingerprint[:9] + " (new)" * new))
+                for e, new in ((past.entry, past.new_rules) for past in section.history)
             ),
         )
     else:

@@ -1,4 +1,4 @@
-"""What a report shows, as plain data: no HTML, no Markdown, texts cleaned but not yet escaped."""
+"""What a report shows, as data: no HTML, no Markdown; texts are as they came, for renderers to clean and escape."""
 
 from __future__ import annotations
 
@@ -10,45 +10,30 @@ from evoclaims.report.evidence import Part
 from evoclaims.report.formatting import counted, place_key
 from evoclaims.report.origin import Made
 from evoclaims.report.training_curves import CurvePanel
+from evoclaims.verdicts.claim_report import ClaimReport
+from evoclaims.verdicts.history import Entry
 from evoclaims.verdicts.robustness import Robustness
 
 
 @dataclass(frozen=True)
-class Look:
-    """One look at the data, and the smallest p that it can give for and against the claim."""
-
-    n: int
-    alpha: float
-    supported: float
-    refuted: float
-
-
-@dataclass(frozen=True)
-class Accepted:
+class AcceptedVerdict:
     """A verdict of the past.
 
     Attributes:
-        date: when it was accepted.
-        outcome, n, p, reason: as they were.
-        fingerprint: of what was fixed beforehand.
+        entry: as it was accepted.
         new_rules: whether the fingerprint differs from the verdict's before: a new history begins.
         made: where its trials were made, in words.
-        versions: of the packages that they were made with.
+        versions: of the packages that they were made with, in words.
     """
 
-    date: str
-    outcome: str
-    n: int
-    p: float | None
-    reason: str
-    fingerprint: str
+    entry: Entry
     new_rules: bool
     made: str
     versions: str
 
 
 @dataclass(frozen=True)
-class Champion:
+class ShownChampion:
     """The best individual of a condition's typical trial.
 
     Attributes:
@@ -61,7 +46,7 @@ class Champion:
 
 
 @dataclass(frozen=True)
-class Conditions:
+class ConditionTrials:
     """The trials of one condition behind one or more claims.
 
     Attributes:
@@ -76,7 +61,7 @@ class Conditions:
     says: str
     settings: tuple[tuple[str, str], ...]
     curves: tuple[CurvePanel, ...]
-    champion: Champion
+    champion: ShownChampion
 
 
 @dataclass(frozen=True)
@@ -84,14 +69,12 @@ class Section:
     """One claim at one tier.
 
     Attributes:
+        report: what became of it.
         anchor: its name in the page's address.
-        name, tier, methods: as claimed.
-        statement: what was judged.
+        methods: that it is about.
+        places: the sections of the paper that it names.
         paper: the paper's own sentence, where another one was judged; else empty.
-        where, places: the place in the paper, and its sections.
-        outcome, reason, expected, because: as in `ClaimReport`.
-        describe, fingerprint, n, alpha, p, attainable_p, p_refuted, a12: of the verdict.
-        looks, protocol: how it was judged.
+        protocol: how it was judged, in words.
         parts: its evidence.
         conditions: keys of `Page.conditions`.
         made: where its trials were made.
@@ -100,39 +83,18 @@ class Section:
         change: what differs from the last accepted verdict; empty when nothing does.
     """
 
+    report: ClaimReport
     anchor: str
-    name: str
-    tier: str
     methods: tuple[str, ...]
-    statement: str
-    paper: str
-    where: str
     places: tuple[str, ...]
-    outcome: Outcome
-    reason: str
-    expected: str | None
-    because: str
-    describe: str = ""
-    fingerprint: str = ""
-    n: int = 0
-    alpha: float | None = None
-    p: float | None = None
-    attainable_p: float | None = None
-    p_refuted: float | None = None
-    a12: float | None = None
-    looks: tuple[Look, ...] = ()
+    paper: str = ""
     protocol: str = ""
     parts: tuple[Part, ...] = ()
     conditions: tuple[str, ...] = ()
     made: tuple[Made, ...] = ()
     warnings: tuple[str, ...] = ()
-    history: tuple[Accepted, ...] = ()
+    history: tuple[AcceptedVerdict, ...] = ()
     change: str = ""
-
-    @property
-    def as_expected(self) -> bool:
-        """Whether the outcome was looked into and accepted."""
-        return self.expected == self.outcome
 
     @property
     def devices(self) -> str:
@@ -154,12 +116,13 @@ class Board:
 
     def count(self, outcome: Outcome) -> int:
         """Return how many claims ended so."""
-        return sum(section.outcome is outcome for section in self.sections)
+        return sum(section.report.outcome is outcome for section in self.sections)
 
     @property
     def accepted(self) -> int:
         """How many verdicts other than supported were looked into and accepted."""
-        return sum(s.as_expected and s.outcome is not Outcome.SUPPORTED for s in self.sections)
+        reports = [section.report for section in self.sections]
+        return sum(report.as_expected and report.outcome is not Outcome.SUPPORTED for report in reports)
 
     @property
     def by_place(self) -> Mapping[str, tuple[Section, ...]]:
@@ -169,7 +132,7 @@ class Board:
 
 
 @dataclass(frozen=True)
-class Plate:
+class PaperFigure:
     """A figure of the paper, redrawn.
 
     Attributes:
@@ -192,7 +155,7 @@ class Page:
         boards: one for each tier.
         conditions: by key.
         notices: what a reader should know about the whole.
-        plates: figures of the paper.
+        figures: of the paper.
         missing: sentences about figures that are not among them.
         variants: of the protocol, by name: what differs.
         robustness: claims that were judged under a variant too.
@@ -202,9 +165,9 @@ class Page:
     title: str
     name: str
     boards: tuple[Board, ...]
-    conditions: Mapping[str, Conditions] = field(default_factory=dict)
+    conditions: Mapping[str, ConditionTrials] = field(default_factory=dict)
     notices: tuple[str, ...] = ()
-    plates: tuple[Plate, ...] = ()
+    figures: tuple[PaperFigure, ...] = ()
     missing: tuple[str, ...] = ()
     variants: Mapping[str, str] = field(default_factory=dict)
     robustness: tuple[Robustness, ...] = ()

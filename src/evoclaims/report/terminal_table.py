@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 import os
-from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Literal
@@ -15,6 +14,7 @@ from rich.table import Table
 from evoclaims.core.printable import printable
 from evoclaims.judging.baseline import DriftReport
 from evoclaims.judging.verdict import Outcome
+from evoclaims.report import table_cells
 from evoclaims.report.console import PlainSpokenConsole
 from evoclaims.verdicts import mixed_versions
 from evoclaims.verdicts.claim_report import ClaimReport
@@ -32,30 +32,25 @@ _COLOURS = {
 
 
 def verdict_table(reports: Sequence[ClaimReport], width: int, colour: bool) -> str:
-    """Return the table: claim, sentence, verdict, n, effect, p against the attainable p, evidence."""
+    """Return the table: claim, sentence, verdict, n, effect, p beside the attainable p, evidence."""
     table = Table(expand=True, show_lines=False, pad_edge=False, box=None)
     wide = width >= WIDE
     # On a narrow terminal a long list of parameters must not squeeze the sentence.
     table.add_column("claim", no_wrap=wide, overflow="fold", max_width=None if wide else 16)
     table.add_column("what is claimed", ratio=1, min_width=16)
-    for heading in ("verdict", "n", "A12", "p (attainable)"):
-        table.add_column(heading, no_wrap=True, justify="right" if heading in ("n", "A12") else "left")
+    for heading in ("verdict", "n", "A12"):
+        table.add_column(heading, no_wrap=True, justify="left" if heading == "verdict" else "right")
+    table.add_column("p (attainable)", no_wrap=wide)
     if wide:
         table.add_column("evidence", no_wrap=True, style="dim")
-    for report in sorted(reports, key=lambda r: (r.tier, r.claim[:1], len(r.claim), r.claim, r.case)):
-        outcome = Outcome(report.outcome)
-        mark = (
-            f"{outcome.symbol} {outcome}"
-            + "*" * report.as_expected
-            + mixed_versions.MARK * mixed_versions.is_mixed(report)
-        )
+    for report in table_cells.ordered(reports):
         cells = (
             _literal(report.name),
             _literal(f"{report.statement} ({report.where})"),
-            f"[{_COLOURS[outcome]}]{mark}[/]",
-            str(report.n) if report.n else "–",
-            _effect(report),
-            _p_values(report),
+            f"[{_COLOURS[report.outcome]}]{table_cells.verdict(report)}[/]",
+            table_cells.trials(report),
+            table_cells.effect(report),
+            table_cells.p(report),
             _literal(Path(report.evidence).name),
         )
         table.add_row(*(cells if wide else cells[:-1]))
@@ -71,7 +66,7 @@ def explanations(reports: Sequence[ClaimReport], width: int, colour: bool) -> st
     """Return a line for every verdict that is not plainly supported: why, what was accepted, which trials broke."""
     lines = []
     for report in reports:
-        broken = (report.verdict or {}).get("without_result", "")
+        broken = report.verdict.without_result if report.verdict else ""
         if report.outcome == Outcome.SUPPORTED and report.expected in (None, report.outcome) and not broken:
             continue
         note = ""
@@ -79,14 +74,8 @@ def explanations(reports: Sequence[ClaimReport], width: int, colour: bool) -> st
             kept = "accepted" if report.as_expected else f"no longer {report.expected}, which was accepted"
             note = f" [{kept}: {report.because}]"
         worst = f" [worst rank: {broken}]" if broken else ""
-        lines.append(f"{Outcome(report.outcome).symbol} {report.name}: {report.reason}{worst}{note}")
+        lines.append(f"{report.outcome.symbol} {report.name}: {report.reason}{worst}{note}")
     return _rendered("\n".join(_literal(line) for line in lines), width, colour) if lines else ""
-
-
-def totals(reports: Sequence[ClaimReport]) -> str:
-    """Return the counts in one line, such as "3 supported, 1 refuted"."""
-    counts = Counter(report.outcome for report in reports)
-    return ", ".join(f"{counts[outcome]} {outcome}" for outcome in Outcome if counts[outcome]) or "no verdicts"
 
 
 def drift_lines(drift: DriftReport, changed: int, compared: int) -> str:
@@ -106,21 +95,6 @@ def drift_lines(drift: DriftReport, changed: int, compared: int) -> str:
 def _literal(text: str) -> str:
     """Return text as markup that shows it as it is, on one line."""
     return escape(" ".join(text.split()))
-
-
-def _effect(report: ClaimReport) -> str:
-    """Return the effect size of a claim's first comparison."""
-    effects = [part["a12"] for part in (report.verdict or {}).get("evidence", ()) if part["a12"] is not None]
-    return f"{effects[0]:.2f}" if effects else "–"
-
-
-def _p_values(report: ClaimReport) -> str:
-    """Return p for the claim, and the smallest p that its trials could have given."""
-    verdict = report.verdict or {}
-    p, attainable = verdict.get("p"), verdict.get("attainable_p")
-    if p is None:
-        return "–"
-    return f"{p:.2g}" + (f" ({attainable:.2g})" if attainable is not None else "")
 
 
 def _rendered(content: Table | str, width: int, colour: bool) -> str:

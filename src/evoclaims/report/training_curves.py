@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evoclaims.report.formatting import clean, number
-from evoclaims.report.trial_summary import POINTS, Glance
+from evoclaims.report.trial_summary import POINTS, TrialSummary
 
 AXES: Final = ("environment_steps", "steps")
 """Curves that count what was spent; the first is the panels' axis."""
@@ -55,7 +55,7 @@ class CurvePanel:
     broken: int
 
 
-def panels(trials: Sequence[Glance]) -> tuple[tuple[CurvePanel, ...], str]:
+def panels(trials: Sequence[TrialSummary]) -> tuple[tuple[CurvePanel, ...], str]:
     """Return the panels of a condition's trials, and in words what is not drawn."""
     usable = [trial for trial in trials if trial.reports > 1 and np.isfinite(trial.curves.get(AXES[0], np.nan)).all()]
     if not usable:
@@ -76,14 +76,14 @@ def panels(trials: Sequence[Glance]) -> tuple[tuple[CurvePanel, ...], str]:
     return tuple(_panel(usable, name) for name in varying[:MOST_PANELS]), text[:1].upper() + text[1:] + "." * bool(text)
 
 
-def _constant(trials: Sequence[Glance], name: str) -> float | None:
+def _constant(trials: Sequence[TrialSummary], name: str) -> float | None:
     """Return the value that a quantity has in all trials at all times; None when it changes."""
     first = trials[0].curves[name][0]
     same = all(np.array_equal(t.curves[name], np.full_like(t.curves[name], first), equal_nan=True) for t in trials)
     return float(first) if same else None
 
 
-def _panel(trials: Sequence[Glance], name: str) -> CurvePanel:
+def _panel(trials: Sequence[TrialSummary], name: str) -> CurvePanel:
     """Return one quantity's panel."""
     broken = sum(not np.isfinite(trial.curves[name]).all() for trial in trials)
     if len(trials) <= MOST_LINES:
@@ -113,7 +113,7 @@ def _quantiles(values: NDArray[np.float64]) -> NDArray[np.float64]:
     return found
 
 
-def _held(trial: Glance, name: str, x: NDArray[np.float64]) -> NDArray[np.float64]:
+def _held(trial: TrialSummary, name: str, x: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return a curve at other places: each value holds until the next, the last for good, NaN before the first."""
     places = np.searchsorted(trial.curves[AXES[0]], x, side="right") - 1
     held = np.where(places >= 0, trial.curves[name][np.maximum(places, 0)], np.nan)

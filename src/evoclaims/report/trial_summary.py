@@ -20,7 +20,7 @@ POINTS: Final = 100
 
 
 @dataclass(frozen=True, eq=False)
-class Glance:
+class TrialSummary:
     """One trial.
 
     Attributes:
@@ -48,24 +48,24 @@ class Reader:
     def __init__(self, archive: Archive) -> None:
         """Read from `archive`."""
         self._archive = archive
-        self._read: dict[str, Glance | None] = {}
+        self._read: dict[str, TrialSummary | None] = {}
         self._origins: dict[Origin, Origin] = {}
         self.settings: dict[str, Mapping[str, Any]] = {}
         """What was run, as plain JSON, by the condition's id."""
         self.troubles: dict[str, None] = {}
         """Why trials could not be read: sentences in the order of their coming."""
 
-    def read(self, trials: Sequence[str], versions: Versions | None = None) -> tuple[Glance, ...]:
+    def read(self, trials: Sequence[str], versions: Versions | None = None) -> tuple[TrialSummary, ...]:
         """Return those of the trials that can be read; `troubles` says why others cannot.
 
         Args:
             trials: ids.
             versions: of a trial's several records the one made with these comes first (see `Archive.get`).
         """
-        glances = (self._one(trial, versions) for trial in trials)
-        return tuple(glance for glance in glances if glance is not None)
+        summaries = (self._one(trial, versions) for trial in trials)
+        return tuple(summary for summary in summaries if summary is not None)
 
-    def _one(self, trial: str, versions: Versions | None) -> Glance | None:
+    def _one(self, trial: str, versions: Versions | None) -> TrialSummary | None:
         """Return a trial."""
         if trial not in self._read:
             try:
@@ -73,16 +73,16 @@ class Reader:
             except UserError as error:
                 self.troubles[str(error)] = None
                 found = None
-            self._read[trial] = None if found is None else self._glance(found)
+            self._read[trial] = None if found is None else self._summary(found)
         return self._read[trial]
 
-    def _glance(self, found: TrialResult) -> Glance:
+    def _summary(self, found: TrialResult) -> TrialSummary:
         """Keep what is shown of a record."""
         self.settings.setdefault(found.condition, {k: v for k, v in found.spec.items() if k != "seed"})
         origin = Origin.of(found.provenance)
         reports = max(map(len, found.curves.values()), default=0)
         kept = slice(None) if reports <= POINTS else np.linspace(0, reports - 1, POINTS).round().astype(int)
-        return Glance(
+        return TrialSummary(
             trial=found.id,
             seed=found.seed,
             status=found.status,

@@ -65,10 +65,11 @@ def key_of(report: ClaimReport) -> tuple[str, str]:
     return report.tier, printable(report.name)
 
 
-def in_order(key: tuple[str, str]) -> tuple[str, str, int, str]:
-    """Sort claims by tier, and as people count: G9 before G10."""
-    tier, claim = key
-    return tier, claim[:1], len(claim.partition("[")[0]), claim
+def in_order(key: tuple[str, str]) -> tuple[str, str, int, str, str]:
+    """Sort claims by tier, and as people count: G9 before G10, and a claim before its cases."""
+    tier, name = key
+    claim, _, case = name.partition("[")
+    return tier, claim[:1], len(claim), claim, case.removesuffix("]")
 
 
 def eras(entries: Sequence[Entry]) -> tuple[tuple[Entry, ...], ...]:

@@ -1,0 +1,61 @@
+"""What every table of verdicts shows of a claim, whatever it is written in: plain texts, not yet escaped."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Sequence
+
+from evoclaims.judging.verdict import Direction, Outcome
+from evoclaims.report.formatting import p_value
+from evoclaims.verdicts import mixed_versions
+from evoclaims.verdicts.claim_report import ClaimReport
+from evoclaims.verdicts.history import in_order, key_of
+
+NONE = "–"
+"""What was not measured."""
+
+
+def ordered(reports: Iterable[ClaimReport]) -> list[ClaimReport]:
+    """Return reports by tier, and as people count."""
+    return sorted(reports, key=lambda report: in_order(key_of(report)))
+
+
+def verdict(report: ClaimReport) -> str:
+    """Return the outcome, such as "✗ refuted*†".
+
+    An asterisk stands for one that was looked into and accepted, a dagger for trials of mixed versions.
+    """
+    mixed = mixed_versions.MARK * mixed_versions.is_mixed(report)
+    return f"{report.outcome.symbol} {report.outcome}{'*' * report.as_expected}{mixed}"
+
+
+def trials(report: ClaimReport) -> str:
+    """Return the trials a side that were looked at."""
+    return str(report.n) if report.n else NONE
+
+
+def effect(report: ClaimReport) -> str:
+    """Return the effect size (A12) of the part that decided."""
+    part = report.verdict.deciding_part if report.verdict else None
+    return NONE if part is None or part.a12 is None else f"{part.a12:.2f}"
+
+
+def p(report: ClaimReport, *, attainable: bool = True) -> str:
+    """Return the p value that the verdict rests on, such as "0.0054 (6e-05)", or "against 0.001 (0.0006)".
+
+    Args:
+        report: of the claim.
+        attainable: whether to add, in parentheses, the smallest p that the trials could have given.
+    """
+    decision = report.verdict.decision if report.verdict else None
+    if decision is None:
+        return NONE
+    against = "against " if decision.direction is Direction.AGAINST else ""
+    smallest = f" ({p_value(decision.attainable_p)})" if attainable and decision.attainable_p is not None else ""
+    return f"{against}{p_value(decision.p)}{smallest}"
+
+
+def totals(reports: Sequence[ClaimReport]) -> str:
+    """Return the counts in one line, such as "3 supported, 1 refuted"."""
+    counts = Counter(report.outcome for report in reports)
+    return ", ".join(f"{counts[outcome]} {outcome}" for outcome in Outcome if counts[outcome]) or "no verdicts"
