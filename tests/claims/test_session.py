@@ -43,11 +43,11 @@ def test_a_claim_ends_supported_or_refuted_and_names_its_trials(session: Session
     report = session.settle(says, "small", "smoke", better.mean_success > worse.mean_success)
     assert (report.name, report.outcome, report.n, report.tier) == ("T1[small]", "supported", 6, "smoke")
     assert report.statement == says.smoke
-    assert [(s["method"], s["task"], len(s["trials"])) for s in report.sources] == [
+    assert [(s.method, s.task, len(s.trials)) for s in report.sources] == [
         ("better", "small", 6),
         ("worse", "small", 6),
     ]
-    assert report.sources[0]["trials"][3] == session.fetch(better.condition, [3])[0].id
+    assert report.sources[0].trials[3] == session.fetch(better.condition, [3])[0].id
     other = session.settle(says, "small", "smoke", worse.mean_success > better.mean_success)
     assert other.outcome == "refuted"
     assert other.failed
@@ -57,7 +57,7 @@ def test_the_full_tier_judges_the_papers_own_sentence_with_its_own_protocol(sess
     better, worse = _pair(session, "full")
     report = session.settle(says, "", "full", better.mean_success > worse.mean_success)
     assert (report.name, report.n, report.statement) == ("T1", 10, says.says)
-    assert [look["n"] for look in report.attainable] == [10]
+    assert [look.n for look in report.attainable] == [10]
 
 
 def test_a_fixed_number_of_trials_takes_the_place_of_the_looks(session: Session, says: Claim) -> None:
@@ -101,8 +101,7 @@ def test_trials_that_may_not_be_run_end_a_claim_as_not_run(
     report = stored.settle(says, "", "smoke", better.mean_success > worse.mean_success)
     assert (report.outcome, report.n, report.failed) == ("not run", 0, False)
     assert report.reason.startswith("6 of 6 trials of hand_built_negated on n_parity are missing")
-    assert report.verdict is not None
-    assert len(report.verdict["fingerprint"]) == 64
+    assert len(report.fingerprint) == 64
     for seed in range(6):
         store.put(made(worse.condition, seed, 0.0), {})
     assert stored.settle(says, "", "smoke", better.mean_success > worse.mean_success).outcome == "supported"

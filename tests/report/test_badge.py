@@ -6,6 +6,7 @@ import re
 from xml.etree import ElementTree
 
 import pytest
+from hand_made_verdicts import report
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -16,7 +17,7 @@ SVG = "{http://www.w3.org/2000/svg}"
 
 
 def _reports(*outcomes: str, expected: str | None = None) -> list[ClaimReport]:
-    return [ClaimReport("G1", "", "smoke", "s", "w", outcome, "r", expected=expected) for outcome in outcomes]
+    return [report("G1", outcome, expected=expected) for outcome in outcomes]
 
 
 def test_a_badge_shows_label_and_message_and_nothing_from_elsewhere() -> None:

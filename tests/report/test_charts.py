@@ -13,6 +13,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
+from evoclaims.judging.verdict import Bound, Interval
 from evoclaims.report.charts import MOST_DOTS, WIDTH, axis_svg, curve_symbol, strip_svg, ticks
 from evoclaims.report.evidence import Dot, Part, Strip
 from evoclaims.report.training_curves import CurvePanel, Line
@@ -82,7 +83,7 @@ def test_trials_without_a_number_stand_in_a_column_of_their_own() -> None:
 
 
 def test_bounds_and_intervals_of_an_event_are_drawn() -> None:
-    part = _part(1.0, 1.0, 0.0, 1.0, event=True, bounds=(("p0", 0.7),), spans=(Span("P", 0.3, 0.9),))
+    part = _part(1.0, 1.0, 0.0, 1.0, event=True, bounds=(Bound("p0", 0.7),), spans=(Interval("P", 0.3, 0.9),))
     said = _titles(_drawn(part), "path")
     assert "p0: 0.7" in said
     assert "P: 0.3 to 0.9" in said

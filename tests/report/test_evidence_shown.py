@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import pytest
+from hand_made_verdicts import evidence
 from laboratory import Laboratory
 
-from evoclaims.judging.kinds.every_trial import EveryTrial
-from evoclaims.judging.kinds.most_trials import Solves, Stays
-from evoclaims.report.evidence import EVENT_KINDS, Part, judged_part
+from evoclaims.judging.sample import Sample
+from evoclaims.judging.verdict import Bound
+from evoclaims.report.evidence import Part, judged_part
 
 
 @pytest.fixture
@@ -23,13 +25,9 @@ def shown(filled: Laboratory) -> Any:
     return part
 
 
-def test_kinds_that_read_events_are_known() -> None:
-    assert {Solves.kind, Stays.kind, EveryTrial.kind} == EVENT_KINDS
-
-
 def test_a_band_shows_its_ends_and_the_interval_of_the_median(shown: Any) -> None:
     part = shown(lambda group: group.mean_success.between(0.25, 0.75))
-    assert part.bounds == (("lowest", 0.25), ("highest", 0.75))
+    assert part.bounds == (Bound("lowest", 0.25), Bound("highest", 0.75))
     assert [span.of for span in part.spans] == ["median, 95% percentile bootstrap"]
     assert part.event is False
 
@@ -37,7 +35,7 @@ def test_a_band_shows_its_ends_and_the_interval_of_the_median(shown: Any) -> Non
 @pytest.mark.parametrize("p0", [0.7, 0.5])
 def test_an_event_shows_the_probability_that_it_is_held_against(shown: Any, p0: float) -> None:
     part = shown(lambda group: group.solves_every_level.in_most_trials(p0))
-    assert part.bounds == (("p0", p0),)
+    assert part.bounds == (Bound("p0", p0),)
     assert part.event is True
     assert [span.of for span in part.spans] == ["P(event), Clopper-Pearson, each end at 0.05"]
 
@@ -59,16 +57,13 @@ def test_numbers_stand_with_what_was_attainable(filled: Laboratory) -> None:
     numbers = dict(filled.section(report).parts[0].numbers)
     assert numbers["p for"] == "0.0011 (smallest attainable 0.0011)"
     assert (numbers["A12"], numbers["Cliff’s δ"], numbers["n a side"]) == ("1", "1", "6")
-    assert numbers["A12, 95% percentile bootstrap"] == "1 to 1"
+    assert (numbers["A12, 95% percentile bootstrap"], numbers["A12 margin"]) == ("1 to 1", "0.71")
 
 
 def test_values_are_written_out_by_seed_up_to_fifty_trials() -> None:
     def part(n: int) -> Part:
-        sample = {"label": "a: x", "seeds": [*range(n)], "values": [0.5] * (n - 1) + ["-inf"], "median": 0.5}
-        evidence = {"kind": "solves", "describe": "", "outcome": "refuted", "n": n, "alpha": 0.05, "intervals": []}
-        rest = dict.fromkeys(("p", "attainable_p", "p_refuted", "attainable_p_refuted", "a12", "cliffs_delta"))
-        samples = [{**sample, "failed": [n - 1]}]
-        return judged_part({**evidence, **rest, "detail": "", "samples": samples}, {"a": {n - 1: "timeout"}})
+        values = (*[0.5] * (n - 1), -math.inf)
+        return judged_part(evidence(samples=(Sample("a: x", tuple(range(n)), values, 0.5, (n - 1,), ("timeout",)),)))
 
     assert part(3).rows == ((0, ("0.5",)), (1, ("0.5",)), (2, ("timeout",)))
     assert len(part(50).rows) == 50

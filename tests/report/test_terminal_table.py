@@ -4,36 +4,22 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
-from typing import Any
 
 import pytest
+from hand_made_verdicts import evidence, report, verdict
 from hypothesis import given
 from hypothesis import strategies as st
 
 from evoclaims.judging.baseline import DriftReport, DriftRow
-from evoclaims.report.terminal_table import drift_lines, explanations, totals, verdict_table
-from evoclaims.verdicts.claim_report import ClaimReport
-
-
-def _report(claim: str = "G1", outcome: str = "supported", **fields: Any) -> ClaimReport:
-    verdict = {"n": 10, "p": 0.0283, "attainable_p": 0.0283, "evidence": [{"a12": None}, {"a12": 0.9375}]}
-    return ClaimReport(
-        **{
-            "claim": claim,
-            "case": "",
-            "tier": "smoke",
-            "statement": "All levels are solved",
-            "where": "§5.1",
-            "outcome": outcome,
-            "reason": "for a reason",
-            "verdict": verdict,
-            **fields,
-        }
-    )
+from evoclaims.judging.verdict import Outcome
+from evoclaims.report.table_cells import totals
+from evoclaims.report.terminal_table import drift_lines, explanations, verdict_table
 
 
 def test_a_row_shows_claim_sentence_verdict_n_effect_p_and_evidence() -> None:
-    table = verdict_table([_report(case="n_parity", evidence="a/verdicts/smoke/G1.json")], 160, False)
+    parts = (evidence(0.5), evidence(0.9375))
+    judged = report(case="n_parity", evidence="a/verdicts/smoke/G1.json", verdict=verdict(evidence=parts, deciding=1))
+    table = verdict_table([judged], 160, False)
     heading, row, *_, caption = table.splitlines()
     assert " ".join(heading.split()) == "claim what is claimed verdict n A12 p (attainable) evidence"
     cells = re.split(r" {2,}", row.strip())
@@ -49,14 +35,23 @@ def test_a_row_shows_claim_sentence_verdict_n_effect_p_and_evidence() -> None:
     assert caption == "evidence: a/verdicts/smoke/<claim>.json"
 
 
+def test_a_refuted_claim_shows_the_p_against_it_and_the_effect_of_the_part_that_decided() -> None:
+    parts = (evidence(0.5), evidence(0.0625), evidence(None))
+    refuted = report(outcome="refuted", verdict=verdict("refuted", evidence=parts, deciding=1))
+    row = verdict_table([refuted], 160, False).splitlines()[1]
+    assert re.split(r" {2,}", row.strip())[2:] == ["✗ refuted", "10", "0.06", "against 0.0043 (0.0042)"]
+    without = replace(refuted, verdict=verdict("refuted", evidence=parts, deciding=2))
+    assert re.split(r" {2,}", verdict_table([without], 160, False).splitlines()[1].strip())[4] == "–"
+
+
 def test_what_was_not_measured_is_shown_as_a_dash() -> None:
-    row = verdict_table([_report(outcome="error", verdict=None)], 160, False).splitlines()[1]
+    row = verdict_table([report(outcome="error", verdict=None)], 160, False).splitlines()[1]
     assert re.split(r" {2,}", row.strip())[2:] == ["E error", "–", "–", "–"]
 
 
 def test_rows_come_in_the_order_in_which_people_count() -> None:
     names = ["G10", "C1", "G9", "G1"]
-    table = verdict_table([_report(name) for name in names], 120, False)
+    table = verdict_table([report(name) for name in names], 120, False)
     assert [line.split()[0] for line in table.splitlines()[1:]] == ["C1", "G1", "G9", "G10"]
 
 
@@ -65,14 +60,14 @@ HOSTILE = ["[red]x[/red]", "[/]", "[bold", "[link=a]b[/link]", ":boom: :x:", "a\
 
 @pytest.mark.parametrize("text", HOSTILE)
 def test_markup_in_a_sentence_is_shown_as_it_stands(text: str) -> None:
-    hostile = _report(outcome="refuted", statement=text, reason=text, because=text, expected="supported")
+    hostile = report(outcome="refuted", statement=text, reason=text, because=text, expected="supported")
     assert f"{text} (§5.1)" in verdict_table([hostile], 160, False)
     assert f"G1: {text} [no longer supported, which was accepted: {text}]" in explanations([hostile], 160, False)
 
 
 @pytest.mark.parametrize("text", ["\x1b[2J\x1b]0;title\x07", "a\rb", "\x9b31m", "\u202egnp", "a\x00b\x08"])
 def test_a_sentence_cannot_steer_the_terminal(text: str) -> None:
-    hostile = _report("G1", "refuted", case=text, statement=text, reason=text, evidence=f"{text}/x")
+    hostile = report("G1", "refuted", case=text, statement=text, reason=text, evidence=f"{text}/x")
     for shown in (verdict_table([hostile], 200, False), explanations([hostile], 200, False)):
         assert [c for c in shown if not c.isprintable() and c != "\n"] == []
 
@@ -80,45 +75,45 @@ def test_a_sentence_cannot_steer_the_terminal(text: str) -> None:
 @given(st.text(max_size=30))
 def test_any_text_can_be_shown(text: str) -> None:
     fields = dict.fromkeys(("case", "statement", "where", "reason", "because"), text)
-    report = _report("G1", "refuted", expected="error", **fields)
+    odd = report("G1", "refuted", expected="error", **fields)
     for colour in (False, True):
-        verdict_table([report], 100, colour)
-        explanations([report], 100, colour)
+        verdict_table([odd], 100, colour)
+        explanations([odd], 100, colour)
 
 
 def test_a_sentence_over_several_lines_stays_in_its_row() -> None:
-    table = verdict_table([_report(statement="All levels\n    are\tsolved")], 160, False)
+    table = verdict_table([report(statement="All levels\n    are\tsolved")], 160, False)
     assert "All levels are solved (§5.1)" in table
 
 
 def test_colour_is_used_only_where_it_is_wanted() -> None:
-    report = _report(outcome="refuted")
-    assert "\x1b[31m" in verdict_table([report], 120, True)
-    assert "\x1b" not in verdict_table([report], 120, False)
+    refuted = report(outcome="refuted")
+    assert "\x1b[31m" in verdict_table([refuted], 120, True)
+    assert "\x1b" not in verdict_table([refuted], 120, False)
 
 
 def test_only_what_is_not_plainly_supported_is_explained() -> None:
-    plain = _report()
+    plain = report()
     assert explanations([plain], 100, False) == ""
-    assert explanations([replace(plain, expected="supported")], 100, False) == ""
-    assert explanations([_report("G2", "inconclusive")], 100, False) == "? G2: for a reason"
-    accepted = replace(_report("G3", "refuted"), expected="refuted", because="known")
+    assert explanations([replace(plain, expected=Outcome.SUPPORTED)], 100, False) == ""
+    assert explanations([report("G2", "inconclusive")], 100, False) == "? G2: for a reason"
+    accepted = report("G3", "refuted", expected="refuted", because="known")
     assert explanations([accepted], 100, False) == "✗ G3: for a reason [accepted: known]"
-    surprising = replace(plain, expected="refuted", because="known")
+    surprising = replace(plain, expected=Outcome.REFUTED, because="known")
     assert explanations([surprising], 100, False) == (
         "✓ G1: for a reason [no longer refuted, which was accepted: known]"
     )
-    not_run = replace(surprising, outcome="not run")  # which says nothing against what was accepted
+    not_run = replace(surprising, outcome=Outcome.NOT_RUN)  # which says nothing against what was accepted
     assert explanations([not_run], 100, False) == "- G1: for a reason"
 
 
 def test_an_accepted_verdict_is_marked_in_its_row() -> None:
-    assert "✗ refuted*" in verdict_table([_report(outcome="refuted", expected="refuted")], 120, False)
-    assert "refuted*" not in verdict_table([_report(outcome="refuted", expected="error")], 120, False)
+    assert "✗ refuted*" in verdict_table([report(outcome="refuted", expected="refuted")], 120, False)
+    assert "refuted*" not in verdict_table([report(outcome="refuted", expected="error")], 120, False)
 
 
 def test_totals_count_each_outcome_in_one_line() -> None:
-    reports = [_report(outcome=outcome) for outcome in ("refuted", "supported", "not run", "supported", "error")]
+    reports = [report(outcome=outcome) for outcome in ("refuted", "supported", "not run", "supported", "error")]
     assert totals(reports) == "2 supported, 1 refuted, 1 error, 1 not run"
     assert totals([]) == "no verdicts"
 
@@ -145,15 +140,17 @@ def test_where_nothing_could_be_compared_to_the_bit_nothing_is_said_to_be_unchan
 
 
 def test_eighty_columns_leave_out_the_files_and_nothing_else() -> None:
-    lines = verdict_table([_report(case="n_parity", evidence="a/verdicts/smoke/G1.json")], 80, False).splitlines()
+    shown = [report(case="n_parity", evidence="a/verdicts/smoke/G1.json"), report("G2", "refuted", expected="refuted")]
+    lines = verdict_table(shown, 80, False).splitlines()
     assert " ".join(lines[0].split()) == "claim what is claimed verdict n A12 p (attainable)"
     assert all(len(line) <= 80 for line in lines)
-    assert lines[-1] == "evidence: a/verdicts/smoke/<claim>.json"
+    assert "evidence: a/verdicts/smoke/<claim>.json" in lines
+    assert re.search(r"✗ refuted\* +10 +– +against 0.0043", "\n".join(lines))
 
 
 def test_trials_without_a_result_are_told_of_whatever_the_verdict() -> None:
     for outcome in ("supported", "refuted"):
-        verdict = {"n": 10, "evidence": [], "without_result": "2 of 10 trials of a ran out of time (seeds 0, 3)"}
-        told = explanations([_report(outcome=outcome, verdict=verdict)], 160, False)
+        broken = verdict(outcome, without_result="2 of 10 trials of a ran out of time (seeds 0, 3)")
+        told = explanations([report(outcome=outcome, verdict=broken)], 160, False)
         assert told.endswith("G1: for a reason [worst rank: 2 of 10 trials of a ran out of time (seeds 0, 3)]")
-    assert explanations([_report()], 160, False) == ""
+    assert explanations([report()], 160, False) == ""

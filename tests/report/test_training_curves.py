@@ -11,7 +11,7 @@ import pytest
 from laboratory import CONDITIONS, Laboratory, record
 
 from evoclaims.report.training_curves import MOST_LINES, CurvePanel, panels
-from evoclaims.report.trial_summary import POINTS, TrialSummary, Reader
+from evoclaims.report.trial_summary import POINTS, Reader, TrialSummary
 
 
 @pytest.fixture

@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 import pytest
+from hand_made_verdicts import report, verdict
 
 from evoclaims.judging.verdict import Outcome
 from evoclaims.paper.archive import Archive
@@ -15,6 +16,7 @@ from evoclaims.trials.store import Store
 from evoclaims.verdicts.acceptance import accept, entry_of
 from evoclaims.verdicts.claim_report import ClaimReport
 from evoclaims.verdicts.history import History
+from evoclaims.verdicts.source_trials import SourceTrials
 
 Report = Callable[..., ClaimReport]
 KEY = ("smoke", "G1")
@@ -41,9 +43,8 @@ def judged(store: Store, made: Any, reproduction: Reproduction) -> Report:
             seed = len(store.ids())
             store.put(made(condition, seed, 1.0, **provenance), {})
             trials.append(made(condition, seed, 1.0).id)
-        verdict = {"fingerprint": "f" * 64, "n": len(trials), "p": 0.03}
-        sources = ({"method": "better", "task": "small", "condition": condition.id, "trials": trials},)
-        basis = ClaimReport("G1", "", "smoke", "s", "§1", "supported", "so", verdict=verdict, sources=sources)
+        sources = (SourceTrials("better", "small", condition.id, tuple(trials), {}, ()),)
+        basis = report("G1", reason="so", verdict=verdict(n=len(trials), p=0.03), sources=sources)
         return replace(basis, **fields)
 
     return make
@@ -89,16 +90,16 @@ def test_a_first_verdict_is_accepted_and_the_same_one_not_again(store: Store, ju
 @pytest.mark.parametrize(
     ("provenance", "fields", "said"),
     [
-        ({}, {"outcome": "refuted"}, "supported -> refuted"),
+        ({}, {"outcome": Outcome.REFUTED}, "supported -> refuted"),
         ({"jax": "0.11.2"}, {}, "still supported (by jax 0.10.2 -> 0.11.2)"),
         (
             {"jax": "0.11.2", "kind": "TPU"},
-            {"outcome": "inconclusive"},
+            {"outcome": Outcome.INCONCLUSIVE},
             "supported -> inconclusive (by jax 0.10.2 -> 0.11.2, nvidia-cublas none -> 13.0, device cpu -> TPU)",
         ),
         (
             {},
-            {"verdict": {"fingerprint": "e" * 64, "n": 1, "p": None}},
+            {"verdict": verdict(fingerprint="e" * 64)},
             "supported; a new history begins, since what is judged has changed (it was supported)",
         ),
     ],
@@ -120,7 +121,7 @@ def test_new_trials_of_another_revision_alone_are_no_new_entry(store: Store, jud
 
 @pytest.mark.parametrize("outcome", ["not run", "error"])
 def test_what_says_nothing_of_a_claim_is_never_accepted(store: Store, judged: Report, outcome: str) -> None:
-    silent = judged(outcome=outcome, reason="10 trials\x1b are missing")
+    silent = judged(outcome=Outcome(outcome), reason="10 trials\x1b are missing")
     assert _accept(store, {}, silent)[:2] == ({}, ())
     before, _, _ = _accept(store, {}, judged(_provenance()))
     history, accepted, left = _accept(store, before, silent)
@@ -131,6 +132,6 @@ def test_what_says_nothing_of_a_claim_is_never_accepted(store: Store, judged: Re
 
 
 def test_a_claim_that_broke_before_it_was_judged_is_left_alone(store: Store, judged: Report) -> None:
-    _, accepted, left = _accept(store, {}, judged(outcome="error", verdict=None, sources=()))
+    _, accepted, left = _accept(store, {}, judged(outcome=Outcome.ERROR, verdict=None, sources=()))
     assert accepted == ()
     assert left == ("G1 (smoke) is error now (so): nothing is accepted",)

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from hand_made_verdicts import report
+
 from evoclaims.judging.verdict import Outcome
 from evoclaims.verdicts.claim_report import ClaimReport
 from evoclaims.verdicts.robustness import matrix
 
 
 def _report(claim: str, outcome: Outcome, variant: str = "", tier: str = "smoke") -> ClaimReport:
-    return ClaimReport(claim, "", tier, "says", "§1", str(outcome), "why", variant=variant)
+    return report(claim, outcome, tier=tier, variant=variant)
 
 
 PLAIN = [_report("A", Outcome.SUPPORTED), _report("B", Outcome.REFUTED), _report("C", Outcome.NOT_RUN)]

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import pytest
+from hand_made_verdicts import report, verdict
 from hypothesis import given
 from hypothesis import strategies as st
 
 from evoclaims.core.errors import UnknownNameError, UserError
 from evoclaims.judging.verdict import Outcome
-from evoclaims.verdicts.claim_report import ClaimReport
 from evoclaims.verdicts.transitions import (
     Kind,
     Standing,
@@ -145,8 +145,8 @@ def test_no_name_can_steer_the_terminal(tier: str, claim: str) -> None:
 
 
 def test_a_report_stands_under_its_name_with_its_fingerprint() -> None:
-    judged = ClaimReport("G1", "a", "smoke", "s", "w", "refuted", "r", verdict={"fingerprint": "f1", "n": 10})
-    broken = ClaimReport("G2", "", "full", "s", "w", "error", "r")
+    judged = report("G1", "refuted", case="a", verdict=verdict("refuted", fingerprint="f1"))
+    broken = report("G2", "error", tier="full", verdict=None)
     assert standings([judged, broken]) == {
         ("smoke", "G1[a]"): Standing(Outcome.REFUTED, "f1"),
         ("full", "G2"): Standing(Outcome.ERROR, ""),

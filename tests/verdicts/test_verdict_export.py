@@ -15,6 +15,7 @@ import pandas
 import pandas.core.arrays.arrow.extension_types  # registers types, once: pytester forgets what tests import
 import pyarrow.parquet
 import pytest
+from hand_made_verdicts import report, verdict
 from hypothesis import example, given
 from hypothesis import strategies as st
 
@@ -24,7 +25,6 @@ from evoclaims.paper.condition_names import Name, names_of
 from evoclaims.paper.reproduction import Reproduction, Tier
 from evoclaims.paper.variant import Variant
 from evoclaims.trials.result import TrialResult
-from evoclaims.verdicts.claim_report import ClaimReport
 from evoclaims.verdicts.export import FORMS, as_csv, as_json, as_parquet, columns_of, trial_rows, verdict_rows
 
 NAMES = (Name("smoke", "", "better", "small"),)
@@ -147,9 +147,8 @@ def test_without_pyarrow_a_sentence_says_what_to_install(monkeypatch: pytest.Mon
 
 
 def test_a_verdict_is_a_row_with_the_numbers_of_the_whole_assertion() -> None:
-    verdict = {"n": 10, "p": 0.03, "attainable_p": 0.02, "alpha": 0.05, "fingerprint": "f" * 64}
-    judged = ClaimReport("G1", "a", "smoke", "s, t", "§1", "refuted", "so", expected="refuted", verdict=verdict)
-    broken = ClaimReport("G2", "", "smoke", "s", "§1", "error", "so")
+    judged = report("G1", "refuted", case="a", statement="s, t", expected="refuted", verdict=verdict("refuted", p=0.03))
+    broken = report("G2", "error", verdict=None)
     first, second = verdict_rows([judged, broken])
     assert (first["claim"], first["case"], first["n"], first["p"], first["expected"]) == (
         "G1",
