@@ -1,12 +1,13 @@
-"""Verdicts as records: strict JSON and one symbol an outcome."""
+"""Verdicts as records: one symbol an outcome, and all that a reader of the evidence needs to know."""
 
 from __future__ import annotations
 
-import json
-
+from evoclaims.judging.assertion import Assertion
 from evoclaims.judging.judge import judge
-from evoclaims.judging.protocol import FIXED_10
-from evoclaims.judging.verdict import Outcome
+from evoclaims.judging.protocol import FIXED_10, Protocol
+from evoclaims.judging.verdict import Bound, Direction, Outcome
+
+RISING = [float(i) for i in range(10)]
 
 
 def test_each_outcome_has_its_symbol() -> None:
@@ -19,10 +20,54 @@ def test_each_outcome_has_its_symbol() -> None:
     }
 
 
-def test_a_verdict_is_strict_json_even_with_failed_trials(source) -> None:
-    verdict = judge(source("a", ["diverged"] * 10).score() > source("b", [1.0] * 10).score(), FIXED_10)
-    plain = json.loads(json.dumps(verdict.to_json(), allow_nan=False))
-    assert plain["outcome"] == "refuted"
-    assert plain["evidence"][0]["samples"][0]["values"] == ["-inf"] * 10
-    assert plain["evidence"][0]["samples"][0]["failed"] == list(range(10))
-    assert plain["fingerprint"] == verdict.fingerprint
+def test_a_sample_says_how_each_failed_trial_ended(source) -> None:
+    verdict = judge(source("a", [1.0, "diverged", 0.0, "timeout"]).solved().stays(), Protocol.fixed(4))
+    (sample,) = verdict.evidence[0].samples
+    assert (sample.failed, sample.endings) == ((1, 3), ("diverged", "timeout"))
+
+
+def test_evidence_carries_what_its_trials_are_compared_with(source) -> None:
+    a, b = source("a", RISING), source("b", RISING)
+    bounds = {
+        a.score().between(4, 6): (Bound("lowest", 4.0), Bound("highest", 6.0)),
+        a.solved().in_most_trials(): (Bound("p0", 0.7),),
+        a.solved().stays(p0=0.5): (Bound("p0", 0.5),),
+        a.score() > b.score(): (Bound("A12 margin", 0.71, on_axis=False),),
+        a.score().equivalent_to(b.score(), margin=2): (Bound("margin", 2.0, on_axis=False),),
+        a.solved().in_every_trial(): (),
+    }
+    for assertion, expected in bounds.items():
+        assert judge(assertion, FIXED_10).evidence[0].bounds == expected
+    events = {entry.events for one in bounds if "solved" in one.describe() for entry in judge(one, FIXED_10).evidence}
+    assert events == {True}
+    assert judge(a.score().between(4, 6), FIXED_10).evidence[0].events is False
+
+
+def test_a_verdict_rests_on_the_p_of_its_own_direction(source) -> None:
+    a, b = source("a", RISING).score(), source("b", [value + 20 for value in RISING]).score()
+    for verdict, direction in ((judge(a < b, FIXED_10), Direction.FOR), (judge(a > b, FIXED_10), Direction.AGAINST)):
+        assert verdict.decision is not None
+        assert verdict.decision.direction is direction
+        assert verdict.decision.p == verdict.decision.attainable_p < 1e-5
+    assert judge(source("a", [1.0] * 10).solved().in_every_trial(), FIXED_10).decision is None
+
+
+def test_the_part_that_decided_is_named_whatever_the_compound(source) -> None:
+    yes, no, open_ = (
+        source(name, [1.0] * held + [0.0] * (10 - held)).solved().in_most_trials(p0=0.6)
+        for name, held in (("yes", 10), ("no", 1), ("open", 7))
+    )
+
+    def decided_by(assertion: Assertion) -> str:
+        part = judge(assertion, FIXED_10).deciding_part
+        assert part is not None
+        return part.describe.partition(":")[0]
+
+    assert decided_by(yes) == "yes"
+    assert decided_by(yes & no & open_) == "no"
+    assert decided_by(yes & open_) == "open"
+    assert decided_by(open_ | yes) == "yes"
+    assert decided_by(no | open_) == "open"
+    assert decided_by((yes | open_) & (yes & no)) == "no"
+    assert decided_by((no & yes) | (open_ & yes)) == "open"
+    assert judge(yes, Protocol.fixed(1)).deciding_part is None

@@ -1,0 +1,30 @@
+"""The goalposts of our own paper: the committed trials give the accepted verdicts, under the same rules."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from evoclaims.cli import main
+from evoclaims.verdicts import history
+from evoclaims.verdicts.claim_report import named
+from reproductions.nisioti2025 import REPRODUCTION
+
+
+def test_committed_trials_give_the_accepted_verdicts_with_the_same_fingerprints(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(Path(__file__).parents[2])
+    out = tmp_path / "verdicts.json"
+    assert main(["export", "--verdicts", f"--storage={tmp_path}", f"--out={out}"]) == 0
+    rows = [row for row in json.loads(out.read_text())["rows"] if row["outcome"] != "not run"]
+    now = {
+        (row["tier"], named(row["claim"], row["case"])): (row["outcome"], row["fingerprint"], row["n"], row["p"])
+        for row in rows
+    }
+    assert now == {
+        key: (last.outcome, last.fingerprint, last.n, last.p)
+        for key, (*_, last) in history.load(REPRODUCTION.folder / history.FILE).items()
+    }
