@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 from evoclaims.core.canonical import as_plain
@@ -101,6 +101,18 @@ class DriftReport:
         return any(row.drifted for row in self.rows)
 
     @property
+    def tested(self) -> int:
+        """How many rows say something either way."""
+        return len(self.rows) - len(self.unchecked)
+
+    @property
+    def lines(self) -> list[str]:
+        """A line for each row that drifted, and one for each condition that could not be checked."""
+        drifted = [f"DRIFT in {row.in_words}" for row in self.rows if row.drifted]
+        unchecked = (f"not checked: {row.label}: {row.detail or row.status}" for row in self.unchecked)
+        return [*drifted, *dict.fromkeys(unchecked)]
+
+    @property
     def unchecked(self) -> tuple[DriftRow, ...]:
         """Rows that say nothing either way, and so are no pass."""
         return tuple(row for row in self.rows if row.status not in ("no drift", "drift"))
@@ -109,20 +121,6 @@ class DriftReport:
         """Return the report as strict JSON."""
         plain: dict[str, Any] = as_plain(self)
         return plain
-
-
-@dataclass(frozen=True)
-class _Tested:
-    """A row whose rank test has run; waits for the correction over the suite."""
-
-    label: str
-    metric: str
-    n_new: int
-    n_ref: int
-    p: float
-    a12: float
-    median_new: float
-    median_ref: float
 
 
 def check_drift(cases: Sequence[DriftCase], alpha: float = ALPHA) -> DriftReport:
@@ -135,18 +133,15 @@ def check_drift(cases: Sequence[DriftCase], alpha: float = ALPHA) -> DriftReport
         cases: conditions to check.
         alpha: familywise error of the whole report.
     """
-    entries = [_test(case, metric) for case in cases for metric in case.metrics]
-    tested = [entry for entry in entries if isinstance(entry, _Tested)]
-    adjusted = iter(holm([entry.p for entry in tested]))
-    rows = [
-        _corrected(entry, next(adjusted), len(tested), alpha) if isinstance(entry, _Tested) else entry
-        for entry in entries
-    ]
-    return DriftReport(tuple(rows), alpha)
+    rows = [_test(case, metric) for case in cases for metric in case.metrics]
+    tested = [row.p for row in rows if row.p is not None]
+    adjusted = iter(holm(tested))
+    corrected = (row if row.p is None else _corrected(row, next(adjusted), len(tested), alpha) for row in rows)
+    return DriftReport(tuple(corrected), alpha)
 
 
-def _test(case: DriftCase, metric: str) -> _Tested | DriftRow:
-    """Run the rank test of one metric, or say in a row why it cannot run."""
+def _test(case: DriftCase, metric: str) -> DriftRow:
+    """Run the rank test of one metric, still without the correction for all; or say in a row why it cannot run."""
     new = [trial for trial in case.new if trial.condition == case.condition]
     reference = [trial for trial in case.reference if trial.condition == case.condition]
 
@@ -176,8 +171,9 @@ def _test(case: DriftCase, metric: str) -> _Tested | DriftRow:
         return row("error", str(error))
     values, stored = _as_exact_as_float32(values, stored)
     p = min(1.0, 2 * min(rank_test(values, stored).p, rank_test(stored, values).p))
-    effect = a12(values, stored), median(values), median(stored)
-    return _Tested(case.label, metric, len(new), len(reference), p, *effect)
+    return replace(
+        row("no drift", ""), p=p, a12=a12(values, stored), median_new=median(values), median_ref=median(stored)
+    )
 
 
 def _as_exact_as_float32(*sides: Sequence[float]) -> list[list[float]]:
@@ -194,14 +190,13 @@ def _as_exact_as_float32(*sides: Sequence[float]) -> list[list[float]]:
     return [[exact[value] for value in side] for side in sides]
 
 
-def _corrected(entry: _Tested, p_holm: float, tests: int, alpha: float) -> DriftRow:
-    """Turn a tested row into its status, given its adjusted p."""
-    smallest = 2 * rank_attainable(entry.n_new, entry.n_ref) * tests
-    status: DriftStatus = "drift" if p_holm <= alpha else "underpowered" if smallest > alpha else "no drift"
+def _corrected(row: DriftRow, p_holm: float, tests: int, alpha: float) -> DriftRow:
+    """Return a tested row with its status, given its adjusted p."""
+    smallest = 2 * rank_attainable(row.n_new, row.n_ref) * tests
+    if p_holm <= alpha or smallest <= alpha:
+        return replace(row, status="drift" if p_holm <= alpha else "no drift", p_holm=p_holm)
     detail = (
-        f"the smallest p that {entry.n_new} against {entry.n_ref} trials allow is {smallest:.3g} "
+        f"the smallest p that {row.n_new} against {row.n_ref} trials allow is {smallest:.3g} "
         f"after correction for {tests} tests"
-        if status == "underpowered"
-        else ""
     )
-    return DriftRow(**asdict(entry), status=status, p_holm=p_holm, detail=detail)
+    return replace(row, status="underpowered", p_holm=p_holm, detail=detail)

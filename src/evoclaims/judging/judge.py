@@ -43,16 +43,27 @@ def judge(assertion: Assertion, protocol: Protocol, *, claim: str = "", tier: st
             finding = assertion.find(trials, protocol, look.alpha)
         except UnreadableTrialError as error:
             return Verdict(Outcome.ERROR, str(error), assertion.describe(), mark, n=look.n)
-        outcome = finding.p.outcome(look.alpha)
-        reason = _reason(finding, look, assertion, protocol)
-        broken = _without_result(assertion, trials)
-        verdict = _verdict(outcome, reason, finding, look, assertion, mark, broken)
-        if outcome is not Outcome.INCONCLUSIVE:
+        outcome, note = finding.p.outcome(look.alpha), ""
+        if outcome is Outcome.INCONCLUSIVE:
+            outcome, note = _settled(assertion, trials, looks[index + 1 :], protocol) or (outcome, note)
+        tested = any(entry.p is not None for entry in finding.evidence)  # a fact has no p
+        verdict = Verdict(
+            outcome=outcome,
+            reason=note + _reason(finding, look, assertion, protocol),
+            describe=assertion.describe(),
+            fingerprint=mark,
+            n=look.n,
+            alpha=look.alpha,
+            p=finding.p.supported if tested else None,
+            attainable_p=finding.attainable.supported if tested else None,
+            p_refuted=finding.p.refuted if tested else None,
+            attainable_p_refuted=finding.attainable.refuted if tested else None,
+            evidence=finding.evidence,
+            without_result=_without_result(assertion, trials),
+            deciding=finding.deciding[outcome.direction],
+        )
+        if outcome is not Outcome.INCONCLUSIVE or note:
             return verdict
-        settled = _settled(assertion, trials, looks[index + 1 :], protocol)
-        if settled is not None:
-            final, note = settled
-            return _verdict(final, f"{note}; {reason}", finding, look, assertion, mark, broken)
     return verdict
 
 
@@ -125,7 +136,7 @@ def _settled(
 
 def _stopped(look: Look) -> str:
     """Return the note of a curtailed verdict."""
-    return f"stopped early: no outcome of the trials up to n = {look.n} could change the verdict"
+    return f"stopped early: no outcome of the trials up to n = {look.n} could change the verdict; "
 
 
 def _reason(finding: Finding, look: Look, assertion: Assertion, protocol: Protocol) -> str:
@@ -142,18 +153,14 @@ def _reason(finding: Finding, look: Look, assertion: Assertion, protocol: Protoc
     if p.supported <= look.alpha:
         return f"the evidence contradicts itself: p = {p.supported:.3g} for and {p.refuted:.3g} against, {at}"
     if not _decidable(attainable, look.alpha):
-        return f"underpowered: with these ties the smallest attainable p is {min(_both(attainable)):.3g} > {at}"
+        smallest = min(attainable.supported, attainable.refuted)
+        return f"underpowered: with these ties the smallest attainable p is {smallest:.3g} > {at}"
     evidence = f"the evidence: p = {p.supported:.3g} for and {p.refuted:.3g} against, {at}"
     if assertion.attainable(look.n, protocol).supported > look.alpha:
         return f"{evidence}; underpowered for support: {_needs(assertion, protocol)}"
     if attainable.supported > look.alpha:
         return f"{evidence}; with these ties support is out of reach"
     return evidence
-
-
-def _both(p: PValues) -> tuple[float, float]:
-    """Return both p values."""
-    return p.supported, p.refuted
 
 
 def _needs(assertion: Assertion, protocol: Protocol) -> str:
@@ -175,26 +182,4 @@ def _underpowered(assertion: Assertion, protocol: Protocol, mark: str) -> Verdic
         alpha=look.alpha,
         attainable_p=attainable.supported,
         attainable_p_refuted=attainable.refuted,
-    )
-
-
-def _verdict(
-    outcome: Outcome, reason: str, finding: Finding, look: Look, assertion: Assertion, mark: str, broken: str
-) -> Verdict:
-    """Fill in the numbers of a look; a fact (no part of which was tested) has no p."""
-    tested = any(entry.p is not None for entry in finding.evidence)
-    return Verdict(
-        outcome=outcome,
-        reason=reason,
-        describe=assertion.describe(),
-        fingerprint=mark,
-        n=look.n,
-        alpha=look.alpha,
-        p=finding.p.supported if tested else None,
-        attainable_p=finding.attainable.supported if tested else None,
-        p_refuted=finding.p.refuted if tested else None,
-        attainable_p_refuted=finding.attainable.refuted if tested else None,
-        evidence=finding.evidence,
-        without_result=broken,
-        deciding=finding.deciding[outcome.direction],
     )

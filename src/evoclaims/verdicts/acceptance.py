@@ -93,9 +93,7 @@ def difference(old: Entry | None, new: Entry) -> str:
     """Return in words what a new entry changes; empty when it need not be written down."""
     if old is None:
         return f"{new.outcome}, the first verdict"
-    moved = [f"{name} {versions}" for name, versions in changed_versions(old, new).items()]
-    if old.device != new.device:
-        moved.append(f"device {old.device or 'unknown'} -> {new.device or 'unknown'}")
+    moved = changes(old, new)
     by = f" (by {', '.join(moved)})" if moved else ""
     if old.fingerprint != new.fingerprint:
         return f"{new.outcome}; a new history begins, since what is judged has changed (it was {old.outcome}){by}"
@@ -104,11 +102,12 @@ def difference(old: Entry | None, new: Entry) -> str:
     return f"still {new.outcome}{by}" if moved else ""
 
 
-def changed_versions(old: Entry, new: Entry) -> dict[str, str]:
-    """Return the packages whose versions differ, such as {"jax": "0.10.2 -> 0.11.2"}."""
+def changes(old: Entry, new: Entry) -> list[str]:
+    """Return in words the packages whose versions differ, such as "jax 0.10.2 -> 0.11.2", and the device."""
     names = sorted(old.versions.keys() | new.versions.keys())
-    pairs = {name: (old.versions.get(name, "none"), new.versions.get(name, "none")) for name in names}
-    return {name: f"{was} -> {now}" for name, (was, now) in pairs.items() if was != now}
+    pairs = [(name, old.versions.get(name, "none"), new.versions.get(name, "none")) for name in names]
+    pairs.append(("device", old.device or "unknown", new.device or "unknown"))
+    return [f"{name} {was} -> {now}" for name, was, now in pairs if was != now]
 
 
 def _packages(trial: TrialResult) -> dict[str, str]:

@@ -9,9 +9,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from datetime import date
 from pathlib import Path
-from typing import Any, Final
+from typing import Annotated, Any, Final
 
 import tomli_w
+from msgspec import Meta, ValidationError, convert
 
 from evoclaims.core.canonical import content_hash
 from evoclaims.core.errors import UserError
@@ -45,7 +46,7 @@ class Entry:
     outcome: Outcome
     reason: str
     n: int
-    p: float | None
+    p: Annotated[float, Meta(ge=0, le=1)] | None
     fingerprint: str
     accepted: str
     versions: Mapping[str, str]
@@ -56,8 +57,6 @@ class Entry:
 
 History = Mapping[tuple[str, str], tuple[Entry, ...]]
 """Accepted verdicts by tier and claim, such as ("full", "G1[n_parity]"); oldest first, so that the last one counts."""
-
-_TEXTS: Final = ("outcome", "reason", "fingerprint", "accepted", "environment", "device", "revision", "trials")
 
 
 def key_of(report: ClaimReport) -> tuple[str, str]:
@@ -137,25 +136,15 @@ def _entry(row: object, environments: Mapping[str, Any], name: str, claim: str) 
     if plain.keys() | {"p"} != expected:
         strange = ", ".join(sorted((plain.keys() | {"p"}) ^ expected))
         raise _torn(name, f"{claim} lacks these entries, or has them beyond the known ones: {strange}")
-    for word in _TEXTS:
-        if not isinstance(plain[word], str):
-            raise _torn(name, f"{word} of {claim} is no text")
-    if plain["outcome"] not in set(Outcome):
-        raise _torn(name, f"{claim} has the outcome {plain['outcome']!r}; known: {', '.join(Outcome)}")
-    if isinstance(plain["n"], bool) or not isinstance(plain["n"], int):
-        raise _torn(name, f"n of {claim} is no whole number")
-    p = plain.get("p")
-    if p is not None and (isinstance(p, bool) or not isinstance(p, int | float) or not 0 <= p <= 1):
-        raise _torn(name, f"p of {claim} is no number from 0 to 1")
+    environment = str(plain["environment"])
+    if environment not in environments:
+        raise _torn(name, f"{claim} names the environment {environment}, which is not among the environments")
     try:
-        date.fromisoformat(plain["accepted"])
-    except ValueError as error:
-        raise _torn(name, f"{claim} was accepted on {plain['accepted']!r}, which is no date") from error
-    versions = _table(environments.get(plain["environment"]), name, f"the environment {plain['environment']}")
-    if not all(isinstance(version, str) for version in versions.values()):
-        raise _torn(name, f"a version in the environment {plain['environment']} is no text")
-    kept = {word: value for word, value in plain.items() if word != "environment"}
-    return Entry(**{**kept, "p": p, "outcome": Outcome(plain["outcome"]), "versions": versions})
+        convert(plain["accepted"], date)
+        return convert({"p": None, **plain, "versions": environments[environment]}, Entry)
+    except ValidationError as error:
+        problem, _, path = str(error).partition(" - at `$")
+        raise _torn(name, f"{path.strip('.`') or 'accepted'} of {claim} is not as it was written: {problem}") from error
 
 
 def _table(value: object, name: str, part: str) -> dict[str, Any]:

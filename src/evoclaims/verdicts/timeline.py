@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 
 from evoclaims.core.errors import UnknownNameError, UserError
 from evoclaims.core.printable import printable
-from evoclaims.verdicts.acceptance import changed_versions
+from evoclaims.verdicts.acceptance import changes
 from evoclaims.verdicts.history import Entry, History, eras, in_order
 
 SHORT = 12
@@ -53,9 +53,7 @@ def _first(entry: Entry) -> str:
 
 def _changes(before: Entry, entry: Entry) -> str:
     """Return what differs from the entry before."""
-    moved = [f"{name} {change}" for name, change in changed_versions(before, entry).items()]
-    if before.device != entry.device:
-        moved.append(f"device {before.device or 'unknown'} -> {entry.device or 'unknown'}")
+    moved = changes(before, entry)
     if before.revision != entry.revision:
         moved.append(f"revision {_short(before.revision)} -> {_short(entry.revision)}")
     return ", ".join(moved)

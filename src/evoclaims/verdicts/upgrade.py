@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from evoclaims.core.packages import Versions, agree, recorded
@@ -81,12 +81,11 @@ class Upgrade:
             those = [one for one in self.successions if one.change == change]
             said.append(f"versions changed: {change}")
             said += [f"  {_told(one)}" for one in those]
-            rows = [row for one in those for row in self.drift.rows if row.label == one.label]
-            said += [f"  DRIFT in {row.in_words}" for row in rows if row.drifted]
-            unchecked = [row for row in rows if row in self.drift.unchecked]
-            said += list(dict.fromkeys(f"  not checked: {row.label}: {row.detail or row.status}" for row in unchecked))
-            tested, drifted = len(rows) - len(unchecked), sum(row.drifted for row in rows)
-            said.append(f"  {tested} comparisons with the trials made before, {drifted} drifted")
+            labels = [one.label for one in those]
+            drift = replace(self.drift, rows=tuple(row for row in self.drift.rows if row.label in labels))
+            drifted = sum(row.drifted for row in drift.rows)
+            said += [f"  {line}" for line in drift.lines]
+            said.append(f"  {drift.tested} comparisons with the trials made before, {drifted} drifted")
         return [printable(line) for line in said]
 
     def to_json(self) -> dict[str, Any]:
