@@ -38,8 +38,9 @@ def test_a_row_shows_claim_sentence_verdict_n_effect_p_and_evidence() -> None:
 def test_a_refuted_claim_shows_the_p_against_it_and_the_effect_of_the_part_that_decided() -> None:
     parts = (evidence(0.5), evidence(0.0625), evidence(None))
     refuted = report(outcome="refuted", verdict=verdict("refuted", evidence=parts, deciding=1))
-    row = verdict_table([refuted], 160, False).splitlines()[1]
-    assert re.split(r" {2,}", row.strip())[2:] == ["✗ refuted", "10", "0.06", "against 0.0043 (0.0042)"]
+    _, row, second = verdict_table([refuted], 160, False).splitlines()
+    assert re.split(r" {2,}", row.strip())[2:] == ["✗ refuted", "10", "0.06", "against 0.0043"]
+    assert second.strip() == "(0.0042)"
     without = replace(refuted, verdict=verdict("refuted", evidence=parts, deciding=2))
     assert re.split(r" {2,}", verdict_table([without], 160, False).splitlines()[1].strip())[4] == "–"
 

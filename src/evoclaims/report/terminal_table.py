@@ -40,7 +40,8 @@ def verdict_table(reports: Sequence[ClaimReport], width: int, colour: bool) -> s
     table.add_column("what is claimed", ratio=1, min_width=16)
     for heading in ("verdict", "n", "A12"):
         table.add_column(heading, no_wrap=True, justify="left" if heading == "verdict" else "right")
-    table.add_column("p (attainable)", no_wrap=wide)
+    # "against 5.4e-06 (5.4e-06)" takes a second line, as most sentences do, and no room from them.
+    table.add_column("p (attainable)", max_width=17)
     if wide:
         table.add_column("evidence", no_wrap=True, style="dim")
     for report in table_cells.ordered(reports):
