@@ -17,6 +17,8 @@ from evoclaims.paper.archive import Archive
 from evoclaims.report.build import gather
 from evoclaims.report.champion import typical
 from evoclaims.report.formatting import Anchors
+from evoclaims.report.html import html
+from evoclaims.report.markdown import markdown
 from evoclaims.report.model import ShownChampion
 from evoclaims.report.trial_summary import Reader
 from evoclaims.verdicts.history import Entry
@@ -171,11 +173,13 @@ def test_the_history_says_when_rules_changed_and_what_differs_now(filled: Labora
         return filled.section(report, history={("full", "T1"): entries})
 
     section = shown(old, same)
-    assert [(one.entry.accepted, one.entry.outcome, one.new_rules) for one in section.history] == [
-        ("2026-01-01", "supported", False),
-        ("2026-02-02", "refuted", True),
-    ]
-    assert section.history[0].made == "cpu, revision aaaaaaaaa-dirty"
+    assert section.history == ((old,), (same,))
+    page = filled.page(report, history={("full", "T1"): (old, same)})
+    assert "| 2026-01-01 | supported | 6 | 0.5 | fffffffff |" in markdown(page)
+    assert f"| 2026-02-02 | refuted | 6 | 0.5 | {now[:9]} (new) |" in markdown(page)
+    shown_page = html(page)
+    assert shown_page.count('<tr class="era"><td>2026-02-02</td>') == shown_page.count('class="era"') == 1
+    assert '<td title="jax 0.10.2">cpu, revision aaaaaaaaa-dirty</td>' in shown_page
     assert section.change == "Accepted on 2026-02-02 as refuted; now supported."
     assert shown(old).change == "What was fixed beforehand has changed since 2026-01-01: a new history begins."
     assert shown(replace(same, outcome=Outcome.SUPPORTED)).change == ""

@@ -29,14 +29,8 @@ def judged(
     """Build the report of a claim that was judged; `again` has the seeds that were run again by the condition's id."""
     groups = [source for source in assertion.sources() if isinstance(source, TrialGroup)]
     seeds = protocol.seeds(verdict.n)
-    return ClaimReport(
-        claim=claim.id,
-        case=case,
-        tier=tier,
-        statement=claim.statement(tier),
-        where=claim.where,
-        outcome=verdict.outcome,
-        reason=verdict.reason,
+    return replace(
+        _unjudged(claim, case, tier, verdict.outcome, verdict.reason),
         verdict=verdict,
         sources=tuple(_source(group, seeds, again.get(group.fingerprint, ())) for group in groups),
         attainable=tuple(

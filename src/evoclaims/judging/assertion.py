@@ -11,7 +11,7 @@ from evoclaims.core.errors import UserError
 from evoclaims.judging.effect import a12, a12_interval, cliffs_delta
 from evoclaims.judging.multiplicity import holm
 from evoclaims.judging.protocol import Look, Protocol
-from evoclaims.judging.reading import Reading
+from evoclaims.judging.reading import TrialReading
 from evoclaims.judging.sample import Sample, Source, Trials
 from evoclaims.judging.verdict import Bound, Direction, Evidence, Interval, PValues
 
@@ -50,7 +50,7 @@ class Assertion(ABC):
     def sources(self) -> tuple[Source, ...]:
         """Return the conditions it needs, each once."""
         values = (getattr(self, field.name) for field in fields(self))
-        return _unique(value.source for value in values if isinstance(value, Reading))
+        return _unique(value.source for value in values if isinstance(value, TrialReading))
 
     def plain(self) -> dict[str, Any]:
         """Return the canonical description that the claim's fingerprint hashes, with the conditions' ids."""
@@ -165,7 +165,7 @@ def _unique(sources: Iterable[Source]) -> tuple[Source, ...]:
 
 def _plain(value: object) -> object:
     """Return a kind's field as the fingerprint hashes it: 1 and 1.0 are the same number."""
-    if isinstance(value, Reading):
+    if isinstance(value, TrialReading):
         return value.plain()
     return float(value) if isinstance(value, int) else value
 

@@ -25,7 +25,7 @@ Better = Literal["higher", "lower"]
 
 
 @dataclass(frozen=True, eq=False)
-class Reading:
+class TrialReading:
     """Something that can be read from every trial of a condition.
 
     Attributes:
@@ -47,7 +47,7 @@ class Reading:
 
 
 @dataclass(frozen=True, eq=False)
-class NumberReading(Reading):
+class NumberReading(TrialReading):
     """One number a trial.
 
     Attributes:
@@ -77,7 +77,7 @@ class NumberReading(Reading):
 
 
 @dataclass(frozen=True, eq=False)
-class EventReading(Reading):
+class EventReading(TrialReading):
     """Something that holds in a trial or does not; never in a failed trial, which supports nothing.
 
     Attributes:
@@ -97,7 +97,7 @@ class EventReading(Reading):
 
 
 @dataclass(frozen=True, eq=False)
-class LevelsReading(Reading):
+class LevelsReading(TrialReading):
     """One vector over levels a trial.
 
     Attributes:

@@ -11,14 +11,15 @@ from evoclaims.judging.protocol import Protocol
 from evoclaims.judging.verdict import Outcome
 from evoclaims.paper.archive import Archive
 from evoclaims.paper.reproduction import Reproduction
-from evoclaims.report import accepted_history, origin, training_curves
+from evoclaims.report import origin, training_curves
 from evoclaims.report.champion import Draw, champion_of, network
 from evoclaims.report.evidence import Part, judged_part, unjudged_part
 from evoclaims.report.formatting import Anchors, clean, counted, listed, place_key, places, plural
 from evoclaims.report.model import Board, ConditionTrials, Page, PaperFigure, Section, ShownChampion
 from evoclaims.report.trial_summary import Reader, TrialSummary
+from evoclaims.verdicts.acceptance import UNDECIDED
 from evoclaims.verdicts.claim_report import ClaimReport
-from evoclaims.verdicts.history import History, in_order, key_of
+from evoclaims.verdicts.history import Entry, History, eras, in_order, key_of
 from evoclaims.verdicts.robustness import Robustness
 from evoclaims.verdicts.source_trials import SourceTrials
 
@@ -131,8 +132,8 @@ class _Gathering:
             conditions=tuple(self._condition(report.tier, source) for source in report.sources if source.trials),
             made=made,
             warnings=(*_broken(every), *origin.warnings(made)),
-            history=accepted_history.accepted(entries),
-            change=accepted_history.change(entries, report),
+            history=eras(entries),
+            change=_change(entries, report),
         )
 
     def _condition(self, tier: str, source: SourceTrials) -> str:
@@ -165,6 +166,18 @@ def _parts(report: ClaimReport, read: Mapping[str, Sequence[TrialSummary]]) -> t
     if report.verdict is not None and report.verdict.evidence:
         return tuple(map(judged_part, report.verdict.evidence))
     return tuple(unjudged_part(label, trials) for label, trials in read.items() if trials)
+
+
+def _change(entries: Sequence[Entry], report: ClaimReport) -> str:
+    """Say what differs from the verdict that was accepted last; nothing where that cannot be told."""
+    if not entries or report.verdict is None or report.outcome in UNDECIDED:
+        return ""
+    last = entries[-1]
+    if last.fingerprint != report.fingerprint:
+        return f"What was fixed beforehand has changed since {last.accepted}: a new history begins."
+    if last.outcome != report.outcome:
+        return f"Accepted on {last.accepted} as {last.outcome}; now {report.outcome}."
+    return ""
 
 
 def _broken(trials: Sequence[TrialSummary]) -> tuple[str, ...]:

@@ -53,29 +53,17 @@ def strip_svg(part: Part, strip: Strip) -> Markup:
     pieces: list[Markup] = [Markup('<path class="rule" d="M{} {}H{}"/>').format(EDGE, HEIGHT - 1, scale.right)]
     for bound in part.bounds:
         pieces.append(
-            Markup('<path class="bound" d="M{0} 1V{1}"><title>{2}: {3}</title></path>').format(
-                _at(scale(bound.value)), HEIGHT - 1, bound.name, number(bound.value)
-            )
+            _mark("bound", f"M{_at(scale(bound.value))} 1V{HEIGHT - 1}", f"{bound.name}: {number(bound.value)}")
         )
     for span in part.spans:
-        pieces.append(
-            Markup('<path class="span" d="M{} {}H{}"><title>{}: {} to {}</title></path>').format(
-                _at(scale(span.low)), HEIGHT - 4, _at(scale(span.high)), span.of, number(span.low), number(span.high)
-            )
-        )
+        path = f"M{_at(scale(span.low))} {HEIGHT - 4}H{_at(scale(span.high))}"
+        pieces.append(_mark("span", path, f"{span.of}: {number(span.low)} to {number(span.high)}"))
     if part.event and strip.n:
         share = sum(dot.value for dot in strip.dots) / strip.n
-        pieces.append(
-            Markup('<path class="share" d="M{} {}l4 4l-4 4l-4 -4z"><title>holds in {} of trials</title></path>').format(
-                _at(scale(share)), HEIGHT - 8, f"{share:.0%}"
-            )
-        )
+        diamond = f"M{_at(scale(share))} {HEIGHT - 8}l4 4l-4 4l-4 -4z"
+        pieces.append(_mark("share", diamond, f"holds in {share:.0%} of trials"))
     elif strip.median is not None and math.isfinite(strip.median):
-        pieces.append(
-            Markup('<path class="median" d="M{} 4V{}"><title>median {}</title></path>').format(
-                _at(scale(strip.median)), HEIGHT - 4, number(strip.median)
-            )
-        )
+        pieces.append(_mark("median", f"M{_at(scale(strip.median))} 4V{HEIGHT - 4}", f"median {number(strip.median)}"))
     if len(strip.dots) <= MOST_DOTS:
         pieces.append(Markup('<g class="dots">{}</g>').format(Markup("").join(_dots(strip.dots, scale))))
     else:
@@ -96,19 +84,11 @@ def axis_svg(part: Part) -> Markup:
         ((0.0, "no"), (1.0, "yes")) if part.event else ((tick, number(tick)) for tick in ticks(low, high))
     ):
         pieces.append(Markup('<path class="rule" d="M{} 0v4"/>').format(_at(scale(value))))
-        pieces.append(
-            Markup('<text class="tick" x="{}" y="14" text-anchor="middle">{}</text>').format(_at(scale(value)), label)
-        )
+        pieces.append(_text("tick", scale(value), 14, label))
     for bound in part.bounds:
-        pieces.append(
-            Markup('<text class="named" x="{}" y="27" text-anchor="middle">{} {}</text>').format(
-                _at(scale(bound.value)), bound.name, number(bound.value)
-            )
-        )
+        pieces.append(_text("named", scale(bound.value), 27, f"{bound.name} {number(bound.value)}"))
     if _right(part) < WIDTH - EDGE:
-        pieces.append(
-            Markup('<text class="tick" x="{}" y="14" text-anchor="middle">no number</text>').format(WIDTH - APART / 2)
-        )
+        pieces.append(_text("tick", WIDTH - APART / 2, 14, "no number"))
     return _svg(WIDTH, AXIS if part.bounds else 18.0, pieces, "")
 
 
@@ -122,24 +102,12 @@ def curve_symbol(panel: CurvePanel, name: str) -> Markup:
     y = _Scale(*ys, height - BOTTOM, TOP)
     pieces = [Markup('<path class="rule" d="M{0} {1}V{2}H{3}"/>').format(LEFT, TOP, height - BOTTOM, width - RIGHT)]
     for value in ticks(*ys, most=3):
-        pieces.append(
-            Markup('<text class="small" x="{}" y="{}" text-anchor="end">{}</text>').format(
-                LEFT - 4, _at(y(value) + 3), large(value)
-            )
-        )
+        pieces.append(_text("small", LEFT - 4, y(value) + 3, large(value), "end"))
     for value, anchor in ((0.0, "start"), (xs[1], "end")):
-        pieces.append(
-            Markup('<text class="small" x="{}" y="{}" text-anchor="{}">{}</text>').format(
-                _at(x(value)), height - 8, anchor, large(value)
-            )
-        )
+        pieces.append(_text("small", x(value), height - 8, large(value), anchor))
     if panel.band is not None:
         pieces += _band(*panel.band, x, y)
-    pieces += [
-        Markup('<path class="line" d="{}"><title>{}</title></path>').format(path, line.label)
-        for line in panel.lines
-        if (path := _path(line, x, y))
-    ]
+    pieces += [_mark("line", path, line.label) for line in panel.lines if (path := _path(line, x, y))]
     inside = Markup("").join(pieces)
     return Markup('<symbol id="{}" viewBox="0 0 {} {}">{}</symbol>').format(name, width, height, inside)
 
@@ -241,17 +209,14 @@ def _quantiles(dots: Sequence[Dot], scale: _Scale) -> Iterator[Markup]:
 def _apart(trials: Sequence[tuple[int, str]]) -> Iterator[Markup]:
     """Draw trials without a finite value as crosses in a column of their own; a count where there are many."""
     if len(trials) > MOST_DOTS // 4:
-        yield Markup('<text class="tick" x="{}" y="{}" text-anchor="middle">{}</text>').format(
-            WIDTH - APART / 2, HEIGHT / 2, plural(len(trials), "trial")
-        )
+        yield _text("tick", WIDTH - APART / 2, HEIGHT / 2, plural(len(trials), "trial"))
         return
     room = min(9.0, math.sqrt((HEIGHT - 10) * (APART - 12) / max(len(trials), 1)))
     across = max(int((APART - 12) / room), 1)
     for index, (seed, why) in enumerate(trials):
         row, column = divmod(index, across)
-        yield Markup(
-            '<path class="broken" d="M{} {}l{r} {r}m0 -{r}l-{r} {r}"><title>seed {}: {}</title></path>'
-        ).format(_at(WIDTH - APART + 9 + column * room), _at(5 + row * room), seed, why, r=_at(0.6 * room))
+        x, y, r = _at(WIDTH - APART + 9 + column * room), _at(5 + row * room), _at(0.6 * room)
+        yield _mark("broken", f"M{x} {y}l{r} {r}m0 -{r}l-{r} {r}", f"seed {seed}: {why}")
 
 
 def _ends(series: Sequence[np.ndarray[tuple[int, ...], np.dtype[np.float64]]]) -> tuple[float, float]:
@@ -285,9 +250,18 @@ def _band(low: Line, high: Line, x: _Scale, y: _Scale) -> Iterator[Markup]:
     if good.any():
         there = [f"{_at(x(a))} {_at(y(b))}" for a, b in zip(low.x[good], low.y[good], strict=True)]
         back = [f"{_at(x(a))} {_at(y(b))}" for a, b in zip(high.x[good][::-1], high.y[good][::-1], strict=True)]
-        yield Markup('<path class="band" d="M{}Z"><title>lower to upper decile</title></path>').format(
-            "L".join([*there, *back])
-        )
+        yield _mark("band", f"M{'L'.join([*there, *back])}Z", "lower to upper decile")
+
+
+def _mark(kind: str, path: str, title: str) -> Markup:
+    """Draw a path that says what it is when it is pointed at."""
+    return Markup('<path class="{}" d="{}"><title>{}</title></path>').format(kind, path, title)
+
+
+def _text(kind: str, x: float, y: float, text: str, anchor: str = "middle") -> Markup:
+    """Write a text at a place."""
+    drawn = Markup('<text class="{}" x="{}" y="{}" text-anchor="{}">{}</text>')
+    return drawn.format(kind, _at(x), _at(y), anchor, text)
 
 
 def _at(place: float) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import chain, repeat
 
 from evoclaims.judging.verdict import Outcome
 from evoclaims.report import table_cells
@@ -110,8 +111,9 @@ def _section(section: Section, page: Page) -> Iterator[str]:
         yield table(
             ("accepted", "verdict", "n", "p", "rules"),
             (
-                map(literal, (e.accepted, e.outcome, str(e.n), p_value(e.p), e.fingerprint[:9] + " (new)" * new))
-                for e, new in ((past.entry, past.new_rules) for past in section.history)
+                map(literal, (e.accepted, e.outcome, str(e.n), p_value(e.p), e.fingerprint[:9] + new * (e is era[0])))
+                for new, era in zip(chain([""], repeat(" (new)")), section.history, strict=False)
+                for e in era
             ),
         )
     else:

@@ -16,23 +16,6 @@ from evoclaims.verdicts.robustness import Robustness
 
 
 @dataclass(frozen=True)
-class AcceptedVerdict:
-    """A verdict of the past.
-
-    Attributes:
-        entry: as it was accepted.
-        new_rules: whether the fingerprint differs from the verdict's before: a new history begins.
-        made: where its trials were made, in words.
-        versions: of the packages that they were made with, in words.
-    """
-
-    entry: Entry
-    new_rules: bool
-    made: str
-    versions: str
-
-
-@dataclass(frozen=True)
 class ShownChampion:
     """The best individual of a condition's typical trial.
 
@@ -79,7 +62,7 @@ class Section:
         conditions: keys of `Page.conditions`.
         made: where its trials were made.
         warnings: what a reader should know first.
-        history: accepted verdicts, oldest first.
+        history: accepted verdicts, oldest first; a new tuple begins where what is judged has changed.
         change: what differs from the last accepted verdict; empty when nothing does.
     """
 
@@ -93,7 +76,7 @@ class Section:
     conditions: tuple[str, ...] = ()
     made: tuple[Made, ...] = ()
     warnings: tuple[str, ...] = ()
-    history: tuple[AcceptedVerdict, ...] = ()
+    history: tuple[tuple[Entry, ...], ...] = ()
     change: str = ""
 
     @property

@@ -1,4 +1,7 @@
-"""Trials and verdicts as flat tables, for people who go on with pandas."""
+"""Trials and verdicts as flat tables, for people who go on with pandas.
+
+They are not written by pandas, which takes None, what was not measured, for NaN, what was.
+"""
 
 from __future__ import annotations
 

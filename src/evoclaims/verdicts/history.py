@@ -54,6 +54,11 @@ class Entry:
     revision: str
     trials: str
 
+    def short_revision(self, digits: int) -> str:
+        """Return the revisions with hashes that are short enough for a line."""
+        parts = (revision.partition("-") for revision in self.revision.split(", "))
+        return ", ".join(sha[:digits] + dash + state for sha, dash, state in parts) or "unknown"
+
 
 History = Mapping[tuple[str, str], tuple[Entry, ...]]
 """Accepted verdicts by tier and claim, such as ("full", "G1[n_parity]"); oldest first, so that the last one counts."""

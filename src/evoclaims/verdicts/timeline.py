@@ -55,11 +55,5 @@ def _changes(before: Entry, entry: Entry) -> str:
     """Return what differs from the entry before."""
     moved = changes(before, entry)
     if before.revision != entry.revision:
-        moved.append(f"revision {_short(before.revision)} -> {_short(entry.revision)}")
+        moved.append(f"revision {before.short_revision(SHORT)} -> {entry.short_revision(SHORT)}")
     return ", ".join(moved)
-
-
-def _short(revisions: str) -> str:
-    """Return revisions with hashes that are short enough for a line."""
-    short = ("-".join(part[:SHORT] for part in revision.split("-")) for revision in revisions.split(", "))
-    return "+".join(short) or "unknown"
