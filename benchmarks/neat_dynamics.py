@@ -35,7 +35,7 @@ from evoclaims.core.files import write_atomically  # noqa: E402
 from evoclaims.envs.gates.parity import NParity  # noqa: E402
 from evoclaims.judging.exact import rank_test  # noqa: E402
 from evoclaims.methods.neat.neat import Neat  # noqa: E402
-from evoclaims.methods.neat.settings import CODE, Settings, Species  # noqa: E402
+from evoclaims.methods.neat.settings import Mutation, Settings, Species  # noqa: E402
 from evoclaims.methods.tensorneat import NeatTensorneat  # noqa: E402
 from evoclaims.trials.budget import Budget  # noqa: E402
 from evoclaims.trials.result import TrialResult  # noqa: E402
@@ -83,7 +83,7 @@ COMPARISONS = {
         measures={"nodes in the last generation": last_nodes},
     ),
     "growth-code": Comparison(
-        settings=replace(SMALL, mutation=CODE.mutation),
+        settings=replace(SMALL, mutation=Mutation(node_add=0.1)),
         progression="direct",
         generations=120,
         measures={"nodes in the last generation": last_nodes},

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from evoclaims.judging.protocol import FIXED_10, SEQUENTIAL
-from evoclaims.paper.reproduction import Reproduction, Tier
+from evoclaims import FIXED_10, SEQUENTIAL, Reproduction, Tier
 from reproductions.nisioti2025 import ecorobot, stepping_gates
+from reproductions.nisioti2025.measures import PaperTrials
 from reproductions.nisioti2025.variants import VARIANTS
 
 REPRODUCTION = Reproduction(
@@ -18,5 +18,6 @@ REPRODUCTION = Reproduction(
         "full": Tier(conditions={**stepping_gates.FULL, **ecorobot.FULL}, protocol=SEQUENTIAL),
     },
     variants=VARIANTS,
+    trials=PaperTrials,
     figures=tuple(f"{__name__}.{name}" for name in (*(f"fig{n}" for n in range(3, 11)), "tables")),
 )

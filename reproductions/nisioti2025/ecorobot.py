@@ -10,27 +10,31 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
-from evoclaims.envs.ecorobot.deceptive import DeceptiveMaze
-from evoclaims.envs.ecorobot.locomotion import Locomotion
-from evoclaims.envs.ecorobot.obstacles import Obstacles
-from evoclaims.envs.ecorobot.robot_task import RobotTask
-from evoclaims.envs.ecorobot.robots import ANT, HALF_CHEETAH, SIMPLE_ROB
-from evoclaims.envs.ecorobot.stones import SteppingStones
-from evoclaims.methods import hyperneat
-from evoclaims.methods.base import Method
-from evoclaims.methods.cma_es import CmaEs
-from evoclaims.methods.hyperneat import HyperNeat
-from evoclaims.methods.map_elites import MapElites
-from evoclaims.methods.neat.neat import Neat
-from evoclaims.methods.neat.settings import Settings, Species
-from evoclaims.methods.ppo import LevelTest, Ppo
-from evoclaims.methods.random_policy import RandomPolicy
-from evoclaims.methods.waypoints import Waypoints
-from evoclaims.networks.all_skips import AllSkips
-from evoclaims.networks.mlp import Mlp
-from evoclaims.networks.substrate import Substrate, on_circle
-from evoclaims.trials.budget import Budget
-from evoclaims.trials.spec import Condition
+from evoclaims import Budget, Condition
+from evoclaims.envs import (
+    ANT,
+    HALF_CHEETAH,
+    SIMPLE_ROB,
+    DeceptiveMaze,
+    Locomotion,
+    Obstacles,
+    RobotTask,
+    SteppingStones,
+)
+from evoclaims.methods import (
+    CPPN_FUNCTIONS,
+    CmaEs,
+    HyperNeat,
+    LevelTest,
+    MapElites,
+    Method,
+    Neat,
+    Ppo,
+    RandomPolicy,
+    Waypoints,
+)
+from evoclaims.methods.neat import Settings, Species
+from evoclaims.networks import AllSkips, Mlp, Substrate, on_circle
 
 Conditions = dict[tuple[str, str], Condition]
 
@@ -144,7 +148,7 @@ FULL = _conditions(
         robot_steps=1_000,
         neat=_EVOLVING,
         limbed_neat=_EVOLVING,
-        cppn=replace(_EVOLVING, activations=hyperneat.CPPN_FUNCTIONS),
+        cppn=replace(_EVOLVING, activations=CPPN_FUNCTIONS),
         cma_es=256,
         hidden=24,
         ppo=Ppo(
@@ -196,7 +200,7 @@ SMOKE = _conditions(
         robot_steps=100,
         neat=_SMALL,
         limbed_neat=replace(_SMALL, nodes=64, connections=320),
-        cppn=replace(_SMALL, activations=hyperneat.CPPN_FUNCTIONS),
+        cppn=replace(_SMALL, activations=CPPN_FUNCTIONS),
         cma_es=32,
         hidden=4,
         ppo=Ppo(

@@ -1,7 +1,6 @@
 """Fig. 10: rewards in the easy deceptive maze."""
 
-from evoclaims.figures.figure import Figure
-from evoclaims.figures.histogram import Condition, Histogram, Mark
+from evoclaims.figures import Figure, Histogram, Mark, Subject
 from reproductions.nisioti2025.figures import HYPERNEAT, PPO
 
 FIGURE = Figure(
@@ -10,9 +9,9 @@ FIGURE = Figure(
     where="§5.2.3, Fig. 10",
     paint=Histogram(
         conditions=(
-            Condition("HyperNEAT, SimpleRob", HYPERNEAT, "deceptive_maze_easy"),
-            Condition("PPO, SimpleRob", PPO, "deceptive_maze_easy"),
-            Condition("HyperNEAT, ant", HYPERNEAT, "deceptive_maze_easy_ant"),
+            Subject("HyperNEAT, SimpleRob", HYPERNEAT, "deceptive_maze_easy"),
+            Subject("PPO, SimpleRob", PPO, "deceptive_maze_easy"),
+            Subject("HyperNEAT, ant", HYPERNEAT, "deceptive_maze_easy_ant"),
         ),
         measure=lambda trials: trials.reward,
         xlabel="reward of an episode",

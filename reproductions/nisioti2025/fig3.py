@@ -1,7 +1,6 @@
 """Fig. 3: success on the levels of both stepping-gates tasks."""
 
-from evoclaims.figures.bars import BarChart, by_level
-from evoclaims.figures.figure import Figure
+from evoclaims.figures import BarChart, Figure, by_level
 from reproductions.nisioti2025.figures import CMA_ES, HYPERNEAT, NEAT, PPO, PUBLISHED
 
 METHODS = (NEAT, HYPERNEAT, CMA_ES, PPO)

@@ -1,7 +1,6 @@
 """Fig. 4: the last level of N-parity, with the curriculum and without."""
 
-from evoclaims.figures.bars import BarChart, compared
-from evoclaims.figures.figure import Figure
+from evoclaims.figures import BarChart, Figure, compared
 from reproductions.nisioti2025.figures import NEAT, PPO, PUBLISHED
 
 FIGURE = Figure(

@@ -1,7 +1,6 @@
 """Fig. 5: the maze with stepping stones, the simplest robot."""
 
-from evoclaims.figures.bars import BarChart, compared
-from evoclaims.figures.figure import Figure
+from evoclaims.figures import BarChart, Figure, compared
 from reproductions.nisioti2025.figures import CMA_ES, GOAL_PPO, HYPERNEAT, MAP_ELITES, NEAT, PPO, PUBLISHED
 
 METHODS = (NEAT, HYPERNEAT, CMA_ES, PPO, GOAL_PPO, MAP_ELITES)

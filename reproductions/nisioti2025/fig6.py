@@ -1,7 +1,6 @@
 """Fig. 6: where MAP-Elites' elites end, in the deceptive maze and in the maze with stepping stones."""
 
-from evoclaims.figures.elites import ElitesMap, Ground
-from evoclaims.figures.figure import Figure
+from evoclaims.figures import ElitesMap, Figure, Ground
 
 FIGURE = Figure(
     name="fig6",

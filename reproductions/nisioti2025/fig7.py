@@ -1,7 +1,6 @@
 """Fig. 7: the half-cheetah over obstacles of rising height."""
 
-from evoclaims.figures.bars import BarChart, compared
-from evoclaims.figures.figure import Figure
+from evoclaims.figures import BarChart, Figure, compared
 from reproductions.nisioti2025.figures import CMA_ES, HYPERNEAT, NEAT, PPO, PUBLISHED
 
 FIGURE = Figure(

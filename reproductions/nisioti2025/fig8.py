@@ -1,7 +1,6 @@
 """Fig. 8: obstacles of one height, without the curriculum of rising ones."""
 
-from evoclaims.figures.bars import BarChart, compared
-from evoclaims.figures.figure import Figure
+from evoclaims.figures import BarChart, Figure, compared
 from reproductions.nisioti2025.figures import NEAT, PPO, PUBLISHED
 
 FIGURE = Figure(

@@ -1,7 +1,6 @@
 """Fig. 9: the maze with stepping stones, the ant beside the simplest robot."""
 
-from evoclaims.figures.bars import BarChart, compared
-from evoclaims.figures.figure import Figure
+from evoclaims.figures import BarChart, Figure, compared
 from reproductions.nisioti2025.figures import CMA_ES, HYPERNEAT, NEAT, PPO, PUBLISHED
 
 METHODS = (NEAT, HYPERNEAT, CMA_ES, PPO)

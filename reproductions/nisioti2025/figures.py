@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from evoclaims.figures import reported, style
-from evoclaims.figures.bar_panel import Series
+from evoclaims.figures import BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILION, Series, load_published
 
-NEAT = Series("neat", "NEAT", style.BLUE)
-HYPERNEAT = Series("hyperneat", "HyperNEAT", style.SKY)
-CMA_ES = Series("cma_es", "CMA-ES", style.GREEN)
-PPO = Series("ppo", "PPO", style.ORANGE)
-GOAL_PPO = Series("goal_ppo", "goal PPO", style.VERMILION)
-MAP_ELITES = Series("map_elites", "MAP-Elites", style.PURPLE)
+NEAT = Series("neat", "NEAT", BLUE)
+HYPERNEAT = Series("hyperneat", "HyperNEAT", SKY)
+CMA_ES = Series("cma_es", "CMA-ES", GREEN)
+PPO = Series("ppo", "PPO", ORANGE)
+GOAL_PPO = Series("goal_ppo", "goal PPO", VERMILION)
+MAP_ELITES = Series("map_elites", "MAP-Elites", PURPLE)
 
-PUBLISHED = reported.load(Path(__file__).with_name("reported.toml"))
+PUBLISHED = load_published(Path(__file__).with_name("reported.toml"))

@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from evoclaims.figures.figure import Figure
-from evoclaims.figures.listing import Block, Listing
-from evoclaims.trials.spec import Condition
+from evoclaims import Condition
+from evoclaims.figures import Block, Figure, Listing
 from reproductions.nisioti2025.figures import PUBLISHED
 
 Settings = Mapping[str, Callable[[Condition], Any]]

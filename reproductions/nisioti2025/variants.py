@@ -5,20 +5,11 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
-from evoclaims.envs.ecorobot.robot_task import RobotTask
-from evoclaims.envs.gates.alu import SimpleAlu
-from evoclaims.envs.gates.cumulative import CumulativeParity
-from evoclaims.envs.gates.parity import NParity
-from evoclaims.methods.cma_es import CmaEs
-from evoclaims.methods.hyperneat import CODE as PUBLISHED_HYPERNEAT
-from evoclaims.methods.hyperneat import HyperNeat
-from evoclaims.methods.neat.neat import Neat
-from evoclaims.methods.neat.settings import Mutation
-from evoclaims.methods.ppo import LevelTest, Ppo
-from evoclaims.networks.all_skips import AllSkips
-from evoclaims.networks.mlp import Mlp
-from evoclaims.paper.variant import Variant, changed
-from evoclaims.trials.spec import Condition
+from evoclaims import Condition, Variant, changed
+from evoclaims.envs import CumulativeParity, NParity, RobotTask, SimpleAlu
+from evoclaims.methods import CmaEs, HyperNeat, LevelTest, Neat, Ppo
+from evoclaims.methods.neat import Mutation
+from evoclaims.networks import AllSkips, Mlp
 from reproductions.nisioti2025 import ecorobot, stepping_gates
 
 
@@ -64,7 +55,7 @@ def _sigmoid(method: str, task: str, condition: Condition) -> Condition | None:
     evolved: Any = condition.method
     if not isinstance(evolved, HyperNeat):
         return None
-    settings = replace(evolved.settings, activations=PUBLISHED_HYPERNEAT.activations)
+    settings = replace(evolved.settings, activations=("sigmoid",))
     return replace(condition, method=replace(evolved, settings=settings))
 
 

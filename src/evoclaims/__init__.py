@@ -1,6 +1,8 @@
-"""evoclaims: claims of a paper as pytest tests over real trials, judged by exact statistics."""
+"""evoclaims: claims of a paper as pytest tests over real trials, judged by exact statistics.
 
-from evoclaims.claims.claim import claim, expected
-from evoclaims.judging.verdict import Outcome
+What claims and reproductions are written with; `envs`, `methods`, `networks` and `figures` have the rest (docs/api.md).
+"""
 
-__all__ = ["Outcome", "claim", "expected"]
+from evoclaims.core.lazy import exported
+
+__all__, __getattr__, __dir__ = exported(__name__)

@@ -8,10 +8,10 @@ from typing import Any
 import pytest
 from small_paper import ONE, OTHER, collisions, told, words
 
-from evoclaims.figures.histogram import Condition, Histogram, Mark
+from evoclaims.figures.histogram import Histogram, Mark, Subject
 
 HISTOGRAM = Histogram(
-    (Condition("first", ONE, "small"), Condition("second", OTHER, "small")),
+    (Subject("first", ONE, "small"), Subject("second", OTHER, "small")),
     lambda trials: trials.reward,
     "reward",
     Mark(8.0, "good"),

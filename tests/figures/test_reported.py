@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from evoclaims.core.errors import UnknownNameError, UserError
-from evoclaims.figures.reported import Reported, load
+from evoclaims.figures.reported import Reported, load_published
 
 SOUND = """
 [plots.maze.reward]
@@ -28,14 +28,14 @@ def _write(folder: Path, text: str) -> Path:
 
 
 def test_a_number_has_its_error_bar_and_its_place(tmp_path: Path) -> None:
-    published = load(_write(tmp_path, SOUND))
+    published = load_published(_write(tmp_path, SOUND))
     assert published.value("maze", "reward", "neat", 1) == Reported(6.5, 0.5, "Fig. 5")
     assert published.value("maze", "reward", "ppo") == Reported(1.0, None, "Fig. 5")
     assert published.table("neat") == {"place": "Table 1", "values": {"population size": 5000}}
 
 
 def test_what_is_not_published_is_nothing(tmp_path: Path) -> None:
-    published = load(_write(tmp_path, SOUND))
+    published = load_published(_write(tmp_path, SOUND))
     for task, quantity, method, at in (
         ("maze", "reward", "neat", 2),
         ("maze", "reward", "cma_es", 0),
@@ -60,10 +60,10 @@ def test_what_is_not_published_is_nothing(tmp_path: Path) -> None:
 )
 def test_a_number_without_its_place_or_a_torn_plot_is_refused(tmp_path: Path, text: str, what: str) -> None:
     with pytest.raises(UserError, match=f"these are neither: {what}"):
-        load(_write(tmp_path, text))
+        load_published(_write(tmp_path, text))
 
 
 def test_a_file_that_cannot_be_read_is_named(tmp_path: Path) -> None:
     for path in (tmp_path / "absent.toml", _write(tmp_path, "[plots")):
         with pytest.raises(UserError, match=f"Cannot read the published numbers in {path}"):
-            load(path)
+            load_published(path)

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from evoclaims.core.errors import UserError
 from evoclaims.envs.gates.parity import NParity
-from evoclaims.methods.hyperneat import CODE, CPPN_FUNCTIONS, PAPER, HyperNeat, SubstrateNetwork
+from evoclaims.methods.hyperneat import CPPN_FUNCTIONS, PAPER, HyperNeat, SubstrateNetwork
 from evoclaims.methods.neat import settings as neat
 from evoclaims.methods.neat.settings import Settings, Species
 from evoclaims.networks.genome import EMPTY, Connections, Genome, Nodes
@@ -290,8 +290,6 @@ def test_the_papers_and_the_published_codes_values() -> None:
     assert replace(PAPER, activations=neat.PAPER.activations) == neat.PAPER
     assert (PAPER.population, PAPER.species.most, PAPER.mutation.node_add) == (5_000, 50, 0.2)
     assert set(PAPER.activations) > {"tanh"}
-    assert (CODE.population, CODE.species.most, CODE.mutation.node_add) == (1_024, 20, 0.1)
-    assert (CODE.nodes, CODE.connections, CODE.activations) == (50, 100, ("sigmoid",))
     assert HyperNeat().hidden == (16,)
     assert (HyperNeat().threshold, HyperNeat().max_weight) == (0.3, 5.0)
 

@@ -6,11 +6,11 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 
 from evoclaims.claims.claim import Claim, Expectation
-from evoclaims.claims.trial_group import TrialGroup
 from evoclaims.judging.assertion import Assertion
 from evoclaims.judging.judge import attainability
 from evoclaims.judging.protocol import Protocol
 from evoclaims.judging.verdict import Outcome, Verdict
+from evoclaims.paper.trial_group import TrialGroup
 from evoclaims.trials.spec import TrialSpec
 from evoclaims.verdicts.claim_report import Attainable, ClaimReport
 from evoclaims.verdicts.source_trials import SourceTrials

@@ -8,7 +8,6 @@ from dataclasses import dataclass, field, replace
 from evoclaims.claims.claim import Claim
 from evoclaims.claims.fetching import NotStoredError
 from evoclaims.claims.reporting import judged
-from evoclaims.claims.trial_group import Fetch, TrialGroup
 from evoclaims.core.errors import UserError
 from evoclaims.core.packages import agree, recorded
 from evoclaims.judging.assertion import Assertion
@@ -20,6 +19,7 @@ from evoclaims.judging.tripwire import DigestCheck
 from evoclaims.judging.verdict import Outcome, Verdict
 from evoclaims.paper import references
 from evoclaims.paper.reproduction import Reproduction
+from evoclaims.paper.trial_group import Fetch, TrialGroup
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.spec import Condition, TrialSpec
 from evoclaims.trials.store import Store
@@ -61,7 +61,8 @@ class Session:
 
     def group(self, method: str, on: str, tier: str) -> TrialGroup:
         """Return the trials of a method on a task, not yet run."""
-        return TrialGroup(method, on, self.reproduction.tier(tier, self.variant).condition(method, on), self.fetch)
+        condition = self.reproduction.tier(tier, self.variant).condition(method, on)
+        return self.reproduction.trials(method, on, condition, self.fetch)
 
     def protocol(self, tier: str) -> Protocol:
         """Return how claims of a tier are judged; with a fixed number of trials, by one look at the whole α."""

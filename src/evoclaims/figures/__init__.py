@@ -3,7 +3,6 @@
 `catalogue.load(reproduction, "fig3").draw(archive, reproduction, "full")` returns a `Drawing`; `svg` makes text of it.
 """
 
-from evoclaims.figures.figure import Drawing, Figure
-from evoclaims.figures.files import svg
+from evoclaims.core.lazy import exported
 
-__all__ = ["Drawing", "Figure", "svg"]
+__all__, __getattr__, __dir__ = exported(__name__)

@@ -6,9 +6,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
-from evoclaims.claims.trial_group import TrialGroup
 from evoclaims.paper.archive import Archive
 from evoclaims.paper.reproduction import Reproduction, Tier
+from evoclaims.paper.trial_group import TrialGroup
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.spec import Condition
 
@@ -46,7 +46,7 @@ class Scope:
 
     def group(self, method: str, task: str) -> TrialGroup:
         """Return a condition's trials as claims speak of them; those that there are."""
-        return TrialGroup(method, task, self.tier.condition(method, task), self._present)
+        return self.reproduction.trials(method, task, self.tier.condition(method, task), self._present)
 
     def _present(self, condition: Condition, seeds: Sequence[int]) -> list[TrialResult]:
         """Return the trials of these seeds that the archive holds."""

@@ -20,7 +20,7 @@ HEIGHT: Final = 0.85
 
 
 @dataclass(frozen=True)
-class Condition:
+class Subject:
     """Whose trials a panel shows.
 
     Attributes:
@@ -55,7 +55,7 @@ class Histogram:
         width: of the figure, inches.
     """
 
-    conditions: tuple[Condition, ...]
+    conditions: tuple[Subject, ...]
     measure: MeasureOf
     xlabel: str
     mark: Mark
@@ -90,7 +90,7 @@ class Histogram:
         )
         return Drawing(figure, table, self.remarks, missing, len(values), f"{heading.title} ({heading.place})")
 
-    def _paint(self, axis: Any, one: Condition, readings: Readings, edges: Any, counts: Any) -> None:
+    def _paint(self, axis: Any, one: Subject, readings: Readings, edges: Any, counts: Any) -> None:
         """Paint one panel: counts, every trial as a dot above its bin, and the mark."""
         colour = one.series.colour
         style = {"facecolor": lighter(colour), "edgecolor": colour, "linewidth": 0.7, "align": "edge"}

@@ -8,7 +8,6 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from evoclaims.claims.trial_group import TrialGroup
 from evoclaims.core.printable import printable
 from evoclaims.figures.figure import Scope
 from evoclaims.judging.measure import Measure
@@ -16,7 +15,8 @@ from evoclaims.judging.sample import MissingNumberError, UnreadableTrialError, c
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.spec import TrialSpec
 
-MeasureOf = Callable[[TrialGroup], Measure]
+MeasureOf = Callable[[Any], Measure]
+"""What is read, of a `TrialGroup` with the measures of the reproduction."""
 
 NOT_FINITE, NOT_RUN, NOT_MEASURED = "not finite", "not run", "not measured"
 PLACE, WHAT = ("panel", "at", "series", "method", "task"), ("what", "against", "n")

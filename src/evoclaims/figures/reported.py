@@ -55,7 +55,7 @@ class Published:
         return self.tables[name]
 
 
-def load(path: Path) -> Published:
+def load_published(path: Path) -> Published:
     """Read a file of published numbers.
 
     Raises:

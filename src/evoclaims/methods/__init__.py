@@ -1,1 +1,5 @@
 """Algorithms: pure functions of an explicit state, one a file."""
+
+from evoclaims.core.lazy import exported
+
+__all__, __getattr__, __dir__ = exported(__name__)

@@ -26,9 +26,6 @@ CPPN_FUNCTIONS = ("tanh", "gauss", "sin", "abs", "identity")
 PAPER = replace(neat.PAPER, activations=CPPN_FUNCTIONS)
 """The paper's values: NEAT's, for a network whose activation functions evolve too (§4)."""
 
-CODE = replace(neat.CODE, nodes=50, connections=100, activations=("sigmoid",))
-"""What the published code runs on the stepping gates."""
-
 
 @dataclass(frozen=True)
 class SubstrateNetwork:

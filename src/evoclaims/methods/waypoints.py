@@ -21,7 +21,7 @@ from evoclaims.core.errors import UserError
 from evoclaims.envs.base import Task
 from evoclaims.envs.ecorobot.boxes import Box
 from evoclaims.envs.ecorobot.maze import Area
-from evoclaims.envs.ecorobot.robot_task import PACKAGES
+from evoclaims.envs.ecorobot.robot_task import ROBOT_PACKAGES
 from evoclaims.envs.ecorobot.robots import SIMPLE_ROB
 from evoclaims.envs.ecorobot.stones import STONES, SteppingStones
 from evoclaims.methods.base import Policy, Progress
@@ -45,7 +45,7 @@ class Waypoints:
 
     name: ClassVar[str] = "waypoints"
     revision: ClassVar[int] = 1
-    packages: ClassVar[tuple[str, ...]] = (*PACKAGES, "scipy")
+    packages: ClassVar[tuple[str, ...]] = (*ROBOT_PACKAGES, "scipy")
 
     speed: float = 1.0
     gain: float = 10.0

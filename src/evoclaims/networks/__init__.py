@@ -1,1 +1,5 @@
 """Networks: what a policy is made of."""
+
+from evoclaims.core.lazy import exported
+
+__all__, __getattr__, __dir__ = exported(__name__)

@@ -6,8 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from evoclaims.core.errors import UnknownNameError
+from evoclaims.core.errors import UnknownNameError, UserError
 from evoclaims.judging.protocol import Protocol
+from evoclaims.paper.trial_group import TrialGroup
 from evoclaims.paper.variant import Variant
 from evoclaims.trials.spec import Condition
 
@@ -47,6 +48,10 @@ class Reproduction:
         variants: by name, of the protocol; claims are re-judged under them.
         figures: modules that redraw the paper's figures and tables, in its order; each holds FIGURE, an
             `evoclaims.figures.Figure` with the module's last name, and is imported only when it is drawn.
+        trials: what `trials(...)` gives a claim: `TrialGroup`, or a subclass with the paper's own measures.
+
+    Raises:
+        UserError: when `trials` is neither.
     """
 
     name: str
@@ -55,6 +60,15 @@ class Reproduction:
     tiers: Mapping[str, Tier]
     figures: tuple[str, ...] = ()
     variants: Mapping[str, Variant] = field(default_factory=dict)
+    trials: type[TrialGroup] = TrialGroup
+
+    def __post_init__(self) -> None:
+        """Check the class of the trials."""
+        if not (isinstance(self.trials, type) and issubclass(self.trials, TrialGroup)):
+            raise UserError(
+                f"The reproduction {self.name!r} says trials={self.trials!r}: name a subclass of TrialGroup whose "
+                "properties are the paper's own measures, or leave it out."
+            )
 
     def tier(self, name: str, variant: str = "") -> Tier:
         """Return a tier, as a variant changes it if one is named; an `UnknownNameError` lists the known ones."""

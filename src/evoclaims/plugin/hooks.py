@@ -23,7 +23,7 @@ from evoclaims.trials.allowance import end_without
 
 if TYPE_CHECKING:
     from evoclaims.claims.session import Session, Verdicts
-    from evoclaims.claims.trial_group import TrialGroup
+    from evoclaims.paper.trial_group import TrialGroup
     from evoclaims.report.live_line import LiveLine
     from evoclaims.verdicts.claim_report import ClaimReport
 

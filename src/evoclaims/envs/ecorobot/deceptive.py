@@ -14,7 +14,7 @@ from evoclaims.envs.ecorobot import stones
 from evoclaims.envs.ecorobot.boxes import Box
 from evoclaims.envs.ecorobot.maze import Area, Maze
 from evoclaims.envs.ecorobot.pose import Pose
-from evoclaims.envs.ecorobot.robot_task import PACKAGES, Outing, Ruling
+from evoclaims.envs.ecorobot.robot_task import ROBOT_PACKAGES, Outing, Ruling
 
 Difficulty = Literal["easy", "difficult"]
 
@@ -71,7 +71,7 @@ class DeceptiveMaze(Maze):
 
     name: ClassVar[str] = "deceptive_maze"  # type: ignore[misc]
     revision: ClassVar[int] = 1
-    packages: ClassVar[tuple[str, ...]] = PACKAGES
+    packages: ClassVar[tuple[str, ...]] = ROBOT_PACKAGES
 
     difficulty: Difficulty = "easy"
 

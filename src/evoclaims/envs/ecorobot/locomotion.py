@@ -10,7 +10,7 @@ from jaxtyping import Array, Bool, Float
 
 from evoclaims.envs.ecorobot.boxes import Box
 from evoclaims.envs.ecorobot.pose import Pose
-from evoclaims.envs.ecorobot.robot_task import PACKAGES, RobotTask, Ruling
+from evoclaims.envs.ecorobot.robot_task import ROBOT_PACKAGES, RobotTask, Ruling
 from evoclaims.envs.ecorobot.robots import HALF_CHEETAH, Robot
 
 
@@ -35,7 +35,7 @@ class Locomotion(RobotTask):
 
     name: ClassVar[str] = "locomotion"  # type: ignore[misc]
     revision: ClassVar[int] = 1
-    packages: ClassVar[tuple[str, ...]] = PACKAGES
+    packages: ClassVar[tuple[str, ...]] = ROBOT_PACKAGES
 
     robot: Robot = HALF_CHEETAH
 

@@ -14,7 +14,7 @@ from evoclaims.core.pytree import pytree
 from evoclaims.envs.ecorobot.boxes import Box
 from evoclaims.envs.ecorobot.locomotion import forward
 from evoclaims.envs.ecorobot.pose import Pose
-from evoclaims.envs.ecorobot.robot_task import PACKAGES, Outing, RobotTask, Ruling
+from evoclaims.envs.ecorobot.robot_task import ROBOT_PACKAGES, Outing, RobotTask, Ruling
 from evoclaims.envs.ecorobot.robots import HALF_CHEETAH, Robot
 
 Heights = Literal["hierarchical", "medium", "high"]
@@ -46,7 +46,7 @@ class Obstacles(RobotTask):
 
     name: ClassVar[str] = "obstacles"  # type: ignore[misc]
     revision: ClassVar[int] = 1
-    packages: ClassVar[tuple[str, ...]] = PACKAGES
+    packages: ClassVar[tuple[str, ...]] = ROBOT_PACKAGES
 
     robot: Robot = HALF_CHEETAH
     heights: Heights = "hierarchical"

@@ -26,7 +26,7 @@ from evoclaims.envs.ecorobot.scene import Places, Scene, scene
 from evoclaims.envs.ecorobot.sensors import Sensor
 from evoclaims.kernels.one_kernel import has_gpu, one_kernel
 
-PACKAGES: Final = ("mujoco", "mujoco-mjx")
+ROBOT_PACKAGES: Final = ("mujoco", "mujoco-mjx")
 """What every robot's task depends on; a task of this kind declares it, and whatever else it needs."""
 
 

@@ -12,7 +12,7 @@ from evoclaims.core.pytree import pytree
 from evoclaims.envs.ecorobot.boxes import Box
 from evoclaims.envs.ecorobot.maze import Area, Maze
 from evoclaims.envs.ecorobot.pose import Pose
-from evoclaims.envs.ecorobot.robot_task import PACKAGES, Outing, Ruling
+from evoclaims.envs.ecorobot.robot_task import ROBOT_PACKAGES, Outing, Ruling
 from evoclaims.envs.ecorobot.sensors import ARENA
 
 WALLS: Final = (
@@ -55,7 +55,7 @@ class SteppingStones(Maze):
 
     name: ClassVar[str] = "stepping_stones"  # type: ignore[misc]
     revision: ClassVar[int] = 1
-    packages: ClassVar[tuple[str, ...]] = PACKAGES
+    packages: ClassVar[tuple[str, ...]] = ROBOT_PACKAGES
 
     within: float = 0.1
     shows_goal: bool = False

@@ -151,5 +151,3 @@ class Settings:
 
 
 PAPER = Settings()
-CODE = Settings(population=1_024, mutation=Mutation(node_add=0.1), species=Species(most=20, on_level_up="keep"))
-"""What the published code runs on the stepping gates."""

@@ -8,9 +8,12 @@ from typing import Any
 
 import pytest
 
-from evoclaims.claims.trial_group import TrialGroup
+from evoclaims.claims.session import Session
+from evoclaims.core.errors import UserError
 from evoclaims.judging.measure import Event, Measure
 from evoclaims.paper.reproduction import Reproduction
+from evoclaims.paper.trial_group import TrialGroup
+from evoclaims.trials.store import Store
 
 Served = Callable[..., Any]
 
@@ -49,6 +52,7 @@ def test_no_trial_is_fetched_before_a_verdict_needs_it(reproduction: Reproductio
     [
         ("mean_success", (0.0, 0.5, 1.0)),
         ("last_success", (0.0, 0.25, 0.5)),
+        ("reward", (-1.0, -0.5, 0.0)),
         ("furthest_solved", (-1.0, -1.0, 1.0)),
         ("furthest_reached", (1.0, 1.0, 1.0)),
     ],
@@ -76,16 +80,6 @@ def test_each_event_holds_where_its_name_says(group: Any, event: Any, held: tupl
     assert _read(event(made), made) == held
 
 
-def test_a_champion_is_mostly_hidden_when_more_than_half_of_its_nodes_are(group: Any) -> None:
-    made = group(lambda seed: 1.0)
-    visible = made.condition.task.observation_size + made.condition.task.action_size
-    trial = made.fetch([0])[0]
-    last = [2 * visible + more for more in (-1, 0, 1)]
-    grown = [replace(trial, seed=seed, curves={"champion_nodes": (99.0, float(n))}) for seed, n in enumerate(last)]
-    assert made.champion_is_mostly_hidden.sample({made.fingerprint: tuple(grown)}).values == (0, 0, 1)
-    assert made.champion_is_mostly_input_and_output.sample({made.fingerprint: tuple(grown)}).values == (1, 1, 0)
-
-
 def test_the_success_of_a_level_can_be_compared_with_another(group: Any) -> None:
     made = group(lambda seed: seed / 2)
     assert made.success.size == 2
@@ -94,13 +88,11 @@ def test_the_success_of_a_level_can_be_compared_with_another(group: Any) -> None
 
 def test_measures_and_events_have_names_of_their_own_since_fingerprints_hash_them(group: Any) -> None:
     made = group(lambda seed: 1.0)
-    measures = [made.mean_success, made.last_success, made.furthest_solved, made.furthest_reached]
+    measures = [made.mean_success, made.last_success, made.reward, made.furthest_solved, made.furthest_reached]
     events = [
         made.solves_every_level,
         made.solves_the_last_level,
         made.does_not_solve_the_last_level,
-        made.champion_is_mostly_hidden,
-        made.champion_is_mostly_input_and_output,
         made.solves_level(0),
         made.solves_level(1),
         made.solves_no_level_beyond(0),
@@ -109,3 +101,59 @@ def test_measures_and_events_have_names_of_their_own_since_fingerprints_hash_the
     ]
     names = [thing.name for thing in (*measures, *events, made.success)]
     assert len(set(names)) == len(names)
+
+
+def test_a_measure_made_on_the_spot_reads_what_it_is_told_to(group: Any) -> None:
+    made = group(lambda seed: seed / 2)
+    spent = made.measure("steps spent", lambda trial: trial.metrics["environment_steps"], "lower")
+    assert (spent.describe(), spent.better, _read(spent, made)) == (
+        "better on small: steps spent",
+        "lower",
+        (100, 101, 102),
+    )
+    odd = made.event("has an odd seed", lambda trial: trial.seed % 2 == 1)
+    assert (odd.describe(), _read(odd, made)) == ("better on small: has an odd seed", (0, 1, 0))
+
+
+class Counted(TrialGroup):
+    """Trials of a paper that counts steps."""
+
+    @property
+    def steps_spent(self) -> Measure:
+        return self.measure("steps spent", lambda trial: trial.metrics["environment_steps"])
+
+    @property
+    def torn(self) -> Measure:
+        return self.condition.nothing  # type: ignore[attr-defined, no-any-return]
+
+
+def test_a_reproduction_s_own_measures_stand_beside_those_of_every_paper(
+    reproduction: Reproduction, store: Store, served: Served
+) -> None:
+    told = Session(replace(reproduction, trials=Counted), store, served(lambda condition, seed: seed / 2))
+    made = told.group("better", "small", "smoke")
+    assert isinstance(made, Counted)
+    assert _read(made.steps_spent, made) == (100, 101, 102)
+    assert _read(made.mean_success, made) == (0.0, 0.5, 1.0)
+
+
+def test_a_misspelled_measure_lists_the_known_ones(reproduction: Reproduction) -> None:
+    made = Counted("better", "small", reproduction.tier("smoke").condition("better", "small"), list)  # type: ignore[arg-type]
+    with pytest.raises(UserError) as error:
+        made.step_spent  # type: ignore[attr-defined]  # noqa: B018
+    said = str(error.value)
+    assert said.startswith("There is no measure named 'step_spent'. Did you mean 'steps_spent'? Known: does_not_")
+    assert "mean_success" in said
+    assert not {"label", "fetch", "fingerprint"} & set(said.rstrip(".").split("Known: ")[1].split(", "))
+    assert not hasattr(made, "step_spent")
+
+
+def test_what_breaks_in_a_measure_is_not_taken_for_a_misspelled_one(reproduction: Reproduction) -> None:
+    made = Counted("better", "small", reproduction.tier("smoke").condition("better", "small"), list)  # type: ignore[arg-type]
+    with pytest.raises(AttributeError, match="'Condition' object has no attribute 'nothing'"):
+        made.torn  # noqa: B018
+
+
+def test_trials_that_are_none_are_refused(reproduction: Reproduction) -> None:
+    with pytest.raises(UserError, match="The reproduction 'tiny' says trials=.*: name a subclass of TrialGroup"):
+        replace(reproduction, trials={"stones": len})  # type: ignore[arg-type]

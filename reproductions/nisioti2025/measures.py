@@ -1,0 +1,86 @@
+"""What the paper measures beyond success and reward: stones, obstacles, ways through mazes, and networks' sizes.
+
+The names in quotation marks are hashed into the claims' fingerprints.
+"""
+
+from __future__ import annotations
+
+from evoclaims import Event, Measure, TrialGroup
+
+
+class PaperTrials(TrialGroup):
+    """Trials of one condition, with the measures of the paper's own tasks and methods."""
+
+    @property
+    def stones(self) -> Measure:
+        """Stones that the final policy crosses in their order, averaged over the examination's episodes."""
+        return self.measure("stones crossed", lambda t: t.metrics["stones"])
+
+    def crosses(self, stones: float) -> Event:
+        """The final policy crosses exactly as many stones as this in every episode."""
+        return self.event(f"crosses {stones:g} stones", lambda t: t.metrics["stones"] == stones)
+
+    def crosses_at_most(self, stones: float) -> Event:
+        """The final policy crosses no more stones than this, averaged over the examination's episodes."""
+        return self.event(f"crosses at most {stones:g} stones", lambda t: t.metrics["stones"] <= stones)
+
+    @property
+    def path_coverage(self) -> Measure:
+        """Share of the reachable cells that the final policy's path leads through."""
+        return self.measure("share of the maze covered", lambda t: t.metrics["coverage"])
+
+    @property
+    def archive_coverage(self) -> Measure:
+        """Share of the reachable cells that hold an elite; of methods with an archive."""
+        return self.measure("share of the maze covered", lambda t: t.curves["coverage"][-1])
+
+    @property
+    def reaches_the_target(self) -> Event:
+        """The final policy reaches the target in more than half of the examination's episodes."""
+        return self.event("reaches the target", lambda t: t.metrics["reached"] > 0.5)
+
+    @property
+    def never_reaches_the_target(self) -> Event:
+        """The final policy reaches the target in no episode of the examination."""
+        return self.event("never reaches the target", lambda t: t.metrics["reached"] == 0)
+
+    @property
+    def has_found_the_target(self) -> Event:
+        """Some individual has reached the target; of methods with an archive."""
+        return self.event("has found the target", lambda t: t.curves["reached"][-1] == 1)
+
+    def ends_within(self, distance: float) -> Event:
+        """The final policy ends within `distance` (m) of where the target counts as reached, on average."""
+        return self.event(f"ends within {distance:g} m of the target", lambda t: t.metrics["distance"] <= distance)
+
+    def passes_at_most(self, obstacles: float) -> Event:
+        """The final policy leaves no more obstacles behind than this, averaged over the examination's episodes."""
+        return self.event(f"passes at most {obstacles:g} obstacles", lambda t: t.metrics["obstacles"] <= obstacles)
+
+    @property
+    def overturned(self) -> Measure:
+        """Share of the final policy's steps that the robot spends upside-down."""
+        return self.measure("share of steps upside-down", lambda t: t.metrics["upside_down"])
+
+    @property
+    def control_cost(self) -> Measure:
+        """What the final policy's actions cost in an episode."""
+        return self.measure("control cost", lambda t: t.metrics["control_cost"])
+
+    @property
+    def champion_is_mostly_hidden(self) -> Event:
+        """More than half of the final champion's neurons are hidden; of methods that grow networks."""
+        most = self._neurons_half_hidden
+        return self.event("most neurons of the champion are hidden", lambda t: t.curves["champion_nodes"][-1] > most)
+
+    @property
+    def champion_is_mostly_input_and_output(self) -> Event:
+        """No more than half of the final champion's neurons are hidden; of methods that grow networks."""
+        most = self._neurons_half_hidden
+        name = "at most half of the champion's neurons are hidden"
+        return self.event(name, lambda t: t.curves["champion_nodes"][-1] <= most)
+
+    @property
+    def _neurons_half_hidden(self) -> int:
+        """Neurons of a network of which half are hidden."""
+        return 2 * (self.condition.task.observation_size + self.condition.task.action_size)

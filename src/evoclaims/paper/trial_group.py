@@ -1,0 +1,129 @@
+"""The trials of one condition as a claim speaks of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from evoclaims.core.errors import UnknownNameError
+from evoclaims.judging.measure import Better, Event, Measure, Profile
+from evoclaims.judging.sample import Source
+from evoclaims.trials.result import TrialResult
+from evoclaims.trials.spec import Condition
+
+Fetch = Callable[[Condition, Sequence[int]], Sequence[TrialResult]]
+
+
+class UnknownMeasureError(UnknownNameError, AttributeError):
+    """A measure that no paper has told of; an `AttributeError` too, so that attributes keep what they promise."""
+
+
+@dataclass(frozen=True, eq=False)
+class TrialGroup:
+    """Trials that are run only when a verdict needs them, and what can be read from each.
+
+    Here are the measures of every method on every task. A paper adds its own in a subclass, which its reproduction
+    names: `Reproduction(trials=...)`. Names of measures and events are hashed into claims' fingerprints.
+
+    Attributes:
+        method, task: the names by which a claim asked for them.
+        condition: what is run.
+        get: how trials are had: run, or read from the store.
+    """
+
+    method: str
+    task: str
+    condition: Condition
+    get: Fetch = field(repr=False)
+
+    if not TYPE_CHECKING:  # a type checker knows the measures, and finds misspelled ones by itself
+
+        def __getattr__(self, name: str) -> Any:
+            """Raise an error that lists the known measures."""
+            known = {known for known in dir(type(self)) if not known.startswith("_")} - set(dir(Source))
+            if name.startswith("_") or name in known:
+                return object.__getattribute__(self, name)  # raises what the measure itself has raised
+            raise UnknownMeasureError("measure", name, known)
+
+    @property
+    def label(self) -> str:
+        """A short name, such as "cma_es on n_parity"."""
+        return f"{self.method} on {self.task}"
+
+    @property
+    def fingerprint(self) -> str:
+        """The condition's id."""
+        return self.condition.id
+
+    def fetch(self, seeds: Sequence[int]) -> Sequence[TrialResult]:
+        """Return one trial per seed."""
+        return self.get(self.condition, seeds)
+
+    def measure(self, name: str, read: Callable[[TrialResult], float], better: Better = "higher") -> Measure:
+        """Return a measure of these trials, such as `measure("steps", lambda t: t.metrics["steps"], "lower")`."""
+        return Measure(self, name, read, better)
+
+    def event(self, name: str, holds: Callable[[TrialResult], bool]) -> Event:
+        """Return an event, which holds in a trial or does not."""
+        return Event(self, name, holds)
+
+    @property
+    def success(self) -> Profile:
+        """Success of the final policy on each level's own table."""
+        return Profile(self, "success", lambda t: t.levels["success"], self.condition.task.levels)
+
+    @property
+    def mean_success(self) -> Measure:
+        """Success of the final policy, averaged over the levels."""
+        return self.measure("mean success over levels", lambda t: t.metrics["mean_success"])
+
+    @property
+    def last_success(self) -> Measure:
+        """Success of the final policy on the last level."""
+        return self.measure("success on the last level", lambda t: t.metrics["last_success"])
+
+    @property
+    def reward(self) -> Measure:
+        """Reward of an episode of the final policy on the last level, averaged over the examination's episodes."""
+        return self.measure("episode reward", lambda t: t.metrics["last_fitness"])
+
+    @property
+    def furthest_solved(self) -> Measure:
+        """Highest level solved while training; -1 for none."""
+        return self.measure("furthest level solved", lambda t: t.metrics["furthest_solved"])
+
+    @property
+    def furthest_reached(self) -> Measure:
+        """Highest level trained on."""
+        return self.measure("furthest level reached", lambda t: t.metrics["furthest_reached"])
+
+    @property
+    def solves_every_level(self) -> Event:
+        """The final policy is right on every row of every level."""
+        return self.success_everywhere_is(1.0)
+
+    @property
+    def solves_the_last_level(self) -> Event:
+        """The last level was solved while training."""
+        last = self.condition.task.levels - 1
+        return self.event("solves the last level", lambda t: t.metrics["furthest_solved"] == last)
+
+    @property
+    def does_not_solve_the_last_level(self) -> Event:
+        """The last level was never solved."""
+        last = self.condition.task.levels - 1
+        return self.event("does not solve the last level", lambda t: t.metrics["furthest_solved"] < last)
+
+    def solves_level(self, level: int) -> Event:
+        """This level, counted from 0, was solved while training."""
+        return self.event(f"solves level {level}", lambda t: t.metrics["furthest_solved"] >= level)
+
+    def solves_no_level_beyond(self, level: int) -> Event:
+        """No level above `level` (counted from 0) was solved while training."""
+        return self.event(f"solves no level beyond {level}", lambda t: t.metrics["furthest_solved"] <= level)
+
+    def success_everywhere_is(self, value: float) -> Event:
+        """The final policy's success is exactly `value` on every level."""
+        name = "solves every level" if value == 1.0 else f"success is {value:g} on every level"
+        return self.event(name, lambda t: all(x == value for x in t.levels["success"]))

@@ -1,0 +1,64 @@
+"""What the paper under test measures beyond what every paper does."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from evoclaims.judging.measure import Event, Measure
+from reproductions.nisioti2025 import REPRODUCTION
+from reproductions.nisioti2025.measures import PaperTrials
+
+CONDITION = REPRODUCTION.tier("smoke").condition("neat", "n_parity")
+VISIBLE = CONDITION.task.observation_size + CONDITION.task.action_size
+
+
+@pytest.fixture
+def read(made: Callable[..., Any]) -> Callable[..., tuple[float, ...]]:
+    """A function that reads something from trials which have these values of one metric, or at the end of a curve."""
+
+    def values(what: Callable[[PaperTrials], Measure | Event], name: str, given: list[float]) -> tuple[float, ...]:
+        trials = [
+            replace(trial, metrics={**trial.metrics, name: value}, curves={name: (99.0, value)})
+            for seed, value in enumerate(given)
+            for trial in [made(CONDITION, seed, 1.0)]
+        ]
+        group = PaperTrials("neat", "n_parity", CONDITION, lambda condition, seeds: trials)
+        return what(group).sample({group.fingerprint: tuple(trials)}).values
+
+    return values
+
+
+@pytest.mark.parametrize(
+    ("what", "name"),
+    [
+        (lambda g: g.stones, "stones"),
+        (lambda g: g.overturned, "upside_down"),
+        (lambda g: g.control_cost, "control_cost"),
+        (lambda g: g.path_coverage, "coverage"),
+        (lambda g: g.archive_coverage, "coverage"),
+    ],
+)
+def test_a_measure_reads_its_own_number(read: Any, what: Any, name: str) -> None:
+    assert read(what, name, [0.25, 3.0]) == (0.25, 3.0)
+
+
+@pytest.mark.parametrize(
+    ("what", "name", "given", "held"),
+    [
+        (lambda g: g.crosses(7), "stones", [6.9, 7.0], (0, 1)),
+        (lambda g: g.crosses_at_most(1), "stones", [0.0, 1.0, 1.1], (1, 1, 0)),
+        (lambda g: g.passes_at_most(1), "obstacles", [0.0, 1.0, 1.1], (1, 1, 0)),
+        (lambda g: g.ends_within(2.0), "distance", [1.9, 2.0, 2.1], (1, 1, 0)),
+        (lambda g: g.reaches_the_target, "reached", [0.0, 0.5, 0.6], (0, 0, 1)),
+        (lambda g: g.never_reaches_the_target, "reached", [0.0, 0.1], (1, 0)),
+        (lambda g: g.has_found_the_target, "reached", [0.0, 1.0], (0, 1)),
+        (lambda g: g.champion_is_mostly_hidden, "champion_nodes", [2 * VISIBLE, 2 * VISIBLE + 1], (0, 1)),
+        (lambda g: g.champion_is_mostly_input_and_output, "champion_nodes", [2 * VISIBLE, 2 * VISIBLE + 1], (1, 0)),
+    ],
+)
+def test_an_event_holds_where_its_name_says(read: Any, what: Any, name: str, given: Any, held: Any) -> None:
+    assert read(what, name, given) == held
