@@ -123,6 +123,8 @@ def warmed() -> None:
     """Import here what a run imports late: pytester forgets the modules that a run within this process imported."""
     import tempfile
 
+    import statsmodels.stats.multitest  # noqa: F401
+
     import evoclaims.cli.plan
     import evoclaims.cli.project
     import evoclaims.cli.run

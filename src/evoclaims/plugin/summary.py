@@ -45,10 +45,10 @@ class Summary:
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
         """Note what became of a claim."""
-        from evoclaims.verdicts.claim_report import ClaimReport
-
         plain = getattr(report, ATTRIBUTE, None)
         if plain is not None:
+            from evoclaims.verdicts.claim_report import ClaimReport
+
             self.reports.append(ClaimReport.from_json(plain))
 
     @pytest.hookimpl(optionalhook=True)
@@ -106,9 +106,9 @@ class Summary:
 
     def _compare_with_accepted(self) -> None:
         """Compare the verdicts with those last accepted, which are of the protocol itself and not of a variant."""
-        from evoclaims.verdicts.regression import regression
-
         if self.reports and not self._config.getoption("claims_variant"):
+            from evoclaims.verdicts.regression import regression
+
             folder = self._make_session(self._config).reproduction.folder
             self._regression = regression(folder, self.reports, self._config.getoption("claims_compare_fail"))
 
