@@ -15,15 +15,22 @@ from evoclaims.figures.elites import ElitesMap, Ground
 from evoclaims.methods.map_elites import MapElites
 from evoclaims.networks.mlp import Mlp
 from evoclaims.trials.budget import Budget
+from evoclaims.trials.result import TrialResult
 from evoclaims.trials.result_making import named_leaves
 from evoclaims.trials.spec import Condition
 
 CELLS = (8, 7)
 METHOD = MapElites(Mlp((2,)), batch=2, initial=2, cells=CELLS)
 MAZE = Condition(METHOD, SteppingStones(episode_steps=3), "whole_budget", Budget(generations=1))
+
+
+def _covered(trial: TrialResult) -> float:
+    return trial.curves["coverage"][-1]
+
+
 ELITES = ElitesMap(
     (Ground("stones", "map_elites", "maze"),),
-    (("coverage", lambda trials: trials.archive_coverage), ("reward", lambda trials: trials.reward)),
+    (("coverage", lambda trials: trials.measure("coverage", _covered)), ("reward", lambda trials: trials.reward)),
 )
 
 

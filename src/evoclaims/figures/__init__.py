@@ -1,6 +1,6 @@
 """Figures and tables of a paper, redrawn from trials: one module for each way of drawing, and no paper in it.
 
-`catalogue.load(reproduction, "fig3").draw(archive, reproduction, "full")` returns a `Drawing`; `svg` makes text of it.
+`catalogue.load(reproduction, "fig3").draw(archive, reproduction, "full")` returns a `Drawing`; `files` writes it.
 """
 
 from evoclaims.core.lazy import exported
