@@ -31,10 +31,10 @@ from evoclaims.methods import (
     Neat,
     Ppo,
     RandomPolicy,
-    Waypoints,
 )
 from evoclaims.methods.neat import Settings, Species
 from evoclaims.networks import AllSkips, Mlp, Substrate, on_circle
+from reproductions.nisioti2025.waypoints import Waypoints
 
 Conditions = dict[tuple[str, str], Condition]
 

@@ -16,7 +16,7 @@ from evoclaims.envs.ecorobot.deceptive import DeceptiveMaze
 from evoclaims.envs.ecorobot.robot_task import Outing
 from evoclaims.envs.ecorobot.robots import ANT
 from evoclaims.envs.ecorobot.stones import STONES, TARGET, SteppingStones
-from evoclaims.methods.waypoints import Waypoints
+from reproductions.nisioti2025.waypoints import Waypoints
 
 pytestmark = pytest.mark.slow
 

@@ -25,8 +25,6 @@ def exported(package: str) -> tuple[list[str], Callable[[str], object], Callable
     def load(name: str) -> object:
         if name not in homes:
             raise AttributeError(f"module {package!r} has no attribute {name!r}", name=name, obj=module)
-        value = getattr(importlib.import_module(homes[name]), name)
-        setattr(module, name, value)
-        return value
+        return getattr(importlib.import_module(homes[name]), name)  # not kept: what is imported anew is another class
 
     return sorted(homes), load, lambda: sorted({*vars(module), *homes})

@@ -18,6 +18,7 @@ from evoclaims.envs.ecorobot.robots import SIMPLE_ROB as SIMPLE_ROB
 from evoclaims.envs.ecorobot.robots import Robot as Robot
 from evoclaims.envs.ecorobot.sensors import PieSlices as PieSlices
 from evoclaims.envs.ecorobot.sensors import Rangefinders as Rangefinders
+from evoclaims.envs.ecorobot.stones import STONES as STONES
 from evoclaims.envs.ecorobot.stones import SteppingStones as SteppingStones
 from evoclaims.envs.gates.alu import SimpleAlu as SimpleAlu
 from evoclaims.envs.gates.circuit import Circuit as Circuit

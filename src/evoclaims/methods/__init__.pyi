@@ -17,4 +17,3 @@ from evoclaims.methods.ppo import Ppo as Ppo
 from evoclaims.methods.random_policy import RandomPolicy as RandomPolicy
 from evoclaims.methods.random_search import RandomSearch as RandomSearch
 from evoclaims.methods.tensorneat import NeatTensorneat as NeatTensorneat
-from evoclaims.methods.waypoints import Waypoints as Waypoints

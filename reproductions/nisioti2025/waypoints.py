@@ -17,14 +17,9 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import dijkstra
 
-from evoclaims.core.errors import UserError
-from evoclaims.envs.base import Task
-from evoclaims.envs.ecorobot.boxes import Box
-from evoclaims.envs.ecorobot.maze import Area
-from evoclaims.envs.ecorobot.robot_task import ROBOT_PACKAGES
-from evoclaims.envs.ecorobot.robots import SIMPLE_ROB
-from evoclaims.envs.ecorobot.stones import STONES, SteppingStones
-from evoclaims.methods.base import Policy, Progress
+from evoclaims import UserError
+from evoclaims.envs import ROBOT_PACKAGES, SIMPLE_ROB, STONES, Box, SteppingStones, Task
+from evoclaims.methods import Policy, Progress
 
 GRID: Final = 0.1
 """Distance of the points between which paths lead, m."""
@@ -92,7 +87,7 @@ class Waypoints:
 
 
 @lru_cache(maxsize=4)
-def _targets(boxes: tuple[Box, ...], area: Area, radius: float) -> NDArray[np.float32]:
+def _targets(boxes: tuple[Box, ...], area: tuple[tuple[float, float], ...], radius: float) -> NDArray[np.float32]:
     """Return where to steer from each point of a grid, to each stone: shape [stones, points x, points y, 2], m."""
     axes = [np.arange(round((high - low) / GRID) + 1) * GRID + low for low, high in area]
     points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
