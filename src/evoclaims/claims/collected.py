@@ -1,8 +1,9 @@
-"""Claim tests as pytest collects them: the tier and the case of each, and a name that no other has."""
+"""Claim tests as pytest collects them: the claim, the tier and the case of each, and a name that no other has."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import dataclass
 from typing import Final
 
 import pytest
@@ -16,61 +17,58 @@ TIER: Final = "claim_tier"
 """The parameter that makes a claim test run once per tier; the plugin makes it the first one."""
 
 
-def tier_of(item: pytest.Item) -> str:
-    """Return the tier that a claim test runs at.
+@dataclass(frozen=True)
+class ClaimTest:
+    """What a test judges.
+
+    Attributes:
+        claim: the paper's sentence.
+        tier: "smoke" or "full".
+        case: the ids of its parameters other than the tier, such as "n_parity"; empty without any.
+    """
+
+    claim: Claim
+    tier: str
+    case: str
+
+    @staticmethod
+    def of(item: pytest.Item) -> ClaimTest:
+        """Return what a test with the mark of a claim judges.
+
+        Raises:
+            UserError: when it has no tier, being no test that takes parameters, or when the mark holds no claim.
+        """
+        callspec, claim = getattr(item, "callspec", None), claim_of(item)
+        if callspec is None or TIER not in callspec.params:
+            raise UserError(
+                f"{item.nodeid} is a claim and cannot be given a tier: write it as a function, or as a method of a "
+                "class that is no unittest.TestCase."
+            )
+        if not isinstance(claim, Claim):
+            raise UserError(f"{item.nodeid} has the mark pytest.mark.claim but no claim: use @claim(...) of evoclaims.")
+        tier: str = callspec.params[TIER]
+        return ClaimTest(claim, tier, callspec.id.removeprefix(tier).removeprefix("-"))
+
+    @property
+    def key(self) -> tuple[str, str]:
+        """What its verdict is kept under: `history.key_of` its report."""
+        return self.tier, printable(named(self.claim.id, self.case))
+
+
+def claim_tests(items: Iterable[pytest.Item]) -> dict[pytest.Item, ClaimTest]:
+    """Return what every claim test among `items` judges, once it is certain that they can be told apart.
 
     Raises:
-        UserError: when it runs at none, being no test that takes parameters.
+        UserError: as `ClaimTest.of` does, or when two tests have the same name and tier.
     """
-    callspec = getattr(item, "callspec", None)
-    if callspec is None or TIER not in callspec.params:
-        raise UserError(
-            f"{item.nodeid} is a claim and cannot be given a tier: write it as a function, or as a method of a class "
-            "that is no unittest.TestCase."
-        )
-    tier: str = callspec.params[TIER]
-    return tier
-
-
-def case_of(item: pytest.Item) -> str:
-    """Return the ids of a claim test's parameters other than the tier, such as "n_parity"; empty without any."""
-    tier, ids = tier_of(item), item.callspec.id  # type: ignore[attr-defined]
-    case: str = ids.removeprefix(tier).removeprefix("-")
-    return case
-
-
-def key_of(item: pytest.Item) -> tuple[str, str]:
-    """Return what a claim test's verdict is kept under: `history.key_of` its report.
-
-    Raises:
-        UserError: as `tier_of` does, or when the mark holds no claim.
-    """
-    return tier_of(item), printable(named(_claim(item).id, case_of(item)))
-
-
-def checked(items: Iterable[pytest.Item]) -> dict[pytest.Item, tuple[str, str]]:
-    """Return the claim id and the tier of every claim test, once it is certain that they can be told apart.
-
-    Raises:
-        UserError: as `key_of` does, or when two tests have the same name and tier.
-    """
-    claims: dict[pytest.Item, tuple[str, str]] = {}
+    tests = {item: ClaimTest.of(item) for item in items if item.get_closest_marker("claim")}
     first: dict[tuple[str, str], pytest.Item] = {}
-    for item in items:
-        tier, name = key_of(item)
-        other = first.setdefault((tier, name), item)
+    for item, test in tests.items():
+        other = first.setdefault(test.key, item)
         if other is not item:
+            tier, name = test.key
             raise UserError(
                 f"Two claim tests are called {name} at the {tier} tier, {other.nodeid} and {item.nodeid}, so that the "
                 "verdict of one would take the other's place: give one of them another claim id or other parameter ids."
             )
-        claims[item] = _claim(item).id, tier
-    return claims
-
-
-def _claim(item: pytest.Item) -> Claim:
-    """Return a claim test's claim."""
-    claim = claim_of(item)
-    if not isinstance(claim, Claim):
-        raise UserError(f"{item.nodeid} has the mark pytest.mark.claim but no claim: use @claim(...) of evoclaims.")
-    return claim
+    return tests

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
-from evoclaims.claims.claim import Claim
-from evoclaims.claims.fetching import NotStoredError
-from evoclaims.claims.reporting import judged
+from evoclaims.claims.claim import Claim, Expectation
+from evoclaims.claims.fetching import NotStoredError, StoredOnly
+from evoclaims.claims.reporting import expecting, judged
 from evoclaims.core.errors import UserError
 from evoclaims.core.packages import agree, recorded
 from evoclaims.judging.assertion import Assertion
@@ -23,7 +23,7 @@ from evoclaims.paper.trial_group import Fetch, TrialGroup
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.spec import Condition, TrialSpec
 from evoclaims.trials.store import Store
-from evoclaims.verdicts.claim_report import ClaimReport
+from evoclaims.verdicts.claim_report import ClaimReport, located, named, save, succeeding
 from evoclaims.verdicts.upgrade import Succession, Upgrade, predecessors, upgrade
 
 
@@ -74,7 +74,7 @@ class Session:
     def settle(self, claim: Claim, case: str, tier: str, assertion: Assertion) -> ClaimReport:
         """Judge an assertion; trials that may not be run make the verdict "not run"."""
         protocol = self.protocol(tier)
-        name = f"{claim.id}[{case}]" if case else claim.id
+        name = named(claim.id, case)
         try:
             if self.variant and self._untouched(tier, assertion):
                 raise NotStoredError(f"the variant {self.variant} changes none of its trials")
@@ -82,7 +82,17 @@ class Session:
         except NotStoredError as error:
             mark = fingerprint(assertion, protocol, claim=name, tier=tier)
             verdict = Verdict(Outcome.NOT_RUN, str(error), assertion.describe(), mark)
-        return replace(judged(claim, case, tier, assertion, protocol, verdict, self.again), variant=self.variant)
+        return judged(claim, case, tier, assertion, protocol, verdict, self.again)
+
+    def complete(self, report: ClaimReport, expectation: Expectation | None) -> ClaimReport:
+        """Return a report with the variant, an accepted outcome, and the file that holds it.
+
+        Trials that are run make verdicts that are written down; where they are only read, the file is an earlier run's.
+        """
+        complete, root = expecting(replace(report, variant=self.variant), expectation), self.store.root
+        if isinstance(self.fetch, StoredOnly):
+            return located(complete, root)
+        return save(succeeding(complete, root), root)
 
     def _untouched(self, tier: str, assertion: Assertion) -> bool:
         """Whether the protocol itself has all conditions that an assertion is about."""

@@ -5,8 +5,7 @@ from __future__ import annotations
 import argparse
 from datetime import UTC, datetime
 
-from evoclaims.cli.project import judge_stored, open_archive, open_project
-from evoclaims.cli.tiers import tiers_of
+from evoclaims.cli.project import open_project
 from evoclaims.core.files import write_atomically
 from evoclaims.verdicts import history
 from evoclaims.verdicts.acceptance import accept
@@ -14,12 +13,12 @@ from evoclaims.verdicts.acceptance import accept
 
 def main(options: argparse.Namespace) -> int:
     """Write verdicts.toml and print what is new in it; 1 when anything is, so that no automation accepts unseen."""
-    config, reproduction = open_project()
-    tiers = tiers_of(reproduction, options.tier)
-    path = reproduction.folder / history.FILE
+    project = open_project(options.storage)
+    tiers = project.tiers(options.tier)
+    path = project.reproduction.folder / history.FILE
     before = history.load(path)
-    reports = [report for tier in tiers for report in judge_stored(config, options.storage, tier)]
-    made = accept(before, reports, open_archive(options.storage, reproduction), f"{datetime.now(UTC):%Y-%m-%d}")
+    reports = project.judge(*tiers)
+    made = accept(before, reports, project.archive, f"{datetime.now(UTC):%Y-%m-%d}")
     for line in made.left:
         print(f"left alone: {line}")
     now = {history.key_of(report) for report in reports}

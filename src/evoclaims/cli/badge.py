@@ -5,16 +5,16 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from evoclaims.cli.project import judge_stored, open_project
+from evoclaims.cli.project import open_project
 from evoclaims.cli.stored import write
 from evoclaims.report.badge import colour_of, message_of, svg
 
 
 def main(options: argparse.Namespace) -> int:
     """Judge from the trials at hand and write the picture."""
-    config, reproduction = open_project()
-    reproduction.tier(options.tier)
-    reports = judge_stored(config, options.storage, options.tier)
+    project = open_project(options.storage)
+    project.reproduction.tier(options.tier)
+    reports = project.judge(options.tier)
     out = Path(options.out or f"claims-{options.tier}.svg")
     message = message_of(reports)
     write(out, svg(f"claims ({options.tier})", message, colour_of(reports)).encode())

@@ -4,47 +4,21 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
+from typing import Final, get_args
 
 from rich.table import Table
 
 from evoclaims.cli.project import open_project
-from evoclaims.cli.run import describe
-from evoclaims.cli.stored import Stored, load, write
+from evoclaims.cli.stored import Stored, describe, load, write
 from evoclaims.cli.terminal import styled
 from evoclaims.core.errors import UnknownNameError, UserError
 from evoclaims.networks import export, picture
-from evoclaims.networks.genome import Genome
-from evoclaims.networks.graph import GraphNetwork
 from evoclaims.report.champion import network_panels
 from evoclaims.report.console import PlainSpokenConsole
 from evoclaims.trials import champions, devices
 from evoclaims.trials.champions import Replay
-
-
-@dataclass(frozen=True)
-class ExportedGenome:
-    """A champion that is a genome, as the forms of export take it.
-
-    Attributes:
-        trial: its trial.
-        network: what the genome describes.
-    """
-
-    trial: Stored
-    network: GraphNetwork
-
-    @property
-    def genome(self) -> Genome:
-        """The genome."""
-        genome: Genome = self.trial.parameters
-        return genome
-
-    @property
-    def title(self) -> str:
-        """Names the trial."""
-        return f"{self.trial.title}, seed {self.trial.result.seed}"
 
 
 def main(options: argparse.Namespace) -> int:
@@ -53,19 +27,17 @@ def main(options: argparse.Namespace) -> int:
         raise UnknownNameError("form of a network", options.form, FORMS)
     if options.out is not None and options.form is None:
         raise UserError(f"--out names the file that --as writes; add --as {', '.join(FORMS)}.")
-    _, reproduction = open_project()
-    tier, chosen = reproduction.tier(options.tier), devices.choose(options.device)
+    tier, chosen = open_project(options.storage).reproduction.tier(options.tier), devices.choose(options.device)
     trial = load(options.storage, tier, options.tier, options.method, options.on, options.seed)
     made = None
     if options.form is not None:
-        network = champions.network_of(trial.condition, trial.parameters)
-        if network is None:
+        made = FORMS[options.form](trial)
+        if made is None:
             raise UserError(
                 f"A champion of {options.method} is no genome but arrays of parameters, of which there is no graph to "
                 f"write as {options.form}. Leave --as out to replay it; its arrays are in "
                 f"{trial.file}."
             )
-        made = FORMS[options.form](ExportedGenome(trial, network))
     replay = champions.replay(trial.condition, trial.result, trial.parameters, chosen)
     print(f"{trial.title}\n  {describe(trial.result)}")
     PlainSpokenConsole(file=styled()).print(_table(replay))
@@ -78,19 +50,25 @@ def main(options: argparse.Namespace) -> int:
     return int(not replay.exact)
 
 
-def _json(exported: ExportedGenome) -> bytes:
-    """Return the genome as JSON."""
-    return export.to_json(exported.genome, exported.network).encode()
+def _json(trial: Stored) -> bytes | None:
+    """Return a champion's genome as JSON; None for one without a graph."""
+    network = champions.network_of(trial.condition, trial.parameters)
+    return None if network is None else export.to_json(trial.parameters, network).encode()
 
 
-def _picture(file_format: picture.Format) -> Callable[[ExportedGenome], bytes]:
-    """Return the function that draws a champion's network, and beside it the one that it draws on a substrate."""
-    return lambda exported: picture.draw(
-        network_panels(exported.trial.condition, exported.network, exported.genome), exported.title, file_format
-    )
+def _picture(trial: Stored, file_format: picture.Format) -> bytes | None:
+    """Draw a champion's network, and beside it the one that it draws on a substrate; None for one without a graph."""
+    network = champions.network_of(trial.condition, trial.parameters)
+    if network is None:
+        return None
+    panels = network_panels(trial.condition, network, trial.parameters)
+    return picture.draw(panels, f"{trial.title}, seed {trial.result.seed}", file_format)
 
 
-FORMS: Mapping[str, Callable[[ExportedGenome], bytes]] = {"json": _json, "svg": _picture("svg"), "png": _picture("png")}
+FORMS: Final[Mapping[str, Callable[[Stored], bytes | None]]] = {
+    "json": _json,
+    **{file_format: partial(_picture, file_format=file_format) for file_format in get_args(picture.Format)},
+}
 
 
 def _table(replay: Replay) -> Table:

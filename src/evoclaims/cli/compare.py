@@ -5,18 +5,16 @@ from __future__ import annotations
 import argparse
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import chain
 from pathlib import Path
 
-from evoclaims.cli.project import judge_stored, open_project, open_store
-from evoclaims.cli.tiers import tiers_of
+from evoclaims.cli.judging import judge
+from evoclaims.cli.project import Project, open_project, open_store
 from evoclaims.core.errors import UserError
 from evoclaims.judging.baseline import DriftReport
 from evoclaims.judging.tripwire import DigestCheck
-from evoclaims.paper.config import SuiteConfig
-from evoclaims.paper.reproduction import Reproduction
 from evoclaims.trials.store import Store
 from evoclaims.verdicts import comparison, history, transitions
-from evoclaims.verdicts.claim_report import ClaimReport
 from evoclaims.verdicts.comparison import Side
 from evoclaims.verdicts.git_revision import GitRevision, find_revision
 from evoclaims.verdicts.timeline import timeline
@@ -34,15 +32,15 @@ def main(options: argparse.Namespace) -> int:
     patterns = transitions.parse_patterns(options.fail) if options.fail is not None else ()
     if len(options.places) > 2:
         raise UserError(f"Two stores or two revisions can be compared, not {len(options.places)}.")
-    config, reproduction = open_project()
-    tiers = tiers_of(reproduction, options.tier)
+    project = open_project(options.storage)
+    tiers = project.tiers(options.tier)
     if options.timeline is not None:
         if options.places or patterns:
             raise UserError("--timeline shows the accepted verdicts alone; leave out what else is to be compared.")
-        kept = history.load(reproduction.folder / history.FILE)
+        kept = history.load(project.reproduction.folder / history.FILE)
         print(timeline({key: entries for key, entries in kept.items() if key[0] in tiers}, options.timeline))
         return 0
-    old, new = (side.of(tiers) for side in _Places(config, reproduction, tiers, options.storage).sides(options.places))
+    old, new = (side.of(tiers) for side in _Places(project, tiers).sides(options.places))
     found = transitions.compare(old.verdicts, new.verdicts)
     drift, digests = comparison.compare_trials(old, new)
     for line in (
@@ -65,22 +63,23 @@ def main(options: argparse.Namespace) -> int:
 class _Places:
     """Where verdicts and trials are found."""
 
-    config: SuiteConfig
-    reproduction: Reproduction
+    project: Project
     tiers: Sequence[str]
-    storage: str
 
     def sides(self, places: Sequence[str]) -> tuple[Side, Side]:
         """Return old and new, as the names on the command line say."""
+        reproduction = self.project.reproduction
         if not places:
-            accepted = comparison.working_tree(self.reproduction)
+            accepted = comparison.working_tree(reproduction)
             if not accepted.verdicts:
                 raise UserError("No verdict has been accepted yet: `evoclaims accept` accepts those of now.")
-            store = open_store(self.storage)
-            reports = self._judged(self.storage)
-            now = replace(comparison.store(self.reproduction, store, reports), verdicts=transitions.standings(reports))
-            name = f"judged from the store {store.root}, and from reference trials where it has none"
-            return replace(accepted, name="accepted verdicts, and reference trials"), replace(now, name=name)
+            store, reports = self.project.store, self.project.judge(*self.tiers)
+            now = replace(
+                comparison.store(reproduction, store, reports),
+                verdicts=transitions.standings(reports),
+                name=f"judged from the store {store.root}, and from reference trials where it has none",
+            )
+            return replace(accepted, name="accepted verdicts, and reference trials"), now
         found = [self._place(place) for place in places]
         revisions = [place for place in found if isinstance(place, GitRevision)]
         stores = [place for place in found if isinstance(place, Store)]
@@ -89,23 +88,19 @@ class _Places:
                 f"{revisions[0].name} is a revision and {stores[0].root} a store: two of a kind can be compared."
             )
         if revisions:
-            read = [comparison.revision(self.reproduction, place) for place in revisions]
-            return (read[0], read[1]) if len(read) == 2 else (read[0], comparison.working_tree(self.reproduction))
-        opened = [self._store(place) for place in (*stores, open_store(self.storage))[:2]]
-        return opened[0], opened[1]
+            read = [comparison.revision(reproduction, place) for place in revisions]
+            return read[0], read[1] if len(read) == 2 else comparison.working_tree(reproduction)
+        return self._stores(*[*stores, self.project.store][:2])
 
     def _place(self, name: str) -> GitRevision | Store:
         """Return what a name stands for."""
-        path = Path(name)
-        if path.is_absolute() or name.startswith("."):  # git knows no revision of such a name
-            revision = None
-        elif path.is_dir():
+        path, revision = Path(name), None
+        if not path.is_absolute() and not name.startswith("."):  # git knows no revision of such a name
             try:
-                revision = find_revision(name, self.reproduction.folder)
-            except UserError:  # without a repository a folder is a folder
-                revision = None
-        else:
-            revision = find_revision(name, self.reproduction.folder)
+                revision = find_revision(name, self.project.reproduction.folder)
+            except UserError:
+                if not path.is_dir():  # without a repository a folder is a folder
+                    raise
         if revision is not None and path.is_dir():
             raise UserError(
                 f"{name} is both a folder and a git revision: write ./{name} for the folder, or "
@@ -117,15 +112,16 @@ class _Places:
             raise UserError(f"There is neither a git revision nor a folder called {name}.")
         return open_store(name)
 
-    def _store(self, store: Store) -> Side:
-        """Judge a store from its own trials."""
-        if not store.ids():
-            raise UserError(f"The folder {store.root} holds no trials, so there is nothing to compare.")
-        return comparison.store(self.reproduction, store, self._judged(str(store.root)))
-
-    def _judged(self, storage: str) -> list[ClaimReport]:
-        """Judge all claims of the tiers."""
-        return [report for tier in self.tiers for report in judge_stored(self.config, storage, tier)]
+    def _stores(self, old: Store, new: Store) -> tuple[Side, Side]:
+        """Judge two stores, each from its own trials."""
+        for store in (old, new):
+            if not store.ids():
+                raise UserError(f"The folder {store.root} holds no trials, so there is nothing to compare.")
+        sessions = [replace(self.project, storage=str(store.root)).session() for store in (old, new)]
+        found = judge(self.project.config, [(session, tier) for tier in self.tiers for session in sessions])
+        before, after = chain.from_iterable(found[::2]), chain.from_iterable(found[1::2])
+        reproduction = self.project.reproduction
+        return comparison.store(reproduction, old, before), comparison.store(reproduction, new, after)
 
 
 def _drift_lines(drift: DriftReport, digests: DigestCheck, new: Side) -> Iterator[str]:

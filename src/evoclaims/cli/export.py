@@ -6,15 +6,12 @@ import argparse
 import sys
 from pathlib import Path
 
-from evoclaims.claims.fetching import StoredOnly
-from evoclaims.cli.project import judge_stored, open_archive, open_project
+from evoclaims.cli.project import ALL_TIERS, Project, open_project
 from evoclaims.cli.stored import write
-from evoclaims.cli.tiers import ALL, tiers_of
 from evoclaims.core.canonical import content_hash
 from evoclaims.core.errors import UnknownNameError, UserError
 from evoclaims.paper import references
 from evoclaims.paper.condition_names import names_of
-from evoclaims.paper.reproduction import Reproduction
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.store import DamagedFileError
 from evoclaims.verdicts import export
@@ -24,20 +21,20 @@ def main(options: argparse.Namespace) -> int:
     """Write the table; 1 when a damaged file was left out."""
     if options.form not in export.FORMS:
         raise UnknownNameError("form", options.form, export.FORMS)
-    config, reproduction = open_project()
-    tiers = tiers_of(reproduction, options.tier)
+    project = open_project(options.storage)
+    tiers = project.tiers(options.tier)
     damaged: list[DamagedFileError] = []
     if options.verdicts:
         what = "verdicts"
-        rows = export.verdict_rows(r for tier in tiers for r in judge_stored(config, options.storage, tier))
+        rows = export.verdict_rows(project.judge(*tiers))
     else:
         what = "trials"
         names = {
             condition: [name for name in known if name.tier in tiers]
-            for condition, known in names_of(reproduction).items()
+            for condition, known in names_of(project.reproduction).items()
         }
-        trials = _trials(reproduction, options.storage, damaged)
-        rows = export.trial_rows((t for t in trials if options.tier == ALL or names.get(t.condition)), names)
+        trials = _trials(project, damaged)
+        rows = export.trial_rows((t for t in trials if options.tier == ALL_TIERS or names.get(t.condition)), names)
         if not rows:
             raise UserError(
                 f"Neither {options.storage} nor the reference trials hold a trial of this tier; "
@@ -51,12 +48,10 @@ def main(options: argparse.Namespace) -> int:
     return int(bool(damaged))
 
 
-def _trials(reproduction: Reproduction, storage: str, damaged: list[DamagedFileError]) -> list[TrialResult]:
+def _trials(project: Project, damaged: list[DamagedFileError]) -> list[TrialResult]:
     """Return all records of the store, several of a trial that several versions have run, then further references."""
-    archive = open_archive(storage, reproduction)
-    StoredOnly(archive).check()
-    found = {_key(trial): trial for trial in archive.store.results(damaged)}
-    for path in sorted(reproduction.references.rglob("*.jsonl")):
+    found = {_key(trial): trial for trial in project.store.results(damaged)}
+    for path in sorted(project.reproduction.references.rglob("*.jsonl")):
         for trial in references.load(path):
             found.setdefault(_key(trial), trial)
     return list(found.values())

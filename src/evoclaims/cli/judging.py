@@ -1,4 +1,4 @@
-"""pytest run within a command to judge claims: all of them, whatever the settings of other runs of pytest say."""
+"""Claims judged within a command: collected by one run of pytest, whatever the settings of other runs say."""
 
 from __future__ import annotations
 
@@ -6,15 +6,18 @@ import contextlib
 import io
 import os
 from collections.abc import Generator, Iterator, Sequence
+from itertools import zip_longest
 from pathlib import Path
 from typing import Final
 
 import pytest
 
-from evoclaims.claims import collected
-from evoclaims.claims.claim import claim_of
+from evoclaims.claims.collected import claim_tests
+from evoclaims.claims.session import Session
 from evoclaims.core.errors import UserError
 from evoclaims.core.raised import in_one_line
+from evoclaims.paper.config import SuiteConfig
+from evoclaims.plugin.run_session import SESSION
 from evoclaims.plugin.summary import ATTRIBUTE
 from evoclaims.verdicts import history
 from evoclaims.verdicts.claim_report import ClaimReport
@@ -36,28 +39,22 @@ MOST_NAMES: Final = 3
 """Most names of tests that an error lists."""
 
 
-def judge(claims: Path, root: Path, tier: str, options: Sequence[str]) -> list[ClaimReport]:
-    """Return the reports of all of a tier's claims.
+def judge(config: SuiteConfig, asked: Sequence[tuple[Session, str]]) -> list[list[ClaimReport]]:
+    """Return the reports of all claims of a tier, for each session and tier asked for; the claims are collected once.
 
     Options in the project's settings (addopts) and in the environment have no say in which claims are judged.
-
-    Args:
-        claims: folder of claim tests.
-        root: of the project.
-        tier: "smoke" or "full".
-        options: further ones for pytest, such as "--claims-stored".
 
     Raises:
         UserError: when the claims cannot be collected, or something keeps one from being judged.
         KeyboardInterrupt: when the run is interrupted.
     """
-    run = _Run((str(claims), f"--rootdir={root}", f"--claims-tier={tier}", *options, *_ALONE), root, tier)
+    run = _Run(config, asked)
     said = io.StringIO()
     with contextlib.redirect_stderr(said), _without(_ENVIRONMENT):
         try:
             status = pytest.main([*run.arguments], plugins=[run])
         except (Exception, SystemExit) as error:  # of a plugin that does not import, say
-            run.troubles.append(_told(error, root))
+            run.troubles.append(_told(error, config.root))
             status = pytest.ExitCode.INTERNAL_ERROR
     if run.interrupted:
         raise KeyboardInterrupt
@@ -65,23 +62,30 @@ def judge(claims: Path, root: Path, tier: str, options: Sequence[str]) -> list[C
         run.troubles.append(" ".join(said.getvalue().split()).removeprefix("ERROR: ").removesuffix("."))
     if run.troubles:
         rest = f", and {len(run.troubles) - 1} more such errors" if len(run.troubles) > 1 else ""
-        raise UserError(f"The claims in {claims} cannot be collected: {run.troubles[0]}{rest}.")
+        raise UserError(f"The claims in {run.claims} cannot be collected: {run.troubles[0]}{rest}.")
     run.check_complete()
     return run.reports
 
 
 class _Run:
-    """A pytest plugin that takes no options from outside, and keeps what became of the claims."""
+    """A pytest plugin that takes no options from outside, judges claims in several ways, and keeps their reports."""
 
-    def __init__(self, arguments: tuple[str, ...], root: Path, tier: str) -> None:
+    def __init__(self, config: SuiteConfig, asked: Sequence[tuple[Session, str]]) -> None:
         """Start empty."""
-        self.arguments = arguments
-        self.reports: list[ClaimReport] = []
+        self.claims = config.root / config.claims
+        tiers = " or ".join({tier: None for _, tier in asked})
+        self.arguments = (str(self.claims), f"--rootdir={config.root}", f"-m{tiers}", *_ALONE)
+        self.reports: list[list[ClaimReport]] = [[] for _ in asked]
         self.troubles: list[str] = []
         self.interrupted = False
-        self._root = root
-        self._tier = tier
+        self._root = config.root
+        self._asked = asked
         self._collected: list[pytest.Item] = []
+        self._now: list[ClaimReport] = []
+
+    def pytest_configure(self, config: pytest.Config) -> None:
+        """Keep the plugin from making a session of its own."""
+        config.stash[SESSION] = self._asked[0][0]
 
     @pytest.hookimpl(wrapper=True, tryfirst=True)
     def pytest_load_initial_conftests(
@@ -115,15 +119,27 @@ class _Run:
         self.interrupted = excinfo.type is KeyboardInterrupt
 
     def pytest_itemcollected(self, item: pytest.Item) -> None:
-        """Note a claim before anything can leave it out."""
-        if claim_of(item) is not None:
-            self._collected.append(item)
+        """Note what is collected before anything can leave it out."""
+        self._collected.append(item)
+
+    @pytest.hookimpl(tryfirst=True)
+    def pytest_runtestloop(self, session: pytest.Session) -> bool:
+        """Run the claims of a tier once for each session that it is asked for with."""
+        claims = claim_tests(session.items)
+        for (judging, tier), reports in zip(self._asked, self.reports, strict=True):
+            session.config.stash[SESSION], self._now = judging, reports
+            items = [item for item in session.items if item in claims and claims[item].tier == tier]
+            for item, following in zip_longest(items, items[1:]):
+                if self.troubles or session.shouldstop or session.shouldfail:
+                    return True
+                session.config.hook.pytest_runtest_protocol(item=item, nextitem=following)
+        return True
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
         """Keep what became of a claim."""
         plain = getattr(report, ATTRIBUTE, None)
         if plain is not None:
-            self.reports.append(ClaimReport.from_json(plain))
+            self._now.append(ClaimReport.from_json(plain))
 
     def check_complete(self) -> None:
         """Refuse to speak for claims that were collected and have no report.
@@ -131,16 +147,18 @@ class _Run:
         Raises:
             UserError: when there are some.
         """
-        judged = {history.key_of(report) for report in self.reports}
-        wanted = [item for item in self._collected if collected.tier_of(item) == self._tier]
-        left = [item.nodeid for item in wanted if collected.key_of(item) not in judged]
-        if left:
-            listed = ", ".join(left[:MOST_NAMES]) + (" and others" if len(left) > MOST_NAMES else "")
-            raise UserError(
-                f"{len(left)} of {len(wanted)} claims of the {self._tier} tier were collected and not judged "
-                f"({listed}), since a plugin, a conftest.py or pytest.exit() left them out: a claim that is not to be "
-                "judged has the mark pytest.mark.skip."
-            )
+        tests = {item.nodeid: test for item, test in claim_tests(self._collected).items()}
+        for (_, tier), reports in zip(self._asked, self.reports, strict=True):
+            judged = {history.key_of(report) for report in reports}
+            wanted = {name: test for name, test in tests.items() if test.tier == tier}
+            left = [name for name, test in wanted.items() if test.key not in judged]
+            if left:
+                listed = ", ".join(left[:MOST_NAMES]) + (" and others" if len(left) > MOST_NAMES else "")
+                raise UserError(
+                    f"{len(left)} of {len(wanted)} claims of the {tier} tier were collected and not judged "
+                    f"({listed}), since a plugin, a conftest.py or pytest.exit() left them out: a claim that is not to "
+                    "be judged has the mark pytest.mark.skip."
+                )
 
 
 def _told(error: BaseException, root: Path) -> str:

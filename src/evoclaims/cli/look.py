@@ -13,8 +13,7 @@ import numpy as np
 
 from evoclaims.cli.episodes import Outings, run_again
 from evoclaims.cli.project import open_project
-from evoclaims.cli.run import describe
-from evoclaims.cli.stored import Stored, load, write
+from evoclaims.cli.stored import Stored, describe, load, write
 from evoclaims.core.errors import UnknownNameError, UserError
 from evoclaims.envs.ecorobot.robot_task import RobotTask
 from evoclaims.envs.ecorobot.views import film, page, pictures
@@ -102,8 +101,7 @@ class Form:
 
 def main(options: argparse.Namespace) -> int:
     """Draw the task; with --method, show what the champion does."""
-    _, reproduction = open_project()
-    tier = reproduction.tier(options.tier)
+    tier = open_project(options.storage).reproduction.tier(options.tier)
     path, data = _task_alone(options, tier) if options.method is None else _champion(options, tier)
     write(path, data)
     print(f"wrote {path}")

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from rich.markup import escape
 from rich.table import Table
 
-from evoclaims.cli.project import judge_stored, open_project, open_store
+from evoclaims.cli.project import open_project
 from evoclaims.cli.terminal import styled
 from evoclaims.core.errors import UserError
 from evoclaims.judging.verdict import Outcome
@@ -25,11 +25,12 @@ from evoclaims.verdicts.claim_report import ClaimReport
 
 def main(options: argparse.Namespace) -> int:
     """Print conditions with their cost, then claims with their attainable p."""
-    config, reproduction = open_project()
-    tier, store = reproduction.tier(options.tier), open_store(options.storage)
+    project = open_project(options.storage)
+    reproduction, store = project.reproduction, project.store
+    tier = reproduction.tier(options.tier)
     chosen = devices.choose(options.device)
     kind = options.like or chosen[0].device_kind
-    reports = judge_stored(config, options.storage, options.tier)
+    reports = project.judge(options.tier)
     used = sorted({(source.method, source.task) for report in reports for source in report.sources})
 
     def pace(condition: Condition, method: str, task: str) -> Pace | None:
@@ -42,7 +43,7 @@ def main(options: argparse.Namespace) -> int:
     console = PlainSpokenConsole(file=styled())
     where = f"as they took on one {kind}" if options.like else f"on {len(chosen)} × {kind}"
     console.print(escape(f"Conditions of the {options.tier} tier, {where}"))
-    console.print(_conditions(tier, store, used, paces, config.seconds(None)))
+    console.print(_conditions(tier, store, used, paces, project.config.seconds(None)))
     console.print(f"\nClaims: the smallest p that the protocol allows (n trials a side, α {tier.protocol.alpha:g})")
     console.print(_claims(reports))
     if any(pace is None for pace in paces.values()):

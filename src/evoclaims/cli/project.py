@@ -1,10 +1,17 @@
-"""The project around the current folder: its reproduction, and its claims judged from the store."""
+"""The project around the current folder as commands work on it: its settings, reproduction, trials and verdicts."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
+from typing import Final
 
+from evoclaims.claims.fetching import StoredOnly
+from evoclaims.claims.session import Session
 from evoclaims.cli.judging import judge
+from evoclaims.core.errors import UnknownNameError
 from evoclaims.paper.archive import Archive
 from evoclaims.paper.config import SuiteConfig, find_root, load_config, load_reproduction
 from evoclaims.paper.reproduction import Reproduction
@@ -12,12 +19,72 @@ from evoclaims.trials import devices
 from evoclaims.trials.store import Store
 from evoclaims.verdicts.claim_report import ClaimReport
 
+ALL_TIERS: Final = "all"
 
-def open_project() -> tuple[SuiteConfig, Reproduction]:
-    """Return the settings and the reproduction of the project that the current folder lies in."""
+
+@dataclass(frozen=True)
+class Project:
+    """A project, and the store that a command was given.
+
+    Attributes:
+        config: its settings.
+        reproduction: the paper under test.
+        storage: folder of the store, relative to the current one.
+    """
+
+    config: SuiteConfig
+    reproduction: Reproduction
+    storage: str
+
+    @cached_property
+    def store(self) -> Store:
+        """The store.
+
+        Raises:
+            UserError: when something else is there.
+        """
+        return open_store(self.storage)
+
+    @cached_property
+    def archive(self) -> Archive:
+        """The trials of the store, found from whatever folder a claim test goes to, and the reference trials."""
+        return Archive(Store(self.store.root.absolute()), self.reproduction.references)
+
+    def tiers(self, name: str) -> tuple[str, ...]:
+        """Return the tiers called `name`: one of them, or "all".
+
+        Raises:
+            UnknownNameError: when there is no such tier.
+        """
+        known = tuple(self.reproduction.tiers)
+        if name not in (*known, ALL_TIERS):
+            raise UnknownNameError("tier", name, (*known, ALL_TIERS))
+        return known if name == ALL_TIERS else (name,)
+
+    def judge(self, *tiers: str) -> list[ClaimReport]:
+        """Judge all claims of some tiers; see `judge_variants`."""
+        return [report for reports in self.judge_variants([(tier, "") for tier in tiers]) for report in reports]
+
+    def judge_variants(self, asked: Sequence[tuple[str, str]]) -> list[list[ClaimReport]]:
+        """Judge all claims for each tier and variant of the protocol ("" for itself), and run nothing.
+
+        Verdicts come from stored trials, and from committed reference trials where those are missing.
+
+        Raises:
+            UserError: when the claims cannot be collected, or not all of them are judged.
+        """
+        return judge(self.config, [(self.session(variant), tier) for tier, variant in asked])
+
+    def session(self, variant: str = "") -> Session:
+        """Return what claims are judged with: the trials at hand, under the protocol or a variant of it."""
+        return Session(self.reproduction, self.archive.store, StoredOnly(self.archive), variant=variant)
+
+
+def open_project(storage: str) -> Project:
+    """Return the project that the current folder lies in, with the store in the folder `storage`."""
     devices.configure()
     config = load_config(find_root(Path.cwd()))
-    return config, load_reproduction(config)
+    return Project(config, load_reproduction(config), storage)
 
 
 def open_store(name: str) -> Store:
@@ -29,24 +96,3 @@ def open_store(name: str) -> Store:
     store = Store(Path(name))
     store.check()
     return store
-
-
-def open_archive(storage: str, reproduction: Reproduction) -> Archive:
-    """Return the trials of the store in the folder `storage`, and the reproduction's reference trials."""
-    return Archive(open_store(storage), reproduction.references)
-
-
-def judge_stored(config: SuiteConfig, storage: str, tier: str, variant: str = "") -> list[ClaimReport]:
-    """Judge a tier's claims from stored trials, and committed reference trials where those are missing; run nothing.
-
-    Raises:
-        UserError: when the claims cannot be collected, or not all of them are judged.
-    """
-    options = (
-        "--claims-stored",
-        "--claims-committed",
-        # the project's own store may not be there yet, which of a folder that is named would be a mistake
-        *([f"--claims-storage={Path(storage).absolute()}"] if Path(storage).exists() else []),
-        f"--claims-variant={variant}",
-    )
-    return judge(config.root / config.claims, config.root, tier, options)

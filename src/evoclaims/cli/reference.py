@@ -6,7 +6,7 @@ import argparse
 from collections.abc import Sequence
 from itertools import takewhile
 
-from evoclaims.cli.project import judge_stored, open_project, open_store
+from evoclaims.cli.project import open_project
 from evoclaims.core.errors import UserError
 from evoclaims.core.packages import agree, recorded
 from evoclaims.judging.baseline import MIN_REFERENCES
@@ -19,9 +19,10 @@ from evoclaims.verdicts.versions import change
 
 def main(options: argparse.Namespace) -> int:
     """Write one file per condition that the tier's claims use and the store holds enough trials of."""
-    config, reproduction = open_project()
-    tier, store = reproduction.tier(options.tier, options.variant), open_store(options.storage)
-    reports = judge_stored(config, options.storage, options.tier, options.variant)
+    project = open_project(options.storage)
+    reproduction, store = project.reproduction, project.store
+    tier = reproduction.tier(options.tier, options.variant)
+    (reports,) = project.judge_variants([(options.tier, options.variant)])
     used = sorted({(source.method, source.task) for report in reports for source in report.sources})
     if options.variant:
         changes = reproduction.variants[options.variant].conditions.get(options.tier, {})

@@ -3,21 +3,16 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
 from datetime import UTC, datetime
 from importlib import metadata
 from pathlib import Path
 from typing import Any
 
 from evoclaims.cli.episodes import run_again
-from evoclaims.cli.project import judge_stored, open_archive, open_project
+from evoclaims.cli.project import ALL_TIERS, Project, open_project
 from evoclaims.cli.stored import Stored, write
-from evoclaims.core.errors import UnknownNameError
 from evoclaims.envs.ecorobot.robot_task import RobotTask
 from evoclaims.envs.ecorobot.views import pictures
-from evoclaims.paper.archive import Archive
-from evoclaims.paper.config import SuiteConfig
-from evoclaims.paper.reproduction import Reproduction
 from evoclaims.report import table_cells
 from evoclaims.report.build import gather
 from evoclaims.report.champion import network
@@ -28,26 +23,24 @@ from evoclaims.trials import devices
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.spec import Condition
 from evoclaims.verdicts import history
-from evoclaims.verdicts.claim_report import ClaimReport
-from evoclaims.verdicts.robustness import Robustness, matrix
-
-ALL = "all"
+from evoclaims.verdicts.robustness import matrix
 
 
 def main(options: argparse.Namespace) -> int:
     """Judge from the trials at hand, write both files, and print where they are."""
-    config, reproduction = open_project()
+    project = open_project(options.storage)
+    reproduction, archive = project.reproduction, project.archive
     tiers = list(reproduction.tiers)[::-1]  # the paper's own sentences come first
-    if options.tier not in (*tiers, ALL):
-        raise UnknownNameError("tier", options.tier, (*tiers, ALL))
-    shown = tiers if options.tier == ALL else [options.tier]
+    shown = tiers if options.tier == ALL_TIERS else project.tiers(options.tier)
     # The paper's sentence is the statement of the largest tier, so that is judged in any case.
-    verdicts = {tier: judge_stored(config, options.storage, tier) for tier in tiers if tier in (tiers[0], *shown)}
-    archive = open_archive(options.storage, reproduction)
+    asked = [(tier, "") for tier in tiers if tier in (tiers[0], *shown)]
+    asked += [(tier, variant) for tier in shown for variant in _tried(project, tier)]
+    judged = dict(zip(asked, project.judge_variants(asked), strict=True))
+    verdicts = {tier: reports for (tier, variant), reports in judged.items() if not variant}
     robustness = [
         row
         for tier in shown
-        for row in _robustness(config, reproduction, options.storage, tier, verdicts[tier], archive)
+        for row in matrix(verdicts[tier], {name: judged[on, name] for on, name in asked if name and on == tier})
     ]
     drawn, missing = paper_figures(reproduction, archive, shown[0])
     page = gather(
@@ -71,22 +64,14 @@ def main(options: argparse.Namespace) -> int:
     return 0
 
 
-def _robustness(
-    config: SuiteConfig,
-    reproduction: Reproduction,
-    storage: str,
-    tier: str,
-    plain: Sequence[ClaimReport],
-    archive: Archive,
-) -> tuple[Robustness, ...]:
-    """Judge a tier's claims under each variant that has run."""
-    seeds = reproduction.tier(tier).protocol.seeds(1)
-    tried = [
+def _tried(project: Project, tier: str) -> list[str]:
+    """Return the variants that have run at a tier."""
+    seeds = project.reproduction.tier(tier).protocol.seeds(1)
+    return [
         name
-        for name, variant in reproduction.variants.items()
-        if any(archive.trials(condition, seeds)[0] for condition in variant.conditions.get(tier, {}).values())
+        for name, variant in project.reproduction.variants.items()
+        if any(project.archive.trials(condition, seeds)[0] for condition in variant.conditions.get(tier, {}).values())
     ]
-    return matrix(plain, {name: judge_stored(config, storage, tier, name) for name in tried})
 
 
 def trajectory(condition: Condition, result: TrialResult, parameters: Any, title: str) -> bytes | None:

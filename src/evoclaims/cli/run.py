@@ -5,28 +5,25 @@ from __future__ import annotations
 import argparse
 import contextlib
 import sys
-from collections.abc import Mapping
 
 from evoclaims.claims.fetching import RunMissing
-from evoclaims.cli.project import judge_stored, open_project, open_store
+from evoclaims.cli.project import Project, open_project
+from evoclaims.cli.stored import describe
 from evoclaims.cli.terminal import StdoutTerminal
 from evoclaims.core.errors import UnknownNameError, UserError
 from evoclaims.core.printable import printable
 from evoclaims.core.raised import in_one_line
 from evoclaims.judging.counting import MAX_TRIALS
-from evoclaims.paper.config import SuiteConfig
 from evoclaims.paper.reproduction import Tier
-from evoclaims.paper.variant import Variant
-from evoclaims.report.live_line import LiveLine, duration
-from evoclaims.trials.result import COMPLETE, TrialResult
+from evoclaims.report.live_line import LiveLine
 from evoclaims.trials.spec import TrialSpec
-from evoclaims.trials.time_limit import time_allowed
 from evoclaims.verdicts.robustness import matrix
 
 
 def main(options: argparse.Namespace) -> int:
     """Run what is missing and list the trials; 1 when a condition failed, which keeps no other from running."""
-    config, reproduction = open_project()
+    project = open_project(options.storage)
+    reproduction, store = project.reproduction, project.store
     tier = reproduction.tier(options.tier, options.variant)
     chosen = choose(tier, options.method, options.on)
     if options.variant:
@@ -47,8 +44,7 @@ def main(options: argparse.Namespace) -> int:
     for names in chosen[:1]:  # a seed that is none is so for every condition: it is said once, and nothing is run
         _ = [TrialSpec(tier.condition(*names), seed) for seed in seeds]
     line = LiveLine(StdoutTerminal())
-    store = open_store(options.storage)
-    fetch = RunMissing(store, options.device, line, config.seconds(options.time_limit))
+    fetch = RunMissing(store, options.device, line, project.config.seconds(options.time_limit))
     fetch.check()
     failed = 0
     for method, task in chosen:
@@ -62,7 +58,7 @@ def main(options: argparse.Namespace) -> int:
         except (KeyboardInterrupt, BrokenPipeError):  # the user, or who reads the output, has had enough
             raise
         except BaseException as error:  # whatever a method or a task raises, the other conditions are not its matter
-            print(f"evoclaims: {name} failed: {printable(in_one_line(error, config.root))}.", file=sys.stderr)
+            print(f"evoclaims: {name} failed: {printable(in_one_line(error, project.config.root))}.", file=sys.stderr)
             failed += 1
             continue
         print(name)
@@ -74,16 +70,15 @@ def main(options: argparse.Namespace) -> int:
     if failed and len(chosen) > 1:
         print(f"evoclaims: {failed} of {len(chosen)} conditions failed.", file=sys.stderr)
     if options.variant:
-        _print_matrix(config, options.storage, options.tier, {options.variant: reproduction.variants[options.variant]})
+        _print_matrix(project, options.tier, options.variant)
     return int(failed > 0)
 
 
-def _print_matrix(config: SuiteConfig, storage: str, tier: str, variants: Mapping[str, Variant]) -> None:
-    """Print how claims end under the protocol and under its variants."""
-    judged = {name: judge_stored(config, storage, tier, name) for name in variants}
-    rows = matrix(judge_stored(config, storage, tier), judged)
-    for name, variant in variants.items():
-        print(f"\n{name}: {variant.says}")
+def _print_matrix(project: Project, tier: str, variant: str) -> None:
+    """Print how claims end under the protocol and under a variant of it."""
+    plain, varied = project.judge_variants([(tier, ""), (tier, variant)])
+    rows = matrix(plain, {variant: varied})
+    print(f"\n{variant}: {project.reproduction.variants[variant].says}")
     for row in rows:
         for name, outcome in row.outcomes.items():
             changed = f"{row.plain} -> {outcome}" if name in row.hangs_on else f"{outcome} either way"
@@ -106,18 +101,3 @@ def choose(tier: Tier, method: str | None, task: str | None) -> list[tuple[str, 
     if method is None:
         known = [names for names in known if not getattr(tier.conditions[names].method, "optional", False)]
     return [names for names in known if method in (None, names[0]) and task in (None, names[1])]
-
-
-def describe(result: TrialResult) -> str:
-    """Return a trial in one line."""
-    steps = result.metrics.get("environment_steps")
-    after = "" if steps is None else f" after {int(steps):,} environment steps"
-    spent = f"seed {result.seed}: {result.status}{after}"
-    took = f"({duration(result.timing['run'])} for the batch of {result.timing['batch']})"
-    if result.status == "timeout":
-        limit = duration(time_allowed(result))
-        return f"{spent}: its batch had {limit}; more by --time-limit, as much again by --retry {took}"
-    if result.status not in COMPLETE:
-        return f"{spent} {took}"
-    success = " ".join(f"{value:.3f}" for value in result.levels["success"])
-    return f"{spent}, success by level {success} {took}"

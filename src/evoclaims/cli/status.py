@@ -6,16 +6,16 @@ import argparse
 
 from rich.console import Console
 
-from evoclaims.cli.project import judge_stored, open_project
+from evoclaims.cli.project import open_project
 from evoclaims.cli.terminal import styled
 from evoclaims.report import table_cells, terminal_table
 
 
 def main(options: argparse.Namespace) -> int:
     """Print the table; 1 when something is refuted or broken without being accepted."""
-    config, reproduction = open_project()
-    reproduction.tier(options.tier)
-    reports = judge_stored(config, options.storage, options.tier)
+    project = open_project(options.storage)
+    project.reproduction.tier(options.tier)
+    reports = project.judge(options.tier)
     console = Console(file=styled())
     for part in (
         terminal_table.verdict_table(reports, console.width, console.is_terminal),

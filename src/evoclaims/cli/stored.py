@@ -10,9 +10,11 @@ from evoclaims.cli.project import open_store
 from evoclaims.core.errors import UserError
 from evoclaims.core.files import write_atomically
 from evoclaims.paper.reproduction import Tier
+from evoclaims.report.live_line import duration
 from evoclaims.trials import champions
-from evoclaims.trials.result import TrialResult
+from evoclaims.trials.result import COMPLETE, TrialResult
 from evoclaims.trials.spec import Condition, TrialSpec
+from evoclaims.trials.time_limit import time_allowed
 
 
 @dataclass(frozen=True)
@@ -52,8 +54,23 @@ def load(storage: str, tier: Tier, tier_name: str, method: str, task: str, seed:
     return Stored(title, condition, result, champions.load(store, condition, result), store.champion_file(result))
 
 
-def write(path: Path, data: bytes) -> None:
-    """Write a file that the user has named with --out.
+def describe(result: TrialResult) -> str:
+    """Return a trial in one line."""
+    steps = result.metrics.get("environment_steps")
+    after = "" if steps is None else f" after {int(steps):,} environment steps"
+    spent = f"seed {result.seed}: {result.status}{after}"
+    took = f"({duration(result.timing['run'])} for the batch of {result.timing['batch']})"
+    if result.status == "timeout":
+        limit = duration(time_allowed(result))
+        return f"{spent}: its batch had {limit}; more by --time-limit, as much again by --retry {took}"
+    if result.status not in COMPLETE:
+        return f"{spent} {took}"
+    success = " ".join(f"{value:.3f}" for value in result.levels["success"])
+    return f"{spent}, success by level {success} {took}"
+
+
+def write(path: Path, data: bytes, name: str = "file") -> None:
+    """Write a file that the user has named with --out, or one in a folder so named: `name` says which.
 
     Raises:
         UserError: when it cannot be written there.
@@ -64,4 +81,4 @@ def write(path: Path, data: bytes) -> None:
         write_atomically(path, data)
     except UserError as error:
         reason = getattr(error.__cause__, "strerror", None) or error.__cause__
-        raise UserError(f"Cannot write {path}: {reason}. Name another file with --out.") from error
+        raise UserError(f"Cannot write {path}: {reason}. Name another {name} with --out.") from error

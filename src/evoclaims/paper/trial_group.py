@@ -7,7 +7,8 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from evoclaims.core.errors import UnknownNameError
-from evoclaims.judging.measure import Better, Event, Measure, Profile
+from evoclaims.judging.measure import Event, Measure, Profile
+from evoclaims.judging.reading import Better
 from evoclaims.judging.sample import Source
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.spec import Condition

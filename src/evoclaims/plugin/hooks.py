@@ -5,11 +5,8 @@ Nothing heavy is imported here at the top: pytest loads this file in every run o
 
 from __future__ import annotations
 
-import os
 import re
 from collections.abc import Callable, Generator
-from dataclasses import replace
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
@@ -18,17 +15,16 @@ from evoclaims.core.errors import UnknownNameError, UserError
 from evoclaims.core.printable import shown
 from evoclaims.plugin import options
 from evoclaims.plugin.options import TIERS
+from evoclaims.plugin.run_session import LINE, make_session
 from evoclaims.plugin.summary import ATTRIBUTE, TROUBLE, Summary
 from evoclaims.trials.allowance import end_without
 
 if TYPE_CHECKING:
-    from evoclaims.claims.session import Session, Verdicts
+    from evoclaims.claims.collected import ClaimTest
+    from evoclaims.claims.session import Verdicts
     from evoclaims.paper.trial_group import TrialGroup
-    from evoclaims.report.live_line import LiveLine
     from evoclaims.verdicts.claim_report import ClaimReport
 
-_session: pytest.StashKey[Session] = pytest.StashKey()
-_line: pytest.StashKey[LiveLine] = pytest.StashKey()
 _verdicts: pytest.StashKey[Verdicts] = pytest.StashKey()
 _ended: pytest.StashKey[pytest.Session] = pytest.StashKey()
 
@@ -48,7 +44,7 @@ def pytest_configure(config: pytest.Config) -> None:
     ):
         config.addinivalue_line("markers", line)
     if not hasattr(config, "workerinput"):  # an xdist worker leaves the summary to its controller
-        config.pluginmanager.register(Summary(config, make_session), "claims-summary")
+        config.pluginmanager.register(Summary(config), "claims-summary")
     options.check(config)
 
 
@@ -67,19 +63,18 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> Generator[None, object, 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Leave out other tiers and claims; the full tier is only kept when it was asked for by name."""
-    marked = [item for item in items if item.get_closest_marker("claim")]
-    claims: dict[pytest.Item, tuple[str, str]] = {}
+    tests: dict[pytest.Item, ClaimTest] = {}
     try:
-        if marked:
-            from evoclaims.claims.collected import checked
+        if any(item.get_closest_marker("claim") for item in items):
+            from evoclaims.claims.collected import claim_tests
 
-            claims = checked(marked)
-        wanted = _wanted_claims(config, {claim for claim, _ in claims.values()})
+            tests = claim_tests(items)
+        wanted = _wanted_claims(config, {test.claim.id for test in tests.values()})
     except UserError as error:
         _refuse(config, items, error)
         return
     tiers = _wanted_tiers(config)
-    dropped = [item for item, (claim, tier) in claims.items() if claim not in wanted or tier not in tiers]
+    dropped = [item for item, test in tests.items() if test.claim.id not in wanted or test.tier not in tiers]
     if dropped:
         config.hook.pytest_deselected(items=dropped)
         items[:] = [item for item in items if item not in set(dropped)]
@@ -126,59 +121,6 @@ def pytest_collection_finish(session: pytest.Session) -> None:
         _refuse(config, session.items, error)
 
 
-def make_session(config: pytest.Config) -> Session:
-    """Load the project's reproduction and check store, device and sizes."""
-    if _session in config.stash:
-        return config.stash[_session]
-    from evoclaims.claims.fetching import RunMissing, StoredOnly
-    from evoclaims.claims.session import Session
-    from evoclaims.paper.archive import Archive
-    from evoclaims.paper.config import load_config, load_reproduction
-    from evoclaims.plugin.terminal import Uncaptured
-    from evoclaims.report.live_line import LiveLine
-    from evoclaims.trials import devices
-    from evoclaims.trials.progress import ignore
-    from evoclaims.trials.store import Store
-
-    devices.configure()
-    store = Store(_storage(config))
-    line = LiveLine(Uncaptured(config)) if config.pluginmanager.has_plugin("terminalreporter") else None
-    project = load_config(config.rootpath)
-    limit, any_version = project.seconds(config.getoption("claims_time_limit")), config.getoption("claims_any_version")
-    mode: Any = RunMissing(store, config.getoption("claims_device"), line or ignore, limit, any_version)
-    again = mode.again
-    reproduction = load_reproduction(project)
-    if config.getoption("claims_stored"):
-        mode = StoredOnly(Archive(store, reproduction.references if config.getoption("claims_committed") else None))
-    trials, variant = config.getoption("claims_trials"), config.getoption("claims_variant")
-    made = Session(reproduction, store, mode, trials, variant, again)
-    reproduction.tier("smoke", made.variant)
-    made.protocol("smoke")
-    mode.check()
-    config.stash[_session] = made
-    if line is not None:
-        config.stash[_line] = line
-    return made
-
-
-def _storage(config: pytest.Config) -> Path:
-    """Return the store's folder: the project's own, or the one that is named, relative to the current folder."""
-    from evoclaims.trials.store_files import DEFAULT_ROOT
-
-    named = config.getoption("claims_storage")
-    if named is None:
-        return config.rootpath / DEFAULT_ROOT
-    if not named:
-        raise UserError("--claims-storage names no folder; leave it out for the project's own store.")
-    folder = Path(config.invocation_params.dir, named)
-    if config.getoption("claims_stored") and not os.path.lexists(folder):
-        raise UserError(
-            f"There is no trial store {folder}: the folder does not exist. Check its name, or leave --claims-storage "
-            "out for the project's own store."
-        )
-    return folder
-
-
 @pytest.hookimpl(trylast=True)
 def pytest_sessionfinish(session: pytest.Session) -> None:
     """Keep the session, which knows the exit status, for `pytest_unconfigure`."""
@@ -212,18 +154,15 @@ def trials(request: pytest.FixtureRequest, claim_tier: str) -> Callable[..., Tri
 @pytest.fixture
 def verdict(request: pytest.FixtureRequest, claim_tier: str) -> Verdicts:
     """Return `verdict(assertion)`, which judges the claim."""
-    from evoclaims.claims.claim import claim_of
-    from evoclaims.claims.collected import case_of
+    from evoclaims.claims.collected import ClaimTest
     from evoclaims.claims.session import Verdicts
 
-    session, claim = make_session(request.config), claim_of(request.node)
-    assert claim is not None  # claim_tier exists for claims alone
-    case = case_of(request.node)
-    line = request.config.stash.get(_line, None)
+    session, test = make_session(request.config), ClaimTest.of(request.node)
+    line = request.config.stash.get(LINE, None)
 
     def settle(assertion: Any) -> ClaimReport:
         try:
-            return session.settle(claim, case, claim_tier, assertion)
+            return session.settle(test.claim, test.case, test.tier, assertion)
         finally:
             if line is not None:
                 line.close()
@@ -242,13 +181,12 @@ def pytest_runtest_makereport(
         return report
     if call.excinfo and call.excinfo.errisinstance(KeyboardInterrupt):
         return report
-    if report.skipped:
-        if report.when == "teardown":  # the claim has been reported
-            return report
-        setattr(report, ATTRIBUTE, _skipped_report(item, report).to_json())
+    if report.skipped and report.when == "teardown":  # the claim has been reported
         return report
-    claimed = _claim_report(item, call)
+    claimed = _claim_report(item, call, report)
     setattr(report, ATTRIBUTE, claimed.to_json())
+    if report.skipped:
+        return report
     undecided = claimed.outcome == "inconclusive" and item.config.getoption("claims_undecided") == "fail"
     failed = claimed.failed or (undecided and not claimed.as_expected)
     report.outcome = "failed" if failed else "passed"
@@ -270,41 +208,24 @@ def pytest_runtest_makereport(
     return report
 
 
-def _claim_report(item: pytest.Item, call: pytest.CallInfo[None]) -> ClaimReport:
-    """Return what became of a claim test: its verdict, or the error in the way of one."""
-    from evoclaims.claims.claim import claim_of, expectation_of
-    from evoclaims.claims.collected import case_of, tier_of
-    from evoclaims.claims.reporting import broken, expecting
-    from evoclaims.verdicts.claim_report import located, save, succeeding
+def _claim_report(item: pytest.Item, call: pytest.CallInfo[None], report: pytest.TestReport) -> ClaimReport:
+    """Return what became of a claim test: its verdict, the error in the way of one, or why it was skipped."""
+    from evoclaims.claims.claim import expectation_of
+    from evoclaims.claims.collected import ClaimTest
+    from evoclaims.claims.reporting import broken, skipped
 
-    claim, case, tier = claim_of(item), case_of(item), tier_of(item)
-    assert claim is not None
-    verdicts = item.stash.get(_verdicts, None)
-    report = verdicts.report if verdicts else None
+    test, verdicts = ClaimTest.of(item), item.stash.get(_verdicts, None)
+    if report.skipped:  # or failed as an xfail mark expects
+        said = report.longrepr[2] if isinstance(report.longrepr, tuple) else f"xfail: {getattr(report, 'wasxfail', '')}"
+        return skipped(test.claim, test.case, test.tier, said.removeprefix("Skipped: "))
     if call.excinfo is not None:
-        report = broken(claim, case, tier, _sentence(call.excinfo))
-    elif report is None:
-        report = broken(claim, case, tier, "the test ended without calling verdict(...), so it judged nothing")
-    report = replace(report, variant=item.config.getoption("claims_variant"))
-    report = expecting(report, expectation_of(item, tier))
-    session = item.config.stash.get(_session, None)
-    if session is None:
-        return report
-    if item.config.getoption("claims_stored"):
-        return located(report, session.store.root)
-    return save(succeeding(report, session.store.root), session.store.root)
-
-
-def _skipped_report(item: pytest.Item, report: pytest.TestReport) -> ClaimReport:
-    """Return what the summary says of a claim whose test was skipped, or failed as an xfail mark expects."""
-    from evoclaims.claims.claim import claim_of
-    from evoclaims.claims.collected import case_of, tier_of
-    from evoclaims.claims.reporting import skipped
-
-    claim = claim_of(item)
-    assert claim is not None
-    words = report.longrepr[2] if isinstance(report.longrepr, tuple) else f"xfail: {getattr(report, 'wasxfail', '')}"
-    return skipped(claim, case_of(item), tier_of(item), words.removeprefix("Skipped: "))
+        claimed = broken(test.claim, test.case, test.tier, _sentence(call.excinfo))
+    elif verdicts is None or verdicts.report is None:
+        nothing = "the test ended without calling verdict(...), so it judged nothing"
+        claimed = broken(test.claim, test.case, test.tier, nothing)
+    else:
+        claimed = verdicts.report
+    return make_session(item.config).complete(claimed, expectation_of(item, test.tier))
 
 
 def _sentence(excinfo: pytest.ExceptionInfo[BaseException]) -> str:

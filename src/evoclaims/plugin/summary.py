@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -13,9 +13,9 @@ import pytest
 from evoclaims.core.errors import UserError
 from evoclaims.core.printable import shown, spelled
 from evoclaims.plugin.options import TIERS
+from evoclaims.plugin.run_session import make_session
 
 if TYPE_CHECKING:
-    from evoclaims.claims.session import Session
     from evoclaims.judging.baseline import DriftReport
     from evoclaims.judging.tripwire import DigestCheck
     from evoclaims.verdicts.claim_report import ClaimReport
@@ -32,10 +32,9 @@ TROUBLE: Final = "claims_trouble"
 class Summary:
     """Gathers the claims' reports of a run, in the process that talks to the user, and ends the run with them."""
 
-    def __init__(self, config: pytest.Config, make_session: Callable[[pytest.Config], Session]) -> None:
+    def __init__(self, config: pytest.Config) -> None:
         """Start empty."""
         self._config = config
-        self._make_session = make_session
         self.reports: list[ClaimReport] = []
         self._drift: tuple[DriftReport, DigestCheck] | None = None
         self._upgrade: Upgrade | None = None
@@ -97,19 +96,19 @@ class Summary:
     def _compare(self) -> None:
         """Compare the store's trials behind the claims with the reference trials."""
         if self.reports:
-            self._drift = self._make_session(self._config).drift(self.reports)
+            self._drift = make_session(self._config).drift(self.reports)
 
     def _compare_with_predecessors(self) -> None:
         """Compare the trials of this environment with those that other versions have left in the store."""
         if self.reports:
-            self._upgrade = self._make_session(self._config).upgrade(self.reports)
+            self._upgrade = make_session(self._config).upgrade(self.reports)
 
     def _compare_with_accepted(self) -> None:
         """Compare the verdicts with those last accepted, which are of the protocol itself and not of a variant."""
         if self.reports and not self._config.getoption("claims_variant"):
             from evoclaims.verdicts.regression import regression
 
-            folder = self._make_session(self._config).reproduction.folder
+            folder = make_session(self._config).reproduction.folder
             self._regression = regression(folder, self.reports, self._config.getoption("claims_compare_fail"))
 
     def _status(self) -> pytest.ExitCode:

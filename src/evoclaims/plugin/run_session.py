@@ -1,0 +1,80 @@
+"""The session of a run of pytest: what its claims are judged with, as its options say.
+
+Nothing heavy is imported here at the top: pytest loads this file in every run of an environment that has evoclaims.
+"""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pytest
+
+from evoclaims.core.errors import UserError
+
+if TYPE_CHECKING:
+    from evoclaims.claims.session import Session
+    from evoclaims.report.live_line import LiveLine
+
+SESSION: pytest.StashKey[Session] = pytest.StashKey()
+"""Where a run keeps its session; who puts another one there has the claims that follow judged with that."""
+
+LINE: pytest.StashKey[LiveLine] = pytest.StashKey()
+"""Where a run that talks to a terminal keeps its progress line."""
+
+
+def make_session(config: pytest.Config) -> Session:
+    """Return the session of a run: made once, from the project's reproduction and the options, and checked.
+
+    Raises:
+        UserError: when store, device, sizes or names are such that no claim could be judged.
+    """
+    if SESSION in config.stash:
+        return config.stash[SESSION]
+    from evoclaims.claims.fetching import RunMissing, StoredOnly
+    from evoclaims.claims.session import Session
+    from evoclaims.paper.archive import Archive
+    from evoclaims.paper.config import load_config, load_reproduction
+    from evoclaims.plugin.terminal import Uncaptured
+    from evoclaims.report.live_line import LiveLine
+    from evoclaims.trials import devices
+    from evoclaims.trials.progress import ignore
+    from evoclaims.trials.store import Store
+
+    devices.configure()
+    store = Store(_storage(config))
+    line = LiveLine(Uncaptured(config)) if config.pluginmanager.has_plugin("terminalreporter") else None
+    project = load_config(config.rootpath)
+    limit, any_version = project.seconds(config.getoption("claims_time_limit")), config.getoption("claims_any_version")
+    run = RunMissing(store, config.getoption("claims_device"), line or ignore, limit, any_version)
+    reproduction = load_reproduction(project)
+    read = StoredOnly(Archive(store, reproduction.references if config.getoption("claims_committed") else None))
+    fetch = read if config.getoption("claims_stored") else run
+    trials, variant = config.getoption("claims_trials"), config.getoption("claims_variant")
+    made = Session(reproduction, store, fetch, trials, variant, run.again)
+    reproduction.tier("smoke", made.variant)
+    made.protocol("smoke")
+    fetch.check()
+    config.stash[SESSION] = made
+    if line is not None:
+        config.stash[LINE] = line
+    return made
+
+
+def _storage(config: pytest.Config) -> Path:
+    """Return the store's folder: the project's own, or the one that is named, relative to the current folder."""
+    from evoclaims.trials.store_files import DEFAULT_ROOT
+
+    named = config.getoption("claims_storage")
+    if named is None:
+        return config.rootpath / DEFAULT_ROOT
+    if not named:
+        raise UserError("--claims-storage names no folder; leave it out for the project's own store.")
+    folder = Path(config.invocation_params.dir, named)
+    if config.getoption("claims_stored") and not os.path.lexists(folder):
+        raise UserError(
+            f"There is no trial store {folder}: the folder does not exist. Check its name, or leave --claims-storage "
+            "out for the project's own store."
+        )
+    return folder
