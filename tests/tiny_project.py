@@ -2,12 +2,22 @@
 
 from __future__ import annotations
 
+import importlib
 import json
+import pkgutil
+import shutil
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
+
+from evoclaims import cli
+from evoclaims.trials.store import Store
+
+LATE = ("evoclaims.report.run_summary", "evoclaims.verdicts.regression", "hypothesis")
+"""What a run of pytest imports when it comes to it."""
 
 PYPROJECT = """
 [tool.evoclaims]
@@ -119,35 +129,34 @@ def claims(**bodies: str) -> str:
 
 
 @pytest.fixture(scope="session")
-def warmed() -> None:
-    """Import here what a run imports late: pytester forgets the modules that a run within this process imported."""
-    import tempfile
+def trials_of_both(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A store with the smoke tier's trials of the right and the wrong network, run once; tests copy it.
 
-    import statsmodels.stats.multitest  # noqa: F401
-
-    import evoclaims.cli.plan
-    import evoclaims.cli.project
-    import evoclaims.cli.run
-    import evoclaims.report.terminal_table  # noqa: F401
+    What a run imports late is imported here: pytester forgets the modules that a test has imported first.
+    """
+    for module in pkgutil.iter_modules(cli.__path__, "evoclaims.cli."):
+        importlib.import_module(module.name)
+    for name in LATE:
+        importlib.import_module(name)
     from evoclaims.envs.gates.parity import NParity
     from evoclaims.methods.hand_built import HandBuilt
     from evoclaims.trials import devices
     from evoclaims.trials.budget import Budget
     from evoclaims.trials.runner import run
     from evoclaims.trials.spec import Condition
-    from evoclaims.trials.store import Store
 
-    with tempfile.TemporaryDirectory() as folder:
-        condition = Condition(HandBuilt(), NParity(2), "curriculum", Budget(generations=1, reports=1))
-        run(condition, [0], Store(Path(folder)), devices.choose("cpu"))
+    store = Store(tmp_path_factory.mktemp("both") / "store")
+    store.check_writable()
+    for method in (HandBuilt(), HandBuilt(negated=True)):
+        condition = Condition(method, NParity(2), "curriculum", Budget(generations=1, reports=1))
+        run(condition, range(10), store, devices.choose("cpu"))
+    return store.root
 
 
 @pytest.fixture(scope="session")
-def shared_store(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def shared_store(tmp_path_factory: pytest.TempPathFactory, trials_of_both: Path) -> Path:
     """A store that tests share which do not look into it, so that their trials are run once."""
-    store = tmp_path_factory.mktemp("shared") / "store"
-    store.mkdir()
-    return store
+    return shutil.copytree(trials_of_both, tmp_path_factory.mktemp("shared") / "store")
 
 
 class Project:
@@ -164,7 +173,8 @@ class Project:
         (self.path / "claims").mkdir()
 
     def write(self, text: str = "", **bodies: str) -> None:
-        """Write the claims; see `claims`."""
+        """Write the claims; see `claims`. Those that this process may have read before are forgotten."""
+        sys.modules.pop("test_claims", None)
         (self.path / "claims" / "test_claims.py").write_text((text and HEAD + text) or claims(**bodies))
 
     def run(self, *arguments: str, own_store: bool = False) -> pytest.RunResult:
@@ -184,9 +194,53 @@ class Project:
 
 
 @pytest.fixture
-def project(pytester: pytest.Pytester, shared_store: Path, warmed: None, monkeypatch: pytest.MonkeyPatch) -> Project:
+def project(shared_store: Path, pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch) -> Project:
     """The tiny project, without claims yet."""
     return Project(pytester, shared_store, monkeypatch)
+
+
+@pytest.fixture
+def stored(project: Project, trials_of_both: Path) -> Store:
+    """The project's own store, with the trials of the right and the wrong network."""
+    return Store(shutil.copytree(trials_of_both, project.path / ".evoclaims"))
+
+
+Evoclaims = Callable[..., tuple[int, str, str]]
+
+
+@pytest.fixture
+def evoclaims(project: Project, capsys: pytest.CaptureFixture[str]) -> Evoclaims:
+    """A function that runs a command in the project, of a right claim `a` and a wrong one `b` unless a test says else.
+
+    It returns status, output and errors, none of which is a traceback.
+    """
+    project.write(a="supported", b="refuted")
+
+    def run(*arguments: str) -> tuple[int, str, str]:
+        capsys.readouterr()
+        status = cli.main(arguments)
+        out, err = capsys.readouterr()
+        assert "Traceback" not in out + err
+        assert "INTERNALERROR" not in out + err
+        return status, out, err
+
+    return run
+
+
+@pytest.fixture(scope="session")
+def accepted_once() -> list[str]:
+    """The text of verdicts.toml that `accepted` shares among tests, once one of them has made it."""
+    return []
+
+
+@pytest.fixture
+def accepted(evoclaims: Evoclaims, stored: Store, accepted_once: list[str]) -> Evoclaims:
+    """The same, with trials in the project's store, and their verdicts of the smoke tier accepted."""
+    if not accepted_once:
+        assert evoclaims("accept", "--tier=smoke")[0] == 1
+        accepted_once.append(Path("verdicts.toml").read_text())
+    Path("verdicts.toml").write_text(accepted_once[0])
+    return evoclaims
 
 
 @pytest.fixture(scope="session")

@@ -2,42 +2,17 @@
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import pytest
+from tiny_project import Evoclaims, Project
 
-from evoclaims.cli import main
 from evoclaims.judging.verdict import Outcome
 from evoclaims.verdicts import history
 
-Evoclaims = Callable[..., tuple[int, str, str]]
 FILE = Path("verdicts.toml")
-
-
-def _rewrite(project: Any, **bodies: str) -> None:
-    """Write other claims where this process has read some already."""
-    sys.modules.pop("test_claims")
-    project.write(**bodies)
-
-
-@pytest.fixture
-def evoclaims(project: Any, capsys: pytest.CaptureFixture[str]) -> Evoclaims:
-    """A function that runs a command in a project whose trials are stored; returns status, output and errors."""
-    project.write(a="supported", b="refuted")
-    project.run("--claims-only=a,b")
-
-    def run(*arguments: str) -> tuple[int, str, str]:
-        capsys.readouterr()
-        status = main([*arguments, f"--storage={project.store}"])
-        out, err = capsys.readouterr()
-        assert "Traceback" not in out + err
-        return status, out, err
-
-    return run
+pytestmark = pytest.mark.usefixtures("stored")
 
 
 def test_the_first_accept_writes_every_verdict_and_ends_with_1(evoclaims: Evoclaims) -> None:
@@ -57,28 +32,25 @@ def test_the_first_accept_writes_every_verdict_and_ends_with_1(evoclaims: Evocla
     assert kept["smoke", "a"][0].device == "cpu"
 
 
-def test_a_second_accept_leaves_the_file_as_it_is_and_ends_with_0(evoclaims: Evoclaims) -> None:
-    evoclaims("accept", "--tier=smoke")
+def test_a_second_accept_leaves_the_file_as_it_is_and_ends_with_0(accepted: Evoclaims) -> None:
     before = FILE.read_bytes(), FILE.stat().st_mtime_ns
-    status, out, _ = evoclaims("accept", "--tier=smoke")
+    status, out, _ = accepted("accept", "--tier=smoke")
     assert (status, out) == (0, f"{FILE.absolute()} stays as it is: no verdict differs from the accepted one.\n")
     assert (FILE.read_bytes(), FILE.stat().st_mtime_ns) == before
 
 
-def test_a_changed_verdict_is_added_to_its_history(evoclaims: Evoclaims) -> None:
-    evoclaims("accept", "--tier=smoke")
+def test_a_changed_verdict_is_added_to_its_history(accepted: Evoclaims) -> None:
     kept = history.load(FILE)
     old = replace(kept["smoke", "b"][0], outcome=Outcome.SUPPORTED, accepted="2020-01-01")
     FILE.write_text(history.dump({**kept, ("smoke", "b"): (old,)}))
-    status, out, _ = evoclaims("accept", "--tier=smoke")
+    status, out, _ = accepted("accept", "--tier=smoke")
     assert (status, out.splitlines()[0]) == (1, "accepted: b (smoke): supported -> refuted")
     assert [entry.outcome for entry in history.load(FILE)["smoke", "b"]] == ["supported", "refuted"]
 
 
-def test_a_claim_that_is_judged_otherwise_begins_a_new_history(evoclaims: Evoclaims, project: Any) -> None:
-    evoclaims("accept", "--tier=smoke")
-    _rewrite(project, a="verdict(trials('right', on='parity').solves_every_level.in_most_trials(p0=0.6))", b="refuted")
-    status, out, _ = evoclaims("accept", "--tier=smoke")
+def test_a_claim_that_is_judged_otherwise_begins_a_new_history(accepted: Evoclaims, project: Project) -> None:
+    project.write(a="verdict(trials('right', on='parity').solves_every_level.in_most_trials(p0=0.6))", b="refuted")
+    status, out, _ = accepted("accept", "--tier=smoke")
     assert (status, out.splitlines()[0]) == (
         1,
         "accepted: a (smoke): supported; a new history begins, since what is judged has changed (it was supported)",
@@ -86,35 +58,28 @@ def test_a_claim_that_is_judged_otherwise_begins_a_new_history(evoclaims: Evocla
     assert [len(era) for era in history.eras(history.load(FILE)["smoke", "a"])] == [1, 1]
 
 
-def test_not_run_and_error_never_take_the_place_of_a_verdict(evoclaims: Evoclaims, project: Any) -> None:
-    evoclaims("accept", "--tier=smoke")
+def test_not_run_and_error_never_take_the_place_of_a_verdict(accepted: Evoclaims, project: Project) -> None:
     before = FILE.read_bytes()
-    _rewrite(project, a="raise RuntimeError('out of order')", b="pytest.skip('not today')")
-    status, out, _ = evoclaims("accept", "--tier=smoke")
+    project.write(a="raise RuntimeError('out of order')", b="pytest.skip('not today')")
+    status, out, _ = accepted("accept", "--tier=smoke")
     assert (status, FILE.read_bytes()) == (0, before)
     assert "left alone: a (smoke) is error now (RuntimeError: out of order): it stays supported, accepted on" in out
     assert "left alone: b (smoke) is not run now (its test was skipped (not today)): it stays refuted" in out
 
 
-def test_both_tiers_are_accepted_unless_one_is_named(project: Any, capsys: pytest.CaptureFixture[str]) -> None:
-    project.write(a="supported", b="refuted")
-    project.run("--claims-only=a,b", own_store=True)  # in the shared one the full tier's trials may lie
-    capsys.readouterr()
-    main(["accept"])
-    out = capsys.readouterr().out
+def test_both_tiers_are_accepted_unless_one_is_named(evoclaims: Evoclaims) -> None:
+    _, out, _ = evoclaims("accept")
     assert "left alone: a (full) is not run now (10 of 10 trials of hand_built on n_parity are missing)" in out
     assert "accepted: a (smoke)" in out
-    main(["accept", "--tier=smoke"])
-    assert "(full)" not in capsys.readouterr().out
+    assert "(full)" not in evoclaims("accept", "--tier=smoke")[1]
 
 
-def test_the_history_of_a_claim_that_is_gone_is_kept_and_said(evoclaims: Evoclaims, project: Any) -> None:
-    evoclaims("accept", "--tier=smoke")
-    _rewrite(project, a="supported")
-    status, out, _ = evoclaims("accept", "--tier=smoke")
+def test_the_history_of_a_claim_that_is_gone_is_kept_and_said(accepted: Evoclaims, project: Project) -> None:
+    project.write(a="supported")
+    status, out, _ = accepted("accept", "--tier=smoke")
     assert (status, out.splitlines()[0]) == (0, "kept: b (smoke), which is no longer among the claims")
     assert ("smoke", "b") in history.load(FILE)
-    assert "kept:" not in evoclaims("accept", "--tier=full")[1]
+    assert "kept:" not in accepted("accept", "--tier=full")[1]
 
 
 def test_accepted_verdicts_that_are_torn_are_not_written_over(evoclaims: Evoclaims) -> None:

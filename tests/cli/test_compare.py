@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import subprocess
 from collections.abc import Callable
 from dataclasses import replace
@@ -10,43 +11,21 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from tiny_project import Evoclaims, Project
 
-from evoclaims.cli import main
 from evoclaims.judging.verdict import Outcome
 from evoclaims.paper import references
 from evoclaims.trials.result import TrialResult, digest
 from evoclaims.trials.store import Store
 from evoclaims.verdicts import history
 
-Evoclaims = Callable[..., tuple[int, str, str]]
+OWN = Path(".evoclaims")
 FILE = Path("verdicts.toml")
+pytestmark = pytest.mark.usefixtures("stored")
 
 
 @pytest.fixture
-def evoclaims(project: Any, capsys: pytest.CaptureFixture[str]) -> Evoclaims:
-    """A function that runs a command in a project whose trials are stored; returns status, output and errors."""
-    project.write(a="supported", b="refuted")
-    project.run("--claims-only=a,b")
-
-    def run(*arguments: str) -> tuple[int, str, str]:
-        capsys.readouterr()
-        status = main([*arguments, f"--storage={project.store}"])
-        out, err = capsys.readouterr()
-        assert "Traceback" not in out + err
-        return status, out, err
-
-    return run
-
-
-@pytest.fixture
-def accepted(evoclaims: Evoclaims) -> Evoclaims:
-    """The same, with the verdicts of the smoke tier accepted."""
-    assert evoclaims("accept", "--tier=smoke")[0] == 1
-    return evoclaims
-
-
-@pytest.fixture
-def git(project: Any, monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
+def git(project: Project, monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
     """A function that runs git in the project, which becomes a repository."""
     for name in [name for name in os.environ if name.startswith("GIT_")]:
         monkeypatch.delenv(name)
@@ -57,8 +36,28 @@ def git(project: Any, monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
         settings = ("-c", "user.name=t", "-c", "user.email=t@t", "-c", "init.defaultBranch=main")
         subprocess.run(["git", *settings, *arguments], cwd=project.path, check=True, capture_output=True)
 
-    run("init", "--quiet")
+    run("init", "--quiet", "--template=")
     return run
+
+
+@pytest.fixture(scope="module")
+def repository(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Where the repository of `with_branches` is kept, once a test has made it."""
+    return tmp_path_factory.mktemp("repository") / "kept"
+
+
+@pytest.fixture
+def with_branches(accepted: Evoclaims, git: Callable[..., None], repository: Path) -> None:
+    """The project is a repository with a branch `bare` without verdicts, and a branch `both` with some."""
+    if repository.exists():
+        shutil.copytree(repository, ".git", dirs_exist_ok=True)
+        return
+    git("commit", "--allow-empty", "-m", "empty")
+    git("branch", "bare")
+    git("add", "verdicts.toml")
+    git("commit", "-m", "accepted")
+    git("branch", "both")
+    shutil.copytree(".git", repository)
 
 
 def _edit(**changes: Any) -> None:
@@ -75,19 +74,23 @@ def _spoiled(trial: TrialResult) -> TrialResult:
     return replace(trial, metrics=metrics, levels=levels, digest=new, champion="")
 
 
-def _copy(source: Path, to: Path, change: Callable[[TrialResult], TrialResult], only: str) -> None:
-    """Fill a store with the changed trials of one method."""
-    for trial in Store(source).results([]):
-        if trial.spec["method"]["name"] == only and trial.spec["budget"]["generations"] == 1 and trial.seed < 10:
-            Store(to).put(change(replace(trial, champion="")), {})
+def _of(method: str) -> list[TrialResult]:
+    """Return the project's trials of a method."""
+    return [trial for trial in Store(OWN).results([]) if trial.spec["method"]["name"] == method]
 
 
-def test_what_is_as_accepted_is_counted_and_not_listed(accepted: Evoclaims, project: Any) -> None:
+def _copy(to: str, change: Callable[[TrialResult], TrialResult] = lambda trial: trial) -> None:
+    """Fill a store with the changed trials of the right network."""
+    for trial in _of("hand_built"):
+        Store(Path(to)).put(change(replace(trial, champion="")), {})
+
+
+def test_what_is_as_accepted_is_counted_and_not_listed(accepted: Evoclaims) -> None:
     status, out, _ = accepted("compare", "--tier=smoke", "--fail=*->*")
     assert status == 0
     assert out.splitlines()[:4] == [
         "old: accepted verdicts, and reference trials",
-        f"new: judged from the store {project.store}, and from reference trials where it has none",
+        f"new: judged from the store {OWN}, and from reference trials where it has none",
         "verdicts: 2 the same",
         "trials: 0 comparisons, 0 drifted (exact rank tests, Holm, α = 0.01)",
     ]
@@ -119,10 +122,9 @@ def test_a_tier_can_be_left_out_of_a_comparison(accepted: Evoclaims) -> None:
     assert (status, "a (smoke)" in out) == (0, False)
 
 
-def test_new_trials_that_drifted_from_the_references_are_said(evoclaims: Evoclaims, project: Any) -> None:
-    trials = [t for t in Store(project.store).results([]) if t.spec["method"]["name"] == "hand_built"]
-    right = [trial for trial in trials if trial.spec["budget"]["generations"] == 1 and trial.seed < 10]
-    references.write(references.path_of(Path("reference"), "smoke", "right", "parity"), map(_spoiled, right))
+def test_new_trials_that_drifted_from_the_references_are_said(evoclaims: Evoclaims) -> None:
+    path = references.path_of(Path("reference"), "smoke", "right", "parity")
+    references.write(path, map(_spoiled, _of("hand_built")))
     evoclaims("accept", "--tier=smoke")
     _, out, _ = evoclaims("compare", "--tier=smoke")
     assert "  DRIFT in smoke/right-parity: mean_success is " in out
@@ -131,27 +133,21 @@ def test_new_trials_that_drifted_from_the_references_are_said(evoclaims: Evoclai
     assert "trials of the new side alone: smoke/wrong-parity" in out
 
 
-def test_verdicts_of_now_come_from_reference_trials_where_the_store_has_none(
-    accepted: Evoclaims, project: Any, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_verdicts_of_now_come_from_reference_trials_where_the_store_has_none(accepted: Evoclaims) -> None:
     for name, method in (("right", "hand_built"), ("wrong", "hand_built_negated")):
-        trials = [t for t in Store(project.store).results([]) if t.spec["method"]["name"] == method]
-        smoke = [trial for trial in trials if trial.spec["budget"]["generations"] == 1 and trial.seed < 10]
-        references.write(references.path_of(Path("reference"), "smoke", name, "parity"), smoke)
-    capsys.readouterr()
+        references.write(references.path_of(Path("reference"), "smoke", name, "parity"), _of(method))
     Path("empty").mkdir()
-    assert main(["compare", "--storage=empty", "--tier=smoke"]) == 0
-    out = capsys.readouterr().out
+    status, out, _ = accepted("compare", "--storage=empty", "--tier=smoke")
+    assert status == 0
     assert "verdicts: 2 the same\n" in out
     assert "trials of the old side alone: smoke/right-parity, smoke/wrong-parity\n" in out
 
 
 def test_a_revisions_accepted_verdicts_are_compared_with_those_of_the_working_tree(
-    accepted: Evoclaims, git: Callable[..., None], project: Any
+    accepted: Evoclaims, git: Callable[..., None]
 ) -> None:
     path = references.path_of(Path("reference"), "smoke", "right", "parity")
-    right = [t for t in Store(project.store).results([]) if t.spec["method"]["name"] == "hand_built"]
-    right = [trial for trial in right if trial.spec["budget"]["generations"] == 1 and trial.seed < 10]
+    right = _of("hand_built")
     references.write(path, right)
     git("add", ".")
     git("commit", "-m", "sound")
@@ -183,11 +179,11 @@ def test_no_code_of_a_revision_is_run(accepted: Evoclaims, git: Callable[..., No
     assert not Path("ran").exists()
 
 
-def test_two_stores_are_each_judged_from_their_own_trials(evoclaims: Evoclaims, project: Any) -> None:
-    _copy(project.store, Path("sound"), lambda trial: trial, "hand_built")
-    _copy(project.store, Path("spoiled"), _spoiled, "hand_built")
-    wrong = [t for t in Store(project.store).results([]) if t.spec["method"]["name"] == "hand_built_negated"]
-    references.write(references.path_of(Path("reference"), "smoke", "wrong", "parity"), wrong)
+def test_two_stores_are_each_judged_from_their_own_trials(evoclaims: Evoclaims) -> None:
+    _copy("sound")
+    _copy("spoiled", _spoiled)
+    path = references.path_of(Path("reference"), "smoke", "wrong", "parity")
+    references.write(path, _of("hand_built_negated"))
     status, out, _ = evoclaims("compare", "sound", "spoiled", "--tier=smoke", "--fail=supported->refuted")
     assert status == 1
     assert out.splitlines()[:3] == ["old: the store sound", "new: the store spoiled", out.splitlines()[2]]
@@ -196,18 +192,18 @@ def test_two_stores_are_each_judged_from_their_own_trials(evoclaims: Evoclaims, 
     assert "verdicts: 1 changed, 1 not run, then or now" in out  # the reference trials of `b` are of neither store
 
 
-def test_one_store_is_compared_with_the_projects_own(evoclaims: Evoclaims, project: Any) -> None:
-    _copy(project.store, Path("spoiled"), _spoiled, "hand_built")
+def test_one_store_is_compared_with_the_projects_own(evoclaims: Evoclaims) -> None:
+    _copy("spoiled", _spoiled)
     status, out, _ = evoclaims("compare", "./spoiled", "--fail=refuted->supported,not run->refuted")
     assert status == 1
-    assert f"new: the store {project.store}" in out
+    assert f"new: the store {OWN}" in out
     assert "FAIL a (smoke): refuted -> supported" in out
     assert "FAIL b (smoke): not run -> refuted" in out
 
 
-def test_a_damaged_record_is_said_and_the_rest_is_compared(evoclaims: Evoclaims, project: Any) -> None:
+def test_a_damaged_record_is_said_and_the_rest_is_compared(evoclaims: Evoclaims) -> None:
     for name in ("one", "other"):
-        _copy(project.store, Path(name), lambda trial: trial, "hand_built")
+        _copy(name)
     store = Store(Path("other"))
     store.record_files(store.ids()[0])[-1].write_text("torn")
     _, out, _ = evoclaims("compare", "one", "other")
@@ -251,33 +247,22 @@ def test_a_timeline_shows_the_versions_that_differ(accepted: Evoclaims) -> None:
     ],
 )
 def test_a_users_mistake_is_one_sentence(
-    accepted: Evoclaims,
-    git: Callable[..., None],
-    capsys: pytest.CaptureFixture[str],
-    arguments: tuple[str, ...],
-    said: str,
+    accepted: Evoclaims, with_branches: None, arguments: tuple[str, ...], said: str
 ) -> None:
-    git("commit", "--allow-empty", "-m", "empty")
-    git("branch", "bare")
-    git("add", "verdicts.toml")
-    git("commit", "-m", "accepted")
-    git("branch", "both")
     Path("both").mkdir()
     Path("claims/__pycache__").mkdir(exist_ok=True)  # where Python writes bytecode: no name that tells a user anything
-    capsys.readouterr()
-    status = main(["compare", *arguments])
-    err = capsys.readouterr().err
+    status, _, err = accepted("compare", *arguments)
     assert (status, err.count("\n")) == (2, 1)
     assert said in err
 
 
 def test_without_a_repository_a_revision_is_one_sentence_and_folders_still_compare(
-    evoclaims: Evoclaims, project: Any, monkeypatch: pytest.MonkeyPatch
+    evoclaims: Evoclaims, project: Project, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("GIT_CEILING_DIRECTORIES", str(project.path.parent))
     status, _, err = evoclaims("compare", "HEAD")
     assert (status, "lies in no git repository" in err) == (2, True)
-    _copy(project.store, Path("one"), lambda trial: trial, "hand_built")
+    _copy("one")
     assert evoclaims("compare", "one", "one")[0] == 0
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import gc
 import io
 import os
 from collections.abc import Generator, Iterator, Sequence
@@ -50,7 +51,7 @@ def judge(config: SuiteConfig, asked: Sequence[tuple[Session, str]]) -> list[lis
     """
     run = _Run(config, asked)
     said = io.StringIO()
-    with contextlib.redirect_stderr(said), _without(_ENVIRONMENT):
+    with contextlib.redirect_stderr(said), _without(_ENVIRONMENT), _frozen():
         try:
             status = pytest.main([*run.arguments], plugins=[run])
         except (Exception, SystemExit) as error:  # of a plugin that does not import, say
@@ -179,3 +180,13 @@ def _without(names: Sequence[str]) -> Iterator[None]:
         yield
     finally:
         os.environ.update(kept)
+
+
+@contextlib.contextmanager
+def _frozen() -> Iterator[None]:
+    """Keep what is imported out of the collection of garbage that a run of pytest ends with, which takes long else."""
+    gc.freeze()
+    try:
+        yield
+    finally:
+        gc.unfreeze()
