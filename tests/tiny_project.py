@@ -16,7 +16,10 @@ import pytest
 from evoclaims import cli
 from evoclaims.trials.store import Store
 
-LATE = ("evoclaims.report.run_summary", "evoclaims.verdicts.regression", "hypothesis")
+FILES = {".evoclaims", "pyproject.toml", "tiny_paper.py", "claims", "__pycache__"}
+"""What is in the project's folder when a command has written nothing else."""
+
+LATE = ("evoclaims.report.run_summary", "evoclaims.verdicts.regression", "hypothesis", "statsmodels.stats.multitest")
 """What a run of pytest imports when it comes to it."""
 
 PYPROJECT = """
@@ -227,19 +230,19 @@ def evoclaims(project: Project, capsys: pytest.CaptureFixture[str]) -> Evoclaims
     return run
 
 
-@pytest.fixture(scope="session")
-def accepted_once() -> list[str]:
-    """The text of verdicts.toml that `accepted` shares among tests, once one of them has made it."""
-    return []
+@pytest.fixture(scope="module")
+def kept(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder where the first test of a module keeps what it has made, for the others to copy."""
+    return tmp_path_factory.mktemp("kept")
 
 
 @pytest.fixture
-def accepted(evoclaims: Evoclaims, stored: Store, accepted_once: list[str]) -> Evoclaims:
+def accepted(evoclaims: Evoclaims, stored: Store, kept: Path) -> Evoclaims:
     """The same, with trials in the project's store, and their verdicts of the smoke tier accepted."""
-    if not accepted_once:
+    if not (kept / "verdicts.toml").exists():
         assert evoclaims("accept", "--tier=smoke")[0] == 1
-        accepted_once.append(Path("verdicts.toml").read_text())
-    Path("verdicts.toml").write_text(accepted_once[0])
+        shutil.copy("verdicts.toml", kept)
+    shutil.copy(kept / "verdicts.toml", ".")
     return evoclaims
 
 

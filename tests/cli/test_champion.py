@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Callable
+import shutil
 from pathlib import Path
 from typing import Any
 
 import pytest
 import tiny_project
+from tiny_project import Evoclaims, Project
 
-from evoclaims.cli import main
 from evoclaims.core.canonical import content_hash
 from evoclaims.networks.export import from_json, optional
+from evoclaims.trials.result import TrialResult
 from evoclaims.trials.store import Store
 
 # What the command imports late: pytester forgets the modules that a test has imported, and would load them twice.
@@ -34,33 +35,28 @@ METHODS |= {"neat": Neat(SMALL), "hyperneat": HyperNeat(SMALL, hidden=(2,)), "cm
 REPRODUCTION = replace(REPRODUCTION, tiers={"smoke": Tier(conditions(3), Protocol.fixed(10))})
 """
 
-Evoclaims = Callable[..., tuple[int, str, str]]
+OWN = Path(".evoclaims")
+TRAINED = ("neat", "hyperneat", "cma_es", "right")
 
 
-@pytest.fixture
-def evoclaims(project: Any, shared_store: Path, capsys: pytest.CaptureFixture[str]) -> Evoclaims:
-    """A function that runs a command in a project with evolving methods; returns status, output and errors."""
+@pytest.fixture(autouse=True)
+def _evolving(project: Project) -> None:
+    """The project has methods that evolve."""
     project.pytester.makepyfile(tiny_paper=tiny_project.REPRODUCTION + MORE)
 
-    def run(*arguments: str, storage: Path = shared_store) -> tuple[int, str, str]:
-        capsys.readouterr()
-        status = main([*arguments, f"--storage={storage}"])
-        out, err = capsys.readouterr()
-        assert "Traceback" not in out + err
-        return status, out, err
-
-    return run
-
 
 @pytest.fixture
-def trained(evoclaims: Evoclaims) -> Evoclaims:
-    """The same, with one trial of neat, hyperneat, cma_es and a hand-built network in the store."""
-    for method in ("neat", "hyperneat", "cma_es", "right"):
-        assert evoclaims("run", method, "--trials=1", "--first-seed=4", "--device=cpu")[0] == 0
+def trained(evoclaims: Evoclaims, kept: Path) -> Evoclaims:
+    """A function that runs a command on one trial, of seed 4, of each method of TRAINED."""
+    if not (kept / "store").exists():
+        for method in TRAINED:
+            assert evoclaims("run", method, "--trials=1", "--first-seed=4", "--device=cpu")[0] == 0
+        shutil.copytree(".evoclaims", kept / "store")
+    shutil.copytree(kept / "store", ".evoclaims", dirs_exist_ok=True)
     return evoclaims
 
 
-@pytest.mark.parametrize("method", ["neat", "hyperneat", "cma_es", "right"])
+@pytest.mark.parametrize("method", TRAINED)
 def test_a_champion_is_replayed_and_equals_its_record(trained: Evoclaims, method: str) -> None:
     status, out, err = trained("champion", method, "--on=parity", "--seed=4", "--device=cpu")
     assert (status, err) == (0, "")
@@ -73,38 +69,40 @@ def test_a_champion_is_replayed_and_equals_its_record(trained: Evoclaims, method
     assert lines[4:] == ["The replay equals the stored record exactly."]
 
 
-def _change_record(store: Store, edit_record: Callable[..., None] | None = None, **fields: Any) -> None:
-    """Write other fields into the only record of a store, sealed as one who knows how the seal is made."""
-    (path,) = store.record_paths()
+def _result(method: str) -> TrialResult:
+    """Return the stored trial of a method."""
+    (result,) = [trial for trial in Store(OWN).results([]) if trial.spec["method"]["name"] == method]
+    return result
+
+
+def _change_record(result: TrialResult, **fields: Any) -> None:
+    """Write other fields into a trial's record, sealed as one who knows how the seal is made."""
+    (path,) = (path for path in Store(OWN).record_files(result.id) if path.exists())
     plain = {**json.loads(path.read_text()), **fields}
     plain["seal"] = content_hash({key: value for key, value in plain.items() if key != "seal"})
     path.write_text(json.dumps(plain))
 
 
-def test_a_record_that_is_not_its_champions_gives_status_1_and_a_sentence(evoclaims: Evoclaims) -> None:
-    storage = Path("own")
-    evoclaims("run", "neat", "--trials=1", "--device=cpu", storage=storage)
-    (result,) = Store(storage).results([])
-    _change_record(Store(storage), levels={**result.levels, "success": [0.875]})
-    arguments = ("champion", "neat", "--on=parity", "--device=cpu", "--as=json")
-    status, out, _ = evoclaims(*arguments, storage=storage)
+def test_a_record_that_is_not_its_champions_gives_status_1_and_a_sentence(trained: Evoclaims) -> None:
+    result = _result("neat")
+    _change_record(result, levels={**result.levels, "success": [0.875]})
+    arguments = ("champion", "neat", "--on=parity", "--seed=4", "--device=cpu", "--as=json")
+    status, out, _ = trained(*arguments)
     assert status == 1
     assert re.search(r"^ +0 +[0-9.]+ +0.875 ", out, re.MULTILINE)
     assert "The replay differs from the stored record, which was made with the same versions" in out
     assert "equals" not in out
-    assert Path("neat-parity-0.json").exists()
-    _change_record(Store(storage), provenance={**result.provenance, "machine": "a mainframe"})
-    status, out, _ = evoclaims(*arguments, storage=storage)
+    assert Path("neat-parity-4.json").exists()
+    _change_record(result, provenance={**result.provenance, "machine": "a mainframe"})
+    status, out, _ = trained(*arguments)
     assert status == 1
     assert "made with other machine: rounding may differ there" in out
 
 
-def test_a_changed_champion_is_told(evoclaims: Evoclaims) -> None:
-    storage = Path("own")
-    evoclaims("run", "cma_es", "--trials=1", "--device=cpu", storage=storage)
-    (path,) = Store(storage).champion_paths()
+def test_a_changed_champion_is_told(trained: Evoclaims) -> None:
+    path = Store(OWN).champion_file(_result("cma_es"))
     path.write_bytes(path.read_bytes() + b" ")
-    status, _, err = evoclaims("champion", "cma_es", "--on=parity", storage=storage)
+    status, _, err = trained("champion", "cma_es", "--on=parity", "--seed=4")
     assert (status, err.count("\n")) == (2, 1)
     assert "it is not the champion that the trial's record names" in err
 
@@ -182,13 +180,17 @@ def test_a_users_mistake_is_one_sentence_and_status_2(
     assert (status, err.count("\n")) == (2, 1)
     assert err.startswith("evoclaims: ")
     assert text in err
-    assert {path.name for path in Path().iterdir()} <= {"pyproject.toml", "tiny_paper.py", "claims", "__pycache__"}
+    assert {path.name for path in Path().iterdir()} <= {
+        ".evoclaims",
+        "pyproject.toml",
+        "tiny_paper.py",
+        "claims",
+        "__pycache__",
+    }
 
 
 def test_the_command_that_a_missing_trial_names_runs_it(evoclaims: Evoclaims) -> None:
-    storage = Path("own")
-    storage.mkdir()
-    _, _, err = evoclaims("champion", "cma_es", "--on=parity", "--seed=5", storage=storage)
+    _, _, err = evoclaims("champion", "cma_es", "--on=parity", "--seed=5")
     command = re.findall("`evoclaims (.*)`", err)[0].split()
-    assert evoclaims(*command, storage=storage)[0] == 0
-    assert evoclaims("champion", "cma_es", "--on=parity", "--seed=5", storage=storage)[0] == 0
+    assert evoclaims(*command)[0] == 0
+    assert evoclaims("champion", "cma_es", "--on=parity", "--seed=5")[0] == 0

@@ -3,43 +3,18 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
+from tiny_project import Evoclaims
 
 from evoclaims.cli import main
 from evoclaims.judging.protocol import SEQUENTIAL
 from evoclaims.paper import references
 from evoclaims.paper.reproduction import Reproduction
 from evoclaims.trials.store import Store
-
-Evoclaims = Callable[..., tuple[int, str, str]]
-
-
-@pytest.fixture
-def evoclaims(project: Any, capsys: pytest.CaptureFixture[str]) -> Evoclaims:
-    """A function that runs a command in the tiny project; returns status, output and errors."""
-    project.write(a="supported", b="refuted")
-
-    def run(*arguments: str) -> tuple[int, str, str]:
-        capsys.readouterr()
-        status = main(arguments)
-        out, err = capsys.readouterr()
-        assert "Traceback" not in out + err
-        return status, out, err
-
-    return run
-
-
-@pytest.fixture
-def stored(evoclaims: Evoclaims) -> Store:
-    """The store of the project after both conditions of its claims were run."""
-    for method in ("right", "wrong"):
-        assert evoclaims("run", method)[0] == 0
-    return Store(Path(".evoclaims"))
 
 
 def test_run_runs_what_is_missing_and_lists_the_trials(evoclaims: Evoclaims) -> None:

@@ -40,24 +40,18 @@ def git(project: Project, monkeypatch: pytest.MonkeyPatch) -> Callable[..., None
     return run
 
 
-@pytest.fixture(scope="module")
-def repository(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Where the repository of `with_branches` is kept, once a test has made it."""
-    return tmp_path_factory.mktemp("repository") / "kept"
-
-
 @pytest.fixture
-def with_branches(accepted: Evoclaims, git: Callable[..., None], repository: Path) -> None:
+def with_branches(accepted: Evoclaims, git: Callable[..., None], kept: Path) -> None:
     """The project is a repository with a branch `bare` without verdicts, and a branch `both` with some."""
-    if repository.exists():
-        shutil.copytree(repository, ".git", dirs_exist_ok=True)
+    if (kept / ".git").exists():
+        shutil.copytree(kept / ".git", ".git", dirs_exist_ok=True)
         return
     git("commit", "--allow-empty", "-m", "empty")
     git("branch", "bare")
     git("add", "verdicts.toml")
     git("commit", "-m", "accepted")
     git("branch", "both")
-    shutil.copytree(".git", repository)
+    shutil.copytree(".git", kept / ".git")
 
 
 def _edit(**changes: Any) -> None:

@@ -3,19 +3,15 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import pytest
-from tiny_project import PYPROJECT
+from tiny_project import PYPROJECT, Evoclaims, Project
 
-from evoclaims.cli import main
+from evoclaims.trials.store import Store
 
 CLAIMS = {"a": "refuted", "b": "supported", "c": "supported"}
 VERDICTS = "claims (smoke): 2 supported, 1 refuted"
-
-Run = Callable[..., tuple[int, str, str]]
 
 OPTIONS = [
     "-x",
@@ -38,22 +34,10 @@ OPTIONS = [
 ]
 
 
-@pytest.fixture
-def evoclaims(project: Any, capsys: pytest.CaptureFixture[str]) -> Run:
-    """A function that runs a command in the project on the trials of three claims, of which the first is refuted."""
+@pytest.fixture(autouse=True)
+def _three_claims(evoclaims: Evoclaims, project: Project, stored: Store) -> None:
+    """The project has three claims, of which the first is refuted, and their trials."""
     project.write(**CLAIMS)
-    for method in ("right", "wrong"):
-        main(["run", method, f"--storage={project.store}"])
-
-    def run(*arguments: str) -> tuple[int, str, str]:
-        capsys.readouterr()
-        status = main([*arguments, f"--storage={project.store}"])
-        out, err = capsys.readouterr()
-        assert "Traceback" not in out + err
-        assert "INTERNALERROR" not in out + err
-        return status, out, err
-
-    return run
 
 
 def _set(addopts: str) -> None:
@@ -61,7 +45,7 @@ def _set(addopts: str) -> None:
 
 
 @pytest.mark.parametrize("options", OPTIONS)
-def test_options_for_other_runs_leave_no_claim_out(evoclaims: Run, options: str) -> None:
+def test_options_for_other_runs_leave_no_claim_out(evoclaims: Evoclaims, options: str) -> None:
     _set(options)
     status, out, _ = evoclaims("status")
     assert (status, out.splitlines()[-1]) == (1, VERDICTS)
@@ -71,7 +55,7 @@ def test_options_for_other_runs_leave_no_claim_out(evoclaims: Run, options: str)
 @pytest.mark.parametrize("options", ["-x", "-p picky -n 2", "--nonsense"])
 @pytest.mark.parametrize("where", ["pytest.ini", "the environment"])
 def test_it_does_not_matter_where_such_options_are_set(
-    evoclaims: Run, monkeypatch: pytest.MonkeyPatch, options: str, where: str
+    evoclaims: Evoclaims, monkeypatch: pytest.MonkeyPatch, options: str, where: str
 ) -> None:
     Path("picky.py").write_text("")
     if where == "pytest.ini":
@@ -82,7 +66,7 @@ def test_it_does_not_matter_where_such_options_are_set(
     assert (status, out.splitlines()[-1]) == (1, VERDICTS)
 
 
-def test_no_verdict_is_left_unaccepted_for_such_options(evoclaims: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_no_verdict_is_left_unaccepted_for_such_options(evoclaims: Evoclaims, monkeypatch: pytest.MonkeyPatch) -> None:
     _set("-x")
     monkeypatch.setenv("PYTEST_ADDOPTS", "-k a")
     status, out, _ = evoclaims("accept", "--tier=smoke")
@@ -94,7 +78,9 @@ def test_no_verdict_is_left_unaccepted_for_such_options(evoclaims: Run, monkeypa
     ]
 
 
-def test_the_environment_is_as_before_once_claims_are_judged(evoclaims: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_environment_is_as_before_once_claims_are_judged(
+    evoclaims: Evoclaims, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setenv("PYTEST_ADDOPTS", "-x")
     monkeypatch.delenv("PYTEST_PLUGINS", raising=False)
     evoclaims("status")
@@ -107,7 +93,7 @@ def test_the_environment_is_as_before_once_claims_are_judged(evoclaims: Run, mon
     [("PYTEST_PLUGINS", "picky"), ("PYTEST_DISABLE_PLUGIN_AUTOLOAD", "1"), ("PYTEST_PLUGINS", "nope")],
 )
 def test_plugins_that_the_environment_adds_or_leaves_out_change_nothing(
-    evoclaims: Run, monkeypatch: pytest.MonkeyPatch, name: str, value: str
+    evoclaims: Evoclaims, monkeypatch: pytest.MonkeyPatch, name: str, value: str
 ) -> None:
     Path("picky.py").write_text("def pytest_collection_modifyitems(items):\n    items.clear()\n")
     monkeypatch.setenv(name, value)
@@ -115,7 +101,7 @@ def test_plugins_that_the_environment_adds_or_leaves_out_change_nothing(
     assert (status, out.splitlines()[-1]) == (1, VERDICTS)
 
 
-def test_how_files_are_imported_and_plugins_with_fixtures_are_kept(project: Any, evoclaims: Run) -> None:
+def test_how_files_are_imported_and_plugins_with_fixtures_are_kept(project: Project, evoclaims: Evoclaims) -> None:
     """Two files of one name can only be imported with importlib."""
     (project.path / "giving.py").write_text("import pytest\n\n@pytest.fixture\ndef method():\n    return 'right'\n")
     text = (
@@ -131,7 +117,7 @@ def test_how_files_are_imported_and_plugins_with_fixtures_are_kept(project: Any,
     assert out.splitlines()[-1].startswith("claims (smoke): 2 ")
 
 
-def test_a_plugin_that_the_project_requires_is_not_missed(evoclaims: Run) -> None:
+def test_a_plugin_that_the_project_requires_is_not_missed(evoclaims: Evoclaims) -> None:
     with Path("pyproject.toml").open("a") as file:
         file.write('\nrequired_plugins = ["pytest-xdist"]\n')
     status, out, _ = evoclaims("status")
@@ -150,7 +136,7 @@ def test_a_plugin_that_the_project_requires_is_not_missed(evoclaims: Run) -> Non
 )
 @pytest.mark.parametrize("command", ["status", "accept"])
 def test_claims_that_something_leaves_out_are_an_error_and_not_forgotten(
-    evoclaims: Run, hook: str, command: str
+    evoclaims: Evoclaims, hook: str, command: str
 ) -> None:
     Path("conftest.py").write_text(hook)
     status, _, err = evoclaims(command, "--tier=smoke")
@@ -159,14 +145,14 @@ def test_claims_that_something_leaves_out_are_an_error_and_not_forgotten(
     assert not Path("verdicts.toml").exists()
 
 
-def test_a_claim_that_is_marked_to_be_skipped_is_spoken_of(project: Any, evoclaims: Run) -> None:
+def test_a_claim_that_is_marked_to_be_skipped_is_spoken_of(project: Project, evoclaims: Evoclaims) -> None:
     path = project.path / "claims" / "test_claims.py"
     path.write_text(path.read_text().replace("@says('b')", "@pytest.mark.skip(reason='later')\n@says('b')"))
     _, out, _ = evoclaims("status")
     assert out.splitlines()[-1] == "claims (smoke): 1 supported, 1 refuted, 1 not run"
 
 
-def test_an_interrupt_while_claims_are_judged_ends_the_command(evoclaims: Run) -> None:
+def test_an_interrupt_while_claims_are_judged_ends_the_command(evoclaims: Evoclaims) -> None:
     Path("conftest.py").write_text("def pytest_runtest_setup(item):\n    raise KeyboardInterrupt\n")
     assert evoclaims("accept")[0] == 130
     assert not Path("verdicts.toml").exists()

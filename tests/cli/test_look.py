@@ -6,7 +6,8 @@ import io
 import json
 import math
 import re
-from collections.abc import Callable, Iterator
+import shutil
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -15,8 +16,8 @@ import jax
 import numpy as np
 import pytest
 import tiny_project
+from tiny_project import Evoclaims, Project
 
-from evoclaims.cli import main
 from evoclaims.cli.episodes import run_again
 from evoclaims.cli.stored import load
 from evoclaims.core.canonical import content_hash
@@ -58,8 +59,6 @@ REPRODUCTION = replace(REPRODUCTION, tiers={
 })
 """
 
-Evoclaims = Callable[..., tuple[int, str, str]]
-
 
 @pytest.fixture(scope="module", autouse=True)
 def _gliding() -> Iterator[None]:
@@ -73,26 +72,20 @@ def _gliding() -> Iterator[None]:
         yield
 
 
-@pytest.fixture
-def evoclaims(project: Any, shared_store: Path, capsys: pytest.CaptureFixture[str]) -> Evoclaims:
-    """A function that runs a command in a project with robots; returns status, output and errors."""
+@pytest.fixture(autouse=True)
+def _robots(project: Project) -> None:
+    """The project has tasks with robots."""
     project.pytester.makepyfile(tiny_paper=tiny_project.REPRODUCTION + MORE)
 
-    def run(*arguments: str, storage: Path = shared_store) -> tuple[int, str, str]:
-        capsys.readouterr()
-        status = main([*arguments, f"--storage={storage}"])
-        out, err = capsys.readouterr()
-        assert "Traceback" not in out + err
-        return status, out, err
-
-    return run
-
 
 @pytest.fixture
-def trained(evoclaims: Evoclaims) -> Evoclaims:
-    """The same, with a trial of each method on the maze in the store."""
-    for method in ("random", "map_elites"):
-        assert evoclaims("run", method, "--on=maze", "--trials=1", "--first-seed=4", "--device=cpu")[0] == 0
+def trained(evoclaims: Evoclaims, kept: Path) -> Evoclaims:
+    """A function that runs a command on one trial, of seed 4, of each method on the maze."""
+    if not (kept / "store").exists():
+        for method in ("random", "map_elites"):
+            assert evoclaims("run", method, "--on=maze", "--trials=1", "--first-seed=4", "--device=cpu")[0] == 0
+        shutil.copytree(".evoclaims", kept / "store")
+    shutil.copytree(kept / "store", ".evoclaims", dirs_exist_ok=True)
     return evoclaims
 
 
@@ -102,7 +95,7 @@ def _texts(path: str) -> list[str]:
 
 def test_a_task_is_drawn_without_any_trial(evoclaims: Evoclaims) -> None:
     Path("none").mkdir()
-    assert evoclaims("look", "maze", storage=Path("none")) == (0, "wrote maze.svg\n", "")
+    assert evoclaims("look", "maze", "--storage=none") == (0, "wrote maze.svg\n", "")
     assert {"maze (smoke)", "1", "7", "simple_rob at the start, to scale"} <= set(_texts("maze.svg"))
     assert not any(Path("none").iterdir())
     assert evoclaims("look", "course", "--out=a/b.PNG")[:2] == (0, "wrote a/b.PNG\n")
@@ -122,9 +115,9 @@ def test_the_paths_of_all_episodes_are_drawn(trained: Evoclaims) -> None:
     assert "paths of the torso in 3 episodes, and their ends" in texts
 
 
-def test_the_episodes_are_those_by_which_the_trial_was_judged(trained: Evoclaims, shared_store: Path) -> None:
+def test_the_episodes_are_those_by_which_the_trial_was_judged(trained: Evoclaims) -> None:
     tier = load_reproduction(load_config(Path())).tier("smoke")
-    trial = load(str(shared_store), tier, "smoke", "random", "maze", 4)
+    trial = load(".evoclaims", tier, "smoke", "random", "maze", 4)
     task: Any = trial.condition.task
     outings = run_again(trial, task, jax.devices("cpu")[0])
     assert [len(path) for path in outings.torsos] == [len(steps) for steps in outings.positions] == [5, 5, 5]
@@ -136,9 +129,9 @@ def test_the_episodes_are_those_by_which_the_trial_was_judged(trained: Evoclaims
     assert len({tuple(path[-1]) for path in outings.torsos}) == 3
 
 
-def test_an_episode_is_shown_up_to_its_end(trained: Evoclaims, shared_store: Path) -> None:
+def test_an_episode_is_shown_up_to_its_end(trained: Evoclaims) -> None:
     tier = load_reproduction(load_config(Path())).tier("smoke")
-    trial = load(str(shared_store), tier, "smoke", "random", "maze", 4)
+    trial = load(".evoclaims", tier, "smoke", "random", "maze", 4)
     task: Any = trial.condition.task
     # Every stone counts as crossed at once, one in a step: all seven after seven steps of nine.
     outings = run_again(trial, replace(task, within=20.0, episode_steps=9), jax.devices("cpu")[0])
@@ -146,19 +139,17 @@ def test_an_episode_is_shown_up_to_its_end(trained: Evoclaims, shared_store: Pat
     assert outings.reached == [True] * 3
 
 
-def test_episodes_that_are_not_those_of_the_record_are_told(evoclaims: Evoclaims) -> None:
-    storage = Path("own")
-    evoclaims("run", "random", "--on=maze", "--trials=1", "--device=cpu", storage=storage)
-    (path,) = Store(storage).record_paths()
+def test_episodes_that_are_not_those_of_the_record_are_told(trained: Evoclaims) -> None:
+    (path,) = (path for path in Store(Path(".evoclaims")).record_paths() if "random_search" in path.read_text())
     plain = json.loads(path.read_text())
     plain["levels"]["success"] = [0.75]
     plain["seal"] = content_hash({key: value for key, value in plain.items() if key != "seal"})
     path.write_text(json.dumps(plain))
-    status, out, _ = evoclaims("look", "maze", "--method=random", storage=storage)
-    assert (status, out.splitlines()[-1]) == (0, "wrote random-maze-0-path.svg")
+    status, out, _ = trained("look", "maze", "--method=random", "--seed=4")
+    assert (status, out.splitlines()[-1]) == (0, "wrote random-maze-4-path.svg")
     assert "The share of episodes that reach the goal is 0 here, and 0.75 in the record" in out
     (command,) = re.findall("`evoclaims (.*)`", out)
-    assert evoclaims(*command.split(), storage=storage)[0] == 1
+    assert trained(*command.split())[0] == 1
 
 
 def test_a_page_shows_the_chosen_episode(trained: Evoclaims) -> None:
@@ -178,13 +169,11 @@ def test_a_gif_has_a_frame_for_each_step(trained: Evoclaims) -> None:
     assert image.n_frames == 5
 
 
-def test_the_map_of_elites_is_the_stored_one(
-    trained: Evoclaims, shared_store: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_map_of_elites_is_the_stored_one(trained: Evoclaims, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("evoclaims.cli.look.run_again", None)  # no episode is run for it
     assert trained("look", "maze", "--method=map_elites", "--seed=4", "--as=elites")[0] == 0
     tier = load_reproduction(load_config(Path())).tier("smoke")
-    trial = load(str(shared_store), tier, "smoke", "map_elites", "maze", 4)
+    trial = load(".evoclaims", tier, "smoke", "map_elites", "maze", 4)
     _, fitnesses = trial.parameters
     assert fitnesses.shape == (5, 4)
     elites = int(np.isfinite(fitnesses).sum())
@@ -246,7 +235,13 @@ def test_a_users_mistake_is_one_sentence_and_status_2(
     assert (status, err.count("\n")) == (2, 1)
     assert err.startswith("evoclaims: ")
     assert text in err
-    assert {path.name for path in Path().iterdir()} <= {"pyproject.toml", "tiny_paper.py", "claims", "__pycache__"}
+    assert {path.name for path in Path().iterdir()} <= {
+        ".evoclaims",
+        "pyproject.toml",
+        "tiny_paper.py",
+        "claims",
+        "__pycache__",
+    }
 
 
 def test_a_folder_is_not_written_over(evoclaims: Evoclaims) -> None:

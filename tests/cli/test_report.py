@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from tiny_project import Evoclaims, Project
 
-from evoclaims.cli import main
 from evoclaims.cli.episodes import Outings
 from evoclaims.cli.report import trajectory
 from evoclaims.envs.ecorobot.stones import SteppingStones
@@ -22,22 +21,10 @@ from evoclaims.report.model import Page
 from evoclaims.trials.budget import Budget
 from evoclaims.trials.spec import Condition
 
-Evoclaims = Callable[..., tuple[int, str, str]]
 
-
-@pytest.fixture
-def evoclaims(project: Any, capsys: pytest.CaptureFixture[str]) -> Evoclaims:
-    """A function that runs a command in the tiny project."""
+@pytest.fixture(autouse=True)
+def _three_claims(evoclaims: Evoclaims, project: Project) -> None:
     project.write(a="supported", b="refuted", c="error")
-
-    def run(*arguments: str) -> tuple[int, str, str]:
-        capsys.readouterr()
-        status = main(arguments)
-        out, err = capsys.readouterr()
-        assert "Traceback" not in out + err
-        return status, out, err
-
-    return run
 
 
 def test_both_files_are_written_and_named_with_the_totals(evoclaims: Evoclaims) -> None:

@@ -68,7 +68,7 @@ def with_hostile_texts(path: Path) -> None:
 
 
 @pytest.fixture
-def hostile(project: Any, capfd: pytest.CaptureFixture[str]) -> Store:
+def hostile(project: Any, stored: Store) -> Store:
     """The project's store, with control characters wherever a sealed record may hold them, and in a claim."""
     project.write(
         f"@claim('T1', says={HOSTILE!r}, where={HOSTILE!r}, smoke={HOSTILE!r})\n"
@@ -82,16 +82,13 @@ def hostile(project: Any, capfd: pytest.CaptureFixture[str]) -> Store:
         "def test_refuted(trials, verdict):\n"
         "    verdict(trials('wrong', on='parity').solves_every_level.in_most_trials())\n"
     )
-    for method in ("right", "wrong"):
-        assert main(["run", method, "--device=cpu"]) == 0
-    store = Store(project.path / ".evoclaims")
-    for path in list(store.record_paths()):
+    for path in list(stored.record_paths()):
         with_hostile_texts(path)
-    damaged = store.record_path("0" * 64)
+    damaged = stored.record_path("0" * 64)
     damaged.parent.mkdir(exist_ok=True)
     damaged.write_text(json.dumps({"schema": HOSTILE}))
-    (store.root / "trials" / "\x1b[31m").touch()
-    return store
+    (stored.root / "trials" / "\x1b[31m").touch()
+    return stored
 
 
 def steering(text: str) -> set[str]:
@@ -129,22 +126,35 @@ def test_no_text_steers_the_terminal_of_a_run(hostile: Store, project: Any) -> N
     assert steering(text) == set()
 
 
-@pytest.mark.parametrize("command", [(), ("-m", "pytest", "-p", "no:cacheprovider")], ids=["evoclaims", "pytest"])
-def test_a_terminal_that_knows_ascii_alone_is_told_the_same(project: Any, command: tuple[str, ...]) -> None:
+COMMANDS = """
+from evoclaims.cli import main
+for arguments in (["status"], ["plan"], ["champion", "right", "--on", "parity"]):
+    print("ended with", main(arguments), flush=True)
+"""
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("-c", COMMANDS), ["ended with 1", "ended with 0", "ended with 0"]),
+        (("-m", "pytest", "-p", "no:cacheprovider", "--claims-stored"), []),
+    ],
+    ids=["evoclaims", "pytest"],
+)
+def test_a_terminal_that_knows_ascii_alone_is_told_the_same(
+    project: Any, stored: Store, arguments: tuple[str, ...], said: list[str]
+) -> None:
     project.write(a="supported", b="refuted")
-    project.run(own_store=True)
-    code = ("-c", "from evoclaims.cli import main; raise SystemExit(main())")
-    for arguments in ("status", "plan", "champion right --on parity") if not command else ("--claims-stored",):
-        done = subprocess.run(
-            [sys.executable, *(command or code), *arguments.split()],
-            env={**os.environ, "PYTHONIOENCODING": "ascii", "PYTHONPATH": os.pathsep.join(sys.path)},
-            capture_output=True,
-            check=False,
-        )
-        text = (done.stdout + done.stderr).decode("ascii")
-        assert "Traceback" not in text
-        if "champion" not in arguments:
-            assert done.returncode == (0 if arguments == "plan" else 1), text
-        if arguments in ("status", "--claims-stored"):
-            assert "+ supported" in text
-            assert any(line.startswith("a ") and line.rstrip().endswith(("a.json", ")")) for line in text.splitlines())
+    done = subprocess.run(
+        [sys.executable, *arguments],
+        env={**os.environ, "PYTHONIOENCODING": "ascii", "PYTHONPATH": os.pathsep.join(sys.path)},
+        capture_output=True,
+        check=False,
+    )
+    text = (done.stdout + done.stderr).decode("ascii")
+    lines = text.splitlines()
+    assert "Traceback" not in text
+    assert [line for line in lines if line.startswith("ended")] == said
+    assert done.returncode == (0 if said else 1), text
+    assert "+ supported" in text
+    assert any(line.startswith("a ") and line.rstrip().endswith(("a.json", ")")) for line in lines)

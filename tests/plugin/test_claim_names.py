@@ -91,12 +91,11 @@ def test_second(trials, verdict, letter):
         (IN_THE_ID, "G1[a]", ("test_first[smoke]", "test_second[smoke-a]")),
     ],
 )
-@pytest.mark.parametrize("workers", [False, True])
 def test_two_claim_tests_of_one_name_are_a_sentence_that_names_both(
-    project: Any, sentence: Sentence, text: str, name: str, tests: tuple[str, ...], workers: bool
+    project: Any, sentence: Sentence, text: str, name: str, tests: tuple[str, ...]
 ) -> None:
     project.write(text)
-    result = project.run_apart("-n1") if workers else project.run(own_store=True)
+    result = project.run(own_store=True)
     assert result.ret == pytest.ExitCode.USAGE_ERROR
     sentence(result, f"Two claim tests are called {name} at the smoke tier, ")
     for test in tests:

@@ -3,9 +3,15 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import pytest
+from tiny_project import Evoclaims
+
+from evoclaims.judging.verdict import Outcome
+from evoclaims.verdicts import history
 
 SPY = """
 import os
@@ -22,12 +28,22 @@ Store.put = telling
 """
 
 BODIES = {"a": "supported", "b": "refuted", "c": "undecided", "d": "supported", "e": "error"}
+SKIPPED = "pytest.skip('later')"
+FILE = Path("verdicts.toml")
 
 
-def test_workers_give_the_verdicts_of_one_process_and_run_each_trial_once(project: Any) -> None:
-    project.write(**BODIES)
+def test_workers_give_the_verdicts_of_one_process_and_run_each_trial_once(
+    project: Any, evoclaims: Evoclaims, sentence: Any
+) -> None:
+    """What is skipped is known to the controller, and so is a regression."""
+    evoclaims("accept", "--tier=smoke", f"--storage={project.store}")
+    accepted = history.load(FILE)
+    was = replace(accepted["smoke", "a"][0], outcome=Outcome.REFUTED)
+    FILE.write_text(history.dump({("smoke", "a"): (was,)}))
+    project.write(**BODIES, f=SKIPPED)
     (project.path / "conftest.py").write_text(SPY)
-    apart = project.run_apart("-n2", "--claims-json=out.json", "--junitxml=out.xml")
+    fail = "--claims-compare-fail=refuted->supported"
+    apart = project.run_apart("-n2", "--claims-json=out.json", "--junitxml=out.xml", fail)
     assert apart.ret == 1
     puts = (project.path / "puts.log").read_text().split("\n")[:-1]
     assert sorted(puts) == sorted(set(puts))
@@ -39,40 +55,54 @@ def test_workers_give_the_verdicts_of_one_process_and_run_each_trial_once(projec
         "c": "inconclusive",
         "d": "supported",
         "e": "error",
+        "f": "not run",
     }
-    apart.stdout.fnmatch_lines(["claims: 2 supported, 1 refuted, 1 inconclusive, 1 error"])
+    sentence(apart, "claims: 2 supported, 1 refuted, 1 inconclusive, 1 error, 1 not run")
+    sentence(apart, "- f: its test was skipped (later)")
+    sentence(apart, "REGRESSION a (smoke): refuted -> supported")
     assert (project.path / "out.xml").read_text().count('name="verdict"') == len(BODIES)
     (project.path / "conftest.py").unlink()
     alone = project.run(own_store=True)
-    rows = [[line for line in result.outlines if line[:2] in {f"{n} " for n in BODIES}] for result in (alone, apart)]
+    rows = [[line for line in result.outlines if line[:3] in {f"{n}  " for n in BODIES}] for result in (alone, apart)]
     assert rows[0] == rows[1]
     assert len(rows[0]) == len(BODIES)
 
 
 def test_a_claim_whose_process_dies_is_not_missing_without_a_word(project: Any) -> None:
-    kill = "import os, signal; os.kill(os.getpid(), signal.SIGKILL)"
-    project.write(a="supported", killed=kill)
+    project.write(a="supported", killed="import os, signal; os.kill(os.getpid(), signal.SIGKILL)")
     apart = project.run_apart("-n1", "--claims-json=out.json")
     assert apart.ret == pytest.ExitCode.TESTS_FAILED
     shown = " ".join(apart.stdout.str().split())
     assert "error: The process that judged claims/test_claims.py::test_killed[smoke] died" in shown
     assert "claims: 1 supported" in shown
-    project.write(killed=kill)
-    apart = project.run_apart("-n1")
-    assert apart.ret == pytest.ExitCode.TESTS_FAILED
-    assert "ERROR: The process that judged claims/test_claims.py::test_killed[smoke] died" in apart.stdout.str()
+
+
+def test_a_process_that_dies_over_the_only_claim_is_an_error_too(project: Any) -> None:
+    """The controller is told so by xdist's hook, called here by hand."""
+    project.write("def test_nothing():\n    pass\n")
+    (project.path / "conftest.py").write_text(
+        "def pytest_sessionfinish(session):\n"
+        "    summary = session.config.pluginmanager.get_plugin('claims-summary')\n"
+        "    summary.pytest_handlecrashitem('claims/test_claims.py::test_killed[smoke]')\n"
+    )
+    result = project.run()
+    result.stdout.fnmatch_lines(["ERROR: The process that judged claims/test_claims.py::test_killed[[]smoke] died*"])
 
 
 @pytest.mark.parametrize(
-    ("argument", "text"),
+    ("claims", "paper", "text"),
     [
-        ("--claims-only=nope", "There is no claim named 'nope'. Known: a."),
-        ("--claims-device=gpu", "finds no hardware for the device 'gpu'"),
+        ({"a": "supported"}, "def f(:\n", "which [tool.evoclaims] names, does not import: SyntaxError: invalid syntax"),
+        ({"a": "supported", "b": "supported"}, "", "There is no claim named 'nope'. Known: a, b."),
     ],
 )
-def test_a_wrong_value_is_one_sentence_under_xdist_too(project: Any, sentence: Any, argument: str, text: str) -> None:
-    project.write(a="supported")
-    result = project.run_apart("-n1", argument)
+def test_what_keeps_workers_from_beginning_is_one_sentence_of_the_controllers(
+    project: Any, sentence: Any, claims: dict[str, str], paper: str, text: str
+) -> None:
+    project.write(**claims)
+    with (project.path / "tiny_paper.py").open("a") as file:
+        file.write(paper)
+    result = project.run_apart(*(["-n2"] if paper else ["-n1", "--claims-only=nope"]))
     assert result.ret == pytest.ExitCode.USAGE_ERROR
     sentence(result, text)
-    assert result.stdout.str().count(text) == 1
+    assert " ".join(result.stdout.str().split()).count(text) == 1

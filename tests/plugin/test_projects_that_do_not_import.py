@@ -60,16 +60,6 @@ def test_a_reproduction_that_does_not_import_is_a_sentence(
     )
 
 
-@pytest.mark.parametrize(("text", "said"), MISTAKES[:2])
-def test_a_worker_passes_the_sentence_on(project: Any, sentence: Sentence, text: str, said: str) -> None:
-    project.write(a="supported", b="supported")
-    line = _spoil(project, text)
-    result = project.run_apart("-n2")
-    assert result.ret == pytest.ExitCode.USAGE_ERROR
-    sentence(result, said.format(line=line))
-    assert result.stdout.str().count("does not import") == 1
-
-
 @pytest.mark.parametrize("command", COMMANDS)
 def test_every_command_says_it_in_one_line(
     project: Any, capsys: pytest.CaptureFixture[str], command: tuple[str, ...]

@@ -93,11 +93,3 @@ def test_a_run_without_claims_leaves_no_old_verdicts_behind(project: Any) -> Non
         "drift": None,
         "upgrade": None,
     }
-
-
-def test_claims_skipped_in_workers_are_known_to_the_controller(project: Any) -> None:
-    project.write(a="pytest.skip('later')")
-    result = project.run_apart("-n1", "--claims-json=out.json")
-    assert result.ret == pytest.ExitCode.NO_TESTS_COLLECTED
-    result.stdout.fnmatch_lines(["- a: its test was skipped (later)", "No claim was judged: nothing was measured."])
-    assert [report["outcome"] for report in _reports(project)] == ["not run"]
