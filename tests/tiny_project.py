@@ -205,7 +205,7 @@ def project(shared_store: Path, pytester: pytest.Pytester, monkeypatch: pytest.M
 @pytest.fixture
 def stored(project: Project, trials_of_both: Path) -> Store:
     """The project's own store, with the trials of the right and the wrong network."""
-    return Store(shutil.copytree(trials_of_both, project.path / ".evoclaims"))
+    return Store(Path(shutil.copytree(trials_of_both, ".evoclaims")))
 
 
 Evoclaims = Callable[..., tuple[int, str, str]]

@@ -156,3 +156,34 @@ def test_an_interrupt_while_claims_are_judged_ends_the_command(evoclaims: Evocla
     Path("conftest.py").write_text("def pytest_runtest_setup(item):\n    raise KeyboardInterrupt\n")
     assert evoclaims("accept")[0] == 130
     assert not Path("verdicts.toml").exists()
+
+
+IN_A_CLASS = """
+class TestThem:
+    seen = ()
+
+    @says("d")
+    def test_d(self, trials, verdict):
+        assert not self.seen  # by the same test under another protocol
+        self.seen += ("this one",)
+        verdict(trials("right", on="parity").solves_every_level.in_most_trials())
+"""
+
+
+def test_claims_are_collected_once_for_all_that_a_command_judges(evoclaims: Evoclaims, project: Project) -> None:
+    """Two tiers, two stores, and a variant of the protocol, whose trials are those of the wrong network."""
+    project.write(IN_A_CLASS)
+    log = Path("collected.log")
+    Path("conftest.py").write_text(
+        "def pytest_collection_finish(session):\n"
+        f"    with open({log.name!r}, 'a') as log:\n        log.write('collected ')\n"
+    )
+    for command, said in (
+        (("accept",), "accepted: d (smoke): supported, the first verdict"),
+        (("report",), "claims (full): 1 not run\nclaims (smoke): 1 supported"),
+        (("run", "right", "--variant=traded"), "d: supported -> refuted"),
+        (("compare", "./.evoclaims", "./.evoclaims"), "verdicts: 1 the same, 1 not run, then or now"),
+    ):
+        log.unlink(missing_ok=True)
+        assert said in evoclaims(*command)[1]
+        assert log.read_text() == "collected "

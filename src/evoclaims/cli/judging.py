@@ -134,6 +134,9 @@ class _Run:
                 if self.troubles or session.shouldstop or session.shouldfail:
                     return True
                 session.config.hook.pytest_runtest_protocol(item=item, nextitem=following)
+                if isinstance(item.parent, pytest.Class):  # a test that runs again has a new object of its class, too
+                    vars(item).pop("_instance", None)
+                    vars(item).pop("_obj", None)
         return True
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
