@@ -19,8 +19,7 @@ def attack(laboratory: Laboratory, times: int, draw: random.Random) -> Tally:
     for number in range(times):
         hosts = ("alpha", "beta") if number % 2 == 0 else ("alpha", "alpha")
         with laboratory.bench(pause=0.06) as bench:
-            # On one host a process is asked whether it lives, and no clock matters; on two it may be taken for dead.
-            guard = Guard(bench, laboratory.truth, tally, once=hosts[0] == hosts[1])
+            guard = Guard(bench, laboratory.truth, tally)
             clocks = [bench.folder / f"clock-{name}" for name in "ab"]
             for clock in clocks:
                 _set(clock, 0.0)
@@ -30,7 +29,7 @@ def attack(laboratory: Laboratory, times: int, draw: random.Random) -> Tally:
                 runs.append(bench.evoclaims("run", host=hosts[1], clock=clocks[1]))
                 bench.until_said("waiting", runs[1], times=2)
                 _set(clocks[1], draw.choice((-3.0, 3.0)) * HOURS)
-                bench.until_said("waiting" if guard.once else "training", runs[1], times=3)
+                bench.until_said("waiting", runs[1], times=3)
             for _ in range(3):
                 time.sleep(draw.uniform(0.0, 0.5))
                 _set(draw.choice(clocks), draw.uniform(-9.0, 9.0) * HOURS)

@@ -6,11 +6,11 @@ import random
 import signal
 import time
 
-from bench import Bench, Laboratory, Running
+from bench import LEASE, Bench, Laboratory, Running
 from guard import Guard
 from tally import Tally
 
-FIRST = ["stop a", "b waits", "continue a", "a trains", "stop a", "age", "b trains", "continue a", "a trains"]
+FIRST = ["stop a", "b waits", "continue a", "a trains", "stop a", "wait long", "b trains", "continue a", "a trains"]
 """A short stop keeps the other waiting and repeats nothing; after a long one the other takes over beside it."""
 
 
@@ -42,15 +42,15 @@ def _start(bench: Bench) -> Running:
 
 def _drawn(draw: random.Random) -> list[str]:
     """Return steps in which both may be stopped at once, and some stops are long."""
-    steps = ["stop a", "stop b", "continue a", "continue b", "age", "wait"]
+    steps = ["stop a", "stop b", "continue a", "continue b", "wait long", "wait"]
     return draw.choices(steps, [4, 4, 3, 3, 3, 3], k=14)
 
 
 def _take(step: str, bench: Bench, runs: dict[str, Running], draw: random.Random, tally: Tally) -> None:
     """Take one step, unless the process that it is about has ended."""
     words = step.split()
-    if step == "age":
-        bench.age_notices()
+    if step == "wait long":
+        time.sleep(1.5 * LEASE)
     elif step == "wait":
         time.sleep(draw.uniform(0.0, 1.0))
     elif words[0] == "stop":

@@ -36,7 +36,6 @@ def attack(laboratory: Laboratory, times: int, draw: random.Random, trees: bool 
                 alpha.signal(signal.SIGSTOP)
             guard.look()
             if end != "lives":
-                bench.age_notices()
                 bench.until_said("training", beta, times=3)
                 alpha.signal(signal.SIGCONT)
             for running in (beta,) if end == "dies" else (beta, alpha):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import time
 from collections.abc import Callable
@@ -15,7 +14,7 @@ import pytest
 from evoclaims.core.errors import UserError
 from evoclaims.trials import integrity
 from evoclaims.trials.integrity import Problem, verify
-from evoclaims.trials.notice import Notice
+from evoclaims.trials.notice import announced, notice_path
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.store import Store
 
@@ -171,11 +170,11 @@ def test_a_champion_whose_record_was_never_written_is_a_leftover_once_settled(st
 def test_the_notice_of_a_process_that_is_gone_is_a_leftover_and_that_of_a_live_one_is_not(
     store: Store, trial: TrialResult
 ) -> None:
-    with Notice(store.root, trial.condition) as notice:
+    with announced(store.root, trial.condition):
+        path = notice_path(store.root, trial.condition)
         assert verify(store, repair=True) == []
-        plain = json.loads(notice.path.read_text())
-        notice.path.write_text(json.dumps({**plain, "pid": 2**22 + 1}))
-        assert [problem.path for problem in verify(store, repair=False)] == [notice.path]
+        age(path)
+        assert [problem.path for problem in verify(store, repair=False)] == [path]
 
 
 def test_a_checkpoint_is_judged_by_whoever_knows_its_schema(store: Store) -> None:

@@ -15,7 +15,6 @@ from evoclaims.core.files import read_file
 from evoclaims.paper import references
 from evoclaims.trials import checkpoint
 from evoclaims.trials.integrity import verify
-from evoclaims.trials.notice import fresh
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.store import DamagedFileError, Store
 from evoclaims.verdicts import history
@@ -93,12 +92,6 @@ def test_a_checkpoint_that_leads_nowhere_is_gone(store: Store) -> None:
     path.parent.mkdir(parents=True)
     as_link_to_nowhere(path)
     assert not list(checkpoint.find(store.checkpoints, "a" * 64, "platform"))
-
-
-@pytest.mark.parametrize("make", [*ODD, as_link_to_nowhere])
-def test_an_odd_notice_announces_nobody(tmp_path: Path, make: Callable[[Path], None]) -> None:
-    make(tmp_path / "notice.json")
-    assert fresh(tmp_path / "notice.json") is None
 
 
 @pytest.mark.parametrize("make", [*ODD, as_link_to_nowhere])

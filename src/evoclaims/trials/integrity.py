@@ -15,7 +15,6 @@ from typing import Final, Literal
 
 from evoclaims.core.errors import UserError
 from evoclaims.core.printable import printable
-from evoclaims.trials.notice import fresh
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.store import DamagedFileError, Store
 from evoclaims.trials.store_files import SPARE_DIGITS, record_id
@@ -154,7 +153,7 @@ def _leftovers(store: Store) -> Iterator[Problem]:
         if _quarantine(store) not in path.parents and _settled(path):
             yield Problem(path, "leftover", "its writer was stopped before the file was whole")
     for path in sorted((store.root / "running").glob("*")):
-        if not path.name.startswith(".") and fresh(path) is None and path.exists():
+        if not path.name.startswith(".") and _settled(path):  # a process at work refreshes its notice
             yield Problem(path, "leftover", "the process that it announces is no longer at work")
 
 

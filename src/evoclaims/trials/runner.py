@@ -20,7 +20,7 @@ from evoclaims.trials.batches import Batch, Run, StoredTrials, batches, drop_fin
 from evoclaims.trials.checkpoint import Header
 from evoclaims.trials.devices import single_threaded_linear_algebra
 from evoclaims.trials.lanes import Lanes
-from evoclaims.trials.notice import Notice, wait_while_others_run
+from evoclaims.trials.notice import announced
 from evoclaims.trials.pacing import Rhythm, Strides
 from evoclaims.trials.program import Report
 from evoclaims.trials.progress import RunProgress, Watcher, ignore
@@ -65,13 +65,8 @@ def run(
     wanted = list(dict.fromkeys(seeds))
     while not stored.answer(found := [stored.get(seed) for seed in wanted]):
         store.check_writable()
-        wait_while_others_run(
-            store.root, condition.id, lambda text: watch(RunProgress(condition.label, text, len(seeds)))
-        )
-        with Notice(store.root, condition.id) as notice:
-            if notice.other is not None:
-                continue  # another process was faster: wait for it, then look again
-            owed = [seed for seed in wanted if stored.lacks(seed)]
+        with announced(store.root, condition.id, lambda text: watch(RunProgress(condition.label, text, len(seeds)))):
+            owed = [seed for seed in wanted if stored.lacks(seed)]  # another process may have stored some meanwhile
             one = Run(Lanes(condition, devices), stored, watch, checkpoint_seconds, time_limit)
             with single_threaded_linear_algebra(), _memory_told(condition, len(owed)):
                 for header, begin in batches(one, owed):

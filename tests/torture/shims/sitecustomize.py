@@ -1,12 +1,26 @@
 """What a process under attack takes for its host's name and for the time, where the system itself cannot be changed.
 
-TORTURE_HOST is a name; TORTURE_CLOCK is a file that holds by how many seconds the clock is wrong, at any moment.
+TORTURE_HOST is a name; TORTURE_CLOCK is a file that holds by how many seconds the clock is wrong, at any moment;
+TORTURE_LEASE is for how many seconds a notice counts.
 """
 
 import os
 import socket
 import time
 from typing import Any
+
+if "TORTURE_LEASE" in os.environ:
+    import filelock
+
+    class HastyLease(filelock.SoftFileLease):
+        """A lease that counts for a shorter time than it was asked to."""
+
+        def __init__(self, path: Any, *, lease_duration: float, heartbeat_interval: float, **options: Any) -> None:
+            hasty = float(os.environ["TORTURE_LEASE"])
+            heartbeat_interval *= hasty / lease_duration
+            super().__init__(path, lease_duration=hasty, heartbeat_interval=heartbeat_interval, **options)
+
+    filelock.SoftFileLease = HastyLease  # type: ignore[misc]
 
 if "TORTURE_HOST" in os.environ:
     socket.gethostname = lambda: os.environ["TORTURE_HOST"]
