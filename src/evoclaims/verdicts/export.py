@@ -97,9 +97,9 @@ def as_parquet(rows: Sequence[Row]) -> bytes:
             "Parquet files are written by pyarrow, which is not installed: pip install evoclaims[parquet], or take "
             "--as json or csv."
         ) from error
-    columns = {name: _uniform([row.get(name) for row in rows]) for name in columns_of(rows)}
     file = io.BytesIO()
-    parquet.write_table(arrow.table({name: arrow.array(values) for name, values in columns.items()}), file)
+    columns = {name: [row.get(name) for row in rows] for name in columns_of(rows)}
+    parquet.write_table(arrow.table({name: _column(arrow, values) for name, values in columns.items()}), file)
     return file.getvalue()
 
 
@@ -161,19 +161,13 @@ def _cell(value: Any) -> Any:
     return f"'{text}" if text.startswith(_FORMULA) else text
 
 
-def _uniform(values: list[Any]) -> list[Any]:
-    """Return a column of one type: as it is, numbers as floats where some are, anything else mixed as text."""
-    kinds = {type(value) for value in values if value is not None}
-    if kinds <= {bool} or kinds == {int}:
-        return values
-    if kinds <= {int, float}:
-        return [None if value is None else float(value) for value in values]
-    if kinds == {list} and all(isinstance(x, int | float) for value in values for x in value or ()):
-        return [None if value is None else [float(x) for x in value] for value in values]
-    return [None if value is None else _text(value) for value in values]
-
-
-def _text(value: Any) -> str:
-    """Return a value as text that a file can hold: stray surrogates are escaped."""
-    text = value if isinstance(value, str) else json.dumps(as_plain(value))
-    return text.encode("utf-8", errors="backslashreplace").decode()
+def _column(arrow: Any, values: Sequence[Any]) -> Any:
+    """Return a column of numbers, of lists of numbers, or else of texts, whose stray surrogates are escaped."""
+    try:
+        column = arrow.array(values)
+    except (arrow.ArrowException, OverflowError, UnicodeError):
+        column = None
+    if column is not None and not arrow.types.is_nested(getattr(column.type, "value_type", column.type)):
+        return column
+    texts = (x if isinstance(x, str) or x is None else json.dumps(as_plain(x)) for x in values)
+    return arrow.array([x if x is None else x.encode("utf-8", "backslashreplace").decode() for x in texts])
