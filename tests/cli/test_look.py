@@ -21,10 +21,10 @@ from tiny_project import Evoclaims, Project
 from evoclaims.cli.episodes import run_again
 from evoclaims.cli.stored import load
 from evoclaims.core.canonical import content_hash
+from evoclaims.core.drawing import optional
 from evoclaims.envs.ecorobot import physics
 from evoclaims.envs.ecorobot.physics import Body
 from evoclaims.envs.ecorobot.scene import Places, Scene
-from evoclaims.networks.export import optional
 from evoclaims.paper.config import load_config, load_reproduction
 from evoclaims.trials.store import Store
 

@@ -10,7 +10,7 @@ import pytest
 import tiny_project
 from tiny_project import Evoclaims, Project
 
-from evoclaims.networks.export import optional
+from evoclaims.core.drawing import optional
 from evoclaims.trials.store import Store
 
 # What the command imports late: pytester forgets the modules that a test has imported, and would load them twice.
@@ -121,7 +121,7 @@ def test_a_project_without_figures_says_so(project: Project, evoclaims: Evoclaim
 
 
 def test_without_matplotlib_it_is_said_how_to_install_it(evoclaims: Evoclaims, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    monkeypatch.setitem(sys.modules, "matplotlib.style", None)
     status, _, err = evoclaims("reproduce", "fig1")
     assert status == 2
     assert 'pip install "evoclaims[pictures]"' in err

@@ -141,11 +141,11 @@ def test_a_network_without_connections_or_with_weights_of_0_is_drawn(edges: dict
 
 def test_another_format_is_told_with_the_known_ones() -> None:
     with pytest.raises(UserError, match="no format of a picture named 'svgg'. Did you mean 'svg'"):
-        draw([], "a title", "svgg")  # type: ignore[arg-type]
+        draw([network_panel(SMALL, SEVERAL, "a network")], "a title", "svgg")  # type: ignore[arg-type]
 
 
 def test_a_picture_without_matplotlib_says_how_to_install_it(monkeypatch: pytest.MonkeyPatch) -> None:
     panel = network_panel(SMALL, SEVERAL, "a network")
-    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    monkeypatch.setitem(sys.modules, "matplotlib.style", None)
     with pytest.raises(UserError, match=r'matplotlib is not installed.*pip install "evoclaims\[pictures\]"'):
         draw([panel], "a title", "svg")

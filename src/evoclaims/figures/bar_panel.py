@@ -6,13 +6,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
+from evoclaims.core.drawing import optional
 from evoclaims.figures import brackets
 from evoclaims.figures.brackets import Comparison
 from evoclaims.figures.readings import NOT_RUN, MeasureOf, Readings
 from evoclaims.figures.reported import Reported
 from evoclaims.figures.sheet import Row, measured
 from evoclaims.figures.style import FAINT, INK, SMALL, TEXT, lighter
-from evoclaims.networks.export import optional
 
 GAP: Final = 0.7
 """Room between groups of bars, in slots."""

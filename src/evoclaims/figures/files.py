@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import io
-from typing import Any
-
+from evoclaims.core.drawing import Format, saved
 from evoclaims.figures.figure import Drawing
 from evoclaims.figures.style import plain
 
@@ -13,12 +11,12 @@ DOTS_PER_INCH = 220
 
 def svg(drawing: Drawing) -> str:
     """Return the drawing as the text of an SVG file; words in it are text, and escaped."""
-    return _saved(drawing, "svg", {"Date": None, "Title": drawing.title}).decode()
+    return _picture(drawing, "svg").decode()
 
 
 def png(drawing: Drawing) -> bytes:
     """Return the drawing as a PNG file's contents, on white."""
-    return _saved(drawing, "png", {"Software": None, "Title": drawing.title})
+    return _picture(drawing, "png")
 
 
 def csv(drawing: Drawing) -> str:
@@ -32,9 +30,7 @@ def contents(drawing: Drawing) -> dict[str, bytes]:
     return {"png": png(drawing), "svg": svg(drawing).encode(), "csv": csv(drawing).encode()}
 
 
-def _saved(drawing: Drawing, file_format: str, metadata: dict[str, Any]) -> bytes:
+def _picture(drawing: Drawing, file_format: Format) -> bytes:
     """Return the contents of a picture's file."""
-    file = io.BytesIO()
     with plain():
-        drawing.figure.savefig(file, format=file_format, metadata=metadata, dpi=DOTS_PER_INCH)
-    return file.getvalue()
+        return saved(drawing.figure, file_format, drawing.title, dpi=DOTS_PER_INCH)

@@ -1,4 +1,8 @@
-"""The page of a figure: heading, legend, rows of panels, notes; sizes in inches, so that nothing is squeezed."""
+"""The page of a figure: heading, legend, rows of panels, notes; sizes in inches, so that nothing is squeezed.
+
+Matplotlib's constrained layout shares out a page of a given height among panels, and knows no text that is broken into
+lines; here the page is as high as what stands on it.
+"""
 
 from __future__ import annotations
 
@@ -7,9 +11,9 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, Final
 
+from evoclaims.core.drawing import optional
 from evoclaims.figures.figure import Heading
 from evoclaims.figures.style import FAINT, SMALL, TEXT, TITLE
-from evoclaims.networks.export import optional
 
 LEFT, RIGHT, EDGE = 0.56, 0.1, 0.06
 LINE: Final = 1.3 / 72

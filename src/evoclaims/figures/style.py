@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
-from typing import Final
+from contextlib import AbstractContextManager
+from typing import Any, Final
 
-from evoclaims.networks.export import optional
+from evoclaims.core.drawing import own_style
 
 BLUE, SKY, GREEN, ORANGE, VERMILION, PURPLE, YELLOW = (
     "#0072b2",
@@ -23,44 +22,36 @@ TITLE, TEXT, SMALL = 8.5, 7.0, 6.5
 """Sizes of letters, pt."""
 COLUMN: Final = 3.5
 """Width of a column of a page, inches: what a figure is drawn for unless it says otherwise."""
+_SETTINGS: Final[dict[str, Any]] = {
+    "text.parse_math": False,  # a dollar sign is a dollar sign
+    "font.size": TEXT,
+    "text.color": INK,
+    "axes.edgecolor": INK,
+    "axes.labelcolor": INK,
+    "axes.linewidth": 0.6,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.titlesize": TEXT,
+    "axes.labelsize": TEXT,
+    "axes.formatter.limits": (-9, 9),
+    "xtick.labelsize": TEXT,
+    "ytick.labelsize": TEXT,
+    "xtick.major.width": 0.6,
+    "ytick.major.width": 0.6,
+    "xtick.major.size": 2.5,
+    "ytick.major.size": 2.5,
+    "legend.fontsize": TEXT,
+    "hatch.linewidth": 0.6,
+}
 
 
-@contextmanager
-def plain() -> Iterator[None]:
+def plain() -> AbstractContextManager[None]:
     """Draw, or write, in this module's style.
 
     Raises:
         UserError: when matplotlib is not installed.
     """
-    matplotlib = optional("matplotlib")
-    with matplotlib.rc_context():
-        matplotlib.rcdefaults()
-        matplotlib.rcParams.update(
-            {
-                "svg.hashsalt": "evoclaims",
-                "svg.fonttype": "none",
-                "text.parse_math": False,  # a dollar sign is a dollar sign
-                "font.size": TEXT,
-                "text.color": INK,
-                "axes.edgecolor": INK,
-                "axes.labelcolor": INK,
-                "axes.linewidth": 0.6,
-                "axes.spines.top": False,
-                "axes.spines.right": False,
-                "axes.titlesize": TEXT,
-                "axes.labelsize": TEXT,
-                "axes.formatter.limits": (-9, 9),
-                "xtick.labelsize": TEXT,
-                "ytick.labelsize": TEXT,
-                "xtick.major.width": 0.6,
-                "ytick.major.width": 0.6,
-                "xtick.major.size": 2.5,
-                "ytick.major.size": 2.5,
-                "legend.fontsize": TEXT,
-                "hatch.linewidth": 0.6,
-            }
-        )
-        yield
+    return own_style(**_SETTINGS)
 
 
 def lighter(colour: str, share: float = 0.5) -> str:

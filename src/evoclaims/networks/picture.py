@@ -2,22 +2,18 @@
 
 from __future__ import annotations
 
-import io
 import math
 from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Final, Literal, get_args
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from evoclaims.core.errors import UnknownNameError
-from evoclaims.networks.export import optional
+from evoclaims.core.drawing import Format, optional, own_style, saved
 from evoclaims.networks.graph import GraphNetwork
 from evoclaims.networks.layout import at_work, positions, substrate_graph
 from evoclaims.networks.substrate import Point, Substrate
-
-Format = Literal["svg", "png"]
 
 KINDS: Final = {"input": "#7fb3d5", "hidden": "#ffffff", "output": "#f5b041"}
 POSITIVE, NEGATIVE, INK, PALE = "#2166ac", "#b2182b", "#333333", 0.22
@@ -103,23 +99,15 @@ def draw(panels: Sequence[Panel], title: str, file_format: Format) -> bytes:
     Raises:
         UserError: for another format, or when matplotlib is not installed.
     """
-    if file_format not in get_args(Format):
-        raise UnknownNameError("format of a picture", file_format, get_args(Format))
-    matplotlib, figures = optional("matplotlib"), optional("matplotlib.figure")
-    file = io.BytesIO()
-    with matplotlib.rc_context():
-        matplotlib.rcdefaults()  # a user's own style must not change the picture
-        matplotlib.rcParams.update({"svg.hashsalt": "evoclaims", "svg.fonttype": "none"})
+    with own_style():
         width, height = sum(panel.size[0] for panel in panels), max(panel.size[1] for panel in panels)
-        figure = figures.Figure(figsize=(width, height + 1.0), dpi=130, layout="constrained")
+        figure = optional("matplotlib.figure").Figure(figsize=(width, height + 1.0), dpi=130, layout="constrained")
         axes = figure.subplots(1, len(panels), squeeze=False, width_ratios=[panel.size[0] for panel in panels])[0]
         for axis, panel in zip(axes, panels, strict=True):
             _paint(axis, panel)
         figure.suptitle(title, fontsize=12)
         _legend(figure, width)
-        stamp = {"svg": {"Date": None}, "png": {"Software": None}}
-        figure.savefig(file, format=file_format, metadata=stamp[file_format])
-    return file.getvalue()
+        return saved(figure, file_format)
 
 
 def _numbered(letter: str, count: int) -> list[str]:

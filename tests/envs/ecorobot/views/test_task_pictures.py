@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from evoclaims.core.drawing import optional
 from evoclaims.core.errors import UnknownNameError, UserError
 from evoclaims.envs.ecorobot.deceptive import DeceptiveMaze
 from evoclaims.envs.ecorobot.locomotion import Locomotion
@@ -18,7 +19,6 @@ from evoclaims.envs.ecorobot.robots import ANT
 from evoclaims.envs.ecorobot.stones import STONES, SteppingStones
 from evoclaims.envs.ecorobot.views.painting import PATHS, STONE, TARGET, WALL, paint_ground, paint_paths
 from evoclaims.envs.ecorobot.views.pictures import draw, draw_elites
-from evoclaims.networks.export import optional
 
 MAZE = SteppingStones()
 PATH = np.stack([np.linspace(-3.0, 2.0, 30), np.linspace(1.0, 1.5, 30), np.full(30, 0.2)], axis=1)

@@ -9,6 +9,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from evoclaims.core.drawing import optional, own_style
 from evoclaims.envs.ecorobot.robot_task import RobotTask
 from evoclaims.envs.ecorobot.views.motion import Motion
 from evoclaims.envs.ecorobot.views.painting import (
@@ -22,8 +23,6 @@ from evoclaims.envs.ecorobot.views.painting import (
     paint_robot,
     plane_of,
 )
-from evoclaims.envs.ecorobot.views.pictures import plain
-from evoclaims.networks.export import optional
 
 MOST_FRAMES: Final = 160
 """Of longer episodes, frames are left out: a file must stay small."""
@@ -47,7 +46,7 @@ def film(task: RobotTask, motion: Motion, title: str) -> bytes:
     """
     shown, plane = motion.every(math.ceil(motion.frames / MOST_FRAMES)), plane_of(task)
     images = optional("PIL.Image")
-    with plain():
+    with own_style():
         figure, axis = _stage(task, shown, plane)
         figure.suptitle(textwrap.fill(title, int(LETTERS * SIZES[plane][0])), fontsize=9)
         (path,) = axis.plot([], [], color=PATHS[0], linewidth=1.2, zorder=3)

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import io
 import math
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
-from typing import Any, Final, get_args
+from collections.abc import Sequence
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from evoclaims.core.errors import UnknownNameError, UserError
+from evoclaims.core.drawing import optional, own_style, saved
+from evoclaims.core.errors import UserError
 from evoclaims.envs.ecorobot.maze import Maze
 from evoclaims.envs.ecorobot.robot_task import RobotTask
 from evoclaims.envs.ecorobot.views.marks import Mark, marks
@@ -32,8 +31,6 @@ from evoclaims.envs.ecorobot.views.painting import (
     paint_robot,
     plane_of,
 )
-from evoclaims.networks.export import optional
-from evoclaims.networks.picture import Format
 
 ROW: Final = 15.0
 """About how much of a course one row shows, m."""
@@ -57,9 +54,9 @@ def draw(task: RobotTask, paths: Sequence[NDArray[np.floating]], title: str, fil
         UserError: for another format, or when matplotlib is not installed.
     """
     seen = [path[np.isfinite(path).all(axis=1)] for path in paths]
-    with plain():
+    with own_style():
         figure = _course(task, seen, title) if plane_of(task) == FROM_THE_SIDE else _ground(task, seen, title)[0]
-        return _saved(figure, file_format)
+        return saved(figure, file_format, bbox_inches="tight", pad_inches=0.12)
 
 
 def draw_elites(task: RobotTask, fitnesses: NDArray[np.floating], title: str, file_format: str) -> bytes:
@@ -79,22 +76,12 @@ def draw_elites(task: RobotTask, fitnesses: NDArray[np.floating], title: str, fi
     filled = np.isfinite(fitnesses)
     ground = task.reachable(fitnesses.shape)
     counts = f"{filled.sum():,} elites; {(filled & ground).sum():,} of {ground.sum():,} reachable cells hold one"
-    with plain():
+    with own_style():
         figure, axis = _ground(task, [], f"{title}\n{counts}")
         edges = [np.linspace(low, high, n + 1) for (low, high), n in zip(task.area, fitnesses.shape, strict=True)]
         mesh = axis.pcolormesh(*edges, np.ma.masked_where(~filled, fitnesses).T, cmap="viridis", zorder=0.5)
         figure.colorbar(mesh, ax=axis, pad=0.02, label="fitness of the elite whose episode ended here")
-        return _saved(figure, file_format)
-
-
-@contextmanager
-def plain() -> Iterator[None]:
-    """Draw in matplotlib's own style: a user's must not change the picture."""
-    matplotlib = optional("matplotlib")
-    with matplotlib.rc_context():
-        matplotlib.rcdefaults()
-        matplotlib.rcParams.update({"svg.hashsalt": "evoclaims", "svg.fonttype": "none"})
-        yield
+        return saved(figure, file_format, bbox_inches="tight", pad_inches=0.12)
 
 
 def _ground(task: RobotTask, paths: Sequence[TorsoPath], title: str) -> tuple[Any, Any]:
@@ -162,13 +149,3 @@ def _legend(figure: Any, task: RobotTask, paths: int, columns: int) -> None:
         handles.append(lines.Line2D([], [], color=PATHS[0], marker="s", ms=4.5, mec="white", label=text))
     style = {"fontsize": 8, "frameon": False, "labelspacing": 0.8}
     figure.legend(handles=handles, loc="outside lower center", ncols=columns, **style)
-
-
-def _saved(figure: Any, file_format: str) -> bytes:
-    """Return the file's contents, without its date."""
-    if file_format not in get_args(Format):
-        raise UnknownNameError("format of a picture", file_format, get_args(Format))
-    file = io.BytesIO()
-    metadata = {"svg": {"Date": None}, "png": {"Software": None}}[file_format]
-    figure.savefig(file, format=file_format, metadata=metadata, bbox_inches="tight", pad_inches=0.12)
-    return file.getvalue()

@@ -1,0 +1,48 @@
+"""Drawing with matplotlib, which is an extra: imported when asked for, in one style, and saved as the same bytes."""
+
+from __future__ import annotations
+
+import importlib
+import io
+from contextlib import AbstractContextManager
+from typing import Any, Literal, get_args
+
+from evoclaims.core.errors import UnknownNameError, UserError
+
+Format = Literal["svg", "png"]
+
+
+def optional(module: str) -> Any:
+    """Import a module of the extra `pictures`; a `UserError` tells how to install it."""
+    try:
+        return importlib.import_module(module)
+    except ImportError as error:
+        raise UserError(
+            f"{module.partition('.')[0]} is not installed, which pictures and graphs of networks need: "
+            'pip install "evoclaims[pictures]".'
+        ) from error
+
+
+def own_style(**settings: Any) -> AbstractContextManager[None]:
+    """Draw, or save, with matplotlib's defaults and these settings, whatever a user's own style is.
+
+    Raises:
+        UserError: when matplotlib is not installed.
+    """
+    settings = {"svg.hashsalt": "evoclaims", "svg.fonttype": "none", **settings}
+    style: AbstractContextManager[None] = optional("matplotlib.style").context(settings, after_reset=True)
+    return style
+
+
+def saved(figure: Any, file_format: str, title: str | None = None, **options: Any) -> bytes:
+    """Return the contents of a picture's file, without its date; `options` go to matplotlib's `savefig`.
+
+    Raises:
+        UnknownNameError: for a format that is no `Format`.
+    """
+    if file_format not in get_args(Format):
+        raise UnknownNameError("format of a picture", file_format, get_args(Format))
+    file, unsaid = io.BytesIO(), {"svg": "Date", "png": "Software"}[file_format]
+    metadata = {unsaid: None, **({"Title": title} if title else {})}
+    figure.savefig(file, format=file_format, metadata=metadata, **options)
+    return file.getvalue()
