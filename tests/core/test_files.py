@@ -51,8 +51,8 @@ def test_a_failing_disk_leaves_the_old_file_and_no_leftovers(
     path = tmp_path / "file"
     write_atomically(path, b"old")
     monkeypatch.setattr(os, call, _raising(fault))
-    with pytest.raises(UserError, match=rf"^Cannot write .*file: {fault.strerror}\. Free some space or .*--storage"):
-        write_atomically(path, b"new")
+    with pytest.raises(UserError, match=rf"^Cannot write .*file: {fault.strerror}\. Buy a larger one\.$"):
+        write_atomically(path, b"new", "Buy a larger one.")
     monkeypatch.undo()
     assert path.read_bytes() == b"old"
     assert list(tmp_path.iterdir()) == [path]

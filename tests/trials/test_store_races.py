@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from evoclaims.trials import first_writer
+from evoclaims.core.files import write_once
 from evoclaims.trials import store as stores
 from evoclaims.trials.integrity import verify
 from evoclaims.trials.result import TrialResult
@@ -27,15 +27,15 @@ ORDERS = sorted({"".join(order) for order in permutations("AABB")})
 def _interleaved(monkeypatch: pytest.MonkeyPatch, order: str, puts: dict[str, Callable[[], str]]) -> dict[str, str]:
     """Run two puts in threads that take their steps in this order, both after neither has found a record."""
     looked, turn, turns = threading.Barrier(2), threading.Condition(), list(order)
-    write_once, arrived = stores.write_once, threading.local()
+    arrived = threading.local()
 
-    def in_turn(path: Path, data: bytes) -> bool:
+    def in_turn(path: Path, data: bytes, advice: str) -> bool:
         if not hasattr(arrived, "name"):
             arrived.name = threading.current_thread().name[-1]
             looked.wait(60)
         with turn:
             assert turn.wait_for(lambda: turns[0] == arrived.name, 60)
-            wrote = write_once(path, data)
+            wrote = write_once(path, data, advice)
             del turns[0]
             turn.notify_all()
         return wrote
@@ -154,8 +154,8 @@ def file_system(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch)
 
 def test_a_file_written_once_stays_as_the_first_has_written_it(tmp_path: Path, file_system: str) -> None:
     path = tmp_path / "folder" / "file"
-    assert first_writer.write_once(path, b"first") is True
-    assert first_writer.write_once(path, b"second") is False
+    assert write_once(path, b"first") is True
+    assert write_once(path, b"second") is False
     assert path.read_bytes() == b"first"
     assert list(path.parent.iterdir()) == [path]
 
@@ -165,7 +165,7 @@ def test_of_many_writers_at_once_exactly_one_writes(tmp_path: Path) -> None:
 
     def write(number: int) -> bool:
         start.wait(60)
-        return first_writer.write_once(tmp_path / "file", bytes([number]))
+        return write_once(tmp_path / "file", bytes([number]))
 
     with ThreadPoolExecutor(8) as pool:
         wrote = list(pool.map(write, range(8)))

@@ -77,8 +77,4 @@ def write(path: Path, data: bytes, name: str = "file") -> None:
     """
     if path.is_dir():
         raise UserError(f"{path} is a folder; name a file in it with --out.")
-    try:
-        write_atomically(path, data)
-    except UserError as error:
-        reason = getattr(error.__cause__, "strerror", None) or error.__cause__
-        raise UserError(f"Cannot write {path}: {reason}. Name another {name} with --out.") from error
+    write_atomically(path, data, f"Name another {name} with --out.")

@@ -7,9 +7,13 @@ import errno
 import os
 import secrets
 import stat
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Final
 
 from evoclaims.core.errors import UserError
+
+ADVICE: Final = "Free some space or name another folder."
 
 
 def read_file(path: Path) -> bytes:
@@ -30,12 +34,42 @@ def read_file(path: Path) -> bytes:
         return file.read()
 
 
-def write_atomically(path: Path, data: bytes) -> None:
+def write_atomically(path: Path, data: bytes, advice: str = ADVICE) -> None:
     """Write `data` to `path` so that a reader, or a kill at any moment, sees the old file or the new one.
+
+    Args:
+        path: of the file; folders on the way are made.
+        data: all that it will hold.
+        advice: a sentence for the user whose disk does not take it.
 
     Raises:
         UserError: when the folder cannot be written or the disk is full.
     """
+    with _aside(path, data, advice) as aside:
+        os.replace(aside, path)
+
+
+def write_once(path: Path, data: bytes, advice: str = ADVICE) -> bool:
+    """Do the same unless something lies at `path` already; return whether this call wrote it.
+
+    Of processes that write at the same time exactly one does. On a file system without hard links the moment between
+    looking and writing stays open.
+    """
+    if os.path.lexists(path):
+        return False
+    with _aside(path, data, advice) as aside:
+        try:
+            os.link(aside, path)
+        except OSError:
+            if os.path.lexists(path):
+                return False
+            os.replace(aside, path)
+    return True
+
+
+@contextlib.contextmanager
+def _aside(path: Path, data: bytes, advice: str) -> Iterator[Path]:
+    """Give a new file beside `path` that holds `data` on disk; it goes with the block unless it was renamed."""
     aside = path.with_name(f".{path.name}.{os.getpid()}.{secrets.token_hex(4)}.tmp")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -43,11 +77,9 @@ def write_atomically(path: Path, data: bytes) -> None:
             file.write(data)
             file.flush()
             os.fsync(file.fileno())
-        os.replace(aside, path)
+        yield aside
     except OSError as error:
+        raise UserError(f"Cannot write {path}: {error.strerror or error}. {advice}") from error
+    finally:
         with contextlib.suppress(OSError):  # a read-only disk refuses this too
             aside.unlink()
-        raise UserError(
-            f"Cannot write {path}: {error.strerror or error}. Free some space or name another folder "
-            "with --claims-storage (pytest) or --storage (evoclaims)."
-        ) from error

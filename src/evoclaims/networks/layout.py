@@ -1,7 +1,7 @@
 """Where the nodes of a network lie in a picture, and which of them are at work.
 
-Graphs are `networkx.DiGraph`s without cycles, whose nodes have a `kind` ("input", "output", "hidden"). Of networkx's own
-layouts, those in columns hide nodes behind connections that pass by, and its springs keep to no columns.
+Graphs are `networkx.DiGraph`s without cycles, whose nodes have a `kind` ("input", "output", "hidden"). Of networkx's
+own layouts, those in columns hide nodes behind connections that pass by, and its springs keep to no columns.
 """
 
 from __future__ import annotations

@@ -197,13 +197,8 @@ class Summary:
         claims = [report.to_json() for report in self.reports]
         plain = {"schema": 1, "claims": claims, "drift": drift, "upgrade": upgrade}
         path = Path(self._config.invocation_params.dir) / name
-        try:
-            write_atomically(path, (json.dumps(plain, indent=1, sort_keys=True) + "\n").encode())
-        except UserError as error:  # its advice is about the store
-            reason = getattr(error.__cause__, "strerror", None) or error.__cause__
-            raise UserError(
-                f"Cannot write the verdicts to {path}: {reason}. Name a file that can be written with --claims-json."
-            ) from error
+        text = json.dumps(plain, indent=1, sort_keys=True) + "\n"
+        write_atomically(path, text.encode(), "Name a file that can be written with --claims-json.")
 
     def _write_step_summary(self, notes: Sequence[str]) -> str:
         """Append the verdicts to the page that GitHub shows of a step; return why it cannot be written, if it cannot.

@@ -21,14 +21,13 @@ from typing import Any, Literal
 from numpy.typing import NDArray
 
 from evoclaims.core.errors import UserError
-from evoclaims.core.files import read_file, write_atomically
+from evoclaims.core.files import read_file, write_atomically, write_once
 from evoclaims.core.packages import Versions, agree, depends_on, recorded
 from evoclaims.trials.arrays import pack, unpack
-from evoclaims.trials.first_writer import write_once
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.result_codec import RecordError, dump, parse
 from evoclaims.trials.store_files import StoreFiles, record_id
-from evoclaims.trials.store_mark import check_store, mark
+from evoclaims.trials.store_mark import ADVICE, check_store, mark
 from evoclaims.trials.time_limit import time_allowed
 
 Put = Literal["stored", "present", "differs"]
@@ -77,16 +76,10 @@ class Store(StoreFiles):
             UserError: when the folder is no store, cannot be written, or the disk is full.
         """
         self.check()
+        mark(self.root)
         probe = self.root / f".writable.{os.getpid()}.tmp"
-        try:
-            mark(self.root)
-            write_atomically(probe, bytes(4096))
-            probe.unlink(missing_ok=True)
-        except OSError as error:
-            raise UserError(
-                f"Cannot write to the trial store {self.root}: {error.strerror or error}. Name another "
-                "folder with --claims-storage (pytest) or --storage (evoclaims)."
-            ) from error
+        write_atomically(probe, bytes(4096), ADVICE)
+        probe.unlink(missing_ok=True)
 
     def made_with(self, trial_id: str, versions: Versions) -> TrialResult | None:
         """Return the record that was made with these versions, or None when there is none.
@@ -206,13 +199,13 @@ class Store(StoreFiles):
         if packed:
             self._write_champion(sealed, packed)
         path = self.home(result)
-        if present is None and write_once(path, record):
+        if present is None and write_once(path, record, ADVICE):
             return "stored"
         first = self._present(result)
         if present is None and first is not None:  # another process was faster
             self._remove_champion_beside(first, sealed)
             return self.put(result, champion)
-        write_atomically(path, record)
+        write_atomically(path, record, ADVICE)
         return "stored"
 
     def forget_timeouts(self, trial_ids: Iterable[str], versions: Versions) -> None:
@@ -235,8 +228,8 @@ class Store(StoreFiles):
     def _write_champion(self, sealed: TrialResult, packed: bytes) -> None:
         """Write a champion to its usual place, or beside it where another one lies there."""
         usual = self.champion_path(sealed.id)
-        if not write_once(usual, packed) and _sha256(usual) != sealed.champion:
-            write_atomically(self.spare_champion_path(sealed.id, sealed.champion), packed)
+        if not write_once(usual, packed, ADVICE) and _sha256(usual) != sealed.champion:
+            write_atomically(self.spare_champion_path(sealed.id, sealed.champion), packed, ADVICE)
 
     def _remove_champion_beside(self, first: TrialResult, sealed: TrialResult) -> None:
         """Remove the champion of a trial that another process has stored first with another champion."""

@@ -9,8 +9,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from evoclaims.core.errors import UserError
-from evoclaims.core.files import read_file
-from evoclaims.trials.first_writer import write_once
+from evoclaims.core.files import read_file, write_once
 
 MARK: Final = "store.json"
 SCHEMA: Final = 1
@@ -25,6 +24,10 @@ _FOLDERS: Final = {
     "quarantine": r".+",
 }
 """Folders of a store made before there was a mark, and what the names in them look like."""
+
+ELSEWHERE: Final = "name another folder with --claims-storage (pytest) or --storage (evoclaims)."
+"""The end of what a user is told whose store cannot be used."""
+ADVICE: Final = f"Free some space or {ELSEWHERE}"
 
 _OTHER: Final = "Name the folder of a store with --storage (evoclaims) or --claims-storage (pytest)"
 
@@ -45,10 +48,7 @@ def check_store(root: Path) -> None:
     except NotADirectoryError as error:
         if not os.path.exists(root):  # a folder on the way to it is a file: it is not there
             return
-        raise UserError(
-            f"The trial store {root} is a file, not a folder: name another with --claims-storage (pytest) or "
-            "--storage (evoclaims)."
-        ) from error
+        raise UserError(f"The trial store {root} is a file, not a folder: {ELSEWHERE}") from error
     except OSError as error:
         raise UserError(f"The trial store {root} cannot be read: {error.strerror or error}. {_OTHER}.") from error
     if MARK in names:
@@ -74,9 +74,9 @@ def mark(root: Path) -> None:
         return
     begins = not any((root / name).exists() for name in _FOLDERS)
     text = json.dumps({"program": PROGRAM, "schema": SCHEMA, "content": "trials of claims; see `evoclaims --help`"})
-    write_once(root / MARK, f"{text}\n".encode())
+    write_once(root / MARK, f"{text}\n".encode(), ADVICE)
     if begins:
-        write_once(root / ".gitignore", b"*\n")
+        write_once(root / ".gitignore", b"*\n", ADVICE)
 
 
 def _check_mark(path: Path) -> None:
