@@ -9,7 +9,6 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from evoclaims.core.errors import UserError
 from evoclaims.envs.base import Episode, PolicyFn
 from evoclaims.envs.probes import CONSTANT, COPY, CURRICULUM, DELAYED, PROBES, SURVIVAL, Probe
 
@@ -148,8 +147,3 @@ def test_the_examination_is_what_episodes_pay_on_average(name: str, policy: Poli
     assert float(_examine(probe, policy, probe.levels - 1).fitness) == pytest.approx(np.mean(list(returns.values())))
     trained = probe.episode(policy, jax.random.key(1), level)
     assert float(trained.fitness) == float(_examine(probe, policy, probe.levels - 1).fitness)
-
-
-def test_an_unknown_probe_lists_the_known_ones() -> None:
-    with pytest.raises(UserError, match=r"no probe named 'probe_copi'\. Did you mean 'probe_copy'\? Known: probe_con"):
-        PROBES["probe_copi"]

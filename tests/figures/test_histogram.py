@@ -8,13 +8,13 @@ from typing import Any
 import pytest
 from small_paper import ONE, OTHER, collisions, told, words
 
-from evoclaims.figures.histogram import Histogram, Mark, Subject
+from evoclaims.figures.histogram import Histogram, HistogramPanel, Threshold
 
 HISTOGRAM = Histogram(
-    (Subject("first", ONE, "small"), Subject("second", OTHER, "small")),
+    (HistogramPanel("first", ONE, "small"), HistogramPanel("second", OTHER, "small")),
     lambda trials: trials.reward,
     "reward",
-    Mark(8.0, "good"),
+    Threshold(8.0, "good"),
     ("A remark.",),
 )
 

@@ -16,13 +16,8 @@ class UserError(Exception):
         super().__init__(shown(message))
 
 
-class UnknownNameError(UserError, KeyError):
-    """A name that nothing is registered under; the message lists the known names.
-
-    It is a `KeyError` too, so that a registry keeps what a mapping promises (`get` with a default).
-    """
-
-    __str__ = Exception.__str__  # a KeyError would show the sentence in quotation marks
+class UnknownNameError(UserError):
+    """A name that nothing is known under; the message lists the known names."""
 
     def __init__(self, kind: str, name: object, known: Iterable[str]) -> None:
         """Build the sentence for `kind` (such as "method"), the wrong `name` and the `known` ones."""

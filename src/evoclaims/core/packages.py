@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
-import functools
-import importlib.metadata
 from collections.abc import Iterator, Mapping
 from typing import Any, Final
 
 from evoclaims.core.canonical import content_hash
 from evoclaims.core.errors import UserError
-from evoclaims.core.provenance import PACKAGES
+from evoclaims.core.provenance import PACKAGES, version_of
 
 Versions = Mapping[str, str | None]
 """Versions of packages by name; None where one is not installed."""
@@ -68,16 +66,7 @@ def _parts(component: Any) -> Iterator[Any]:
 
 def installed(packages: tuple[str, ...]) -> dict[str, str | None]:
     """Return the versions of packages in this process's environment."""
-    return {name: _installed(name) for name in packages}
-
-
-@functools.cache
-def _installed(package: str) -> str | None:
-    """Return a package's version; cached because what is imported does not change under a running process."""
-    try:
-        return importlib.metadata.version(package)
-    except importlib.metadata.PackageNotFoundError:
-        return None
+    return {name: version_of(name) for name in packages}
 
 
 def recorded(provenance: Mapping[str, Any], packages: tuple[str, ...]) -> dict[str, str | None]:

@@ -9,7 +9,7 @@ import os
 import platform
 import re
 import subprocess
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
@@ -63,7 +63,7 @@ def _collected() -> dict[str, Any]:
         "git": git_state(),
         "versions": versions(),
         "cuda": cuda_versions(),
-        "device": _device(),
+        "device": device_of(jax.devices()),
         "machine": machine_class(),
         "xla_flags": os.environ.get("XLA_FLAGS"),
         "matmul_precision": None if precision is None else str(precision),
@@ -120,7 +120,7 @@ def _git(*arguments: str) -> str | None:
 
 def versions() -> dict[str, str | None]:
     """Return the installed version of every package that can change a result (None where absent), and Python's."""
-    return {"python": platform.python_version(), **{name: _version(name) for name in PACKAGES}}
+    return {"python": platform.python_version(), **{name: version_of(name) for name in PACKAGES}}
 
 
 def cuda_versions() -> dict[str, str]:
@@ -131,19 +131,17 @@ def cuda_versions() -> dict[str, str]:
     return dict(sorted((name, version) for name, version in found if CUDA.fullmatch(name)))
 
 
-def _version(package: str) -> str | None:
-    """Return the installed version of `package`, or None."""
+@functools.cache
+def version_of(package: str) -> str | None:
+    """Return a package's version, or None; cached because what is imported does not change under a running process."""
     try:
         return importlib.metadata.version(package)
     except importlib.metadata.PackageNotFoundError:
         return None
 
 
-def _device() -> dict[str, Any]:
-    """Return platform, kind and count of JAX's default devices."""
-    import jax
-
-    devices = jax.devices()
+def device_of(devices: Sequence[Any]) -> dict[str, Any]:
+    """Return platform, kind and count of JAX's devices, which are alike."""
     return {"platform": devices[0].platform, "kind": devices[0].device_kind, "count": len(devices)}
 
 

@@ -16,7 +16,6 @@ from jaxtyping import Array, Bool, Float, Int, PRNGKeyArray
 from numpy.typing import NDArray
 
 from evoclaims.core.pytree import pytree
-from evoclaims.core.registry import Registry
 from evoclaims.envs.base import Episode, PolicyFn, TaskState, fitting, share
 
 Question = tuple[tuple[float, ...], int | None]
@@ -193,4 +192,4 @@ CURRICULUM: Final = Probe(
 )
 """Repeat the second bit (level 0), and negate it where the first is set (level 1): is a level left when solved?"""
 
-PROBES: Final = Registry("probe", {probe.name: probe for probe in (CONSTANT, COPY, DELAYED, SURVIVAL, CURRICULUM)})
+PROBES: Final = {probe.name: probe for probe in (CONSTANT, COPY, DELAYED, SURVIVAL, CURRICULUM)}

@@ -9,8 +9,8 @@ from evoclaims.figures.figure import Figure as Figure
 from evoclaims.figures.figure import Heading as Heading
 from evoclaims.figures.figure import Scope as Scope
 from evoclaims.figures.histogram import Histogram as Histogram
-from evoclaims.figures.histogram import Mark as Mark
-from evoclaims.figures.histogram import Subject as Subject
+from evoclaims.figures.histogram import HistogramPanel as HistogramPanel
+from evoclaims.figures.histogram import Threshold as Threshold
 from evoclaims.figures.listing import Block as Block
 from evoclaims.figures.listing import Listing as Listing
 from evoclaims.figures.reported import load_published as load_published

@@ -8,10 +8,10 @@ from typing import Any, Final
 
 from evoclaims.core.drawing import optional
 from evoclaims.figures import brackets
-from evoclaims.figures.brackets import Comparison
+from evoclaims.figures.brackets import PairTest
 from evoclaims.figures.readings import NOT_RUN, MeasureOf, Readings
 from evoclaims.figures.reported import Reported
-from evoclaims.figures.sheet import Row, measured
+from evoclaims.figures.sheet import PanelRow, measured
 from evoclaims.figures.style import FAINT, INK, SMALL, TEXT, lighter
 
 GAP: Final = 0.7
@@ -53,7 +53,7 @@ class Bar:
 
 
 @dataclass(frozen=True)
-class Panel:
+class BarPanel:
     """A panel of bars.
 
     Attributes:
@@ -91,9 +91,9 @@ class Filled:
 class Measured:
     """A panel with what was read, and its comparisons."""
 
-    panel: Panel
+    panel: BarPanel
     bars: tuple[Filled, ...]
-    comparisons: tuple[Comparison, ...]
+    comparisons: tuple[PairTest, ...]
 
     @property
     def shows_reported(self) -> bool:
@@ -122,12 +122,12 @@ class Layout:
     """
 
     measured: Measured
-    row: Row
+    row: PanelRow
     slots: tuple[float, ...]
     bars: tuple[float, ...]
     limits: tuple[float, float]
     bracket: float
-    brackets: tuple[tuple[Comparison, float], ...]
+    brackets: tuple[tuple[PairTest, float], ...]
     slanted: bool
 
 
@@ -157,7 +157,7 @@ def lay_out(one: Measured, width: float) -> Layout:
     names = _names(one)
     slanted = any(measured(name, TEXT) > slot * members - 0.04 for name, members, _ in names)
     under = 0.12 + (max(measured(name, TEXT) for name, *_ in names) * 0.5 + 0.1 if slanted else 0.14)
-    row = Row(
+    row = PanelRow(
         height=(limits[1] - limits[0]) / span * BASE,
         below=under + (0.16 if one.panel.xlabel else 0.0),
         above=0.24 if one.panel.title else 0.1,

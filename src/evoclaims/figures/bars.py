@@ -9,13 +9,13 @@ from functools import partial
 from typing import Any
 
 from evoclaims.figures import bar_panel, brackets, sheet
-from evoclaims.figures.bar_panel import Bar, Filled, Measured, Panel, Series
+from evoclaims.figures.bar_panel import Bar, BarPanel, Filled, Measured, Series
 from evoclaims.figures.figure import Drawing, Heading, Scope
 from evoclaims.figures.readings import MeasureOf, absences, frame, read
 from evoclaims.figures.reported import Published
 from evoclaims.figures.style import COLUMN, plain
 
-PanelOf = Callable[[Scope], Panel]
+PanelOf = Callable[[Scope], BarPanel]
 
 HOW = (
     "Bars: mean of the trials; error bars: their standard deviation; dots: trials, each seed at one place across bars."
@@ -72,14 +72,14 @@ class BarChart:
 def by_level(task: str, title: str, series: Sequence[Series], published: Published) -> PanelOf:
     """Return a panel of the success on each level of a task, one bar a method, beside the published "success"."""
 
-    def made(scope: Scope) -> Panel:
+    def made(scope: Scope) -> BarPanel:
         levels = scope.tier.condition(series[0].method, task).task.levels
         bars = tuple(
             Bar(str(k), one, task, partial(_success_at, k), published.value(task, "success", one.method, k))
             for k in range(levels)
             for one in series
         )
-        return Panel(title, bars, "success", "level", limits=(0.0, 1.0))
+        return BarPanel(title, bars, "success", "level", limits=(0.0, 1.0))
 
     return made
 
@@ -112,13 +112,13 @@ def compared(
         comparable: tiers at which the published numbers are drawn; at others they are told below.
     """
 
-    def made(scope: Scope) -> Panel:
+    def made(scope: Scope) -> BarPanel:
         bars = tuple(
             Bar(place, one, task, measure, published.value(task, quantity, one.method))
             for place, task in places.items()
             for one in series
         )
-        return Panel(title, bars, ylabel, limits=limits, beside=scope.tier_name in comparable, across=True)
+        return BarPanel(title, bars, ylabel, limits=limits, beside=scope.tier_name in comparable, across=True)
 
     return made
 
@@ -128,7 +128,7 @@ def _success_at(level: int, group: Any) -> Any:
     return group.mean_success if group.condition.task.levels == 1 else group.success.at(level)
 
 
-def _measured(scope: Scope, panel: Panel) -> Measured:
+def _measured(scope: Scope, panel: BarPanel) -> Measured:
     """Read a panel's trials, and compare them as the paper does."""
     readings = [read(scope, bar.series.method, bar.task, bar.measure) for bar in panel.bars]
     families = [*_families(bar.at for bar in panel.bars)]

@@ -20,7 +20,7 @@ EXPLAINED: Final = (
 
 
 @dataclass(frozen=True)
-class Comparison:
+class PairTest:
     """Two samples of a family of samples, compared.
 
     Attributes:
@@ -39,7 +39,7 @@ class Comparison:
     asterisks: str
 
 
-def compare(samples: Sequence[Sequence[float]], families: Sequence[Sequence[int]]) -> tuple[Comparison, ...]:
+def compare(samples: Sequence[Sequence[float]], families: Sequence[Sequence[int]]) -> tuple[PairTest, ...]:
     """Compare every pair of each family.
 
     Args:
@@ -54,7 +54,7 @@ def compare(samples: Sequence[Sequence[float]], families: Sequence[Sequence[int]
         overall = kruskal_wallis([samples[i] for i in present])
         for pair in pairwise_mann_whitney({str(i): samples[i] for i in present}):
             stars = pair.asterisks if overall < LEVEL else ""
-            found.append(Comparison(int(pair.left), int(pair.right), present, pair.p, overall, stars))
+            found.append(PairTest(int(pair.left), int(pair.right), present, pair.p, overall, stars))
     return tuple(found)
 
 

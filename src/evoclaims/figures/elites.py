@@ -72,7 +72,7 @@ class ElitesMap:
         without = [_unmapped(scope, one) for one, found in zip(self.grounds, maps, strict=True) if found is None]
         missing = (*absent, *without)
         with plain():
-            row = sheet.Row(0.0, below=0.44 + 2 * len(self.told) * LINE, right=0.6, columns=len(self.grounds))
+            row = sheet.PanelRow(0.0, below=0.44 + 2 * len(self.told) * LINE, right=0.6, columns=len(self.grounds))
             wide = row.wide(self.width)
             figure, axes = sheet.build(heading, self.width, [replace(row, height=wide)], [], [*missing, HOW])
             for axis, one, found, told in zip(axes, self.grounds, maps, read_all, strict=True):

@@ -20,7 +20,7 @@ HEIGHT: Final = 0.85
 
 
 @dataclass(frozen=True)
-class Subject:
+class HistogramPanel:
     """Whose trials a panel shows.
 
     Attributes:
@@ -35,7 +35,7 @@ class Subject:
 
 
 @dataclass(frozen=True)
-class Mark:
+class Threshold:
     """A value that the axis marks, and what it means."""
 
     value: float
@@ -55,10 +55,10 @@ class Histogram:
         width: of the figure, inches.
     """
 
-    conditions: tuple[Subject, ...]
+    conditions: tuple[HistogramPanel, ...]
     measure: MeasureOf
     xlabel: str
-    mark: Mark
+    mark: Threshold
     remarks: tuple[str, ...] = ()
     width: float = COLUMN
 
@@ -75,7 +75,7 @@ class Histogram:
         missing = absences(read_all)
         with plain():
             last = len(self.conditions) - 1
-            rows = [sheet.Row(HEIGHT, below=0.44 if i == last else 0.18) for i in range(last + 1)]
+            rows = [sheet.PanelRow(HEIGHT, below=0.44 if i == last else 0.18) for i in range(last + 1)]
             legend = [optional("matplotlib.lines").Line2D([], [], label=self.mark.label, **_LINE)]
             figure, axes = sheet.build(heading, self.width, rows, legend, [*missing, *self.remarks])
             for axis, one, readings, count in zip(axes, self.conditions, read_all, counts, strict=True):
@@ -90,7 +90,7 @@ class Histogram:
         )
         return Drawing(figure, table, self.remarks, missing, len(values), f"{heading.title} ({heading.place})")
 
-    def _paint(self, axis: Any, one: Subject, readings: Readings, edges: Any, counts: Any) -> None:
+    def _paint(self, axis: Any, one: HistogramPanel, readings: Readings, edges: Any, counts: Any) -> None:
         """Paint one panel: counts, every trial as a dot above its bin, and the mark."""
         colour = one.series.colour
         style = {"facecolor": lighter(colour), "edgecolor": colour, "linewidth": 0.7, "align": "edge"}

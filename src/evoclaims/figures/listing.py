@@ -80,7 +80,7 @@ class Listing:
             page = _Page(self.width, ["paper", *tiers])
             for block, found in zip(self.blocks, settings, strict=True):
                 page.block(block.title, found, self.published.table(block.published)["place"])
-            figure, (axis,) = sheet.build(heading, self.width, [sheet.Row(page.height, below=0.1)], [], caption)
+            figure, (axis,) = sheet.build(heading, self.width, [sheet.PanelRow(page.height, below=0.1)], [], caption)
             page.paint(axis)
         rows = [
             {"table": block.title, "setting": one.name, "paper": one.paper, **dict(zip(tiers, one.ours, strict=True))}

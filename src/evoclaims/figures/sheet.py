@@ -21,7 +21,7 @@ LINE: Final = 1.3 / 72
 
 
 @dataclass(frozen=True)
-class Row:
+class PanelRow:
     """Panels side by side.
 
     Attributes:
@@ -44,7 +44,7 @@ class Row:
 
 
 def build(
-    heading: Heading, width: float, rows: Sequence[Row], legend: Sequence[Any], notes: Sequence[str]
+    heading: Heading, width: float, rows: Sequence[PanelRow], legend: Sequence[Any], notes: Sequence[str]
 ) -> tuple[Any, list[Any]]:
     """Return a figure and the axes of its panels, row by row.
 
@@ -110,7 +110,7 @@ def wrap(text: str, width: float, size: float, *, bold: bool = False) -> list[st
     return lines
 
 
-def _frames(figure: Any, row: Row, top: float) -> list[Any]:
+def _frames(figure: Any, row: PanelRow, top: float) -> list[Any]:
     """Add a row's axes, `top` inches below the page's upper edge."""
     width, height = figure.get_size_inches()
     bottom, wide = height - top - row.above - row.height, row.wide(width)

@@ -8,7 +8,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from evoclaims.kernels.expressions import COMPARISONS, KNOWN, Expression, Number, Operation, is_known
+from evoclaims.kernels.expressions import COMPARISONS, KNOWN, Expression, Number, ScalarOperation, is_known
 from evoclaims.kernels.unsupported import Unsupported
 
 Rule = Callable[..., Number | None]
@@ -20,7 +20,7 @@ class Algebra:
 
     def __init__(self) -> None:
         """Begin without any."""
-        self._made: dict[tuple[Any, ...], Operation] = {}
+        self._made: dict[tuple[Any, ...], ScalarOperation] = {}
 
     def apply(self, name: str, *operands: Number) -> Number:
         """Return an operation on numbers of one dtype (but for the condition of "select").
@@ -48,12 +48,12 @@ class Algebra:
             return self.apply("ne", number, number.dtype.type(0))
         return self._shared("cast", (number,), dtype)
 
-    def _shared(self, name: str, operands: tuple[Number, ...], dtype: np.dtype[Any]) -> Operation:
+    def _shared(self, name: str, operands: tuple[Number, ...], dtype: np.dtype[Any]) -> ScalarOperation:
         """Return the one object for an operation on these operands."""
         keys = [(o.dtype.str, o.tobytes()) if is_known(o) else ("", id(o)) for o in operands]
         key = (name, dtype, *(sorted(keys, key=repr) if name in COMMUTATIVE else keys))
         if key not in self._made:  # it keeps its operands alive, whose ids are in the key
-            self._made[key] = Operation(dtype, name, operands)
+            self._made[key] = ScalarOperation(dtype, name, operands)
         return self._made[key]
 
 
@@ -117,7 +117,7 @@ def _check_divisor(divisor: Number) -> None:
 
 
 def _neg(algebra: Algebra, a: Number) -> Number | None:
-    return a.operands[0] if isinstance(a, Operation) and a.name == "neg" else None
+    return a.operands[0] if isinstance(a, ScalarOperation) and a.name == "neg" else None
 
 
 def _same(algebra: Algebra, a: Number, b: Number) -> Number | None:
@@ -139,7 +139,7 @@ def _or(algebra: Algebra, a: Number, b: Number) -> Number | None:
 
 
 def _not(algebra: Algebra, a: Expression) -> Number | None:
-    return a.operands[0] if isinstance(a, Operation) and a.name == "not" else None
+    return a.operands[0] if isinstance(a, ScalarOperation) and a.name == "not" else None
 
 
 def _select(algebra: Algebra, condition: Number, yes: Number, no: Number) -> Number | None:

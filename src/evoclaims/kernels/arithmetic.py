@@ -151,5 +151,5 @@ def _scan(s: Scalars, equation: Any, *operands: Numbers) -> Sequence[Numbers]:
     results = s.run(inner, [*constants, *carried])
     flat = [[n for array in arrays for n in array.flat] for arrays in (carried, start, results)]
     around = ex.loop(rounds, *flat)
-    outcomes = iter([ex.Outcome(c.dtype, around, place) for place, c in enumerate(around.carried)])
+    outcomes = iter([ex.LoopResult(c.dtype, around, place) for place, c in enumerate(around.carried)])
     return [listed([next(outcomes) for _ in x.flat], x.shape) for x in start]

@@ -35,7 +35,7 @@ class Input(Expression):
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Operation(Expression):
+class ScalarOperation(Expression):
     """A simple operation on numbers: one of `KNOWN`, or "cast"."""
 
     name: str
@@ -68,7 +68,7 @@ class Loop:
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Outcome(Expression):
+class LoopResult(Expression):
     """What the last round of a loop handed on at a place."""
 
     loop: Loop
@@ -113,9 +113,9 @@ def in_order(numbers: Iterable[Number]) -> list[Expression]:
 def _parents(expression: Expression) -> list[Expression]:
     """Return what it is made of."""
     match expression:
-        case Operation(operands=operands):
+        case ScalarOperation(operands=operands):
             return [o for o in operands if not is_known(o)]
-        case Outcome(loop=around):
+        case LoopResult(loop=around):
             return [*(s for s in around.start if not is_known(s)), *around.taken]
     return []
 

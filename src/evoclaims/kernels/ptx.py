@@ -14,9 +14,9 @@ from evoclaims.kernels.expressions import (
     Expression,
     Input,
     Loop,
+    LoopResult,
     Number,
-    Operation,
-    Outcome,
+    ScalarOperation,
     in_order,
     is_known,
 )
@@ -103,7 +103,7 @@ def check_results(results: Sequence[Numbers]) -> None:
     if len(everything) > LARGEST:
         raise Unsupported(f"its {len(everything):,} operations ({LARGEST:,} at most)")
     for operation in everything:
-        if isinstance(operation, Operation):
+        if isinstance(operation, ScalarOperation):
             kind, name = operation.operands[-1].dtype.kind, operation.name
             if name not in ("cast", *INSTRUCTIONS[kind]) and (kind, name) != ("b", "eq"):
                 raise Unsupported(f'"{name}" of {operation.operands[-1].dtype}')
@@ -118,7 +118,7 @@ def kernel(results: Sequence[Numbers], arrays: dict[int, Array], threads: int, b
         threads: how many rows there are.
         block: threads in a block.
     """
-    page = _Page()
+    page = _Assembly()
     page.write("mov.u32 %row, %ctaid.x", "mov.u32 %in_block, %tid.x", f"mad.lo.u32 %row, %row, {block}, %in_block")
     page.write(f"setp.ge.u32 %none, %row, {threads}", "@%none bra done")
     for parameter, array in arrays.items():
@@ -147,15 +147,15 @@ def _numbers(results: Sequence[Numbers]) -> list[Number]:
 def _everything(numbers: Iterable[Number]) -> list[Expression]:
     """Return these and all that they are made of, what loops make inside too."""
     order = in_order(numbers)
-    loops = {id(e.loop): e.loop for e in order if isinstance(e, Outcome)}
+    loops = {id(e.loop): e.loop for e in order if isinstance(e, LoopResult)}
     return order + [inner for loop in loops.values() for inner in _everything(loop.results)]
 
 
-class _Page:
+class _Assembly:
     """Instructions, as they are written down. Every register is written once, but for those that loops carry."""
 
     def __init__(self) -> None:
-        """Begin an empty page."""
+        """Begin without any."""
         self.lines: list[str] = []
         self.count = dict.fromkeys(TYPES, 0)
         self.labels = 0
@@ -187,12 +187,12 @@ class _Page:
             match expression:
                 case Input():
                     place = self._load(expression)
-                case Outcome():
+                case LoopResult():
                     around = expression.loop
                     if id(around) not in registers:
                         registers[id(around)] = self._repeat(around, registers)
                     place = registers[id(around)][expression.place]
-                case Operation():
+                case ScalarOperation():
                     operands = [self.operand(o, registers) for o in expression.operands]
                     place = self.register(expression.dtype)
                     self._operate(expression, place, operands)
@@ -232,7 +232,7 @@ class _Page:
             self.write(f"ld.global.{TYPES[kind]} {place}, {address}")
         return place
 
-    def _operate(self, operation: Operation, place: str, operands: list[str]) -> None:
+    def _operate(self, operation: ScalarOperation, place: str, operands: list[str]) -> None:
         """Write one operation."""
         kind = operation.operands[-1].dtype.kind
         if operation.name == "cast":

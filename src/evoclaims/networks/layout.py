@@ -61,15 +61,16 @@ def positions(graph: Any) -> dict[Hashable, Point]:
     y = np.zeros(len(nodes))
     for kind in ("input", "output"):
         these = [i for i, its_kind in enumerate(kinds) if its_kind == kind]
-        y[these] = _spread(len(these), height)
+        y[these] = height * (0.5 - (np.arange(len(these)) + 0.5) / max(len(these), 1))
     hidden = np.array([kind == "hidden" for kind in kinds])
     ends = np.array([(index[source], index[target]) for source, target in graph.edges], int).reshape(-1, 2)
+    linked = optional("networkx").to_numpy_array(graph.to_undirected(as_view=True), nodes, weight=None)
     # How far apart nodes would lie if they shared the area evenly.
     apart = max(1.2 * math.sqrt(x.max() * height / len(nodes)), 1.5 * NEAR)
     # A golden ratio's multiples start nodes of one column apart, wherever there are how many.
     y[hidden] = height * (np.arange(hidden.sum()) * 0.618034 % 1.0 - 0.5)
     for i in range(ROUNDS):
-        pull = _towards_neighbours(y, ends)
+        pull = linked @ y / np.maximum(linked.sum(axis=1), 1) - y
         push = _off_nodes(x, y, apart) + _off_connections(x, y, ends)
         step = 0.3 * (1 - i / ROUNDS)
         y = np.where(hidden, np.clip(y + step * (0.3 * pull + push), -height / 2, height / 2), y)
@@ -97,20 +98,6 @@ def substrate_graph(substrate: Substrate, weights: Sequence[NDArray[Any]]) -> tu
         for target, source in np.argwhere(np.asarray(matrix) != 0).tolist():
             graph.add_edge((layer, source), (layer + 1, target), weight=float(matrix[target, source]))
     return graph, places
-
-
-def _spread(count: int, height: float) -> NDArray[np.float64]:
-    """Return `count` heights from top to bottom, each in the middle of an equal share."""
-    return height * (0.5 - (np.arange(count) + 0.5) / max(count, 1))
-
-
-def _towards_neighbours(y: NDArray[Any], ends: NDArray[Any]) -> NDArray[Any]:
-    """Return how far each node is from the mean height of those that it is connected with."""
-    total, count = np.zeros(len(y)), np.zeros(len(y))
-    for one, other in ((ends[:, 0], ends[:, 1]), (ends[:, 1], ends[:, 0])):
-        np.add.at(total, one, y[other])
-        np.add.at(count, one, 1)
-    return np.where(count > 0, total / np.maximum(count, 1) - y, -y)
 
 
 def _off_nodes(x: NDArray[Any], y: NDArray[Any], apart: float) -> NDArray[Any]:

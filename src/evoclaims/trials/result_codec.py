@@ -14,7 +14,7 @@ from evoclaims.core.canonical import canonical_json
 from evoclaims.core.errors import UserError
 from evoclaims.core.printable import printable
 from evoclaims.trials.result import SCHEMA, TrialResult
-from evoclaims.trials.result_schema import MisfitError, Number, Vector, check
+from evoclaims.trials.result_schema import Number, SchemaError, Vector, check
 
 _HASH: Final = re.compile(r"[0-9a-f]{64}")
 _WORDS: Final = {"nan": math.nan, "inf": math.inf, "-inf": -math.inf}
@@ -59,7 +59,7 @@ def parse(data: bytes | str) -> TrialResult:
         _fail("its contents do not match its seal, so it was torn or edited")
     try:
         record = check(plain)
-    except MisfitError as error:
+    except SchemaError as error:
         _fail(str(error))
     spec = record.spec
     if type(spec.get("seed")) is not int or spec["seed"] != record.seed:

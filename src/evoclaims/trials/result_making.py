@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evoclaims.core.packages import DEPENDS_ON
-from evoclaims.core.provenance import collect
+from evoclaims.core.provenance import collect, device_of
 from evoclaims.methods.base import Method, PartlyUsed
 from evoclaims.trials.arrays import pack
 from evoclaims.trials.curriculum import NEVER
@@ -135,12 +135,11 @@ def are_finite(*arrays: NDArray[Any]) -> bool:
 def provenance(devices: Sequence[jax.Device], condition: Condition) -> dict[str, Any]:
     """Return the process's provenance, with the devices, the precision and the packages that trials really use."""
     found = collect()
-    device = {"platform": devices[0].platform, "kind": devices[0].device_kind, "count": len(devices)}
     return {
         **found,
         "versions": {**found["versions"], **condition.versions},
         DEPENDS_ON: list(condition.packages),
-        "device": device,
+        "device": device_of(devices),
         "matmul_precision": MATMUL_PRECISION,
     }
 

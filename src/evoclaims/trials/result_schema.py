@@ -82,7 +82,7 @@ class Device(Struct):
     count: int = 1
 
 
-class Revision(Struct):
+class GitState(Struct):
     """The code's state."""
 
     sha: str | None = None
@@ -99,7 +99,7 @@ class Spec(Struct):
 class Provenance(Struct):
     """Where a trial came from; records of earlier releases say less."""
 
-    git: Revision | None = None
+    git: GitState | None = None
     versions: dict[str, str | None] | None = None
     depends_on: list[str] | None = None
     cuda: dict[str, str] | None = None
@@ -110,7 +110,7 @@ class Provenance(Struct):
     x64: bool | None = None
 
 
-class MisfitError(ValueError):
+class SchemaError(ValueError):
     """A record does not fit the schema; the text is a clause that says where."""
 
 
@@ -121,7 +121,7 @@ def check(plain: dict[str, Any]) -> Record:
         plain: the record as JSON says it, with whole numbers that a float can hold.
 
     Raises:
-        MisfitError: naming the first field that is not as declared here.
+        SchemaError: naming the first field that is not as declared here.
     """
     _check_depth([plain["spec"], plain["timing"], plain["provenance"]])
     record: Record = _fitted(plain, Record, "")
@@ -132,7 +132,7 @@ def check(plain: dict[str, Any]) -> Record:
         _fitted(record.metrics, Metrics, "metrics")
         _fitted(record.levels, Levels, "levels")
     if len({len(curve) for curve in record.curves.values()}) > 1:
-        raise MisfitError("its curves are not equally long")
+        raise SchemaError("its curves are not equally long")
     return record
 
 
@@ -143,9 +143,9 @@ def _fitted(value: Any, kind: Any, name: str) -> Any:
     except ValidationError as error:
         problem, _, path = str(error).partition(" - at `$")
         place = f"{name}{path.rstrip('`')}".lstrip(".").replace("[...]", "")
-        raise MisfitError(f"its {place or 'contents'} field is not as the schema says: {problem}") from error
+        raise SchemaError(f"its {place or 'contents'} field is not as the schema says: {problem}") from error
     except UnicodeEncodeError as error:
-        raise MisfitError(f"a name in its {name} field is no text") from error
+        raise SchemaError(f"a name in its {name} field is no text") from error
 
 
 def _check_depth(level: list[Any]) -> None:
@@ -155,7 +155,7 @@ def _check_depth(level: list[Any]) -> None:
         if not tables:
             return
         level = [item for table in tables for item in table]
-    raise MisfitError(f"it is nested too deeply: more than {DEEPEST} levels")
+    raise SchemaError(f"it is nested too deeply: more than {DEEPEST} levels")
 
 
 _NESTING: Final = frozenset((dict, list))

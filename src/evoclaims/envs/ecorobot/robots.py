@@ -7,8 +7,6 @@ from dataclasses import dataclass
 from importlib import resources
 from typing import Final
 
-from evoclaims.core.registry import Registry
-
 OURS: Final = "evoclaims.envs.ecorobot:assets/"
 BRAX: Final = "brax:envs/assets/"
 
@@ -121,6 +119,4 @@ WALKER2D: Final = Robot(
     velocity_limit=10.0,
 )
 
-ROBOTS: Final = Registry(
-    "robot", {robot.name: robot for robot in (SIMPLE_ROB, ANT, HALF_CHEETAH, HOPPER, HUMANOID, WALKER2D)}
-)
+ROBOTS: Final = {robot.name: robot for robot in (SIMPLE_ROB, ANT, HALF_CHEETAH, HOPPER, HUMANOID, WALKER2D)}
