@@ -1,1 +1,1 @@
-"""Functions of small arrays as single GPU kernels: their arithmetic, number by number, a thread for each of a batch."""
+"""A compiler of functions of small arrays to single GPU kernels; README.md beside this file explains the way."""
