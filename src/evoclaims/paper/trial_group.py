@@ -17,7 +17,7 @@ Fetch = Callable[[Condition, Sequence[int]], Sequence[TrialResult]]
 
 
 class UnknownMeasureError(UnknownNameError, AttributeError):
-    """A measure that no paper has told of; an `AttributeError` too, so that attributes keep what they promise."""
+    """A misspelled measure; an `AttributeError` too, so that attributes keep what they promise (`hasattr`)."""
 
 
 @dataclass(frozen=True, eq=False)
