@@ -6,12 +6,15 @@ import math
 from typing import Any
 
 import pytest
-from hand_made_verdicts import evidence
+from hand_made_verdicts import evidence, verdict
 from laboratory import Laboratory
 
+from evoclaims.judging.assertion import Assertion
 from evoclaims.judging.sample import Sample
 from evoclaims.judging.verdict import Bound
-from evoclaims.report.evidence import Part, judged_part
+from evoclaims.report.evidence import Part, judged_parts
+from evoclaims.report.html import html
+from evoclaims.report.markdown import markdown
 
 
 @pytest.fixture
@@ -63,8 +66,23 @@ def test_numbers_stand_with_what_was_attainable(filled: Laboratory) -> None:
 def test_values_are_written_out_by_seed_up_to_fifty_trials() -> None:
     def part(n: int) -> Part:
         values = (*[0.5] * (n - 1), -math.inf)
-        return judged_part(evidence(samples=(Sample("a: x", tuple(range(n)), values, 0.5, (n - 1,), ("timeout",)),)))
+        sample = Sample("a: x", tuple(range(n)), values, 0.5, (n - 1,), ("timeout",))
+        (shown,) = judged_parts(verdict(evidence=(evidence(samples=(sample,)),), deciding=0))
+        return shown
 
     assert part(3).rows == ((0, ("0.5",)), (1, ("0.5",)), (2, ("timeout",)))
     assert len(part(50).rows) == 50
     assert part(51).rows == ()
+
+
+def test_of_several_parts_the_one_that_decided_is_marked(filled: Laboratory) -> None:
+    def both(group: Any) -> Assertion:
+        above: Assertion = group("better").mean_success > group("worse").mean_success
+        return above & group("worse").mean_success.between(0.6, 1.0)
+
+    page = filled.page(filled.judge(both))
+    assert [part.decided for part in page.sections[0].parts] == [False, True]
+    assert html(page).count('<span class="tag">decided</span>') == 1
+    assert markdown(page).count("**This part decided.**") == 1
+    alone = filled.page(filled.judge(lambda group: group("better").mean_success > group("worse").mean_success))
+    assert "decided</span>" not in html(alone)

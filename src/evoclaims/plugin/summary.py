@@ -113,13 +113,14 @@ class Summary:
 
     def _status(self) -> pytest.ExitCode:
         """Return the exit status of a run in which no test failed."""
-        if self._troubles or (self._drift is not None and self._drift[0].drifted):
-            return pytest.ExitCode.TESTS_FAILED
-        if self._upgrade is not None and self._upgrade.drifted:
-            return pytest.ExitCode.TESTS_FAILED
-        if self._regression is not None and self._regression.matched:
-            return pytest.ExitCode.TESTS_FAILED
-        if self.reports and not self._judged and self._config.getoption("claims_undecided") == "fail":
+        unjudged = self.reports and not self._judged
+        if (
+            self._troubles
+            or (self._drift and self._drift[0].drifted)
+            or (self._upgrade and self._upgrade.drifted)
+            or (self._regression and self._regression.matched)
+            or (unjudged and self._config.getoption("claims_undecided") == "fail")
+        ):
             return pytest.ExitCode.TESTS_FAILED
         if self.reports and not any(report.n for report in self.reports):
             return pytest.ExitCode.NO_TESTS_COLLECTED

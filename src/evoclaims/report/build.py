@@ -13,7 +13,7 @@ from evoclaims.paper.archive import Archive
 from evoclaims.paper.reproduction import Reproduction
 from evoclaims.report import origin, training_curves
 from evoclaims.report.champion import Draw, champion_of, network
-from evoclaims.report.evidence import Part, judged_part, unjudged_part
+from evoclaims.report.evidence import Part, judged_parts, unjudged_part
 from evoclaims.report.formatting import Anchors, clean, counted, listed, place_key, places, plural
 from evoclaims.report.model import Board, ConditionTrials, Page, PaperFigure, Section, ShownChampion
 from evoclaims.report.trial_summary import Reader, TrialSummary
@@ -164,7 +164,7 @@ class _Gathering:
 def _parts(report: ClaimReport, read: Mapping[str, Sequence[TrialSummary]]) -> tuple[Part, ...]:
     """Return the evidence; where there is none, the trials as they are."""
     if report.verdict is not None and report.verdict.evidence:
-        return tuple(map(judged_part, report.verdict.evidence))
+        return judged_parts(report.verdict)
     return tuple(unjudged_part(label, trials) for label, trials in read.items() if trials)
 
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from statistics import median
 from typing import Final
 
 from evoclaims.judging.sample import Sample
-from evoclaims.judging.verdict import Bound, Evidence, Interval, Outcome
+from evoclaims.judging.verdict import Bound, Evidence, Interval, Outcome, Verdict
 from evoclaims.report.formatting import clean, number, p_value
 from evoclaims.report.trial_summary import TrialSummary
 
@@ -60,6 +60,7 @@ class Part:
         strips: the trials.
         bounds: what the assertion compares with, on the strips' axis.
         spans: intervals on the strips' axis.
+        decided: whether it is the one of several parts that the verdict rests on.
     """
 
     describe: str
@@ -70,6 +71,7 @@ class Part:
     strips: tuple[Strip, ...]
     bounds: tuple[Bound, ...] = ()
     spans: tuple[Interval, ...] = ()
+    decided: bool = False
 
     @property
     def rows(self) -> tuple[tuple[int, tuple[str, ...]], ...]:
@@ -83,8 +85,16 @@ class Part:
         return tuple((seed, tuple(column.get(seed, "–") for column in columns)) for seed in seeds)
 
 
-def judged_part(evidence: Evidence) -> Part:
-    """Return a part of a verdict as it is shown."""
+def judged_parts(verdict: Verdict) -> tuple[Part, ...]:
+    """Return the parts of a verdict as they are shown."""
+    parts = tuple(map(_judged_part, verdict.evidence))
+    return tuple(
+        replace(part, decided=index == verdict.deciding and len(parts) > 1) for index, part in enumerate(parts)
+    )
+
+
+def _judged_part(evidence: Evidence) -> Part:
+    """Return one part as it is shown."""
     return Part(
         describe=evidence.describe,
         outcome=evidence.outcome,

@@ -96,6 +96,7 @@ def _section(section: Section, page: Page) -> Iterator[str]:
         yield "\n".join(
             f"* {literal(part.describe)}: {literal('; '.join(f'{name} {value}' for name, value in part.numbers))}"
             + (f" ({literal(part.detail)})" if part.detail else "")
+            + " **This part decided.**" * part.decided
             for part in parts
         )
     if section.protocol:
