@@ -15,6 +15,7 @@ from evoclaims.judging.verdict import Bound
 from evoclaims.report.evidence import Part, judged_parts
 from evoclaims.report.html import html
 from evoclaims.report.markdown import markdown
+from evoclaims.verdicts.claim_report import ClaimReport
 
 
 @pytest.fixture
@@ -61,6 +62,20 @@ def test_numbers_stand_with_what_was_attainable(filled: Laboratory) -> None:
     assert numbers["p for"] == "0.0011 (smallest attainable 0.0011)"
     assert (numbers["A12"], numbers["Cliff’s δ"], numbers["n a side"]) == ("1", "1", "6")
     assert (numbers["A12, 95% percentile bootstrap"], numbers["A12 margin"]) == ("1 to 1", "0.71")
+
+
+def test_of_a_refuted_part_the_p_against_it_comes_first(filled: Laboratory) -> None:
+    def names(report: ClaimReport) -> list[str]:
+        return [name for name, _ in filled.section(report).parts[0].numbers if name.startswith("p ")]
+
+    assert names(filled.judge(lambda group: group("worse").mean_success > group("better").mean_success)) == [
+        "p against",
+        "p for",
+    ]
+    assert names(filled.judge(lambda group: group("better").mean_success > group("worse").mean_success)) == [
+        "p for",
+        "p against",
+    ]
 
 
 def test_values_are_written_out_by_seed_up_to_fifty_trials() -> None:

@@ -9,7 +9,7 @@ from statistics import median
 from typing import Final
 
 from evoclaims.judging.sample import Sample
-from evoclaims.judging.verdict import Bound, Evidence, Interval, Outcome, Verdict
+from evoclaims.judging.verdict import Bound, Direction, Evidence, Interval, Outcome, Verdict
 from evoclaims.report.formatting import clean, number, p_value
 from evoclaims.report.trial_summary import TrialSummary
 
@@ -135,11 +135,13 @@ def _strip(sample: Sample) -> Strip:
 
 
 def _numbers(evidence: Evidence) -> tuple[tuple[str, str], ...]:
-    """Return what was computed, without what the kind does not have."""
-    tests = (
+    """Return what was computed, the p that decided first, without what the kind does not have."""
+    tests = [
         ("p for", evidence.p, evidence.attainable_p),
         ("p against", evidence.p_refuted, evidence.attainable_p_refuted),
-    )
+    ]
+    if evidence.direction is Direction.AGAINST:
+        tests.reverse()
     effects = (("A12", evidence.a12), ("Cliff’s δ", evidence.cliffs_delta))
     return (
         ("n a side", str(evidence.n)),
