@@ -102,6 +102,15 @@ def test_a_hostile_sentence_is_shown_as_it_is(bench: tuple[Laboratory, ClaimRepo
     assert not set(page) & set("\x00\ud800\u202e")
 
 
+def test_the_trials_of_a_claim_that_was_not_judged_have_safe_names_too(bench: tuple[Laboratory, ClaimReport]) -> None:
+    lab, report = bench
+    hostile = replace(report.sources[0], method=HOSTILE)
+    page = html(lab.page(replace(report, verdict=None, sources=(hostile,))))
+    assert "the trials at hand, not judged" in page
+    assert clean(HOSTILE) in " ".join(Parsed(page).values("aria-label"))
+    assert not set(page) & set("\x00\ud800\u202e")
+
+
 def test_hostile_provenance_and_names_of_curves_are_escaped(lab: Laboratory) -> None:
     provenance = {
         **HERE,

@@ -113,7 +113,7 @@ def unjudged_part(label: str, trials: Sequence[TrialSummary]) -> Part:
     shown = {dot.seed for dot in dots}
     apart = tuple((t.seed, _why(t)) for t in trials if t.seed not in shown)
     middle = median(dot.value for dot in dots) if dots else None
-    strip = Strip(f"{label}: mean success over levels", dots, apart, middle)
+    strip = Strip(clean(f"{label}: mean success over levels"), dots, apart, middle)
     return Part("the trials at hand, not judged", None, (), "", False, (strip,))
 
 

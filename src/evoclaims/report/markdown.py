@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from itertools import chain, repeat
 
 from evoclaims.judging.verdict import Outcome
 from evoclaims.report import table_cells
@@ -112,8 +111,8 @@ def _section(section: Section, page: Page) -> Iterator[str]:
         yield table(
             ("accepted", "verdict", "n", "p", "rules"),
             (
-                map(literal, (e.accepted, e.outcome, str(e.n), p_value(e.p), e.fingerprint[:9] + new * (e is era[0])))
-                for new, era in zip(chain([""], repeat(" (new)")), section.history, strict=False)
+                map(literal, (e.accepted, e.outcome, str(e.n), p_value(e.p), e.fingerprint[:9] + " (new)" * (e is new)))
+                for new, era in ((era[0] if index else None, era) for index, era in enumerate(section.history))
                 for e in era
             ),
         )

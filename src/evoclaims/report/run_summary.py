@@ -33,7 +33,7 @@ def _cells(report: ClaimReport) -> tuple[str, ...]:
     return (
         f"{report.name} ({report.tier})",
         f"{report.statement} ({report.where})",
-        table_cells.verdict(report),
+        table_cells.verdict_of_versions(report),
         table_cells.trials(report),
         table_cells.p(report, attainable=False),
         "" if report.outcome is Outcome.SUPPORTED and not because else f"{report.reason}{because}",

@@ -21,12 +21,13 @@ def ordered(reports: Iterable[ClaimReport]) -> list[ClaimReport]:
 
 
 def verdict(report: ClaimReport) -> str:
-    """Return the outcome, such as "✗ refuted*†".
+    """Return the outcome, such as "✗ refuted"; with an asterisk where it was looked into and accepted."""
+    return f"{report.outcome.symbol} {report.outcome}{'*' * report.as_expected}"
 
-    An asterisk stands for one that was looked into and accepted, a dagger for trials of mixed versions.
-    """
-    mixed = mixed_versions.MARK * mixed_versions.is_mixed(report)
-    return f"{report.outcome.symbol} {report.outcome}{'*' * report.as_expected}{mixed}"
+
+def verdict_of_versions(report: ClaimReport) -> str:
+    """Return the outcome with a dagger where trials are of mixed versions, which `mixed_versions.lines` tells of."""
+    return verdict(report) + mixed_versions.MARK * mixed_versions.is_mixed(report)
 
 
 def trials(report: ClaimReport) -> str:

@@ -48,7 +48,7 @@ def verdict_table(reports: Sequence[ClaimReport], width: int, colour: bool) -> s
         cells = (
             _literal(report.name),
             _literal(f"{report.statement} ({report.where})"),
-            f"[{_COLOURS[report.outcome]}]{table_cells.verdict(report)}[/]",
+            f"[{_COLOURS[report.outcome]}]{table_cells.verdict_of_versions(report)}[/]",
             table_cells.trials(report),
             table_cells.effect(report),
             table_cells.p(report),
