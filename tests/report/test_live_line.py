@@ -18,19 +18,17 @@ TRAINING = RunProgress("ppo on n_parity", "training", 3, 1, 2000, 4000, 0.75, 1,
 class Screen:
     """Where the line goes, and the time on its wall."""
 
-    def __init__(self, hasmarkup: bool, fullwidth: int = 120) -> None:
-        self.hasmarkup = hasmarkup
-        self.fullwidth = fullwidth
+    def __init__(self, columns: int | None = 120) -> None:
         self.text = ""
         self.now = 0.0
+        self.line = LiveLine(self.write, columns, lambda: self.now)
 
-    def write(self, msg: str, *, flush: bool = False) -> None:
-        self.text += msg
+    def write(self, text: str) -> None:
+        self.text += text
 
     def shown(self, *reports: RunProgress) -> str:
-        line = LiveLine(self, lambda: self.now)
         for report in reports:
-            line(report)
+            self.line(report)
         return self.text
 
 
@@ -43,30 +41,28 @@ def test_the_line_says_condition_trials_step_level_best_and_time_left() -> None:
 
 
 def test_a_terminal_shows_one_line_of_its_own_that_is_rewritten_and_wiped_at_the_end() -> None:
-    screen = Screen(hasmarkup=True)
-    line = LiveLine(screen, lambda: 0.0)
-    for report in (WAITING, TRAINING):
-        line(report)
+    screen = Screen()
+    screen.shown(WAITING, TRAINING)
     assert screen.text[0] == "\n"
     assert "\n" not in screen.text[1:]
     frames = screen.text[1:].split("\r")
     assert [frame.strip() for frame in frames] == [describe(WAITING), describe(TRAINING)]
     assert {len(frame) for frame in frames} == {119}
-    line.close()
+    screen.line.close()
     assert screen.text.endswith("\r" + " " * 119 + "\r")
 
 
 @given(st.integers(1, 200), st.text(max_size=200))
 def test_the_line_never_wraps(width: int, name: str) -> None:
-    screen = Screen(hasmarkup=True, fullwidth=width)
-    LiveLine(screen, lambda: 0.0)(replace(WAITING, condition=name.replace("\r", "")))
+    screen = Screen(width)
+    screen.shown(replace(WAITING, condition=name.replace("\r", "")))
     assert len(screen.text) - 1 == max(width - 1, 20)
 
 
 def test_closing_a_line_twice_or_before_it_opened_writes_nothing() -> None:
-    for hasmarkup in (True, False):
-        screen = Screen(hasmarkup)
-        line = LiveLine(screen, lambda: 0.0)
+    for columns in (120, None):
+        screen = Screen(columns)
+        line = screen.line
         line.close()
         assert screen.text == ""
         line(TRAINING)
@@ -77,8 +73,7 @@ def test_closing_a_line_twice_or_before_it_opened_writes_nothing() -> None:
 
 
 def test_a_log_gets_a_line_for_each_step_of_a_run_and_then_one_every_few_seconds() -> None:
-    screen = Screen(hasmarkup=False)
-    line = LiveLine(screen, lambda: screen.now)
+    screen = Screen(None)
     for now, report, lines in (
         (0.0, WAITING, 1),
         (0.0, TRAINING, 2),
@@ -89,14 +84,14 @@ def test_a_log_gets_a_line_for_each_step_of_a_run_and_then_one_every_few_seconds
         (LOG_SECONDS + 1, replace(TRAINING, condition="another"), 5),
     ):
         screen.now = now
-        line(report)
+        screen.line(report)
         assert screen.text.strip().count("\n") == lines - 1
     assert "\r" not in screen.text
     assert screen.text.endswith("\n")
 
 
 def test_a_log_begins_on_a_line_of_its_own() -> None:
-    assert Screen(hasmarkup=False).shown(WAITING, TRAINING).split("\n") == [
+    assert Screen(None).shown(WAITING, TRAINING).split("\n") == [
         "",
         f"  {describe(WAITING)}",
         f"  {describe(TRAINING)}",

@@ -9,7 +9,7 @@ import sys
 from evoclaims.claims.fetching import RunMissing
 from evoclaims.cli.project import Project, open_project
 from evoclaims.cli.stored import describe
-from evoclaims.cli.terminal import StdoutTerminal
+from evoclaims.cli.terminal import terminal
 from evoclaims.core.errors import UnknownNameError, UserError
 from evoclaims.core.printable import printable
 from evoclaims.core.raised import in_one_line
@@ -43,7 +43,7 @@ def main(options: argparse.Namespace) -> int:
     seeds = range(options.first_seed, options.first_seed + n)
     for names in chosen[:1]:  # a seed that is none is so for every condition: it is said once, and nothing is run
         _ = [TrialSpec(tier.condition(*names), seed) for seed in seeds]
-    line = LiveLine(StdoutTerminal())
+    line = LiveLine(*terminal())
     fetch = RunMissing(store, options.device, line, project.config.seconds(options.time_limit))
     fetch.check()
     failed = 0

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shutil
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from typing import Any
 
@@ -48,14 +48,7 @@ def styled() -> Any:
     return Styled(sys.stdout.stream if isinstance(sys.stdout, Plain) else sys.stdout)
 
 
-class StdoutTerminal:
-    """Standard output as the progress line wants it; rewritten in place only when a person is looking."""
-
-    def __init__(self) -> None:
-        """Look at what standard output is."""
-        self.fullwidth = shutil.get_terminal_size().columns
-        self.hasmarkup = sys.stdout.isatty()
-
-    def write(self, msg: str, *, flush: bool = False) -> None:
-        """Write text as it is."""
-        print(msg, end="", flush=flush, file=styled())
+def terminal() -> tuple[Callable[[str], None], int | None]:
+    """Return what writes the progress line, and the columns of a terminal that a person looks at; None for a log."""
+    columns = shutil.get_terminal_size().columns if sys.stdout.isatty() else None
+    return lambda text: print(text, end="", flush=True, file=styled()), columns

@@ -6,22 +6,20 @@ from dataclasses import dataclass
 from typing import Any, ClassVar, get_args
 
 import jax.numpy as jnp
-from jaxtyping import Array, Bool, Float, Int, PRNGKeyArray
+from jaxtyping import Array, Bool, Float
 
 from evoclaims.core.errors import UnknownNameError, UserError
 from evoclaims.core.foreign import implicit_promotions
 from evoclaims.envs.base import Task
-from evoclaims.methods.base import Policy, Progress
 from evoclaims.methods.hyperneat import PAPER
 from evoclaims.methods.neat.settings import Settings
-from evoclaims.methods.tensorneat import TensorneatState, begin, evolve, library, neat, policy
-from evoclaims.methods.tensorneat_genes import Genes, present
+from evoclaims.methods.tensorneat import NeatTensorneat, library, neat
 from evoclaims.networks.activations import ACTIVATIONS
 from evoclaims.networks.substrate import Extent
 
 
 @dataclass(frozen=True)
-class HyperneatTensorneat:
+class HyperneatTensorneat(NeatTensorneat):
     """TensorNEAT's HyperNEAT on a layered substrate.
 
     Attributes:
@@ -34,8 +32,6 @@ class HyperneatTensorneat:
 
     name: ClassVar[str] = "hyperneat_tensorneat"
     revision: ClassVar[int] = 1
-    packages: ClassVar[tuple[str, ...]] = ("tensorneat",)
-    optional: ClassVar[bool] = True
 
     settings: Settings = PAPER
     hidden: tuple[int, ...] = (16,)
@@ -52,28 +48,6 @@ class HyperneatTensorneat:
                 "HyperNEAT's hidden layers have at least one neuron each, its threshold lies in [0, 1) and its largest "
                 f"weight above 0; {self.hidden}, {self.threshold} and {self.max_weight} do not."
             )
-
-    def init(self, key: PRNGKeyArray, task: Task) -> TensorneatState:
-        """Draw the first population; a `UserError` says when TensorNEAT is missing or the network does not fit."""
-        return begin(key, self._algorithm(task))
-
-    def step(
-        self, key: PRNGKeyArray, task: Task, level: Int[Array, ""], state: TensorneatState
-    ) -> tuple[TensorneatState, Progress]:
-        """Run one generation; the counts it tells are the CPPNs'."""
-        return evolve(key, self._algorithm(task), self.settings.species, task, level, state)
-
-    def best(self, task: Task, state: TensorneatState) -> Policy:
-        """Return the best genome of the last population that was evaluated."""
-        return policy(self._algorithm(task), state)
-
-    def used(self, parameters: Genes) -> Any:
-        """Return the genes; NaN stands where there is none."""
-        return present(parameters)
-
-    def cost(self, task: Task) -> int:
-        """Return the environment steps of one generation, at the longest episode."""
-        return self.settings.population * task.horizon
 
     def _algorithm(self, task: Task) -> Any:
         """Build TensorNEAT's algorithm for a substrate of the task's size."""

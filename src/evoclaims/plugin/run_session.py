@@ -36,7 +36,7 @@ def make_session(config: pytest.Config) -> Session:
     from evoclaims.claims.session import Session
     from evoclaims.paper.archive import Archive
     from evoclaims.paper.config import load_config, load_reproduction
-    from evoclaims.plugin.terminal import Uncaptured
+    from evoclaims.plugin.terminal import uncaptured
     from evoclaims.report.live_line import LiveLine
     from evoclaims.trials import devices
     from evoclaims.trials.progress import ignore
@@ -44,7 +44,7 @@ def make_session(config: pytest.Config) -> Session:
 
     devices.configure()
     store = Store(_storage(config))
-    line = LiveLine(Uncaptured(config)) if config.pluginmanager.has_plugin("terminalreporter") else None
+    line = LiveLine(*uncaptured(config)) if config.pluginmanager.has_plugin("terminalreporter") else None
     project = load_config(config.rootpath)
     limit, any_version = project.seconds(config.getoption("claims_time_limit")), config.getoption("claims_any_version")
     run = RunMissing(store, config.getoption("claims_device"), line or ignore, limit, any_version)

@@ -2,23 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from contextlib import nullcontext
 from typing import Any
 
 import pytest
 
 
-class Uncaptured:
-    """The terminal behind pytest's capture, for a progress line that is seen while a claim's trials run."""
+def uncaptured(config: pytest.Config) -> tuple[Callable[[str], None], int | None]:
+    """Return what writes behind pytest's capture, for a line that is seen while trials run, and a terminal's columns.
 
-    def __init__(self, config: pytest.Config) -> None:
-        """Look at what the terminal is."""
-        self._capture: Any = config.pluginmanager.get_plugin("capturemanager")
-        self._writer = config.get_terminal_writer()
-        self.fullwidth = self._writer.fullwidth
-        self.hasmarkup = self._writer.hasmarkup
+    The columns are None where there is no terminal to rewrite a line on.
+    """
+    capture: Any = config.pluginmanager.get_plugin("capturemanager")
+    writer = config.get_terminal_writer()
 
-    def write(self, msg: str, *, flush: bool = False) -> None:
-        """Write text as it is."""
-        with self._capture.global_and_fixture_disabled() if self._capture else nullcontext():
-            self._writer.write(msg, flush=flush)
+    def write(text: str) -> None:
+        with capture.global_and_fixture_disabled() if capture else nullcontext():
+            writer.write(text, flush=True)
+
+    return write, writer.fullwidth if writer.hasmarkup else None

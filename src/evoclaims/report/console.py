@@ -1,4 +1,7 @@
-"""Tables and other rich content as text: the content's own characters steer nothing, rich's colours do."""
+"""Tables and other rich content as text: the content's own characters steer nothing, rich's colours do.
+
+Rich itself drops five control characters and lets all others through, among them the one that begins commands.
+"""
 
 from __future__ import annotations
 

@@ -1,10 +1,13 @@
-"""One line that shows how a run is getting on: rewritten in place on a terminal, now and then in a log."""
+"""One line that shows how a run is getting on: rewritten in place on a terminal, now and then in a log.
+
+Rich's live displays write nothing to a log before they end, and hide the cursor, which a killed process leaves hidden.
+"""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from typing import Final, Protocol
+from typing import Final
 
 from evoclaims.core.printable import printable
 from evoclaims.trials.progress import RunProgress
@@ -13,22 +16,15 @@ LOG_SECONDS: Final = 10.0
 """Least time between two lines of a log about the same condition."""
 
 
-class Terminal(Protocol):
-    """Where the line goes; pytest's own `TerminalWriter` is one."""
-
-    fullwidth: int
-    hasmarkup: bool
-
-    def write(self, msg: str, *, flush: bool = False) -> None:
-        """Write text as it is."""
-
-
 class LiveLine:
     """A watcher of runs that draws the progress line."""
 
-    def __init__(self, terminal: Terminal, clock: Callable[[], float] = time.monotonic) -> None:
-        """Draw on `terminal`: in place when it has markup (a terminal), else as a log."""
-        self._terminal = terminal
+    def __init__(
+        self, write: Callable[[str], None], columns: int | None, clock: Callable[[], float] = time.monotonic
+    ) -> None:
+        """Draw by `write`: in place on a terminal of so many columns, or as a log where that is None."""
+        self._write = write
+        self._width = None if columns is None else max(columns - 1, 20)
         self._clock = clock
         self._shown = ("", "")
         self._at = -LOG_SECONDS
@@ -36,25 +32,22 @@ class LiveLine:
 
     def __call__(self, progress: RunProgress) -> None:
         """Show the newest state."""
-        if self._terminal.hasmarkup:
-            width = max(self._terminal.fullwidth - 1, 20)
+        if self._width is not None:
             start = "\r" if self._open else "\n"
-            self._terminal.write(start + describe(progress)[:width].ljust(width), flush=True)
+            self._write(start + describe(progress)[: self._width].ljust(self._width))
             self._open = True
             return
         step = (progress.condition, progress.phase)
         finished = progress.trials > 0 and progress.ended == progress.trials
         if step != self._shown or finished or self._clock() - self._at >= LOG_SECONDS:
-            self._terminal.write(("" if self._open else "\n") + f"  {describe(progress)}\n", flush=True)
+            self._write(("" if self._open else "\n") + f"  {describe(progress)}\n")
             self._shown, self._at, self._open = step, self._clock(), True
 
     def close(self) -> None:
         """Leave the line, so that other output starts on a fresh one."""
-        if self._open:
-            width = max(self._terminal.fullwidth - 1, 20)
-            if self._terminal.hasmarkup:
-                self._terminal.write("\r" + " " * width + "\r", flush=True)
-            self._open = False
+        if self._open and self._width is not None:
+            self._write("\r" + " " * self._width + "\r")
+        self._open = False
 
 
 def describe(progress: RunProgress) -> str:

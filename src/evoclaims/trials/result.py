@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Literal, get_args
+from typing import Any, Literal
 
 from evoclaims.core.canonical import as_plain, content_hash
 
 Status = Literal["done", "diverged", "timeout", "crashed"]
-STATUSES: tuple[str, ...] = get_args(Status)
 COMPLETE: tuple[str, ...] = ("done", "diverged")
 """Statuses of trials that have come to their end, and whose metrics are all there."""
 SCHEMA = 1
