@@ -19,14 +19,7 @@ def static(**kwargs: Any) -> Any:
 @dataclass_transform(frozen_default=True, field_specifiers=(dataclasses.field, static))
 def pytree(cls: type[T]) -> type[T]:
     """Turn a class into a frozen dataclass registered as a jax pytree; fields made by `static()` are structure."""
-    frozen = dataclasses.dataclass(frozen=True)(cls)
-    fields = dataclasses.fields(frozen)  # type: ignore[arg-type]
-    jax.tree_util.register_dataclass(
-        frozen,
-        data_fields=[f.name for f in fields if not f.metadata.get("static")],
-        meta_fields=[f.name for f in fields if f.metadata.get("static")],
-    )
-    return frozen
+    return jax.tree_util.register_dataclass(dataclasses.dataclass(frozen=True)(cls))  # which reads the fields' metadata
 
 
 def strong(tree: T) -> T:

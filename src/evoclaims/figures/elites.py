@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from evoclaims.core.errors import UserError
 from evoclaims.envs.ecorobot.maze import Maze
-from evoclaims.envs.ecorobot.views.painting import paint_ground
+from evoclaims.envs.ecorobot.views.painting import paint_elites, paint_ground
 from evoclaims.figures import sheet
 from evoclaims.figures.figure import Drawing, Heading, Scope
 from evoclaims.figures.readings import MeasureOf, Readings, absences, frame, read
@@ -122,9 +122,7 @@ def _paint(
         box = {"facecolor": "white", "edgecolor": FAINT, "linewidth": 0.5, "boxstyle": "round,pad=0.4"}
         axis.text(0.5, 0.5, "no map of elites is stored", transform=axis.transAxes, bbox=box, **style)
     else:
-        edges = [np.linspace(*ends, count + 1) for ends, count in zip(task.area, found.fitnesses.shape, strict=True)]
-        shown = np.ma.masked_where(~np.isfinite(found.fitnesses), found.fitnesses)
-        mesh = axis.pcolormesh(*edges, shown.T, cmap="viridis", zorder=0.5)
+        mesh = paint_elites(axis, task, found.fitnesses)
         bar = axis.figure.colorbar(mesh, cax=axis.inset_axes((1.03, 0.1, 0.03, 0.8)))
         bar.outline.set_linewidth(0.5)
     lines = [line for name, readings in told for line in sheet.wrap(f"{name}: {_summary(readings)}", wide, SMALL)]

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
 
 
 @dataclass(frozen=True)
@@ -32,11 +32,8 @@ class RunProgress:
     seconds_left: float | None = None
 
 
-class Watcher(Protocol):
-    """Receives progress; must be quick and must not raise."""
-
-    def __call__(self, progress: RunProgress) -> None:
-        """Take note of one report."""
+Watcher = Callable[[RunProgress], None]
+"""Receives progress; must be quick and must not raise."""
 
 
 def ignore(progress: RunProgress) -> None:

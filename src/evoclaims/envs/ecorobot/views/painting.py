@@ -75,6 +75,13 @@ def paint_ground(axis: Any, task: RobotTask, paths: Sequence[TorsoPath]) -> None
     axis.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal", xlabel="x, m", ylabel="y, m")
 
 
+def paint_elites(axis: Any, task: Maze, fitnesses: NDArray[np.floating]) -> Any:
+    """Paint the fitness of each elite over its cell, shape [cells along x, along y], -inf for none; return the mesh."""
+    edges = [np.linspace(*ends, count + 1) for ends, count in zip(task.area, fitnesses.shape, strict=True)]
+    shown = np.ma.masked_where(~np.isfinite(fitnesses), fitnesses)
+    return axis.pcolormesh(*edges, shown.T, cmap="viridis", zorder=0.5)
+
+
 def ground_shown(task: RobotTask, paths: Sequence[TorsoPath]) -> NDArray[np.float64]:
     """Return the lowest and the highest x and y, shape [2, 2], m, between which lies all that is seen from above."""
     start = at_start(task)

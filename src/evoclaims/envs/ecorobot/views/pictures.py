@@ -26,6 +26,7 @@ from evoclaims.envs.ecorobot.views.painting import (
     ground_shown,
     mark_sign,
     paint_earth,
+    paint_elites,
     paint_ground,
     paint_paths,
     paint_robot,
@@ -78,8 +79,7 @@ def draw_elites(task: RobotTask, fitnesses: NDArray[np.floating], title: str, fi
     counts = f"{filled.sum():,} elites; {(filled & ground).sum():,} of {ground.sum():,} reachable cells hold one"
     with own_style():
         figure, axis = _ground(task, [], f"{title}\n{counts}")
-        edges = [np.linspace(low, high, n + 1) for (low, high), n in zip(task.area, fitnesses.shape, strict=True)]
-        mesh = axis.pcolormesh(*edges, np.ma.masked_where(~filled, fitnesses).T, cmap="viridis", zorder=0.5)
+        mesh = paint_elites(axis, task, fitnesses)
         figure.colorbar(mesh, ax=axis, pad=0.02, label="fitness of the elite whose episode ended here")
         return saved(figure, file_format, bbox_inches="tight", pad_inches=0.12)
 
