@@ -1,4 +1,4 @@
-"""Control flow that stays control flow when it is batched."""
+"""A switch that still runs a single branch when it is batched by `jax.vmap`."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def _apply(function: Callable[..., Any], place: int, closed_over: Sequence[Any],
 
 
 def _switch(index: Int[Array, ""], branches: Sequence[Callable[..., Any]], *operands: Any) -> Any:
-    """Do the same with branches that close over nothing traced."""
+    """Run `branches[index]`, of branches that close over no traced values, with a rule for batches."""
 
     @custom_vmap
     def choose(index: Array, *operands: Any) -> Any:

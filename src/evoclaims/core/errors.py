@@ -9,7 +9,7 @@ from evoclaims.core.printable import shown
 
 
 class UserError(Exception):
-    """Something a user can cause and mend; shown as its message alone, without a traceback, and safe to print."""
+    """An error that a user can cause and correct; shown as its message, without a traceback, and safe to print."""
 
     def __init__(self, message: object) -> None:
         """Keep a sentence, whatever the names in it hold."""

@@ -50,7 +50,7 @@ def write_atomically(path: Path, data: bytes, advice: str = ADVICE) -> None:
 
 
 def write_once(path: Path, data: bytes, advice: str = ADVICE) -> bool:
-    """Do the same unless something lies at `path` already; return whether this call wrote it.
+    """Write `data` to `path` as `write_atomically` does, unless something is there; return whether this call wrote it.
 
     Of processes that write at the same time exactly one does. On a file system without hard links the moment between
     looking and writing stays open.
@@ -69,7 +69,7 @@ def write_once(path: Path, data: bytes, advice: str = ADVICE) -> bool:
 
 @contextlib.contextmanager
 def _aside(path: Path, data: bytes, advice: str) -> Iterator[Path]:
-    """Give a new file beside `path` that holds `data` on disk; it goes with the block unless it was renamed."""
+    """Yield a temporary file beside `path` that holds `data` on disk; it is deleted after the block unless renamed."""
     aside = path.with_name(f".{path.name}.{os.getpid()}.{secrets.token_hex(4)}.tmp")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)

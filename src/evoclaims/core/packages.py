@@ -17,7 +17,7 @@ ALWAYS: Final = ("jax", "jaxlib", "numpy")
 """What computes every trial."""
 
 UNDECLARED: Final = tuple(name for name in PACKAGES if name not in ("evoclaims", *ALWAYS))
-"""What a component without a declaration may depend on. Of evoclaims itself the revisions tell, in a trial's id."""
+"""What a component without a declaration may depend on; not evoclaims itself, whose revisions are in a trial's id."""
 
 DEPENDS_ON: Final = "depends_on"
 """Name under which a trial's provenance lists the packages that its condition depends on."""
@@ -76,7 +76,7 @@ def recorded(provenance: Mapping[str, Any], packages: tuple[str, ...]) -> dict[s
 
 
 def depends_on(provenance: Mapping[str, Any]) -> tuple[str, ...] | None:
-    """Return the packages that a provenance says its trial depends on; None for one that does not say, as old ones."""
+    """Return the packages that a provenance lists as its trial's dependencies; None for old ones, which list none."""
     names = provenance.get(DEPENDS_ON)
     if not isinstance(names, list | tuple) or not all(isinstance(name, str) for name in names):
         return None
@@ -89,7 +89,7 @@ def agree(provenance: Mapping[str, Any], versions: Versions) -> bool:
 
 
 def short_hash(versions: Versions) -> str:
-    """Return what stands for versions in a file's name."""
+    """Return the hash of versions that is part of a record's file name."""
     return content_hash(dict(versions))[:SHORT_HASH]
 
 

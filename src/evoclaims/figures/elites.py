@@ -50,7 +50,7 @@ class Map(NamedTuple):
 
 @dataclass(frozen=True)
 class ElitesMap:
-    """Maps side by side, each of the first trial whose champion is stored; of all trials what their records say.
+    """Maps side by side, each of the first trial whose champion is stored; below, measures of all trials.
 
     Attributes:
         grounds: one a panel.

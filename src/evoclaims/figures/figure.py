@@ -107,7 +107,7 @@ class Figure:
     paint: Painter
 
     def draw(self, archive: Archive, reproduction: Reproduction, tier: str) -> Drawing:
-        """Draw the figure from a tier's trials; what there is none of is said on it.
+        """Draw the figure from a tier's trials; the figure itself says which trials are missing.
 
         Raises:
             UnknownNameError: for another tier.

@@ -1,4 +1,4 @@
-"""Making expressions: what is known is worked out, what is the same is shared, and what does nothing is left out."""
+"""Making expressions: constants are folded, equal expressions are shared, and operations without effect left out."""
 
 from __future__ import annotations
 
@@ -167,4 +167,4 @@ RULES: Final[dict[str, Rule]] = {
     "select": _select,
     "sub": _sub,
 }
-"""What is simpler than an operation on its operands; None for nothing."""
+"""Simplifications by operation: each returns a simpler number, or None where there is none."""

@@ -28,7 +28,7 @@ class Expression:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Input(Expression):
-    """The number at a place of an array that the function takes."""
+    """A number of one of the function's input arrays: `array` is its index, `place` the position in the flat array."""
 
     array: int
     place: int
@@ -44,7 +44,7 @@ class ScalarOperation(Expression):
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Carried(Expression):
-    """A number that a loop hands from round to round."""
+    """A number that a loop carries from one round to the next."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -69,7 +69,7 @@ class Loop:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class LoopResult(Expression):
-    """What the last round of a loop handed on at a place."""
+    """A result of a loop: the value that its last round hands on at position `place` of what it carries."""
 
     loop: Loop
     place: int

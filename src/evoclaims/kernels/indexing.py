@@ -1,4 +1,4 @@
-"""Primitives that move numbers about; which place a number comes from may itself be computed."""
+"""Primitives that index, reshape and sort; the positions that they read from may themselves be computed."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from evoclaims.kernels.interpreter import Numbers, Scalars, filled, known, liste
 from evoclaims.kernels.unsupported import Unsupported
 
 Place = tuple[int, Number, int]
-"""Along which dimension a window begins where, and the last place where it may."""
+"""A dimension, where a window begins along it, and the last position where it may begin."""
 
 
 @primitive("copy", "stop_gradient", "optimization_barrier", "pvary")

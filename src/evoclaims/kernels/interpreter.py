@@ -31,7 +31,7 @@ CALLS: Final = {
 }
 """Primitives that call a function, and the parameter that holds it."""
 COMPOUND: Final = "call_hi_primitive"
-"""What jax 0.12 stages for some functions, such as `jax.numpy.nonzero`; it says itself what it is made of."""
+"""What jax 0.12 stages for some functions, such as `jax.numpy.nonzero`; it can be lowered to simpler primitives."""
 
 
 def primitive(*names: str) -> Callable[[Any], Any]:

@@ -1,7 +1,7 @@
-"""What cannot be a kernel."""
+"""The exception for functions that cannot be compiled to one kernel."""
 
 from __future__ import annotations
 
 
 class Unsupported(Exception):  # noqa: N818  (nothing has gone wrong: the function runs as any other)
-    """The function has something that has no scalar expression here; says what."""
+    """A function uses something that kernels do not support; the message says what."""

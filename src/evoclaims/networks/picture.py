@@ -22,7 +22,7 @@ POSITIVE, NEGATIVE, INK, PALE = "#2166ac", "#b2182b", "#333333", 0.22
 
 @dataclass(frozen=True)
 class Panel:
-    """One network at its places.
+    """One network and the positions of its nodes.
 
     Attributes:
         graph: a `networkx.DiGraph` with `kind` on nodes and `weight` on edges.

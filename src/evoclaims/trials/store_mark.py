@@ -63,9 +63,9 @@ def check_store(root: Path) -> None:
 
 
 def mark(root: Path) -> None:
-    """Say in a folder's root that it is a store, and to git that it is none of its business.
+    """Mark a folder as a store, and tell git to ignore what is in it.
 
-    A store that is older than its mark keeps what git knows of it: somebody may have committed it.
+    An older store that has no mark yet gets no `.gitignore`: somebody may have committed its files.
 
     Raises:
         UserError: when the folder cannot be written or the disk is full.

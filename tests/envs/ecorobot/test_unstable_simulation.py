@@ -1,4 +1,4 @@
-"""A simulation that bursts ends its episode, and leaves no number behind that is none."""
+"""A simulation that diverges ends its episode, and leaves no number that is not finite."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ def test_numbers_beyond_mujocos_limit_are_unstable(where: str, number: float, st
     assert bool(physics.is_stable(body)) is stable
 
 
-def test_a_step_that_bursts_pays_nothing_and_ends_the_episode_where_it_was() -> None:
+def test_a_step_that_diverges_pays_nothing_and_ends_the_episode_where_it_was() -> None:
     start = TASK.reset(jax.random.key(0), jnp.asarray(0))
     fast = replace(start.inner.body, velocity=jnp.full_like(start.inner.body.velocity, 1e12))
     states = [start, replace(start, inner=replace(start.inner, body=fast))]
     step = jax.jit(TASK.step)
-    usual, burst = (step(state, jnp.ones(TASK.action_size)) for state in states)
+    usual, diverged = (step(state, jnp.ones(TASK.action_size)) for state in states)
     assert not bool(usual.terminated)
     assert float(usual.reward) != 0.0
-    assert (bool(burst.terminated), bool(burst.truncated), float(burst.reward)) == (True, False, 0.0)
-    np.testing.assert_array_equal(burst.inner.body.position, start.inner.body.position)
-    assert np.isfinite(burst.observation).all()
+    assert (bool(diverged.terminated), bool(diverged.truncated), float(diverged.reward)) == (True, False, 0.0)
+    np.testing.assert_array_equal(diverged.inner.body.position, start.inner.body.position)
+    assert np.isfinite(diverged.observation).all()

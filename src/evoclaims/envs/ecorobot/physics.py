@@ -49,7 +49,7 @@ def act(scene: Scene, body: Body, control: Float[Array, " nu"], places: Places) 
 
 
 def is_stable(body: Body) -> Bool[Array, ""]:
-    """Whether the simulation has not burst, by MuJoCo's own test of positions, velocities and accelerations.
+    """Whether the simulation has not diverged, by MuJoCo's own test of positions, velocities and accelerations.
 
     Large steps let a fast ant gain speed without end. C MuJoCo warns and puts such a robot back at the start; MJX goes
     on to numbers that are none.

@@ -212,7 +212,7 @@ class RobotTask(ABC):
     def plain_step(self, state: TaskState, action: Float[Array, " action"]) -> TaskState:
         """Act for `robot.frames` simulation steps.
 
-        A step in which the simulation bursts (`physics.is_stable`) did not happen: it pays nothing, and all ends there.
+        A step in which the simulation diverges (`physics.is_stable`) is undone: it pays nothing, and the episode ends.
         """
         outing: Outing = state.inner
         control = action
