@@ -7,13 +7,14 @@ import json
 import pkgutil
 import shutil
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from evoclaims import cli
+from evoclaims.trials.result import TrialResult
 from evoclaims.trials.store import Store
 
 FILES = {".evoclaims", "pyproject.toml", "tiny_paper.py", "claims", "__pycache__"}
@@ -206,6 +207,18 @@ def project(shared_store: Path, pytester: pytest.Pytester, monkeypatch: pytest.M
 def stored(project: Project, trials_of_both: Path) -> Store:
     """The project's own store, with the trials of the right and the wrong network."""
     return Store(Path(shutil.copytree(trials_of_both, ".evoclaims")))
+
+
+def trials_of(store: Store, method: str) -> list[TrialResult]:
+    """Return a store's trials of a method, called as the package calls it."""
+    return [trial for trial in store.results([]) if trial.spec["method"]["name"] == method]
+
+
+def forget(store: Store, trials: Iterable[TrialResult]) -> None:
+    """Remove records from a store."""
+    for trial in trials:
+        for path in store.record_files(trial.id):
+            path.unlink(missing_ok=True)
 
 
 Evoclaims = Callable[..., tuple[int, str, str]]

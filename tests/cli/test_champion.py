@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 import tiny_project
-from tiny_project import Evoclaims, Project
+from tiny_project import FILES, Evoclaims, Project, trials_of
 
 from evoclaims.core.canonical import content_hash
 from evoclaims.core.drawing import optional
@@ -71,7 +71,7 @@ def test_a_champion_is_replayed_and_equals_its_record(trained: Evoclaims, method
 
 def _result(method: str) -> TrialResult:
     """Return the stored trial of a method."""
-    (result,) = [trial for trial in Store(OWN).results([]) if trial.spec["method"]["name"] == method]
+    (result,) = trials_of(Store(OWN), method)
     return result
 
 
@@ -180,13 +180,7 @@ def test_a_users_mistake_is_one_sentence_and_status_2(
     assert (status, err.count("\n")) == (2, 1)
     assert err.startswith("evoclaims: ")
     assert text in err
-    assert {path.name for path in Path().iterdir()} <= {
-        ".evoclaims",
-        "pyproject.toml",
-        "tiny_paper.py",
-        "claims",
-        "__pycache__",
-    }
+    assert {path.name for path in Path().iterdir()} <= FILES
 
 
 def test_the_command_that_a_missing_trial_names_runs_it(evoclaims: Evoclaims) -> None:

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from tiny_project import Evoclaims, Project
+from tiny_project import Evoclaims, Project, trials_of
 
 from evoclaims.judging.verdict import Outcome
 from evoclaims.paper import references
@@ -68,14 +68,9 @@ def _spoiled(trial: TrialResult) -> TrialResult:
     return replace(trial, metrics=metrics, levels=levels, digest=new, champion="")
 
 
-def _of(method: str) -> list[TrialResult]:
-    """Return the project's trials of a method."""
-    return [trial for trial in Store(OWN).results([]) if trial.spec["method"]["name"] == method]
-
-
 def _copy(to: str, change: Callable[[TrialResult], TrialResult] = lambda trial: trial) -> None:
     """Fill a store with the changed trials of the right network."""
-    for trial in _of("hand_built"):
+    for trial in trials_of(Store(OWN), "hand_built"):
         Store(Path(to)).put(change(replace(trial, champion="")), {})
 
 
@@ -118,7 +113,7 @@ def test_a_tier_can_be_left_out_of_a_comparison(accepted: Evoclaims) -> None:
 
 def test_new_trials_that_drifted_from_the_references_are_said(evoclaims: Evoclaims) -> None:
     path = references.path_of(Path("reference"), "smoke", "right", "parity")
-    references.write(path, map(_spoiled, _of("hand_built")))
+    references.write(path, map(_spoiled, trials_of(Store(OWN), "hand_built")))
     evoclaims("accept", "--tier=smoke")
     _, out, _ = evoclaims("compare", "--tier=smoke")
     assert "  DRIFT in smoke/right-parity: mean_success is " in out
@@ -129,7 +124,7 @@ def test_new_trials_that_drifted_from_the_references_are_said(evoclaims: Evoclai
 
 def test_verdicts_of_now_come_from_reference_trials_where_the_store_has_none(accepted: Evoclaims) -> None:
     for name, method in (("right", "hand_built"), ("wrong", "hand_built_negated")):
-        references.write(references.path_of(Path("reference"), "smoke", name, "parity"), _of(method))
+        references.write(references.path_of(Path("reference"), "smoke", name, "parity"), trials_of(Store(OWN), method))
     Path("empty").mkdir()
     status, out, _ = accepted("compare", "--storage=empty", "--tier=smoke")
     assert status == 0
@@ -141,7 +136,7 @@ def test_a_revisions_accepted_verdicts_are_compared_with_those_of_the_working_tr
     accepted: Evoclaims, git: Callable[..., None]
 ) -> None:
     path = references.path_of(Path("reference"), "smoke", "right", "parity")
-    right = _of("hand_built")
+    right = trials_of(Store(OWN), "hand_built")
     references.write(path, right)
     git("add", ".")
     git("commit", "-m", "sound")
@@ -177,7 +172,7 @@ def test_two_stores_are_each_judged_from_their_own_trials(evoclaims: Evoclaims) 
     _copy("sound")
     _copy("spoiled", _spoiled)
     path = references.path_of(Path("reference"), "smoke", "wrong", "parity")
-    references.write(path, _of("hand_built_negated"))
+    references.write(path, trials_of(Store(OWN), "hand_built_negated"))
     status, out, _ = evoclaims("compare", "sound", "spoiled", "--tier=smoke", "--fail=supported->refuted")
     assert status == 1
     assert out.splitlines()[:3] == ["old: the store sound", "new: the store spoiled", out.splitlines()[2]]

@@ -9,7 +9,7 @@ from xml.etree import ElementTree
 import pandas
 import pandas.core.arrays.arrow.extension_types  # registers types, once: pytester forgets what tests import
 import pytest
-from tiny_project import Evoclaims
+from tiny_project import Evoclaims, forget, trials_of
 
 from evoclaims.paper import references
 from evoclaims.trials.store import Store
@@ -18,10 +18,7 @@ from evoclaims.trials.store import Store
 @pytest.fixture
 def exported(evoclaims: Evoclaims, stored: Store) -> Evoclaims:
     """A function that runs a command on ten trials of the right network and two of the wrong one."""
-    for trial in stored.results([]):
-        if trial.spec["method"]["name"] == "hand_built_negated" and trial.seed >= 2:
-            for path in stored.record_files(trial.id):
-                path.unlink(missing_ok=True)
+    forget(stored, [trial for trial in trials_of(stored, "hand_built_negated") if trial.seed >= 2])
     return evoclaims
 
 

@@ -16,7 +16,7 @@ import jax
 import numpy as np
 import pytest
 import tiny_project
-from tiny_project import Evoclaims, Project
+from tiny_project import FILES, Evoclaims, Project
 
 from evoclaims.cli.episodes import run_again
 from evoclaims.cli.stored import load
@@ -235,13 +235,7 @@ def test_a_users_mistake_is_one_sentence_and_status_2(
     assert (status, err.count("\n")) == (2, 1)
     assert err.startswith("evoclaims: ")
     assert text in err
-    assert {path.name for path in Path().iterdir()} <= {
-        ".evoclaims",
-        "pyproject.toml",
-        "tiny_paper.py",
-        "claims",
-        "__pycache__",
-    }
+    assert {path.name for path in Path().iterdir()} <= FILES
 
 
 def test_a_folder_is_not_written_over(evoclaims: Evoclaims) -> None:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 import tiny_project
-from tiny_project import Evoclaims, Project
+from tiny_project import Evoclaims, Project, forget, trials_of
 
 from evoclaims.core.drawing import optional
 from evoclaims.trials.store import Store
@@ -45,10 +45,7 @@ def _figures(project: Project) -> None:
 @pytest.fixture
 def half(evoclaims: Evoclaims, stored: Store) -> Evoclaims:
     """A function that runs a command where one bar of the first figure has all its trials, and the other none."""
-    for trial in stored.results([]):
-        if trial.spec["method"]["name"] == "hand_built_negated":
-            for path in stored.record_files(trial.id):
-                path.unlink(missing_ok=True)
+    forget(stored, trials_of(stored, "hand_built_negated"))
     return evoclaims
 
 

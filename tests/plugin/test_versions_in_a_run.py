@@ -11,23 +11,23 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from tiny_project import trials_of
+
+from evoclaims.trials.result import digest
+from evoclaims.trials.store import Store
 
 HERE = version("numpy")
 Sentence = Callable[[pytest.RunResult, str], None]
 
 
 @pytest.fixture
-def aged(project: Any) -> Callable[..., None]:
+def aged(project: Any, stored: Store) -> Callable[..., None]:
     """A function that makes a store of the claim `a` whose first `count` trials numpy 1.0 has made, all wrong."""
-    from evoclaims.trials.result import digest
-    from evoclaims.trials.store import Store
-
     project.write(a="supported")
-    project.run(own_store=True)
 
     def age(count: int) -> None:
-        folder = project.path / ".evoclaims"
-        results = list(Store(folder).results([]))
+        folder = stored.root
+        results = trials_of(stored, "hand_built")
         shutil.rmtree(folder)
         for result in results:
             if result.seed < count:
@@ -98,7 +98,6 @@ def test_a_claim_that_looks_at_no_trial_compares_none(project: Any, aged: Callab
 
 def test_bits_are_not_said_to_be_unchanged_where_versions_differ(project: Any, aged: Callable[..., None]) -> None:
     from evoclaims.paper import references
-    from evoclaims.trials.store import Store
 
     aged(10)
     trials = Store(project.path / ".evoclaims").results([])

@@ -1,4 +1,4 @@
-"""How a claim's trials are had: by running them, or from the store alone."""
+"""Where a claim's trials come from: they are run when they are missing, or only read."""
 
 from __future__ import annotations
 

@@ -46,7 +46,7 @@ class Session:
     Attributes:
         reproduction: the paper under test.
         store: where trials are kept.
-        fetch: how trials are had.
+        fetch: runs trials, or reads them.
         trials: a fixed number of trials in place of the tier's looks; None keeps the tier's protocol.
         variant: name of a variant of the protocol; empty for the protocol itself.
         again: seeds that were run again, since stored trials were made with other versions, by the condition's id.
