@@ -8,6 +8,7 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import pytest
+from small_methods import METHODS, Entry
 
 from evoclaims.envs.probes import PROBES, Probe
 from evoclaims.trials.budget import Budget
@@ -23,10 +24,11 @@ AT_ONCE = 10
 """Steps for a probe with one level: a method that takes longer has drifted there."""
 
 
+@pytest.mark.parametrize("name", [name for name, entry in METHODS.items() if entry.curriculum])
 @pytest.mark.parametrize("probe", PROBES.values(), ids=list(PROBES))
-def test_every_method_solves_every_probe(entry: Any, probe: Probe, tmp_path: Path, cpus: list[Any]) -> None:
+def test_every_method_solves_every_probe(entry: Entry, probe: Probe, tmp_path: Path, cpus: list[Any]) -> None:
     budget = Budget(generations=entry.curriculum if probe.levels > 1 else AT_ONCE, reports=1)
-    for trial in run(Condition(entry.prober, probe, "curriculum", budget), SEEDS, Store(tmp_path), cpus):
+    for trial in run(Condition(entry.other, probe, "curriculum", budget), SEEDS, Store(tmp_path), cpus):
         assert trial.status == "done"
         assert trial.metrics["furthest_solved"] == probe.levels - 1
         assert trial.metrics["last_success"] == 1.0
@@ -36,9 +38,9 @@ def test_every_method_solves_every_probe(entry: Any, probe: Probe, tmp_path: Pat
 
 
 @pytest.mark.parametrize("probe", PROBES)
-def test_an_untrained_policy_solves_a_probe_with_few_seeds(probe: str, probers: dict[str, Any]) -> None:
+def test_an_untrained_policy_solves_a_probe_with_few_seeds(probe: str) -> None:
     """Otherwise the probes would be solved by luck, and would show nothing."""
-    method, task = probers["ppo"], PROBES[probe]
+    method, task = METHODS["ppo"].other, PROBES[probe]
     level = jnp.asarray(task.levels - 1, jnp.int32)
 
     def untrained(key: jax.Array) -> jax.Array:
