@@ -151,6 +151,8 @@ class Bench:
     pause: float = 0.04
     kept: bool = False
     started: list[Running] = field(default_factory=list)
+    _events: list[dict[str, Any]] = field(default_factory=list)
+    _read: int = 0
     _numbers: Iterator[int] = field(default_factory=itertools.count)
 
     def __post_init__(self) -> None:
@@ -212,15 +214,19 @@ class Bench:
         return self.started[-1]
 
     def events(self) -> list[dict[str, Any]]:
-        """Return what the processes have said so far."""
-        with suppress(FileNotFoundError):
-            lines = (self.folder / "log").read_bytes().split(b"\n")[:-1]
-            return [json.loads(line) for line in lines]
-        return []
+        """Return what the processes have said so far; whoever waits asks often, so that each line is read once."""
+        with suppress(FileNotFoundError), (self.folder / "log").open("rb") as file:
+            file.seek(self._read)
+            *lines, rest = file.read().split(b"\n")
+            self._events += [json.loads(line) for line in lines]
+            self._read = file.tell() - len(rest)
+        return self._events.copy()
 
     def said(self, what: str, by: Running, since: int = 0) -> list[dict[str, Any]]:
         """Return what the living processes of a command have said of one kind, after so many lines of the log."""
-        return [line for line in self.events()[since:] if line["what"] == what and by.owns(line["pid"])]
+        lines = [line for line in self.events()[since:] if line["what"] == what]
+        living = {pid for pid in {line["pid"] for line in lines} if by.owns(pid)}
+        return [line for line in lines if line["pid"] in living]
 
     def until_said(self, what: str, by: Running, times: int = 1) -> None:
         """Wait until a command says something so many times from now on; its end will do as well."""
