@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from made_trials import trial_of
 
 from evoclaims.claims.claim import Claim
 from evoclaims.envs.gates.parity import NParity
@@ -14,8 +15,8 @@ from evoclaims.judging.protocol import Protocol
 from evoclaims.methods.hand_built import HandBuilt
 from evoclaims.paper.reproduction import Reproduction, Tier
 from evoclaims.trials.budget import Budget
-from evoclaims.trials.result import Status, TrialResult, digest
-from evoclaims.trials.spec import Condition, TrialSpec
+from evoclaims.trials.result import Status, TrialResult
+from evoclaims.trials.spec import Condition
 from evoclaims.trials.store import Store
 
 CONDITIONS = {
@@ -27,31 +28,15 @@ CONDITIONS = {
 
 def _made(condition: Condition, seed: int, value: float, status: Status = "done", **provenance: Any) -> TrialResult:
     """Return a sound record whose numbers all follow from `value`."""
-    levels = condition.task.levels
+    last = condition.task.levels - 1.0
     metrics = {
-        "mean_success": value,
         "last_success": value / 2,
         "last_fitness": value - 1.0,
-        "furthest_solved": float(levels - 1 if value == 1.0 else -1),
-        "furthest_reached": float(levels - 1),
-        "steps": 2.0,
+        "furthest_solved": last if value == 1.0 else -1.0,
+        "furthest_reached": last,
         "environment_steps": 100.0 + seed,
     }
-    success = {"success": (value,) * levels, "fitness": (value - 1.0,) * levels}
-    spec = TrialSpec(condition, seed)
-    return TrialResult(
-        id=spec.id,
-        condition=condition.id,
-        spec=spec.plain,
-        seed=seed,
-        status=status,
-        metrics=metrics,
-        levels=success,
-        curves={},
-        digest=digest(status, metrics, success, {}, b""),
-        timing={"run": 1.0, "compile": 0.5, "batch": 1, "started": "2025-01-01T00:00:00+00:00"},
-        provenance=provenance,
-    )
+    return trial_of(condition, seed, value, status, metrics=metrics, provenance=provenance)
 
 
 @pytest.fixture(scope="session")

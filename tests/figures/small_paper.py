@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
+from made_trials import trial_of
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.text import Text
@@ -22,8 +23,8 @@ from evoclaims.methods.hand_built import HandBuilt
 from evoclaims.paper.archive import Archive
 from evoclaims.paper.reproduction import Reproduction, Tier
 from evoclaims.trials.budget import Budget
-from evoclaims.trials.result import Status, TrialResult, digest
-from evoclaims.trials.spec import Condition, TrialSpec
+from evoclaims.trials.result import Status, TrialResult
+from evoclaims.trials.spec import Condition
 from evoclaims.trials.store import Store
 
 ONE, OTHER = Series("one", "The One", "#0072b2"), Series("other", "The Other", "#d55e00")
@@ -37,27 +38,7 @@ HEADING = Heading("A title", "§1, Fig. 1 – full tier")
 
 def made(condition: Condition, seed: int, value: float, status: Status = "done") -> TrialResult:
     """Return a record whose success is `value` on every level; its reward is ten times that."""
-    levels = condition.task.levels
-    metrics = {
-        **dict.fromkeys(("mean_success", "last_success"), value),
-        "last_fitness": 10 * value,
-        **dict.fromkeys(("furthest_solved", "furthest_reached", "steps", "environment_steps"), 1.0),
-    }
-    success = {"success": (value,) * levels, "fitness": (10 * value,) * levels}
-    spec = TrialSpec(condition, seed)
-    return TrialResult(
-        id=spec.id,
-        condition=condition.id,
-        spec=spec.plain,
-        seed=seed,
-        status=status,
-        metrics=metrics,
-        levels=success,
-        curves={},
-        digest=digest(status, metrics, success, {}, b""),
-        timing={"run": 1.0, "compile": 0.5, "batch": 1, "started": "2025-01-01T00:00:00+00:00"},
-        provenance={},
-    )
+    return trial_of(condition, seed, value, status, metrics={"last_fitness": 10 * value, "environment_steps": 1.0})
 
 
 class Paper:

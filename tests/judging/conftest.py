@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import pytest
+from made_trials import sound
 
 from evoclaims.judging.measure import Event, Measure, Profile
 from evoclaims.trials.result import TrialResult
@@ -18,17 +19,15 @@ def make_trial(
     seed: int, value: Value, condition: str = "condition", digest: str = "d", **provenance: Any
 ) -> TrialResult:
     """Return a record whose score is `value`; a string is a status, a tuple the success of each level."""
-    return TrialResult(
-        id=f"{condition}-{seed}",
-        condition=condition,
-        spec={},
-        seed=seed,
+    return sound(
+        {"condition": condition, "seed": seed},
         status=value if isinstance(value, str) else "done",  # type: ignore[arg-type]
         metrics={"score": value} if isinstance(value, int | float) else {},
         levels={"success": value} if isinstance(value, tuple) else {},
         curves={},
+        id=f"{condition}-{seed}",
+        condition=condition,
         digest=digest,
-        timing={},
         provenance=provenance,
     )
 

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 import jax
+from made_trials import trial_of
 
 from evoclaims.claims.claim import Claim
 from evoclaims.claims.fetching import StoredOnly
@@ -27,9 +28,9 @@ from evoclaims.paper.reproduction import Reproduction, Tier
 from evoclaims.report.build import gather
 from evoclaims.report.model import Page, PaperFigure, Section
 from evoclaims.trials.budget import Budget
-from evoclaims.trials.result import TrialResult, digest
+from evoclaims.trials.result import TrialResult
 from evoclaims.trials.result_making import named_leaves
-from evoclaims.trials.spec import Condition, TrialSpec
+from evoclaims.trials.spec import Condition
 from evoclaims.trials.store import Store
 from evoclaims.verdicts.claim_report import ClaimReport
 from evoclaims.verdicts.history import History
@@ -51,15 +52,7 @@ Judge = Callable[[Callable[[str], Any]], Assertion]
 
 
 def record(condition: Condition, seed: int, value: float, **changes: Any) -> TrialResult:
-    """Return a sound record whose numbers follow from `value`."""
-    spec, levels = TrialSpec(condition, seed), condition.task.levels
-    metrics = {
-        **dict.fromkeys(("mean_success", "last_success", "last_fitness"), value),
-        **dict.fromkeys(("furthest_solved", "furthest_reached"), 1.0),
-        "steps": 2.0,
-        "environment_steps": 50.0,
-    }
-    success = dict.fromkeys(("success", "fitness"), (value,) * levels)
+    """Return a record of five reports, made here."""
     points = 5
     finite = value if math.isfinite(value) else 0.0
     curves = {
@@ -67,20 +60,7 @@ def record(condition: Condition, seed: int, value: float, **changes: Any) -> Tri
         "success": tuple(finite * i / points for i in range(points)),
         "level": (0.0,) * points,
     }
-    made = TrialResult(
-        id=spec.id,
-        condition=condition.id,
-        spec=spec.plain,
-        seed=seed,
-        status="done",
-        metrics=metrics,
-        levels=success,
-        curves=curves,
-        digest=digest("done", metrics, success, curves, b""),
-        timing={"run": 1.0, "compile": 0.5, "batch": 1, "started": "2025-01-01T00:00:00+00:00"},
-        provenance=HERE,
-    )
-    return replace(made, **changes)
+    return trial_of(condition, seed, value, **{"curves": curves, "provenance": HERE, **changes})
 
 
 @dataclass(frozen=True)

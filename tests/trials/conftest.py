@@ -10,9 +10,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from made_trials import sound
 
 from evoclaims.core.canonical import content_hash
-from evoclaims.trials.result import Status, TrialResult, digest
+from evoclaims.trials.result import Status, TrialResult
 from evoclaims.trials.store import Store
 
 METRICS = {
@@ -35,22 +36,15 @@ def _make_result(
     curves: Mapping[str, tuple[float, ...]] | None = None,
     method: str = "an_algorithm",
 ) -> TrialResult:
-    """Return a sound result whose id, condition and digest follow from its parts."""
+    """Return a sound result of a method that is a name alone."""
     condition = {"engine": 1, "method": {"name": method, "revision": 1, "parameters": {"rate": 0.1}}}
-    spec = {**condition, "seed": seed}
-    metrics = {**METRICS, **(metrics or {})}
-    levels = {"success": (1.0, 0.5), "fitness": (0.0, -0.5), **(levels or {})}
-    curves = {"best": (0.25, 0.75)} if curves is None else curves
-    return TrialResult(
-        id=content_hash(spec),
-        condition=content_hash(condition),
-        spec=spec,
-        seed=seed,
+    return sound(
+        {**condition, "seed": seed},
         status=status,
-        metrics=metrics,
-        levels=levels,
-        curves=curves,
-        digest=digest(status, metrics, levels, curves, b"parameters"),
+        metrics={**METRICS, **(metrics or {})},
+        levels={"success": (1.0, 0.5), "fitness": (0.0, -0.5), **(levels or {})},
+        curves={"best": (0.25, 0.75)} if curves is None else curves,
+        champion=b"parameters",
         timing={"run": 1.5, "compile": 0.5, "batch": 3, "started": "2025-01-01T00:00:00+00:00"},
         provenance={"git": None, "versions": {"numpy": "2.0"}},
     )
