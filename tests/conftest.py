@@ -1,4 +1,4 @@
-"""Settings of every test: two CPU devices, quick compilation, and one compilation cache for the processes of a run."""
+"""Settings of every test: no deadlines, two CPU devices, quick compilation, one compilation cache for all processes."""
 
 from __future__ import annotations
 
@@ -8,8 +8,13 @@ import tempfile
 from typing import Final
 
 import pytest
+from hypothesis import settings
 
 pytest_plugins = ["hand_made_paper", "ptx_machine", "pytester", "tiny_project"]
+
+# No test fails on a slow machine for being slow.
+settings.register_profile("untimed", deadline=None)
+settings.load_profile("untimed")
 
 _CACHE: Final = "JAX_COMPILATION_CACHE_DIR"
 _made = ""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Any
 
+from evoclaims.methods.waypoints import Waypoints
 from plane import Plane
 from workbench import Workbench
 
@@ -21,7 +22,6 @@ from evoclaims.methods.ppo import Ppo
 from evoclaims.methods.random_policy import RandomPolicy
 from evoclaims.methods.random_search import RandomSearch
 from evoclaims.methods.tensorneat import NeatTensorneat
-from evoclaims.methods.waypoints import Waypoints
 from evoclaims.networks.all_skips import AllSkips
 from evoclaims.networks.mlp import Mlp
 
