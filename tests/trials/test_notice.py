@@ -302,6 +302,13 @@ def test_who_ends_a_condition_or_has_nothing_to_run_sweeps_too(tmp_path: Path, d
     assert not gone.exists()
 
 
+@pytest.mark.skipif(not Path("/proc/self/ns/pid").exists(), reason="only Linux numbers processes anew in containers")
+def test_a_process_of_another_container_is_not_taken_for_one_that_has_ended(tmp_path: Path) -> None:
+    path = forge(tmp_path, OTHER, pid=GONE, host=f"{socket.gethostname()}?pidns-1")
+    sweep(tmp_path)
+    assert path.exists()
+
+
 def test_a_folder_that_cannot_be_swept_stops_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def refuse(path: Path) -> None:
         raise OSError(errno.EROFS, "Read-only file system")

@@ -8,6 +8,7 @@ failure to write one is passed over in silence.
 from __future__ import annotations
 
 import contextlib
+import os
 import socket
 import time
 from collections.abc import Callable, Iterator
@@ -25,6 +26,9 @@ machine, or stopped (SIGSTOP, Ctrl-Z). The notice of a process of this machine t
 
 REFRESH_SECONDS: Final = 15.0
 """Time between two refreshes: some may come late on a slow network folder before the notice looks stale."""
+
+_CONTAINER: Final = "?pidns-"
+"""What filelock adds to a host's name where processes are numbered anew, as in a container; a number follows."""
 
 
 def notice_path(store_root: Path, condition_id: str) -> Path:
@@ -67,7 +71,7 @@ def announced(
         if _has_ended(owner) or time.monotonic() - since > FRESH_SECONDS:
             lease.force_break()  # filelock itself leaves zombies' alone, and on network folders all that are stale
             continue
-        who = f"process {owner.pid} on {_host(owner)}" if owner else "another process"
+        who = f"process {owner.pid} on {owner.hostname.partition(_CONTAINER)[0]}" if owner else "another process"
         tell(f"waiting for {who}, which runs the same trials")
         sleep(poll)
     try:
@@ -110,14 +114,13 @@ def _refreshed(path: Path) -> int:
         return 0
 
 
-def _host(owner: filelock.OwnerRecord) -> str:
-    """Return the name of a process' machine without what filelock adds in a container."""
-    return owner.hostname.partition("?")[0]
-
-
 def _has_ended(owner: filelock.OwnerRecord | None) -> bool:
     """Whether a process of this machine has ended, as Linux tells it; also one that its parent has not collected."""
-    if owner is None or _host(owner) != socket.gethostname() or not Path("/proc/self/stat").exists():
+    try:
+        namespace = f"{os.stat('/proc/self/ns/pid').st_ino:x}"  # in another container, numbers mean other processes
+    except OSError:
+        return False
+    if owner is None or owner.hostname not in (socket.gethostname(), f"{socket.gethostname()}{_CONTAINER}{namespace}"):
         return False
     try:
         state = Path(f"/proc/{owner.pid}/stat").read_text(errors="replace").rpartition(")")[2].split()[0]
