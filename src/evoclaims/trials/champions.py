@@ -20,6 +20,7 @@ from evoclaims.networks.genome import Genome
 from evoclaims.networks.graph import GraphNetwork
 from evoclaims.networks.substrate import Substrate
 from evoclaims.trials.devices import MATMUL_PRECISION, layout_for
+from evoclaims.trials.lanes import options_for
 from evoclaims.trials.program import over_trials
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.result_making import named_leaves, provenance
@@ -109,8 +110,9 @@ def replay(condition: Condition, result: TrialResult, parameters: Any, devices: 
         return score_every_level(condition.task, policy, trial_key(seed, EVALUATION))
 
     arguments = jax.tree.map(lambda leaf: np.asarray(leaf)[None], (np.int32(result.seed), parameters))
+    layout = layout_for(list(devices))
     with jax.default_matmul_precision(MATMUL_PRECISION):
-        compiled = jax.jit(over_trials(score, layout_for(list(devices))))
+        compiled = jax.jit(over_trials(score, layout), compiler_options=options_for(condition, layout))
         episode: Episode = jax.device_get(compiled(*jax.device_put(arguments, devices[0])))
     again = {"success": episode.success[0], "fitness": episode.fitness[0]}
     for name, values in again.items():

@@ -32,6 +32,11 @@ Shares = tuple[TrialState, ...]
 """The states of a batch, leaves [lanes of the share]: each share lies on one device, and one call advances it."""
 
 
+def options_for(condition: Condition, layout: str) -> dict[str, Any] | None:
+    """Return how programs are compiled: it depends on condition and kind of device alone, so that bits do, too."""
+    return FAST_TO_COMPILE if layout == "alone" and condition.environment_steps <= SHORT else None
+
+
 def width_for(active: int, devices: int, full: int) -> int:
     """Return the lanes to run `active` trials in: `full` halved while they fit, a multiple of the devices.
 
@@ -197,9 +202,8 @@ class Lanes:
         return jax.jit(laid_out, donate_argnums=(0,) if donate else ()).lower(*placed)
 
     def _finished(self, lowered: Any) -> Any:
-        """Compile a program; how depends on nothing but the condition and the kind of device, so that bits do not."""
-        short = self.layout == "alone" and self.condition.environment_steps <= SHORT
-        return lowered.compile(FAST_TO_COMPILE if short else None)
+        """Compile a program."""
+        return lowered.compile(options_for(self.condition, self.layout))
 
     def _compile(self, size: int, homes: Sequence[jax.Device]) -> dict[jax.Device, Compiled]:
         """Compile what runs again and again, ahead of time, so that compile time and run time are told apart."""
