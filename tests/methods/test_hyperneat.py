@@ -143,8 +143,8 @@ def test_the_drawn_network_is_a_dense_one_with_the_weights_that_the_cppn_answers
             kinds |= {"none" if w == 0 else "positive" if w > 0 else "negative" for w in wanted_matrix.ravel()}
         observation = drawing.normal(size=len(substrate.layers[0]) - 1)
         signal = np.append(observation, 1.0)
-        for wanted_matrix in wanted:
-            signal = np.array([np.tanh(sum(w * x for w, x in zip(row, signal, strict=True))) for row in wanted_matrix])
+        for matrix in map(np.float64, drawn):
+            signal = np.array([np.tanh(sum(w * x for w, x in zip(row, signal, strict=True))) for row in matrix])
         answer = apply(drawn, jnp.float32(observation))
         np.testing.assert_allclose(answer, signal, atol=1e-5)
     assert kinds == {"none", "positive", "negative"}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -34,6 +35,10 @@ def _settings(on_level_up: LevelUp, nodes: int, connections: int) -> Settings:
     )
 
 
+AS_ELSEWHERE = {"xla_cpu_use_fusion_emitters": True} if "fusion_emitters" in os.environ["XLA_FLAGS"] else None
+"""Without them, as the tests compile otherwise (tests/conftest.py), roundings depend on the size of arrays."""
+
+
 @dataclass(frozen=True)
 class Bench:
     """A compiled generation, and the states and reports of some of them on the first level."""
@@ -52,7 +57,7 @@ def _bench(settings: Settings) -> Bench:
     with jax.numpy_dtype_promotion("strict"), jax.numpy_rank_promotion("raise"), jax.debug_key_reuse(True):
         state = jax.jit(lambda key: begin(key, settings, NETWORK))(jax.random.key(2))
         level = jnp.zeros((), jnp.int32)
-        step = jax.jit(generation).lower(keys[0], level, state).compile()
+        step = jax.jit(generation).lower(keys[0], level, state).compile(AS_ELSEWHERE)
     states, reports = [state], []
     for key in keys:
         state, progress = step(key, level, state)
