@@ -97,5 +97,6 @@ def test_training_and_evaluation_grow_from_different_roots(seed: int, other: int
 def test_the_evaluation_of_a_seed_is_the_same_for_every_method_and_budget() -> None:
     short = Condition(METHODS["random_search"], Watched(3), "curriculum", Budget(generations=1, reports=1))
     long = Condition(RandomSearch(5, network=AllSkips(hidden=2)), Watched(3), "direct", Budget(generations=4))
-    assert _keys(short, 7)[1] == _keys(long, 7)[1]
-    assert not _keys(short, 7)[1] & _keys(short, 8)[1]
+    judged = _keys(short, 7)[1]
+    assert judged == _keys(long, 7)[1]
+    assert not judged & _keys(short, 8)[1]
