@@ -1,0 +1,52 @@
+"""Planting a fault in a method or a task: the same parameters, with one of its functions replaced."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any, ClassVar, TypeVar
+
+from evoclaims.core.errors import UserError
+
+F = TypeVar("F", bound="Fault")
+
+
+class Fault:
+    """What a fault replaces; a subclass overrides functions of the method or task that it is planted in.
+
+    A faulty component is of the sound one's class as well, since methods and reports ask what a task is. Its name tells
+    the two apart, so that it has trials of its own, and code for sound components has no switch for faults.
+    """
+
+    says: ClassVar[str]
+    _sound_class: ClassVar[type]
+
+    @property
+    def sound(self) -> Any:
+        """The component without the fault."""
+        made = object.__new__(self._sound_class)
+        made.__dict__.update(self.__dict__)
+        return made
+
+    @property
+    def name(self) -> str:
+        """The sound component's name, and what is wrong."""
+        return f"{self.sound.name} that {self.says}"
+
+
+@cache
+def _faulty(fault: type[Fault], sound: type) -> type:
+    """Return the class of a faulty component; cached, since equal components have one class."""
+    return type(f"{fault.__name__}{sound.__name__}", (fault, sound), {"_sound_class": sound})
+
+
+def plant(fault: type[F], component: Any) -> F:
+    """Return a component with the same parameters and the fault.
+
+    Raises:
+        UserError: when there is a fault in it already: what two of them come to is nothing that one could name.
+    """
+    if isinstance(component, Fault):
+        raise UserError(f"{component.name!r} has a fault already; plant each in a component without one.")
+    made: F = object.__new__(_faulty(fault, type(component)))
+    made.__dict__.update(component.__dict__)
+    return made

@@ -1,0 +1,193 @@
+"""Faults are planted in what they say, change what they say, and leave sound components alone."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from evoclaims.core.errors import UserError
+from evoclaims.envs.base import Episode, PolicyFn
+from evoclaims.envs.gates.alu import SimpleAlu
+from evoclaims.envs.gates.parity import NParity
+from evoclaims.envs.probes import COPY
+from evoclaims.methods.cma_es import CmaEs
+from evoclaims.methods.hand_built import HandBuilt
+from evoclaims.methods.random_search import RandomSearch
+from evoclaims.mutants import of_methods, of_tasks
+from evoclaims.mutants.mutant import MUTANTS
+from evoclaims.mutants.planting import plant
+from evoclaims.networks.all_skips import AllSkips
+from evoclaims.trials.budget import Budget
+from evoclaims.trials.program import Program
+from evoclaims.trials.spec import Condition
+
+PARITY = NParity(3)
+CMA_ES = CmaEs(population=8, network=AllSkips(4))
+KEY = jax.random.key(0)
+LEVEL = jnp.int32(1)
+
+
+def condition(method: Any = CMA_ES, task: Any = PARITY) -> Condition:
+    return Condition(method, task, "curriculum", Budget(generations=3))
+
+
+def right(task: Any) -> PolicyFn:
+    return HandBuilt().best(PARITY, jnp.int32(0))
+
+
+def examined(fault: type[Any], policy: PolicyFn, level: int = 1) -> Episode:
+    return plant(fault, PARITY).examine(policy, KEY, jnp.int32(level))  # type: ignore[no-any-return]
+
+
+def trained(method: Any, steps: int = 3, task: Any = PARITY, seed: int = 0) -> Any:
+    state = method.init(jax.random.key(seed), task)
+    step = jax.jit(lambda key, state: method.step(key, task, LEVEL, state))
+    for number in range(steps):
+        state, progress = step(jax.random.key(100 * seed + number), state)
+    return state, progress
+
+
+@pytest.mark.parametrize("name", MUTANTS)
+def test_a_mutant_has_conditions_of_its_own_and_the_sound_ones_stay(name: str) -> None:
+    sound = {("cma_es", "n_parity"): condition(), ("other", "copy"): condition(RandomSearch(4, 1.0, AllSkips(4)), COPY)}
+    before = {names: one.id for names, one in sound.items()}
+    mutant = MUTANTS[name]
+    for target in mutant.targets(sound):
+        for names, faulty in mutant.conditions(sound, target).items():
+            assert target in names
+            assert faulty.id != sound[names].id
+            assert mutant.conditions(sound, target)[names].id == faulty.id
+    assert {names: one.id for names, one in sound.items()} == before
+
+
+def test_equal_faulty_components_are_equal_and_differ_from_sound_ones() -> None:
+    blind = plant(of_tasks.Blind, PARITY)
+    assert blind == plant(of_tasks.Blind, NParity(3))
+    assert hash(blind) == hash(plant(of_tasks.Blind, NParity(3)))
+    assert len({id(plant(of_tasks.Blind, PARITY).__class__), id(blind.__class__)}) == 1
+    assert blind != PARITY
+    assert isinstance(blind, NParity)
+    assert blind.sound == PARITY
+    assert (blind.name, PARITY.name) == ("n_parity that shows nothing", "n_parity")
+
+
+def test_two_faults_in_one_component_are_one_sentence() -> None:
+    with pytest.raises(UserError, match="'n_parity that shows nothing' has a fault already"):
+        plant(of_tasks.Paralysed, plant(of_tasks.Blind, PARITY))
+
+
+@pytest.mark.parametrize(
+    ("fault", "success", "fitness"),
+    [
+        (of_tasks.Blind, 0.5, -0.5),
+        (of_tasks.Paralysed, 0.5, -0.5),
+        (of_tasks.PaysNothing, 1.0, 0.0),
+        (of_tasks.IgnoresAnInput, 0.5, -0.5),
+        (of_tasks.HasAWrongRow, 7 / 8, -1 / 8),
+    ],
+)
+def test_what_a_right_circuit_gets_from_faulty_parity(fault: type[Any], success: float, fitness: float) -> None:
+    episode = examined(fault, right(PARITY))
+    assert (float(episode.success), float(episode.fitness)) == (success, fitness)
+
+
+def test_a_reversed_reward_is_the_negative_of_the_right_one() -> None:
+    always = lambda bits: jnp.ones(1)  # noqa: E731
+    assert float(examined(of_tasks.ReversesReward, always).fitness) == 0.5
+    assert float(PARITY.examine(always, KEY, LEVEL).fitness) == -0.5
+
+
+def test_a_random_payment_depends_on_the_key_alone() -> None:
+    task: Any = plant(of_tasks.PaysAtRandom, PARITY)
+    paid = [float(task.episode(right(PARITY), jax.random.key(seed), LEVEL).fitness) for seed in (0, 0, 1)]
+    assert paid[0] == paid[1] != paid[2]
+    assert 0 <= min(paid) <= max(paid) < 1
+
+
+def test_the_level_is_the_first_one_whatever_is_asked() -> None:
+    first_level_alone: Any = lambda bits: jnp.where(bits[:1] > 0, -1.0, right(PARITY)(bits))  # noqa: E731
+    assert float(PARITY.examine(first_level_alone, KEY, LEVEL).success) < 1
+    assert float(examined(of_tasks.StaysAtFirstLevel, first_level_alone).success) == 1
+
+
+@pytest.mark.parametrize(
+    "fault", [of_tasks.Blind, of_tasks.PaysNothing, of_tasks.ReversesReward, of_tasks.PaysAtRandom]
+)
+def test_steps_are_faulty_like_episodes(fault: type[Any]) -> None:
+    task: Any = plant(fault, NParity(3, "sampled"))
+    state = task.reset(KEY, LEVEL)
+    following = task.step(state, -right(PARITY)(PARITY.reset(KEY, LEVEL).observation))
+    sound = task.sound.step(state, -right(PARITY)(PARITY.reset(KEY, LEVEL).observation))
+    assert bool(jnp.any(state.observation != 0)) == (fault is not of_tasks.Blind) or not bool(
+        jnp.any(task.sound.reset(KEY, LEVEL).observation)
+    )
+    changed = {of_tasks.PaysNothing: 0.0, of_tasks.ReversesReward: -float(sound.reward)}
+    if fault in changed:
+        assert float(following.reward) == changed[fault]
+    assert bool(following.terminated) == bool(sound.terminated)
+
+
+def test_an_alu_that_ignores_an_input_differs_from_the_right_one_in_targets_alone() -> None:
+    alu = SimpleAlu(level_count=3)
+    faulty: Any = plant(of_tasks.IgnoresAnInput, alu)
+    np.testing.assert_array_equal(faulty.table.inputs, alu.table.inputs)
+    assert (faulty.table.targets != alu.table.targets).any()
+
+
+def test_a_method_that_learns_nothing_keeps_its_state() -> None:
+    method: Any = plant(of_methods.LearnsNothing, CMA_ES)
+    state, _ = trained(method)
+    np.testing.assert_array_equal(state.distribution.mean, method.init(KEY, PARITY).distribution.mean)
+    moved, _ = trained(CMA_ES)
+    assert (moved.distribution.mean != state.distribution.mean).any()
+
+
+def test_a_method_that_minimizes_ends_with_the_worst_individual() -> None:
+    assert float(trained(CMA_ES)[1].fitness) > float(-trained(plant(of_methods.Minimizes, CMA_ES))[1].fitness)
+
+
+def test_selection_at_random_does_not_follow_the_rewards() -> None:
+    _, progress = trained(plant(of_methods.SelectsAtRandom, CMA_ES))
+    assert 0 <= float(progress.fitness) < 1
+
+
+def test_a_forgotten_champion_is_what_training_began_with() -> None:
+    method: Any = plant(of_methods.ForgetsChampion, CMA_ES)
+    state, _ = trained(method)
+    np.testing.assert_array_equal(method.best(PARITY, state).parameters, np.zeros_like(state.champion.parameters))
+    assert (CMA_ES.best(PARITY, state).parameters != 0).any()
+
+
+def test_one_seed_gives_the_same_trial_whatever_the_seed() -> None:
+    method: Any = plant(of_methods.HasOneSeed, CMA_ES)
+    finals = [method.best(PARITY, trained(method, seed=seed)[0]).parameters for seed in (0, 1)]
+    np.testing.assert_array_equal(*finals)
+    assert (trained(CMA_ES, seed=0)[0].champion.parameters != trained(CMA_ES, seed=1)[0].champion.parameters).any()
+
+
+def test_the_step_size_stays_what_it_was() -> None:
+    method: Any = plant(of_methods.KeepsItsStepSize, CMA_ES)
+    assert float(trained(method)[0].distribution.std) == float(method.init(KEY, PARITY).distribution.std)
+    assert float(trained(CMA_ES)[0].distribution.std) != float(CMA_ES.init(KEY, PARITY).distribution.std)
+
+
+@pytest.mark.parametrize(
+    "name", [name for name, mutant in MUTANTS.items() if mutant.targets({("a", "b"): condition()})]
+)
+def test_the_engine_runs_a_mutant_as_any_other_condition(name: str) -> None:
+    (faulty,) = (
+        MUTANTS[name]
+        .conditions({("a", "b"): condition()}, MUTANTS[name].targets({("a", "b"): condition()})[0])
+        .values()
+    )
+    program = Program(faulty)
+
+    def whole(seed: Any) -> Any:
+        trial = program.start(seed, jnp.zeros((), bool))
+        return program.score(program.advance(trial, jnp.int32(3))[0]).final.success
+
+    assert jax.eval_shape(whole, jnp.int32(0)).shape == (PARITY.levels,)
