@@ -8,7 +8,7 @@ import pytest
 
 from evoclaims.core.errors import UserError
 from evoclaims.judging.verdict import Outcome
-from evoclaims.mutants.matrix import Attempt, Fate, Matrix, Sensitivity, dump, fate, load, score
+from evoclaims.verdicts.mutation_matrix import Attempt, Fate, Matrix, Sensitivity, dump, fate, load, score
 
 SUPPORTED, REFUTED = Outcome.SUPPORTED, Outcome.REFUTED
 
