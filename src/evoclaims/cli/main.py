@@ -100,6 +100,12 @@ def _parser() -> argparse.ArgumentParser:
     run.add_argument("--retry", action="store_true", help="run trials again that ran out of time under this limit")
     run.add_argument("--first-seed", type=int, default=0, metavar="SEED", help="seed of the first trial (0)")
 
+    mutants = add("mutants", "plant faults in methods and tasks, run them, and write which of them the claims notice")
+    tier(mutants)
+    device(mutants)
+    mutants.add_argument("--mutant", metavar="NAME", help="only this fault, such as minimizes")
+    mutants.add_argument("--of", metavar="TARGET", help="only faults of this method or this task")
+
     status = add("status", "show the verdicts that the stored trials give; run nothing")
     tier(status)
 

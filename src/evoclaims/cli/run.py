@@ -5,6 +5,8 @@ from __future__ import annotations
 import argparse
 import contextlib
 import sys
+from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
 
 from evoclaims.claims.fetching import RunMissing
 from evoclaims.cli.project import Project, open_project
@@ -16,7 +18,8 @@ from evoclaims.core.raised import in_one_line
 from evoclaims.judging.counting import MAX_TRIALS
 from evoclaims.paper.reproduction import Tier
 from evoclaims.report.live_line import LiveLine
-from evoclaims.trials.spec import TrialSpec
+from evoclaims.trials.result import TrialResult
+from evoclaims.trials.spec import Condition, TrialSpec
 from evoclaims.verdicts.robustness import matrix
 
 
@@ -46,23 +49,18 @@ def main(options: argparse.Namespace) -> int:
     line = LiveLine(*terminal())
     fetch = RunMissing(store, options.device, line, project.config.seconds(options.time_limit))
     fetch.check()
+    if options.retry:
+        for names in chosen:
+            condition = tier.condition(*names)
+            store.forget_timeouts((TrialSpec(condition, seed).id for seed in seeds), condition.versions)
+    named = [(f"{' on '.join(names)} ({options.tier})", tier.condition(*names)) for names in chosen]
     failed = 0
-    for method, task in chosen:
-        name = f"{method} on {task} ({options.tier})"
-        try:
-            with contextlib.closing(line):
-                condition = tier.condition(method, task)
-                if options.retry:
-                    store.forget_timeouts((TrialSpec(condition, seed).id for seed in seeds), condition.versions)
-                results = fetch(condition, seeds)
-        except (KeyboardInterrupt, BrokenPipeError):  # the user, or who reads the output, has had enough
-            raise
-        except BaseException as error:  # whatever a method or a task raises, the other conditions are not its matter
-            print(f"evoclaims: {name} failed: {printable(in_one_line(error, project.config.root))}.", file=sys.stderr)
+    for name, results in run_each(named, seeds, fetch, line, project.config.root):
+        if results is None:
             failed += 1
             continue
         print(name)
-        again = len(fetch.again.get(tier.condition(method, task).id, ()))
+        again = len(fetch.again.get(results[0].condition, ()))
         if again:
             print(f"  {again} of these were run again, since the stored ones were made with other versions")
         for result in results:
@@ -72,6 +70,27 @@ def main(options: argparse.Namespace) -> int:
     if options.variant:
         _print_matrix(project, options.tier, options.variant)
     return int(failed > 0)
+
+
+def run_each(
+    conditions: Iterable[tuple[str, Condition]], seeds: Sequence[int], fetch: RunMissing, line: LiveLine, root: Path
+) -> Iterator[tuple[str, Sequence[TrialResult] | None]]:
+    """Run conditions one after the other; what one of them raises is said in a line and keeps no other from running.
+
+    Yields:
+        Each condition's name and its trials, or None for one that failed.
+    """
+    for name, condition in conditions:
+        try:
+            with contextlib.closing(line):
+                results = fetch(condition, seeds)
+        except (KeyboardInterrupt, BrokenPipeError):  # the user, or who reads the output, has had enough
+            raise
+        except BaseException as error:  # whatever a method or a task raises, the other conditions are not its matter
+            print(f"evoclaims: {name} failed: {printable(in_one_line(error, root))}.", file=sys.stderr)
+            yield name, None
+            continue
+        yield name, results
 
 
 def _print_matrix(project: Project, tier: str, variant: str) -> None:

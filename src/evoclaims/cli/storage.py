@@ -10,7 +10,7 @@ from evoclaims.core.errors import UserError
 from evoclaims.paper.config import find_root
 from evoclaims.trials.store_files import DEFAULT_ROOT
 
-BEGINNING: Final = frozenset({"run"})
+BEGINNING: Final = frozenset({"run", "mutants"})
 """Commands that begin a store where none is; the others read one."""
 
 

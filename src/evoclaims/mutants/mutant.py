@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Final, Literal
 
-from evoclaims.core.registry import Registry
 from evoclaims.envs.gates.circuit import Circuit
 from evoclaims.methods.cma_es import CmaEs
 from evoclaims.methods.map_elites import MapElites
@@ -74,24 +73,21 @@ def _drawing_all(one: Condition) -> Condition | None:
     return replace(one, method=replace(method, initial=2**30)) if isinstance(method, MapElites) else None
 
 
-MUTANTS: Final = Registry(
-    "mutant",
-    {
-        "learns-nothing": of_method(of_methods.LearnsNothing),
-        "minimizes": of_method(of_methods.Minimizes),
-        "selects-at-random": of_method(of_methods.SelectsAtRandom),
-        "forgets-champion": of_method(of_methods.ForgetsChampion),
-        "one-seed": of_method(of_methods.HasOneSeed),
-        "fixed-step-size": of_method(of_methods.KeepsItsStepSize, CmaEs),
-        "random-archive": Mutant("varies no elite", "method", _drawing_all),
-        "blind": of_task(of_tasks.Blind),
-        "paralysed": of_task(of_tasks.Paralysed),
-        "pays-nothing": of_task(of_tasks.PaysNothing),
-        "reverses-rewards": of_task(of_tasks.ReversesReward),
-        "pays-at-random": of_task(of_tasks.PaysAtRandom),
-        "first-level-only": of_task(of_tasks.StaysAtFirstLevel),
-        "ignores-an-input": of_task(of_tasks.IgnoresAnInput, Circuit),
-        "wrong-row": of_task(of_tasks.HasAWrongRow, Circuit),
-    },
-)
+MUTANTS: Final[Mapping[str, Mutant]] = {
+    "learns-nothing": of_method(of_methods.LearnsNothing),
+    "minimizes": of_method(of_methods.Minimizes),
+    "selects-at-random": of_method(of_methods.SelectsAtRandom),
+    "forgets-champion": of_method(of_methods.ForgetsChampion),
+    "one-seed": of_method(of_methods.HasOneSeed),
+    "fixed-step-size": of_method(of_methods.KeepsItsStepSize, CmaEs),
+    "random-archive": Mutant("varies no elite", "method", _drawing_all),
+    "blind": of_task(of_tasks.Blind),
+    "paralysed": of_task(of_tasks.Paralysed),
+    "pays-nothing": of_task(of_tasks.PaysNothing),
+    "reverses-rewards": of_task(of_tasks.ReversesReward),
+    "pays-at-random": of_task(of_tasks.PaysAtRandom),
+    "first-level-only": of_task(of_tasks.StaysAtFirstLevel),
+    "ignores-an-input": of_task(of_tasks.IgnoresAnInput, Circuit),
+    "wrong-row": of_task(of_tasks.HasAWrongRow, Circuit),
+}
 """Faults that any paper's methods and tasks may have; a reproduction may declare further ones."""
