@@ -108,7 +108,7 @@ def fate(sound: Outcome, faulty: Outcome, *, equivalent: bool, drifted: bool) ->
 
 
 @dataclass(frozen=True)
-class Score:
+class MutationScore:
     """How many mutants are noticed; equivalent and broken ones do not count.
 
     Attributes:
@@ -133,7 +133,7 @@ class Score:
         )
 
 
-def score(matrix: Matrix, tier: str) -> Score:
+def score(matrix: Matrix, tier: str) -> MutationScore:
     """Return the mutation score of a tier."""
     rows = {claim: row for (one, claim), row in matrix.items() if one == tier}
     fates: dict[tuple[str, str], set[Fate]] = {}
@@ -142,7 +142,7 @@ def score(matrix: Matrix, tier: str) -> Score:
             fates.setdefault((attempt.mutant, attempt.target), set()).add(attempt.fate)
     tried = [found for found in fates.values() if found - {Fate.EQUIVALENT, Fate.BROKEN}]
     killed = sum(Fate.KILLED in found for found in tried)
-    return Score(
+    return MutationScore(
         mutants=len(tried),
         by_verdict=killed,
         by_drift=sum(Fate.DRIFTED in found and Fate.KILLED not in found for found in tried),

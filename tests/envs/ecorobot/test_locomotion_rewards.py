@@ -13,7 +13,7 @@ import jax.numpy as jnp
 import pytest
 
 from evoclaims.envs.ecorobot.locomotion import Locomotion
-from evoclaims.envs.ecorobot.obstacles import Obstacles, Run
+from evoclaims.envs.ecorobot.obstacles import FurthestRun, Obstacles
 from evoclaims.envs.ecorobot.pose import Pose
 from evoclaims.envs.ecorobot.robots import ANT, HOPPER, HUMANOID, ROBOTS, WALKER2D, Robot
 
@@ -107,7 +107,7 @@ def test_an_unhealthy_torso_ends_the_episode(robot: Robot, height: float, pitch:
 def test_an_obstacle_counts_once_the_torso_has_been_beyond_its_far_side(furthest: float, count: int) -> None:
     task = Obstacles()
     start = task.reset(jax.random.key(0), jnp.zeros((), jnp.int32)).inner
-    measures = task.measures(replace(start, memory=Run(furthest=jnp.asarray(furthest, jnp.float32))))
+    measures = task.measures(replace(start, memory=FurthestRun(furthest=jnp.asarray(furthest, jnp.float32))))
     assert float(measures["obstacles"]) == count
     assert float(measures["furthest"]) == pytest.approx(furthest)
 

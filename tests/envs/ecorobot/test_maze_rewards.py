@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 from evoclaims.envs.ecorobot.deceptive import DIFFICULT, EASY, DeceptiveMaze
 from evoclaims.envs.ecorobot.pose import Pose
 from evoclaims.envs.ecorobot.robot_task import Ruling
-from evoclaims.envs.ecorobot.stones import ARENA, STONES, Progress, SteppingStones
+from evoclaims.envs.ecorobot.stones import ARENA, STONES, SteppingStones, StonesCrossed
 
 TASK = SteppingStones()
 NO_ACTION = jnp.zeros(4)
@@ -27,8 +27,8 @@ def _at(x: float, y: float) -> Pose:
     return Pose(place=jnp.asarray([x, y, 0.2], jnp.float32), rotation=jnp.eye(3))
 
 
-def _crossed(count: int) -> Progress:
-    return Progress(crossed=jnp.asarray(count, jnp.int32))
+def _crossed(count: int) -> StonesCrossed:
+    return StonesCrossed(crossed=jnp.asarray(count, jnp.int32))
 
 
 def _stones_rule(count: int, x: float, y: float, task: SteppingStones = TASK) -> Ruling:

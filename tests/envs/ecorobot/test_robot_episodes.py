@@ -22,7 +22,7 @@ from evoclaims.envs.ecorobot.pose import torso
 from evoclaims.envs.ecorobot.robot_task import Outing
 from evoclaims.envs.ecorobot.robots import ANT, HOPPER, SIMPLE_ROB, Robot
 from evoclaims.envs.ecorobot.scene import Places, Scene
-from evoclaims.envs.ecorobot.stones import STONES, Progress, SteppingStones
+from evoclaims.envs.ecorobot.stones import STONES, SteppingStones, StonesCrossed
 
 LEVEL = jnp.zeros((), jnp.int32)
 PAID = replace(SIMPLE_ROB, control_cost=0.1, healthy_reward=0.5, forward_reward=2.0, velocity_limit=0.5)
@@ -123,7 +123,7 @@ def _near_its_end(task: Any, ended: bool) -> TaskState:
     if isinstance(task, Locomotion):  # a hopper that stands, or one head over heels
         return _moved(task, state, 0.0, 0.0, 2.0 if ended else 0.0)
     if isinstance(task, SteppingStones):
-        state = _changed(state, memory=Progress(crossed=jnp.asarray(6 if ended else 5, jnp.int32)))
+        state = _changed(state, memory=StonesCrossed(crossed=jnp.asarray(6 if ended else 5, jnp.int32)))
     return _moved(task, state, *task.target) if ended or isinstance(task, SteppingStones) else state
 
 

@@ -27,7 +27,7 @@ DEPTH: Final = 1.0
 
 
 @pytree
-class Run:
+class FurthestRun:
     """The furthest x that the torso has come to, m."""
 
     furthest: Float[Array, ""]
@@ -71,14 +71,16 @@ class Obstacles(RobotTask):
             for x, top in zip(PLACES, self.tops, strict=True)
         )
 
-    def memory(self, pose: Pose) -> Run:
+    def memory(self, pose: Pose) -> FurthestRun:
         """Start where the torso is."""
-        return Run(furthest=pose.place[0])
+        return FurthestRun(furthest=pose.place[0])
 
-    def rule(self, memory: Run, before: Pose, after: Pose, action: Float[Array, " action"]) -> Ruling:
+    def rule(self, memory: FurthestRun, before: Pose, after: Pose, action: Float[Array, " action"]) -> Ruling:
         """Pay as in plain locomotion."""
         reward, lost = forward(self.robot, self.scene.seconds, before, after, action)
-        return Ruling(memory=Run(furthest=jnp.maximum(memory.furthest, after.place[0])), reward=reward, ended=lost)
+        return Ruling(
+            memory=FurthestRun(furthest=jnp.maximum(memory.furthest, after.place[0])), reward=reward, ended=lost
+        )
 
     def measures(self, outing: Outing) -> dict[str, Array]:
         """Return how many obstacles were left behind, and the furthest x, m."""

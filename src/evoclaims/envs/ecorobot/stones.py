@@ -35,7 +35,7 @@ BONUS: Final = 1000.0
 
 
 @pytree
-class Progress:
+class StonesCrossed:
     """How many stones have been crossed."""
 
     crossed: Int[Array, ""]
@@ -80,14 +80,14 @@ class SteppingStones(Maze):
         """The last stone."""
         return TARGET
 
-    def memory(self, pose: Pose) -> Progress:
+    def memory(self, pose: Pose) -> StonesCrossed:
         """Start without a stone."""
-        return Progress(crossed=jnp.zeros((), jnp.int32))
+        return StonesCrossed(crossed=jnp.zeros((), jnp.int32))
 
-    def rule(self, memory: Progress, before: Pose, after: Pose, action: Float[Array, " action"]) -> Ruling:
+    def rule(self, memory: StonesCrossed, before: Pose, after: Pose, action: Float[Array, " action"]) -> Ruling:
         """Count a stone when the robot is at the one that is next."""
         crossed = memory.crossed + (self._distance(memory, after) <= self.within).astype(jnp.int32)
-        now = Progress(crossed=crossed)
+        now = StonesCrossed(crossed=crossed)
         done = crossed == len(STONES)
         reward = crossed.astype(jnp.float32) + 1.0 - self._distance(now, after) / ARENA
         return Ruling(memory=now, reward=reward + jnp.where(done, BONUS, 0.0), ended=done)
@@ -104,10 +104,10 @@ class SteppingStones(Maze):
         """Return how many stones were crossed."""
         return {"stones": outing.memory.crossed.astype(jnp.float32)}
 
-    def _next(self, memory: Progress) -> Float[Array, 2]:
+    def _next(self, memory: StonesCrossed) -> Float[Array, 2]:
         """Return where the next stone lies; after the last, the last."""
         return jnp.asarray(STONES, jnp.float32)[jnp.minimum(memory.crossed, len(STONES) - 1)]
 
-    def _distance(self, memory: Progress, pose: Pose) -> Float[Array, ""]:
+    def _distance(self, memory: StonesCrossed, pose: Pose) -> Float[Array, ""]:
         """Return how far the next stone is, m."""
         return jnp.linalg.norm(pose.place[:2] - self._next(memory))
