@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -12,6 +11,7 @@ import numpy as np
 import pytest
 import reference
 from genomes import at, read, read_all, same
+from workbench import AS_SHIPPED
 
 from evoclaims.envs.gates.parity import NParity
 from evoclaims.methods.neat import capacity
@@ -35,10 +35,6 @@ def _settings(on_level_up: LevelUp, nodes: int, connections: int) -> Settings:
     )
 
 
-AS_ELSEWHERE = {"xla_cpu_use_fusion_emitters": True} if "fusion_emitters" in os.environ["XLA_FLAGS"] else None
-"""Without them, as the tests compile otherwise (tests/conftest.py), roundings depend on the size of arrays."""
-
-
 @dataclass(frozen=True)
 class Bench:
     """A compiled generation, and the states and reports of some of them on the first level."""
@@ -57,7 +53,7 @@ def _bench(settings: Settings) -> Bench:
     with jax.numpy_dtype_promotion("strict"), jax.numpy_rank_promotion("raise"), jax.debug_key_reuse(True):
         state = jax.jit(lambda key: begin(key, settings, NETWORK))(jax.random.key(2))
         level = jnp.zeros((), jnp.int32)
-        step = jax.jit(generation).lower(keys[0], level, state).compile(AS_ELSEWHERE)
+        step = jax.jit(generation).lower(keys[0], level, state).compile(AS_SHIPPED)
     states, reports = [state], []
     for key in keys:
         state, progress = step(key, level, state)
