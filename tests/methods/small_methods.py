@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Any
 
-from evoclaims.methods.waypoints import Waypoints
 from plane import Plane
 from workbench import Workbench
 
@@ -24,6 +23,7 @@ from evoclaims.methods.random_search import RandomSearch
 from evoclaims.methods.tensorneat import NeatTensorneat
 from evoclaims.networks.all_skips import AllSkips
 from evoclaims.networks.mlp import Mlp
+from reproductions.nisioti2025.waypoints import Waypoints
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from laboratory import HERE, Laboratory, better_solves, better_wins
 
 from evoclaims.judging.verdict import Outcome
-from evoclaims.report.formatting import clean
+from evoclaims.report.formatting import clean, places
 from evoclaims.report.html import html
 from evoclaims.report.model import Page, PaperFigure
 from evoclaims.verdicts.claim_report import ClaimReport
@@ -81,7 +81,7 @@ def _page(lab: Laboratory, report: ClaimReport, text: str) -> Page:
     return lab.page(changed, sentences={changed.name: f"paper {text}"})
 
 
-@given(st.text(min_size=1))
+@given(st.text(min_size=1).filter(lambda text: not places(text)[0].startswith("§")))  # sections are chosen by
 def test_no_text_changes_what_the_page_is_made_of(bench: tuple[Laboratory, ClaimReport], text: str) -> None:
     lab, report = bench
     shown = f"x{text}x"

@@ -18,7 +18,7 @@ from evoclaims.envs.gates.parity import NParity
 from evoclaims.envs.gates.truth_table import TruthTable
 from evoclaims.envs.probes import CURRICULUM
 from evoclaims.methods.base import Policy, Progress
-from evoclaims.methods.hand_built import threshold_network
+from evoclaims.methods.hand_built import HandBuilt
 from evoclaims.trials.budget import Budget
 from evoclaims.trials.compatibility import traced_progress
 from evoclaims.trials.program import Program
@@ -46,7 +46,7 @@ class Answering(Walker):
     bend: str = ""
 
     def best(self, task: Any, state: Any) -> Policy:
-        right = threshold_network(task, 1.0)
+        right = HandBuilt().best(task, jnp.int32(0))
         return Policy(right.parameters, lambda parameters, bits: BENDS[self.bend](right.function(parameters, bits)))
 
 

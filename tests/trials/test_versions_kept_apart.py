@@ -14,7 +14,7 @@ import pytest
 from climbers import CLIMBING, SEEDS, Log, run_climbers
 from trial_toys import StoppedError, stopping
 
-from evoclaims.core import packages
+from evoclaims.core import packages, provenance
 from evoclaims.trials import checkpoint
 from evoclaims.trials.batches import StoredTrials, drop_finished_checkpoints
 from evoclaims.trials.integrity import verify
@@ -139,10 +139,11 @@ def test_a_record_under_the_name_of_other_versions_is_foreign(store: Store, make
 @pytest.fixture
 def upgraded(monkeypatch: pytest.MonkeyPatch) -> Callable[[], None]:
     """A function after which this process believes another numpy to be installed."""
-    there = packages._installed
+    there = packages.version_of
 
     def upgrade() -> None:
-        monkeypatch.setattr(packages, "_installed", lambda name: "99" if name == "numpy" else there(name))
+        for module in (packages, provenance):
+            monkeypatch.setattr(module, "version_of", lambda name: "99" if name == "numpy" else there(name))
 
     return upgrade
 

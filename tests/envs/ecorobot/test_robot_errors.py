@@ -15,17 +15,12 @@ from evoclaims.envs.ecorobot.boxes import Box
 from evoclaims.envs.ecorobot.deceptive import DeceptiveMaze
 from evoclaims.envs.ecorobot.locomotion import Locomotion
 from evoclaims.envs.ecorobot.obstacles import Obstacles
-from evoclaims.envs.ecorobot.robots import ROBOTS, SIMPLE_ROB
+from evoclaims.envs.ecorobot.robots import SIMPLE_ROB
 from evoclaims.envs.ecorobot.scene import Scene
 from evoclaims.envs.ecorobot.sensors import PieSlices, Rangefinders
 from evoclaims.envs.ecorobot.stones import SteppingStones
 
 WRONG: Any = "steep"
-
-
-def test_an_unknown_robot_is_told_the_known_ones() -> None:
-    with pytest.raises(UserError, match=r"no robot named 'antt'\. Did you mean 'ant'\? Known: ant, half_cheetah, "):
-        ROBOTS["antt"]
 
 
 @pytest.mark.parametrize(
