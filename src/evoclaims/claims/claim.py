@@ -63,7 +63,7 @@ def claim(
         says: the paper's own words.
         where: section and figure.
         smoke: the scaled-down statement of the smoke tier.
-        expect: an accepted outcome, for every tier and parameter; a finer one (see `expected`) comes before it.
+        expect: an accepted outcome, for every tier and parameter; a narrower one (see `expected`) overrides it.
         because: why it is accepted; required with `expect`.
 
     Raises:
@@ -107,8 +107,8 @@ def claim_of(item: pytest.Item) -> Claim | None:
 def expectation_of(item: pytest.Item, tier: str) -> Expectation | None:
     """Return the accepted outcome that holds for a test at a tier: the one of the closest mark.
 
-    A parameter's mark is closer than its test's, then come class and module; of marks that are equally close, one for
-    this tier alone is closer than one for every tier.
+    A parameter's mark is closer than its test's, then come class and module; of equally close marks, one for this tier
+    only is closer than one for every tier.
     """
     callspec = getattr(item, "callspec", None)
     of_case = {id(mark) for mark in callspec.marks} if callspec else set()
@@ -116,7 +116,7 @@ def expectation_of(item: pytest.Item, tier: str) -> Expectation | None:
     found: list[tuple[int, bool, Expectation]] = []
     for node, mark in item.iter_markers_with_node(EXPECT_MARK):
         expectation: Expectation = mark.args[0]
-        # pytest itself gives the marks of a test before those of its parameters.
+        # pytest lists the marks of a test before those of its parameters.
         distance = 0 if id(mark) in of_case else 1 + nodes.index(node)
         if expectation.tier in (None, tier):
             found.append((distance, expectation.tier is None, expectation))

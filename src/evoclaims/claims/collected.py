@@ -1,4 +1,4 @@
-"""Claim tests as pytest collects them: the claim, the tier and the case of each, and a name that no other has."""
+"""Claim tests as pytest collects them: the claim, the tier, the case and the unique name of each."""
 
 from __future__ import annotations
 
@@ -33,10 +33,10 @@ class ClaimTest:
 
     @staticmethod
     def of(item: pytest.Item) -> ClaimTest:
-        """Return what a test with the mark of a claim judges.
+        """Return what a test marked as a claim judges.
 
         Raises:
-            UserError: when it has no tier, being no test that takes parameters, or when the mark holds no claim.
+            UserError: when it has no tier, since it cannot take parameters, or when the mark holds no claim.
         """
         callspec, claim = getattr(item, "callspec", None), claim_of(item)
         if callspec is None or TIER not in callspec.params:
@@ -51,12 +51,12 @@ class ClaimTest:
 
     @property
     def key(self) -> tuple[str, str]:
-        """What its verdict is kept under: `history.key_of` its report."""
+        """The key of its verdict, as `history.key_of` gives it."""
         return self.tier, printable(named(self.claim.id, self.case))
 
 
 def claim_tests(items: Iterable[pytest.Item]) -> dict[pytest.Item, ClaimTest]:
-    """Return what every claim test among `items` judges, once it is certain that they can be told apart.
+    """Return what every claim test among `items` judges, after checking that their names are unique.
 
     Raises:
         UserError: as `ClaimTest.of` does, or when two tests have the same name and tier.

@@ -1,4 +1,4 @@
-"""Where a claim's trials come from: they are run when they are missing, or only read."""
+"""Where a claim's trials come from: missing ones are run, or stored ones are only read."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from evoclaims.trials.store import Store
 
 
 class NotStoredError(Exception):
-    """Trials are missing and may not be run; ends a claim as "not run"."""
+    """Trials are missing and may not be run; the claim is then "not run"."""
 
 
 @dataclass(frozen=True)
@@ -28,11 +28,11 @@ class RunMissing:
     Attributes:
         store: where trials are kept.
         device: "auto", "cpu" or "gpu".
-        watch: who is told.
+        watch: is told the progress.
         time_limit: seconds that a batch of trials may take.
-        any_version: take a stored trial whatever versions it was made with; else one made with other versions than this
+        any_version: accept a stored trial made with any versions; else one made with versions other than this
             environment's is run again.
-        again: seeds that were run again for their versions, by the condition's id; filled in as trials are fetched.
+        again: seeds run again because of their versions, by the condition's id; filled in as trials are fetched.
     """
 
     store: Store
@@ -43,10 +43,10 @@ class RunMissing:
     again: dict[str, set[int]] = field(default_factory=dict, compare=False)
 
     def check(self) -> None:
-        """Find out before the first trial whether the store can be written and the device is there.
+        """Check before the first trial that the store can be written and the device exists.
 
-        A store with trials that cannot be written may have all that is asked for; where it does not, the first
-        condition that lacks a trial says so.
+        A read-only store with trials passes, since it may hold all that is needed; if not, the first condition that
+        lacks a trial raises the error.
         """
         try:
             self.store.check_writable()
@@ -76,7 +76,7 @@ class RunMissing:
         return results
 
     def _is_outdated(self, spec: TrialSpec) -> bool:
-        """Whether every record of a trial was made with other versions than this environment's."""
+        """Whether every record of a trial was made with versions other than this environment's."""
         versions = spec.condition.versions
         if self.store.record_path(spec.id, versions).exists():  # without reading it: the usual case
             return False
@@ -90,7 +90,7 @@ class StoredOnly:
     archive: Archive
 
     def check(self) -> None:
-        """What is no store cannot be read."""
+        """Check that the folder is a store."""
         self.archive.store.check()
 
     def __call__(self, condition: Condition, seeds: Sequence[int]) -> Sequence[TrialResult]:

@@ -26,7 +26,7 @@ def judged(
     verdict: Verdict,
     again: Mapping[str, Collection[int]],
 ) -> ClaimReport:
-    """Build the report of a claim that was judged; `again` has the seeds that were run again by the condition's id."""
+    """Build the report of a claim that was judged; `again` holds the seeds that were run again, by condition id."""
     groups = [source for source in assertion.sources() if isinstance(source, TrialGroup)]
     seeds = protocol.seeds(verdict.n)
     return replace(
@@ -45,12 +45,12 @@ def broken(claim: Claim, case: str, tier: str, reason: str) -> ClaimReport:
 
 
 def skipped(claim: Claim, case: str, tier: str, reason: str) -> ClaimReport:
-    """Build the report of a claim whose test was skipped, with pytest's words for why."""
+    """Build the report of a claim whose test was skipped, with pytest's reason."""
     return _unjudged(claim, case, tier, Outcome.NOT_RUN, f"its test was skipped ({reason or 'no reason given'})")
 
 
 def expecting(report: ClaimReport, expectation: Expectation | None) -> ClaimReport:
-    """Add an accepted outcome to a report; what is accepted of the protocol is not of its variants."""
+    """Add an accepted outcome to a report; what is accepted for the protocol is not for its variants."""
     if expectation is None or report.variant:
         return report
     return replace(report, expected=expectation.outcome, because=expectation.because)

@@ -29,7 +29,7 @@ from evoclaims.verdicts.upgrade import Succession, Upgrade, predecessors, upgrad
 
 @dataclass(frozen=True)
 class _Used:
-    """A condition that claims of a tier are about: the ids of its trials, and the seeds that were run again."""
+    """A condition that a tier's claims use: the ids of its trials, and the seeds that were run again."""
 
     tier: str
     method: str
@@ -65,7 +65,7 @@ class Session:
         return self.reproduction.trials(method, on, condition, self.fetch)
 
     def protocol(self, tier: str) -> Protocol:
-        """Return how claims of a tier are judged; with a fixed number of trials, by one look at the whole α."""
+        """Return a tier's protocol; with a fixed number of trials, it has one look with the whole α."""
         protocol = self.reproduction.tier(tier).protocol
         if self.trials is None:
             return protocol
@@ -87,7 +87,7 @@ class Session:
     def complete(self, report: ClaimReport, expectation: Expectation | None) -> ClaimReport:
         """Return a report with the variant, an accepted outcome, and the file that holds it.
 
-        Trials that are run make verdicts that are written down; where they are only read, the file is an earlier run's.
+        A session that runs trials saves the report; one that only reads them refers to an earlier run's file.
         """
         complete, root = expecting(replace(report, variant=self.variant), expectation), self.store.root
         if isinstance(self.fetch, StoredOnly):
@@ -111,9 +111,9 @@ class Session:
         return references.compare(cases)
 
     def upgrade(self, reports: Sequence[ClaimReport]) -> Upgrade:
-        """Compare the trials behind `reports` with those that the store holds of other versions.
+        """Compare the trials behind `reports` with the store's trials of other versions.
 
-        Conditions that are judged from other versions' trials themselves are left out.
+        Conditions that are themselves judged from trials of other versions are left out.
         """
         successions = []
         for used in self._used(reports):
@@ -131,10 +131,10 @@ class Session:
         return upgrade(successions)
 
     def _used(self, reports: Sequence[ClaimReport]) -> list[_Used]:
-        """Return the conditions that `reports` are about, each once, with all trials that were looked at."""
+        """Return each condition of `reports` once, with all its judged trials."""
         found: dict[tuple[str, str, str], _Used] = {}
         for report in reports:
-            if self.variant and not report.n:  # most claims are not about what a variant changes
+            if self.variant and not report.n:  # a variant leaves most claims unchanged
                 continue
             for source in report.sources:
                 names = report.tier, source.method, source.task
@@ -152,7 +152,7 @@ class Session:
 
 
 class Verdicts:
-    """The `verdict` fixture: takes exactly one assertion per test and keeps what became of it."""
+    """The `verdict` fixture: takes exactly one assertion per test and keeps its report."""
 
     def __init__(self, settle: Callable[[Assertion], ClaimReport]) -> None:
         """Remember how to judge."""
@@ -163,7 +163,7 @@ class Verdicts:
         """Judge the claim's assertion.
 
         Raises:
-            UserError: for a second assertion, or something that is none.
+            UserError: for a second assertion, or a value that is not one.
         """
         if not isinstance(assertion, Assertion):
             raise UserError(

@@ -18,14 +18,14 @@ from evoclaims.trials.time_limit import is_final
 
 @dataclass(frozen=True)
 class Archive:
-    """Trials by id, wherever they are kept and whatever versions they were made with: what is there to be judged.
+    """All trials that can be judged, by id, from the store or committed, made with any versions.
 
-    Of several records of a trial the one made with the versions asked for comes first, from the store or committed;
+    If a trial has several records, the one made with the requested versions comes first, from the store or committed;
     then the store's newest, then the committed one.
 
     Attributes:
-        store: looked into first; what ran out of time there may still be among the reference trials.
-        references: folder of the committed reference trials; None for none.
+        store: searched first; a trial that ran out of time there may still be a reference trial.
+        references: folder of the committed reference trials, or None.
     """
 
     store: Store
@@ -36,7 +36,7 @@ class Archive:
 
         Args:
             trial: its id.
-            versions: what it would best have been made with; None for no preference.
+            versions: preferred versions of its packages; None for no preference.
 
         Raises:
             UserError: when a record, or a file of reference trials, is torn or edited.
@@ -52,7 +52,7 @@ class Archive:
         return newest(filter(is_final, records)) or newest(committed) or newest(records)
 
     def trials(self, condition: Condition, seeds: Sequence[int]) -> tuple[TrialResult | None, ...]:
-        """Return a condition's trial for each seed, None where there is none; this environment's come first."""
+        """Return a condition's trial for each seed, or None; this environment's records come first."""
         return tuple(self.get(TrialSpec(condition, seed).id, condition.versions) for seed in seeds)
 
     @cached_property

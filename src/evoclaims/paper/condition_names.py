@@ -1,4 +1,4 @@
-"""What stored trials are of: the names that a reproduction has for their conditions."""
+"""The names that a reproduction has for the conditions of stored trials."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ class Name:
 
     Attributes:
         tier: "smoke" or "full".
-        variant: of the protocol; empty for the protocol itself.
-        method, task: as claims say.
+        variant: its name; empty for the protocol itself.
+        method, task: as claims name them.
     """
 
     tier: str
@@ -26,9 +26,9 @@ class Name:
 
 
 def names_of(reproduction: Reproduction) -> dict[str, tuple[Name, ...]]:
-    """Return the names of every condition by its id; several, where tiers or methods share it.
+    """Return the names of every condition by its id; several if tiers or methods share it.
 
-    A variant names only what the protocol itself does not have: of trials that both use, the protocol's name counts.
+    A variant names only conditions that the protocol itself does not have; shared ones keep the protocol's name.
     """
     found: dict[str, tuple[Name, ...]] = {}
 

@@ -30,10 +30,10 @@ class SuiteConfig:
     time_limit: str = DEFAULT_LIMIT
 
     def seconds(self, option: str | None) -> float:
-        """Return the time that a batch of trials may take: what an option says, or else these settings.
+        """Return the seconds that a batch of trials may take, from an option or else from these settings.
 
         Raises:
-            UserError: when that is no length of time.
+            UserError: when that is not a length of time.
         """
         return seconds_of(self.time_limit if option is None else option)
 
@@ -57,7 +57,7 @@ def load_config(root: Path) -> SuiteConfig:
     """Read the settings of the project in `root`.
 
     Raises:
-        UserError: when the table is missing, has other keys, or a value that is no text.
+        UserError: when the table is missing, has other keys, or a value that is not text.
     """
     table = _tool_tables(root / "pyproject.toml").get("evoclaims")
     known = isinstance(table, dict) and {"reproduction"} <= set(table) <= {"reproduction", "claims", "time_limit"}

@@ -1,4 +1,4 @@
-"""What a condition costs on this machine, from trials that have run on such a device, or from a few steps."""
+"""The cost of a condition on this machine, from earlier trials on such a device or from a few timed steps."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class Pace:
     """How fast a condition runs.
 
     Attributes:
-        per_step: seconds of one step: of one trial where each is a call of its own, else of the whole batch.
+        per_step: seconds per step: of one trial if each trial is a separate call, else of the whole batch.
         compile: seconds of compilation.
         layout: see `program.over_trials`.
     """
@@ -50,7 +50,7 @@ def known_pace(
     task: str,
     kind: str,
 ) -> Pace | None:
-    """Return the pace of stored or reference trials of this condition on this kind of device; None without any."""
+    """Return the pace of stored or reference trials of this condition on this kind of device, or None."""
     versions = condition.versions
     stored = (store.get(TrialSpec(condition, seed).id, versions) for seed in range(SEEDS_LOOKED_AT))
     trials = [trial for trial in stored if trial is not None and is_final(trial)]

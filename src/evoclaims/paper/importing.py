@@ -1,4 +1,4 @@
-"""Importing a project's own modules: whatever goes wrong in them is one sentence with the file and the line."""
+"""Import a project's own modules; any error in them becomes one sentence with the file and the line."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ def import_module(name: str, root: Path, named_by: str) -> ModuleType:
 
     Args:
         name: of the module, with dots.
-        root: the project's folder; files in it are named from there.
-        named_by: what names the module, such as "[tool.evoclaims]".
+        root: the project's folder; errors name files relative to it.
+        named_by: the setting that names it, such as "[tool.evoclaims]".
 
     Raises:
         UserError: when there is no such module, or when anything is raised while it is imported.

@@ -1,4 +1,4 @@
-"""Committed reference trials: one JSON record a line, in reference/<tier>/<method>-<task>.jsonl of a reproduction."""
+"""Committed reference trials: one JSON record per line, in reference/<tier>/<method>-<task>.jsonl of a reproduction."""
 
 from __future__ import annotations
 
@@ -16,18 +16,18 @@ from evoclaims.trials.result_codec import RecordError, dump, parse
 from evoclaims.trials.time_limit import is_final
 
 METRICS = ("mean_success", "last_fitness", "environment_steps")
-"""What the drift check compares: how well a trial ended, in success and in reward, and how long it took."""
+"""Metrics that the drift check compares: final success, final reward, and environment steps."""
 
 _MEND = "Restore the file from version control, or write it anew with `evoclaims reference`."
 
 
 def path_of(folder: Path, tier: str, method: str, task: str) -> Path:
-    """Return where the reference trials of a method on a task lie."""
+    """Return the path of the reference trials of a method on a task."""
     return folder / tier / f"{method}-{task}.jsonl"
 
 
 def load(path: Path) -> tuple[TrialResult, ...]:
-    """Read reference trials; none when there is no such file.
+    """Read reference trials; empty if there is no such file.
 
     Raises:
         UserError: when the file cannot be read, or a line is torn or edited.
@@ -64,7 +64,7 @@ def drift_case(folder: Path, tier: str, method: str, task: str, new: Sequence[Tr
 
 
 def compare(cases: Sequence[DriftCase]) -> tuple[DriftReport, DigestCheck]:
-    """Check all cases for drift, and trials made on a CPU for being the same to the bit, which only a CPU promises."""
+    """Check all cases for drift, and CPU trials for bit-identical results, which only a CPU guarantees."""
     checks = [
         compare_digests([trial], [old for old in case.reference if _bits_should_agree(trial, old)])
         for case in cases
@@ -76,11 +76,11 @@ def compare(cases: Sequence[DriftCase]) -> tuple[DriftReport, DigestCheck]:
 
 
 def _bits_should_agree(one: TrialResult, other: TrialResult) -> bool:
-    """Whether all that fixes bits is the same, as far as both records say it: old ones say less."""
+    """Whether all settings that fix bits, and that both records contain, are equal; old records contain fewer."""
     ours, theirs = what_fixes_bits(one.provenance), what_fixes_bits(other.provenance)
     return all(ours[name] == theirs[name] for name in ours.keys() & theirs.keys())
 
 
 def _made_on_cpu(trial: TrialResult) -> bool:
-    """Whether a record says that it was made on a CPU; one that does not say is comparable with nothing."""
+    """Whether a record says that it was made on a CPU; False if it names no device."""
     return (trial.provenance.get("device") or {}).get("platform") == "cpu"

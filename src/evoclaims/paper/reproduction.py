@@ -1,4 +1,4 @@
-"""What a paper's reproduction consists of: which trials each tier runs, and how many decide."""
+"""A paper's reproduction: which trials each tier runs, and how many of them decide."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class Tier:
 
     Attributes:
         conditions: by method and task, as claims name them: `{("ppo", "n_parity"): Condition(...)}`.
-        protocol: how many trials are looked at, with which error rates.
+        protocol: how many trials are judged, with which error rates.
     """
 
     conditions: Mapping[tuple[str, str], Condition]
@@ -43,12 +43,12 @@ class Reproduction:
     Attributes:
         name: a short name, such as "nisioti2025".
         title: the paper's title.
-        folder: where the reproduction lies; its reference trials are in folder/reference.
+        folder: of the reproduction; its reference trials are in folder/reference.
         tiers: by name; "smoke" and "full".
-        variants: by name, of the protocol; claims are re-judged under them.
-        figures: modules that redraw the paper's figures and tables, in its order; each holds FIGURE, an
+        variants: of the protocol, by name; claims are judged again under them.
+        figures: modules that redraw the paper's figures and tables, in paper order; each holds FIGURE, an
             `evoclaims.figures.Figure` with the module's last name, and is imported only when it is drawn.
-        trials: what `trials(...)` gives a claim: `TrialGroup`, or a subclass with the paper's own measures.
+        trials: class that `trials(...)` returns: `TrialGroup`, or a subclass with the paper's own measures.
 
     Raises:
         UserError: when `trials` is neither.
@@ -71,7 +71,7 @@ class Reproduction:
             )
 
     def tier(self, name: str, variant: str = "") -> Tier:
-        """Return a tier, as a variant changes it if one is named; an `UnknownNameError` lists the known ones."""
+        """Return a tier, changed by a variant if one is named; an `UnknownNameError` lists the known ones."""
         if name not in self.tiers:
             raise UnknownNameError("tier", name, self.tiers)
         if not variant:
@@ -87,5 +87,5 @@ class Reproduction:
         return self.folder / "reference"
 
     def references_of(self, variant: str) -> Path:
-        """The folder of the reference trials that only a variant has; without a name, of the protocol's own."""
+        """The folder of the reference trials that only a variant has; without a name, of the protocol's."""
         return self.references / "variants" / variant if variant else self.references

@@ -1,4 +1,4 @@
-"""The trials of one condition as a claim speaks of them."""
+"""The trials of one condition, with the measures that claims use."""
 
 from __future__ import annotations
 
@@ -17,20 +17,20 @@ Fetch = Callable[[Condition, Sequence[int]], Sequence[TrialResult]]
 
 
 class UnknownMeasureError(UnknownNameError, AttributeError):
-    """A misspelled measure; an `AttributeError` too, so that attributes keep what they promise (`hasattr`)."""
+    """A misspelled measure; an `AttributeError` too, so that `hasattr` works."""
 
 
 @dataclass(frozen=True, eq=False)
 class TrialGroup:
-    """Trials that are run only when a verdict needs them, and what can be read from each.
+    """Trials that are run only when a verdict needs them, and the measures of each.
 
-    Here are the measures of every method on every task. A paper adds its own in a subclass, which its reproduction
+    Here are the measures of every method and task. A paper adds its own in a subclass, which its reproduction
     names: `Reproduction(trials=...)`. Names of measures and events are hashed into claims' fingerprints.
 
     Attributes:
         method, task: the names by which a claim asked for them.
         condition: what is run.
-        get: how trials are had: run, or read from the store.
+        get: runs trials, or reads them from the store.
     """
 
     method: str
@@ -86,7 +86,7 @@ class TrialGroup:
 
     @property
     def reward(self) -> Measure:
-        """Reward of an episode of the final policy on the last level, averaged over the examination's episodes."""
+        """Episode reward of the final policy on the last level, averaged over the evaluation's episodes."""
         return self.measure("episode reward", lambda t: t.metrics["last_fitness"])
 
     @property

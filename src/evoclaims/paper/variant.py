@@ -25,7 +25,7 @@ class Variant:
 
 
 def changed(conditions: Conditions, change: Callable[[str, str, Condition], Any]) -> dict[tuple[str, str], Condition]:
-    """Return the conditions that `change(method, task, condition)` gives another one for.
+    """Return the new conditions where `change(method, task, condition)` returns a different one.
 
     `change` returns a condition, or None where the detail does not matter.
     """

@@ -1,1 +1,1 @@
-"""What became of claims: the report of each, the accepted ones, and how two sets of them differ."""
+"""Verdicts of claims: their reports, the accepted ones, and how two sets of them differ."""

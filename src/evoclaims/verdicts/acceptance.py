@@ -1,4 +1,4 @@
-"""Accepting verdicts: which of now differ from the last accepted ones, and what is written down of them."""
+"""Accepting verdicts: which ones differ from the last accepted ones, and the entries that record them."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ from evoclaims.verdicts.claim_report import ClaimReport
 from evoclaims.verdicts.history import Entry, History, key_of
 
 UNDECIDED = (Outcome.NOT_RUN, Outcome.ERROR)
-"""Outcomes that say nothing of a claim, and so are never accepted."""
+"""Outcomes that say nothing about a claim and are never accepted."""
 
 
 @dataclass(frozen=True)
 class Acceptance:
-    """What accepting the verdicts of now comes to.
+    """The result of accepting the current verdicts.
 
     Attributes:
         history: with the new entries.
         accepted: a line for each new entry.
-        left: a line for each claim whose verdict of now is not accepted.
+        left: a line for each claim whose current verdict is not accepted.
     """
 
     history: History
@@ -34,11 +34,11 @@ class Acceptance:
 
 
 def accept(history: History, reports: Sequence[ClaimReport], archive: Archive, today: str) -> Acceptance:
-    """Append an entry for every claim whose outcome, fingerprint, versions or device is not the last accepted one.
+    """Append an entry for every claim whose outcome, fingerprint, versions or device has changed since the last one.
 
     Args:
-        history: accepted before.
-        reports: verdicts of now.
+        history: verdicts accepted so far.
+        reports: current verdicts.
         archive: where their trials are.
         today: ISO 8601 date.
     """
@@ -60,7 +60,7 @@ def accept(history: History, reports: Sequence[ClaimReport], archive: Archive, t
 
 
 def entry_of(report: ClaimReport, archive: Archive, today: str) -> Entry:
-    """Return what is written down of a judged claim.
+    """Return the entry that records a judged claim.
 
     Raises:
         UserError: when a trial behind it is damaged.
@@ -83,14 +83,14 @@ def entry_of(report: ClaimReport, archive: Archive, today: str) -> Entry:
 
 
 def versions_of(trials: Sequence[TrialResult]) -> dict[str, str]:
-    """Return the versions that trials were made with, by package; CUDA's where a GPU made them."""
+    """Return the versions that trials were made with, by package; CUDA's too if a GPU made them."""
     made_with = [_packages(trial) for trial in trials]
     names = sorted({name for packages in made_with for name in packages})
     return {printable(name): _joined(packages.get(name) for packages in made_with) for name in names}
 
 
 def difference(old: Entry | None, new: Entry) -> str:
-    """Return in words what a new entry changes; empty when it need not be written down."""
+    """Describe what a new entry changes; empty if it need not be recorded."""
     if old is None:
         return f"{new.outcome}, the first verdict"
     moved = changes(old, new)
@@ -103,7 +103,7 @@ def difference(old: Entry | None, new: Entry) -> str:
 
 
 def changes(old: Entry, new: Entry) -> list[str]:
-    """Return in words the packages whose versions differ, such as "jax 0.10.2 -> 0.11.2", and the device."""
+    """Describe the packages whose versions differ, such as "jax 0.10.2 -> 0.11.2", and the device."""
     names = sorted(old.versions.keys() | new.versions.keys())
     pairs = [(name, old.versions.get(name, "none"), new.versions.get(name, "none")) for name in names]
     pairs.append(("device", old.device or "unknown", new.device or "unknown"))
@@ -125,5 +125,5 @@ def _revision(trial: TrialResult) -> str | None:
 
 
 def _joined(values: Iterable[Any]) -> str:
-    """Return the different values as one text; what is unknown is left out."""
+    """Return the different values as one text; unknown ones are left out."""
     return ", ".join(sorted({printable(value) for value in values if value}))

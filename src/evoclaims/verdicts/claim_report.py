@@ -1,4 +1,4 @@
-"""What became of one claim test, and the one place where that is turned into JSON and back."""
+"""The report of one claim test, and the only place that converts it to JSON and back."""
 
 from __future__ import annotations
 
@@ -31,12 +31,12 @@ class Attainable:
 
 @dataclass(frozen=True)
 class LastVerdict:
-    """The verdict that a store held of a claim before a run.
+    """A claim's verdict in the store before a run.
 
     Attributes:
         outcome: how the claim ended.
-        fingerprint: of what was fixed beforehand; None where the test broke before judging.
-        versions: that its trials were made with.
+        fingerprint: hash of what was fixed beforehand; None if the test broke before judging.
+        versions: of packages that its trials were made with.
     """
 
     outcome: Outcome
@@ -58,10 +58,10 @@ class ClaimReport:
         expected, because: an accepted outcome, if there is one.
         verdict: the whole verdict; None when the test broke before judging.
         sources: the trials behind it, by condition.
-        attainable: one entry a look.
-        evidence: path of the file that holds all this.
+        attainable: one entry per look.
+        evidence: path of the file that holds this report.
         variant: name of the variant of the protocol; empty for the protocol itself.
-        unsaved: why that file could not be written; empty when it was, or was not to be.
+        unsaved: why that file could not be written; empty if it was, or need not be.
         before: the verdict that the store held before this run, if any.
     """
 
@@ -94,18 +94,18 @@ class ClaimReport:
 
     @property
     def failed(self) -> bool:
-        """Whether this ends the run with status 1: refuted or broken, and not accepted; of a variant, broken alone."""
+        """Whether this ends the run with status 1: refuted or broken, and not accepted; for a variant, only broken."""
         failures = (Outcome.ERROR,) if self.variant else (Outcome.REFUTED, Outcome.ERROR)
         return self.outcome in failures and not self.as_expected
 
     @property
     def n(self) -> int:
-        """Trials a side that were looked at."""
+        """Number of judged trials per side."""
         return self.verdict.n if self.verdict else 0
 
     @property
     def p(self) -> float | None:
-        """For the claim; None where nothing was tested."""
+        """The p value for the claim; None if nothing was tested."""
         return self.verdict.p if self.verdict else None
 
     @property
@@ -114,13 +114,13 @@ class ClaimReport:
         return self.verdict.fingerprint if self.verdict else ""
 
     def to_json(self) -> dict[str, Any]:
-        """Return the report as strict JSON, an infinity as "inf" or "-inf": xdist passes on built-in types alone."""
+        """Return the report as strict JSON, infinities as "inf" or "-inf": xdist transfers only built-in types."""
         plain: dict[str, Any] = json.loads(json.dumps(as_plain(self)))
         return plain
 
     @staticmethod
     def from_json(plain: dict[str, Any]) -> ClaimReport:
-        """Return the report that `to_json` gave.
+        """Return a report from the output of `to_json`.
 
         Raises:
             ValueError: for anything else.
@@ -129,7 +129,7 @@ class ClaimReport:
 
 
 def named(claim_id: str, case: str) -> str:
-    """Return what a claim with some parameters is called, such as "G1[n_parity]"; its id alone without any."""
+    """Return the name of a claim with its parameters, such as "G1[n_parity]"; just its id without any."""
     return f"{claim_id}[{case}]" if case else claim_id
 
 
@@ -144,23 +144,23 @@ def save(report: ClaimReport, root: Path) -> ClaimReport:
 
 
 def succeeding(report: ClaimReport, root: Path) -> ClaimReport:
-    """Return the report with what the file of the claim's last verdict, which it takes the place of, says of that."""
+    """Return the report with the claim's previous verdict, read from the file that this report will replace."""
     try:
         last = ClaimReport.from_json(json.loads(_path(report, root).read_bytes()))
     except (OSError, ValueError):
-        return report  # none, or one that another release has written: nothing is judged from it
+        return report  # no file, or one written by another release: nothing is judged from it
     before = LastVerdict(last.outcome, last.fingerprint or None, versions_of(last.sources))
     return replace(report, before=before)
 
 
 def located(report: ClaimReport, root: Path) -> ClaimReport:
-    """Return the report with the path of the file that an earlier run has written, if there is one."""
+    """Return the report with the path of the file that an earlier run wrote, if any."""
     path = _path(report, root)
     return replace(report, evidence=str(path)) if os.path.isfile(path) else report
 
 
 def _path(report: ClaimReport, root: Path) -> Path:
-    """Return where a report's file lies."""
+    """Return the path of a report's file."""
     folder = root / "verdicts" / report.tier
     if report.variant:
         folder = folder / "variants" / file_name(report.variant)

@@ -1,4 +1,4 @@
-"""The two sides of a comparison: verdicts, and trials by condition, of a store, of a working tree, or of a revision."""
+"""The two sides of a comparison: verdicts and trials of a store, of a working tree, or of a git revision."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ from evoclaims.verdicts.git_revision import GitRevision
 from evoclaims.verdicts.transitions import Standings
 
 Trials = Mapping[str, Sequence[TrialResult]]
-"""Trials by condition, named as its file of reference trials is: "smoke/cma_es-n_parity"."""
+"""Trials by condition, named like its file of reference trials: "smoke/cma_es-n_parity"."""
 
 
 @dataclass(frozen=True)
 class Side:
-    """What is compared.
+    """One side of a comparison.
 
     Attributes:
         name: in words, such as "the revision HEAD~3".
@@ -55,7 +55,7 @@ class Side:
 
 
 def working_tree(reproduction: Reproduction) -> Side:
-    """Return the accepted verdicts and the reference trials as they lie in the reproduction's folder.
+    """Return the accepted verdicts and the reference trials in the reproduction's folder.
 
     Raises:
         UserError: when one of the files is torn.
@@ -70,8 +70,8 @@ def revision(reproduction: Reproduction, at: GitRevision) -> Side:
     """Return the accepted verdicts and the reference trials that are committed at a revision.
 
     Args:
-        reproduction: of now; only its folders are used.
-        at: read in the reproduction's folder.
+        reproduction: the current one; only its folders are used.
+        at: the revision, read in the reproduction's folder.
 
     Raises:
         UserError: when the revision has neither, or one of the files is torn.
@@ -89,10 +89,10 @@ def revision(reproduction: Reproduction, at: GitRevision) -> Side:
 
 
 def store(reproduction: Reproduction, of: Store, reports: Iterable[ClaimReport]) -> Side:
-    """Return verdicts and trials of a store; claims whose trials it does not hold itself are not run.
+    """Return verdicts and trials of a store; claims with trials that it lacks are not run.
 
     Args:
-        reproduction: whose conditions are looked for; trials of others are left out.
+        reproduction: only trials of its conditions are used.
         of: the store.
         reports: verdicts judged from it, and from committed reference trials where it has none.
     """
@@ -119,11 +119,11 @@ def store(reproduction: Reproduction, of: Store, reports: Iterable[ClaimReport])
 
 
 def _one_of_each(records: Iterable[TrialResult], versions: Mapping[str, Versions]) -> Iterator[TrialResult]:
-    """Return one record of each trial of known conditions: this environment's, or else the newest, as it is judged.
+    """Return the judged record of each trial of known conditions: this environment's, or else the newest.
 
     Args:
-        records: those of a trial one after the other.
-        versions: what this environment has of the packages that a condition depends on, by the condition's id.
+        records: grouped by trial.
+        versions: installed versions of the packages that a condition depends on, by the condition's id.
     """
     for _, several in itertools.groupby(records, key=lambda record: record.id):
         found = [record for record in several if record.condition in versions]
@@ -134,7 +134,7 @@ def _one_of_each(records: Iterable[TrialResult], versions: Mapping[str, Versions
 
 
 def compare_trials(old: Side, new: Side) -> tuple[DriftReport, DigestCheck]:
-    """Check the conditions that both sides have for drift, and CPU trials for being the same to the bit."""
+    """Check the conditions that both sides have for drift, and CPU trials for bit-identical results."""
     both = sorted(name for name in old.trials.keys() & new.trials.keys() if new.trials[name])
     return references.compare(
         [
@@ -151,7 +151,7 @@ def compare_trials(old: Side, new: Side) -> tuple[DriftReport, DigestCheck]:
 
 
 def _named(path: PurePosixPath | Path) -> str:
-    """Return a condition's name from where its reference trials lie."""
+    """Return a condition's name from the path of its reference trials."""
     return path.with_suffix("").as_posix()
 
 

@@ -1,6 +1,6 @@
-"""Trials and verdicts as flat tables, for people who go on with pandas.
+"""Trials and verdicts as flat tables, for analysis with pandas.
 
-They are not written by pandas, which takes None, what was not measured, for NaN, what was.
+They are not written by pandas, which turns None (not measured) into NaN (measured).
 """
 
 from __future__ import annotations
@@ -20,22 +20,22 @@ from evoclaims.trials.result import TrialResult
 from evoclaims.verdicts.claim_report import ClaimReport
 
 SCHEMA: Final = 1
-"""Of the JSON form; raised when a column changes its meaning."""
+"""Version of the JSON form; raised when a column changes its meaning."""
 
 Row = Mapping[str, Any]
-"""One line of a table: values by column. None where there is nothing; a column may be missing for it."""
+"""One row of a table: values by column. For a missing value, the column holds None or is absent."""
 
 _FORMULA: Final = ("=", "+", "-", "@")
-"""How a text begins that spreadsheets calculate (a tab or a carriage return before it has been escaped by then)."""
+"""First characters of texts that spreadsheets evaluate (a leading tab or carriage return is already escaped)."""
 
 
 def trial_rows(trials: Iterable[TrialResult], names: Mapping[str, Sequence[Name]]) -> list[Row]:
     """Return one row per trial.
 
     Columns: "id", "condition", "tier", "variant", "method", "task" (as the reproduction names them; several names are
-    joined by commas; of a condition that it does not have, tier and variant are None and the others the record's own
-    names), "seed", "status", "digest", then "metrics.…" (numbers), "levels.…" (one number per level), "timing.…" and
-    "provenance.…" ("provenance.versions.jax", …). Training curves are left to the records themselves.
+    joined by commas; for a condition that it does not have, tier and variant are None, method and task the record's
+    own), "seed", "status", "digest", then "metrics.…" (numbers), "levels.…" (one number per level), "timing.…" and
+    "provenance.…" ("provenance.versions.jax", …). Training curves are only in the records themselves.
     """
     return [_trial_row(trial, names.get(trial.condition, ())) for trial in trials]
 
@@ -72,8 +72,8 @@ def as_json(rows: Sequence[Row]) -> bytes:
 def as_csv(rows: Sequence[Row]) -> bytes:
     """Return comma-separated values: empty for None, "nan" for NaN, JSON for lists.
 
-    In texts and headings, control characters are escaped, and an apostrophe stands before what a spreadsheet would take
-    for a formula; numbers are left as they are.
+    In texts and headings, control characters are escaped, and an apostrophe precedes what a spreadsheet would take
+    for a formula; numbers are unchanged.
     """
     text = io.StringIO(newline="")
     columns = columns_of(rows)
@@ -112,7 +112,7 @@ FORMS: Final[Mapping[str, Callable[[Sequence[Row]], bytes]]] = {
 
 
 def columns_of(rows: Sequence[Row]) -> list[str]:
-    """Return the columns of all rows; each group (before the dot) in one piece, in the order of first appearance."""
+    """Return the columns of all rows; grouped by the part before the dot, in the order of first appearance."""
     names = dict.fromkeys(name for row in rows for name in row)
     groups = list(dict.fromkeys(name.partition(".")[0] for name in names))
     return sorted(names, key=lambda name: groups.index(name.partition(".")[0]))
@@ -139,7 +139,7 @@ def _trial_row(trial: TrialResult, names: Sequence[Name]) -> Row:
 
 
 def _joined(values: Iterable[str]) -> str | None:
-    """Return different texts as one; None for none at all."""
+    """Return the different texts as one; None if there are none."""
     different = list(dict.fromkeys(values))
     return ", ".join(different) if different else None
 

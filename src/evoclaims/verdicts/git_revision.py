@@ -1,4 +1,4 @@
-"""Files of a project as a git revision has them: read through git, never checked out, and no code of theirs is run."""
+"""Files of a project at a git revision: read through git, never checked out; none of their code is run."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ GIT_SECONDS: Final = 60.0
 
 @dataclass(frozen=True)
 class GitRevision:
-    """A commit of the repository that a folder lies in.
+    """A commit of the repository that contains a folder.
 
     Attributes:
         name: as the user wrote it.
@@ -56,10 +56,10 @@ class GitRevision:
 
 
 def find_revision(name: str, folder: Path) -> GitRevision | None:
-    """Return the commit that a name means (a branch, a tag, HEAD~3, …); None when it means none.
+    """Return the commit that a name means (a branch, a tag, HEAD~3, …), or None.
 
     Raises:
-        UserError: when git is missing or too slow, or `folder` lies in no repository.
+        UserError: when git is missing or too slow, or `folder` is not in a repository.
     """
     inside = run_git(folder, "rev-parse", "--is-inside-work-tree")
     if inside.returncode or inside.stdout.strip() != b"true":

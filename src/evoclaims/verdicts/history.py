@@ -1,4 +1,4 @@
-"""Verdicts as they were last accepted, and before: `verdicts.toml` beside a reproduction, written by machine."""
+"""The history of accepted verdicts: `verdicts.toml` beside a reproduction, written by machine."""
 
 from __future__ import annotations
 
@@ -28,14 +28,14 @@ _MEND: Final = "Restore the file from version control; `evoclaims accept` goes o
 
 @dataclass(frozen=True)
 class Entry:
-    """A verdict that was accepted.
+    """An accepted verdict.
 
     Attributes:
         outcome: as judged: supported, refuted or inconclusive.
         reason: why, in a sentence.
-        n: trials a side that were looked at.
-        p: of the whole assertion; None where nothing was tested.
-        fingerprint: of everything that was fixed beforehand.
+        n: number of judged trials per side.
+        p: of the whole assertion; None if nothing was tested.
+        fingerprint: hash of everything fixed beforehand.
         accepted: when (ISO 8601 date).
         versions: of the packages that the trials were made with, by name; several are joined by commas.
         device: kind of device that made the trials; several are joined by commas.
@@ -55,7 +55,7 @@ class Entry:
     trials: str
 
     def short_revision(self, digits: int) -> str:
-        """Return the revisions with hashes that are short enough for a line."""
+        """Return the revisions with shortened hashes."""
         parts = (revision.partition("-") for revision in self.revision.split(", "))
         return ", ".join(sha[:digits] + dash + state for sha, dash, state in parts) or "unknown"
 
@@ -65,27 +65,27 @@ History = Mapping[tuple[str, str], tuple[Entry, ...]]
 
 
 def key_of(report: ClaimReport) -> tuple[str, str]:
-    """Return what a claim's verdicts are kept under; without characters that a file cannot hold."""
+    """Return the key of a claim's verdicts, without characters that a file cannot hold."""
     return report.tier, printable(report.name)
 
 
 def in_order(key: tuple[str, str]) -> tuple[str, str, int, str, str]:
-    """Sort claims by tier, and as people count: G9 before G10, and a claim before its cases."""
+    """Return a sort key: by tier, then G9 before G10, and a claim before its cases."""
     tier, name = key
     claim, _, case = name.partition("[")
     return tier, claim[:1], len(claim), claim, case.removesuffix("]")
 
 
 def eras(entries: Sequence[Entry]) -> tuple[tuple[Entry, ...], ...]:
-    """Split entries where the fingerprint changes: what was judged before is another question."""
+    """Split entries where the fingerprint changes: before that, something else was judged."""
     return tuple(tuple(group) for _, group in itertools.groupby(entries, key=lambda entry: entry.fingerprint))
 
 
 def load(path: Path) -> History:
-    """Read accepted verdicts; none when there is no such file.
+    """Read accepted verdicts; empty if there is no such file.
 
     Raises:
-        UserError: when the file is torn, of another schema, or has an entry that is none.
+        UserError: when the file is torn, of another schema, or has an invalid entry.
     """
     try:
         data = read_file(path)
@@ -119,7 +119,7 @@ def parse(data: bytes, name: str) -> History:
 
 
 def dump(history: History) -> str:
-    """Return a history as TOML; versions are written once for all that share them, so that an entry is a few lines."""
+    """Return a history as TOML; entries with the same versions share one table, so that each is short."""
     environments: dict[str, dict[str, str]] = {}
     verdicts: dict[str, dict[str, list[dict[str, Any]]]] = {}
     for (tier, claim), entries in sorted(history.items()):
@@ -160,5 +160,5 @@ def _table(value: object, name: str, part: str) -> dict[str, Any]:
 
 
 def _torn(name: str, reason: str) -> UserError:
-    """Return the error of a file that holds no history."""
+    """Return the error for a file without a history."""
     return UserError(f"{name} holds no accepted verdicts: {reason}. {_MEND}")

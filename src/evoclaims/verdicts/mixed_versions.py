@@ -1,4 +1,4 @@
-"""Claims whose trials were made with mixed versions of a package, or with others than are installed: said in lines."""
+"""Lines on claims whose trials were made with mixed versions of a package, or not with the installed ones."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from evoclaims.verdicts.source_trials import versions_of
 from evoclaims.verdicts.versions import different, in_words
 
 MARK: Final = "†"
-"""Stands beside a verdict whose trials were made with mixed versions."""
+"""Marks a verdict whose trials were made with mixed versions."""
 
 MOST_NAMES: Final = 6
 """Most names of claims that a line lists."""
@@ -25,7 +25,7 @@ def is_mixed(report: ClaimReport) -> bool:
 
 
 def lines(reports: Sequence[ClaimReport]) -> list[str]:
-    """Say which claims are judged from mixed versions, and which from others than are installed; nothing otherwise."""
+    """Return lines on claims judged from mixed versions, or from other versions than the installed ones, if any."""
     mixed: dict[str, list[str]] = defaultdict(list)
     foreign: dict[str, list[str | None]] = defaultdict(list)
     elsewhere = []
@@ -53,6 +53,6 @@ def lines(reports: Sequence[ClaimReport]) -> list[str]:
 
 
 def _listed(names: Sequence[str]) -> str:
-    """Return some of the names, and how many more there are."""
+    """Return the first names, and how many more there are."""
     rest = len(names) - MOST_NAMES
     return ", ".join(names[:MOST_NAMES]) + (f" and {rest} more" if rest > 0 else "")

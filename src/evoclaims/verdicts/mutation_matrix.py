@@ -22,7 +22,7 @@ SCHEMA: Final = 1
 
 
 class Fate(StrEnum):
-    """What became of a mutant before a claim."""
+    """The result of trying a mutant on a claim."""
 
     KILLED = "killed by the verdict"
     DRIFTED = "killed by drift"
@@ -33,15 +33,15 @@ class Fate(StrEnum):
 
 @dataclass(frozen=True)
 class Attempt:
-    """One mutant before one claim.
+    """One mutant tried on one claim.
 
     Attributes:
         mutant: its name, such as "minimizes".
         target: the method or task that has the fault, as claims name it.
-        outcome: of the claim, judged from faulty trials.
-        fate: killed by the verdict: the outcome is another one than without the fault; killed by drift: the outcome is
-            the same and the drift check would have told of the fault; equivalent: the faulty trials are the sound
-            ones, which no check can tell apart; broken: the faulty trials crashed, which says nothing of the claim.
+        outcome: of the claim, judged on the faulty trials.
+        fate: killed by the verdict: the outcome differs from the one without the fault; killed by drift: the outcome is
+            the same, but the drift check finds the fault; equivalent: the faulty trials equal the sound ones, so that
+            no check can find it; broken: the faulty trials crashed, which says nothing about the claim.
     """
 
     mutant: str
@@ -51,13 +51,13 @@ class Attempt:
 
     @property
     def name(self) -> str:
-        """Such as "cma_es: minimizes"."""
+        """A name such as "cma_es: minimizes"."""
         return f"{self.target}: {self.mutant}"
 
 
 @dataclass(frozen=True)
 class Sensitivity:
-    """What one claim notices.
+    """Which faults one claim notices.
 
     Attributes:
         outcome: without a fault.
@@ -70,17 +70,17 @@ class Sensitivity:
     attempts: tuple[Attempt, ...]
 
     def named(self, fate: Fate) -> tuple[str, ...]:
-        """Return the mutants of a fate."""
+        """Return the mutants with a fate."""
         return tuple(attempt.name for attempt in self.attempts if attempt.fate is fate)
 
     @property
     def insensitive(self) -> bool:
-        """Whether mutants were tried and none has changed the verdict: it says nothing of what it names."""
+        """Whether mutants were tried and none changed the verdict: the claim tests nothing that it names."""
         counted = [one for one in self.attempts if one.fate not in (Fate.EQUIVALENT, Fate.BROKEN)]
         return bool(counted) and not self.named(Fate.KILLED)
 
     def unnoticed(self, targets: Sequence[str]) -> tuple[str, ...]:
-        """Return the targets of which no mutant has changed the verdict."""
+        """Return the targets whose mutants all left the verdict unchanged."""
         noticed = {one.target for one in self.attempts if one.fate is Fate.KILLED}
         return tuple(target for target in targets if target not in noticed)
 
@@ -90,13 +90,13 @@ Matrix = Mapping[tuple[str, str], Sensitivity]
 
 
 def fate(sound: Outcome, faulty: Outcome, *, equivalent: bool, drifted: bool) -> Fate:
-    """Return what became of a mutant.
+    """Return the fate of a mutant.
 
     Args:
         sound: the claim's outcome without the fault.
         faulty: its outcome with it.
-        equivalent: whether all faulty trials are the sound ones.
-        drifted: whether the drift check tells a condition of the claim from its reference trials.
+        equivalent: whether all faulty trials equal the sound ones.
+        drifted: whether the drift check finds that a condition of the claim has drifted.
     """
     if equivalent:
         return Fate.EQUIVALENT
@@ -112,11 +112,11 @@ class MutationScore:
     """How many mutants are noticed; equivalent and broken ones do not count.
 
     Attributes:
-        mutants: faults with their targets that were tried.
+        mutants: pairs of fault and target that were tried.
         by_verdict: those that change the verdict of at least one claim.
-        by_drift: those that change none, and are told by the drift check.
+        by_drift: those that change none but are found by the drift check.
         claims: that mutants were tried on.
-        insensitive: those that none has changed.
+        insensitive: claims that no mutant changed.
     """
 
     mutants: int
@@ -126,7 +126,7 @@ class MutationScore:
     insensitive: tuple[str, ...]
 
     def __str__(self) -> str:
-        """One line for a table's foot."""
+        """Return one line for a table's foot."""
         return (
             f"{self.by_verdict} of {self.mutants} mutants change a verdict, {self.by_drift} more are told by the drift "
             f"check; {len(self.insensitive)} of {self.claims} claims are insensitive"
@@ -152,10 +152,10 @@ def score(matrix: Matrix, tier: str) -> MutationScore:
 
 
 def load(path: Path) -> Matrix:
-    """Read a matrix; an empty one when there is no such file.
+    """Read a matrix; empty if there is no such file.
 
     Raises:
-        UserError: when the file holds none.
+        UserError: when the file holds no matrix.
     """
     try:
         plain = tomllib.loads(read_file(path).decode())

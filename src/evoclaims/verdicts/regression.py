@@ -14,11 +14,11 @@ from evoclaims.verdicts.transitions import Kind, Transition
 
 @dataclass(frozen=True)
 class Regression:
-    """What became of the verdicts of the claims that a run was about.
+    """How the verdicts of a run's claims have changed.
 
     Attributes:
-        transitions: one for each claim of the run; none where nothing has been accepted yet.
-        matched: those that the run was told to fail on.
+        transitions: one for each claim of the run; empty if nothing has been accepted yet.
+        matched: those that make the run fail.
     """
 
     transitions: tuple[Transition, ...]
@@ -26,7 +26,7 @@ class Regression:
 
     @property
     def lines(self) -> list[str]:
-        """The counts, and a line for each verdict that is not as accepted; nothing where nothing has been accepted."""
+        """The counts, and a line for each verdict that differs from the accepted one; empty if none was accepted."""
         if not self.transitions:
             return []
         said = [one for one in self.transitions if one.kind in (Kind.CHANGED, Kind.NEW_HISTORY)]
@@ -45,7 +45,7 @@ def regression(folder: Path, reports: Sequence[ClaimReport], changes: str | None
         changes: the changes of verdicts to fail on (see `transitions.parse_patterns`); None for none.
 
     Raises:
-        UserError: when the accepted verdicts are torn; when a run shall fail on changes of them and there are none.
+        UserError: when the accepted verdicts are torn, or missing although the run should fail on their changes.
     """
     path = folder / history.FILE
     patterns = transitions.parse_patterns(changes) if changes is not None else ()

@@ -1,4 +1,4 @@
-"""Which conclusions hang on a detail: claims against variants of the protocol."""
+"""Which conclusions depend on a detail: claims under variants of the protocol."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ class Robustness:
         claim: id and parameters, such as "G1[n_parity]".
         tier: "smoke" or "full".
         plain: the verdict under the protocol itself.
-        outcomes: by variant; a variant that changes none of the claim's trials, or whose trials have not run, is not
-            there.
+        outcomes: by variant; a variant that changes none of the claim's trials, or whose trials have not run, is left
+            out.
     """
 
     claim: str
@@ -28,7 +28,7 @@ class Robustness:
 
     @property
     def hangs_on(self) -> tuple[str, ...]:
-        """Variants under which the claim ends otherwise."""
+        """Variants under which the outcome differs."""
         return tuple(name for name, outcome in self.outcomes.items() if outcome != self.plain)
 
 

@@ -12,14 +12,14 @@ from evoclaims.verdicts.versions import Several, different
 
 @dataclass(frozen=True)
 class SourceTrials:
-    """A condition that a claim is about, with the trials that were looked at.
+    """A condition that a claim is about, with the trials that were judged.
 
     Attributes:
         method, task: the names by which the claim asked for them.
         condition: its id.
         trials: their ids.
-        versions: of the packages that it depends on: the different ones that the trials were made with.
-        again: seeds that this run has run again, since the store's trials were made with other versions.
+        versions: the different versions that the trials were made with, by package that it depends on.
+        again: seeds that this run repeated because the store's trials were made with other versions.
     """
 
     method: str
@@ -38,7 +38,7 @@ class SourceTrials:
     def installed(self) -> Versions:
         """The installed versions of the packages that it depends on.
 
-        Of several records of its trials the one with these versions is the one that was judged.
+        If a trial has several records, the one with these versions was judged.
         """
         return installed(tuple(self.versions))
 

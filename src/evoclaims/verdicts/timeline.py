@@ -14,7 +14,7 @@ SHORT = 12
 
 
 def timeline(history: History, claim: str = "") -> str:
-    """Return the entries of a claim ("G1", or one case of it, "G1[n_parity]"), or of all, a line each.
+    """Return the entries of a claim ("G1", or one case of it, "G1[n_parity]"), or of all claims, one per line.
 
     Raises:
         UserError: when nothing has been accepted yet.
@@ -46,7 +46,7 @@ def _claim(tier: str, claim: str, entries: Sequence[Entry]) -> Iterator[str]:
 
 
 def _first(entry: Entry) -> str:
-    """Return what made the first verdict's trials."""
+    """Return versions and device of the first verdict's trials."""
     made_by = [f"{name} {entry.versions[name]}" for name in ("python", "jax") if name in entry.versions]
     return ", ".join([*made_by, *filter(None, [entry.device])])
 

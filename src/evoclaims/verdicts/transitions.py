@@ -1,4 +1,4 @@
-"""Two sets of verdicts compared: what stayed, what turned, and what can no longer be compared."""
+"""Two sets of verdicts compared: what stayed, what changed, and what can no longer be compared."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ ARROW: Final = "->"
 
 
 class Kind(StrEnum):
-    """What became of a claim's verdict; the values complete "12 …" in a line of counts."""
+    """How a claim's verdict changed; the values complete "12 …" in a line of counts."""
 
     SAME = "the same"
     CHANGED = "changed"
@@ -31,11 +31,11 @@ class Kind(StrEnum):
 
 @dataclass(frozen=True)
 class Standing:
-    """A verdict as far as it is compared.
+    """The compared parts of a verdict.
 
     Attributes:
         outcome: how the claim ended.
-        fingerprint: of what was fixed beforehand; empty for a test that ended before its claim was known.
+        fingerprint: hash of what was fixed beforehand; empty for a test that ended before its claim was known.
     """
 
     outcome: Outcome
@@ -48,11 +48,11 @@ Standings = Mapping[tuple[str, str], Standing]
 
 @dataclass(frozen=True)
 class Transition:
-    """One claim at one tier, then and now.
+    """One claim's old and new verdict at one tier.
 
     Attributes:
-        tier, claim: whose verdict.
-        kind: what became of it.
+        tier, claim: of the verdict.
+        kind: how it changed.
         old, new: the verdicts; None where there is none.
     """
 
@@ -71,7 +71,7 @@ class Pattern:
     new: Outcome | None
 
     def matches(self, transition: Transition) -> bool:
-        """Whether a transition is such a change; verdicts that cannot be compared are none."""
+        """Whether a transition is such a change; False if the verdicts cannot be compared."""
         if transition.kind is not Kind.CHANGED or transition.old is None or transition.new is None:
             return False
         return self.old in (None, transition.old.outcome) and self.new in (None, transition.new.outcome)
@@ -81,8 +81,8 @@ def parse_patterns(text: str) -> tuple[Pattern, ...]:
     """Return the patterns in a list such as "supported->refuted,*->error".
 
     Raises:
-        UserError: for no pattern, a part that is none, or a change that is none.
-        UnknownNameError: for an outcome that there is not.
+        UserError: for an empty list, an invalid pattern, or one that changes nothing.
+        UnknownNameError: for an unknown outcome.
     """
     patterns = []
     for part in filter(None, (part.strip() for part in text.split(","))):
@@ -110,23 +110,23 @@ def matched(transitions: Iterable[Transition], patterns: Sequence[Pattern]) -> t
 
 
 def standings(reports: Iterable[ClaimReport]) -> Standings:
-    """Return verdicts of now."""
+    """Return the current verdicts."""
     return {key_of(r): Standing(r.outcome, r.fingerprint) for r in reports}
 
 
 def accepted(history: History) -> Standings:
-    """Return the verdicts last accepted."""
+    """Return the last accepted verdicts."""
     return {key: Standing(entries[-1].outcome, entries[-1].fingerprint) for key, entries in history.items()}
 
 
 def compare(old: Standings, new: Standings) -> tuple[Transition, ...]:
-    """Return a transition for every claim of either side, in the order in which people count."""
+    """Return a transition for every claim of either side, in natural order (G9 before G10)."""
     keys = sorted(old.keys() | new.keys(), key=in_order)
     return tuple(Transition(*key, _kind(old.get(key), new.get(key)), old.get(key), new.get(key)) for key in keys)
 
 
 def _kind(old: Standing | None, new: Standing | None) -> Kind:
-    """Return what became of a verdict; a fingerprint that is not known is taken for the same."""
+    """Return how a verdict changed; an unknown fingerprint counts as unchanged."""
     if new is not None and new.outcome is Outcome.NOT_RUN and (old is None or old.outcome is Outcome.NOT_RUN):
         return Kind.NOT_RUN
     if old is None:
@@ -139,19 +139,19 @@ def _kind(old: Standing | None, new: Standing | None) -> Kind:
 
 
 def counts(transitions: Sequence[Transition]) -> str:
-    """Return how many verdicts are what, such as "22 the same, 1 changed"."""
+    """Return the number of verdicts by kind, such as "22 the same, 1 changed"."""
     found = Counter(one.kind for one in transitions)
     return ", ".join(f"{found[kind]} {kind}" for kind in Kind if found[kind]) or "no verdicts"
 
 
 def describe(transition: Transition) -> str:
-    """Return a transition in one line, without what would steer a terminal."""
+    """Return a transition in one line, without terminal control characters."""
     said = _said(transition.old, transition.new, transition.kind)
     return f"{printable(transition.claim)} ({printable(transition.tier)}): {said}"
 
 
 def _said(old: Standing | None, new: Standing | None, kind: Kind) -> str:
-    """Return what became of a verdict."""
+    """Describe how a verdict changed."""
     if old is None or new is None:
         return f"{new.outcome}, new" if new else f"gone; it was {old.outcome}" if old else "no verdict"
     if kind is Kind.NEW_HISTORY:

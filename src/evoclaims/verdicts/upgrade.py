@@ -1,4 +1,4 @@
-"""What other versions of the packages have changed: trials of this environment against those that came before them."""
+"""What changes of package versions have changed: trials of this environment compared with those of earlier ones."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ from evoclaims.verdicts.source_trials import versions_of
 
 @dataclass(frozen=True)
 class Succession:
-    """A condition whose stored trials of this environment have predecessors that other versions have made.
+    """A condition with stored trials of this environment and of an older one with other versions.
 
     Attributes:
         label: names the condition.
         old, new: versions of the packages that it depends on.
-        before, now: its trials; of several older environments those of the newest.
-        again: how many trials this run has run again for their versions.
+        before, now: its trials, of the newest older environment and of this one.
+        again: how many trials this run repeated because of their versions.
     """
 
     label: str
@@ -44,7 +44,7 @@ class Succession:
 
     @property
     def pairs(self) -> list[tuple[TrialResult, TrialResult]]:
-        """Trials of the same seed, before and now, that nothing but the versions tells apart."""
+        """Old and new trials of the same seed that differ only in versions."""
         now = {trial.seed: trial for trial in self.now}
         both = [(old, now[old.seed]) for old in self.before if old.seed in now]
         return [(old, new) for old, new in both if _same_machine(old, new)]
@@ -52,11 +52,11 @@ class Succession:
 
 @dataclass(frozen=True)
 class Upgrade:
-    """All conditions of a run whose trials have predecessors.
+    """All conditions of a run that also have trials of an older environment.
 
     Attributes:
         successions: one for each condition.
-        drift: its trials against their predecessors, judged together.
+        drift: drift of the new trials from the old, judged together.
     """
 
     successions: tuple[Succession, ...]
@@ -64,18 +64,18 @@ class Upgrade:
 
     @property
     def again(self) -> int:
-        """Trials that this run has run again for their versions."""
+        """Trials that this run repeated because of their versions."""
         return sum(one.again for one in self.successions)
 
     @property
     def drifted(self) -> bool:
-        """Whether this run has run trials again and some have drifted; later runs tell of it and do not fail by it."""
+        """Whether a condition that this run repeated has drifted; later runs report it but do not fail."""
         drifted = {row.label for row in self.drift.rows if row.drifted}
         return any(one.again and one.label in drifted for one in self.successions)
 
     @property
     def lines(self) -> list[str]:
-        """What changed, which conditions were run again, how many trials differ, and what has drifted how far."""
+        """What changed, which conditions were run again, how many trials differ, and what drifted how far."""
         said: list[str] = []
         for change in dict.fromkeys(one.change for one in self.successions):
             those = [one for one in self.successions if one.change == change]
@@ -111,7 +111,7 @@ def upgrade(successions: Sequence[Succession]) -> Upgrade:
 
 
 def predecessors(records: Sequence[TrialResult], packages: tuple[str, ...]) -> tuple[TrialResult, ...]:
-    """Return the records that the newest environment has made.
+    """Return the records made by the newest environment.
 
     Args:
         records: of trials of one condition, made with other versions than this environment's.
@@ -125,7 +125,7 @@ def predecessors(records: Sequence[TrialResult], packages: tuple[str, ...]) -> t
 
 
 def verdict_changes(reports: Iterable[ClaimReport]) -> list[str]:
-    """Say which verdicts are not those that the store's last run has come to under the same rules."""
+    """Return lines on verdicts that differ from the store's last run under the same rules."""
     said = []
     for report in reports:
         before = report.before
@@ -147,7 +147,7 @@ def verdict_changes(reports: Iterable[ClaimReport]) -> list[str]:
 
 
 def _told(one: Succession) -> str:
-    """Return what became of one condition."""
+    """Describe what changed for one condition."""
     ran = f"{one.again} trials run again" if one.again else "run again before"
     pairs = one.pairs
     if not pairs:
@@ -156,7 +156,7 @@ def _told(one: Succession) -> str:
 
 
 def _changed(one: Succession) -> int:
-    """Count the trials whose digest is not what it was."""
+    """Count the trials whose digest has changed."""
     return sum(old.digest != new.digest for old, new in one.pairs)
 
 

@@ -8,7 +8,7 @@ from evoclaims.core.packages import Versions, differences, recorded
 from evoclaims.trials.result import TrialResult
 
 Several = Mapping[str, tuple[str | None, ...]]
-"""Different versions by package; None for what was not installed."""
+"""Different versions by package; None if not installed."""
 
 
 def found_in(trials: Iterable[TrialResult], packages: tuple[str, ...]) -> Several:
@@ -18,7 +18,7 @@ def found_in(trials: Iterable[TrialResult], packages: tuple[str, ...]) -> Severa
 
 
 def change(old: Versions, new: Versions) -> str:
-    """Return in words which versions differ, such as "evosax 0.3.2 -> 0.3.3"; empty when none does."""
+    """Describe which versions differ, such as "evosax 0.3.2 -> 0.3.3"; empty when none does."""
     moved = differences(old, new).items()
     return ", ".join(f"{name} {was or 'none'} -> {now or 'none'}" for name, (was, now) in moved)
 
@@ -29,5 +29,5 @@ def in_words(versions: Iterable[str | None]) -> str:
 
 
 def different(versions: Iterable[str | None]) -> tuple[str | None, ...]:
-    """Return different versions in order; what was not installed comes first."""
+    """Return different versions in order; None (not installed) comes first."""
     return tuple(sorted(set(versions), key=lambda version: (version is not None, str(version))))
