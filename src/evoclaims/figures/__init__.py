@@ -1,4 +1,4 @@
-"""Figures and tables of a paper, redrawn from trials: one module for each way of drawing, and no paper in it.
+"""Figures and tables of a paper, redrawn from trials: one module per way of drawing, independent of any paper.
 
 `catalogue.load(reproduction, "fig3").draw(archive, reproduction, "full")` returns a `Drawing`; `files` writes it.
 """

@@ -1,4 +1,4 @@
-"""One panel of a bar chart: every trial a dot, published numbers beside, what is missing named and never a zero."""
+"""One panel of a bar chart: a dot per trial, published numbers beside; missing trials are named, never drawn as 0."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ GAP: Final = 0.7
 BASE, BRACKET = 1.25, 7.5 / 72
 """Height of the numbers' range and of a bracket, inches."""
 ASIDE: Final = 0.14
-"""How far a bar stands from the middle of its slot, for the sake of a published number."""
+"""How far a bar is moved from the middle of its slot, to make room for a published number."""
 UNDER: Final = 0.03
-"""Share of the range that is shown below and above it."""
+"""Margin below and above the range, as a share of it."""
 
 
 @dataclass(frozen=True)
@@ -60,9 +60,9 @@ class BarPanel:
         title: above it.
         bars: in the order of the axis.
         ylabel, xlabel: of the axes.
-        limits: what the axis shows at least; the numbers decide beyond.
+        limits: the least range of the axis; larger numbers extend it.
         across: whether each method is compared with itself between places.
-        beside: whether published numbers are drawn; else they are only told.
+        beside: whether published numbers are drawn; else they are only listed.
     """
 
     title: str
@@ -76,7 +76,7 @@ class BarPanel:
 
 @dataclass(frozen=True)
 class Filled:
-    """A bar with what was read."""
+    """A bar with its numbers."""
 
     bar: Bar
     readings: Readings
@@ -89,7 +89,7 @@ class Filled:
 
 @dataclass(frozen=True)
 class Measured:
-    """A panel with what was read, and its comparisons."""
+    """A panel with its numbers and comparisons."""
 
     panel: BarPanel
     bars: tuple[Filled, ...]
@@ -118,7 +118,7 @@ class Layout:
         limits: of the vertical axis.
         bracket: height of a bracket, in the axis' units.
         brackets: for each bracket its comparison, and its height.
-        slanted: whether the names of the axis are.
+        slanted: whether the axis labels are.
     """
 
     measured: Measured
@@ -132,7 +132,7 @@ class Layout:
 
 
 def lay_out(one: Measured, width: float) -> Layout:
-    """Lay a panel out on a frame of `width` inches: its height grows with the brackets that it needs."""
+    """Lay a panel out on a frame of `width` inches: its height grows with the number of brackets."""
     slots, at = [], 0.0
     for i, bar in enumerate(one.bars):
         at += GAP if i and bar.bar.at != one.bars[i - 1].bar.at else 0.0
@@ -192,7 +192,7 @@ def paint(axis: Any, layout: Layout) -> None:
 
 
 def _number(axis: Any, layout: Layout) -> None:
-    """Number the vertical axis as far as numbers go: there is no success of 1.4 to read off beside the brackets."""
+    """Put ticks on the vertical axis only up to the largest number, not beside the brackets: no success is 1.4."""
     one, (low, high) = layout.measured, layout.limits
     top = max([*(one.panel.limits or ()), *(_top(bar, one) for bar in one.bars)])
     locator = optional("matplotlib.ticker").MaxNLocator(5, steps=[1, 2, 5, 10])
@@ -203,7 +203,7 @@ def _number(axis: Any, layout: Layout) -> None:
 
 
 def legend(panels: Sequence[Measured]) -> list[Any]:
-    """Return the handles of a legend for panels: their methods where those have no names on the axis, and signs."""
+    """Return the handles of a legend for panels: the methods that the axis does not name, and symbols."""
     lines, patches = optional("matplotlib.lines"), optional("matplotlib.patches")
     series = {bar.bar.series: None for one in panels if one.grouped for bar in one.bars}
     handles = [patches.Patch(facecolor=lighter(s.colour), edgecolor=s.colour, label=s.label) for s in series]
@@ -255,12 +255,12 @@ def _paint_reported(axis: Any, reported: Reported, place: float) -> None:
 
 
 def _across(count: int) -> list[float]:
-    """Return where each seed's dot lies across its bar, from -0.5 to 0.5: a seed has the same place in all bars."""
+    """Return each seed's position across its bar, from -0.5 to 0.5; it is the same in all bars."""
     return [0.0] if count == 1 else [i / (count - 1) - 0.5 for i in range(count)]
 
 
 def _names(one: Measured) -> list[tuple[str, int, int]]:
-    """Return the names below the axis, over how many bars each stands, and the first of them."""
+    """Return the names below the axis, the number of bars of each, and the first of them."""
     if not one.grouped:
         return [(bar.bar.series.label, 1, i) for i, bar in enumerate(one.bars)]
     names: list[tuple[str, int, int]] = []

@@ -1,4 +1,4 @@
-"""Bar charts: what is compared, at which places of the axis; `bar_panel` paints them."""
+"""Bar charts: what is compared, and where on the axis; `bar_panel` paints them."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ class BarChart:
         return Drawing(figure, table, caption, missing, shown, f"{heading.title} ({heading.place})")
 
     def _caption(self, measured: Sequence[Measured]) -> tuple[str, ...]:
-        """Say how to read the figure, and where the published numbers stand."""
+        """Say how to read the figure, and where the paper has the published numbers."""
         shown = [one for one in measured for bar in one.bars if bar.readings.values]
         sentences = [HOW] if shown else []
         if any(one.comparisons for one in measured):
@@ -70,7 +70,7 @@ class BarChart:
 
 
 def by_level(task: str, title: str, series: Sequence[Series], published: Published) -> PanelOf:
-    """Return a panel of the success on each level of a task, one bar a method, beside the published "success"."""
+    """Return a panel of the success on each level of a task, one bar per method, beside the published "success"."""
 
     def made(scope: Scope) -> BarPanel:
         levels = scope.tier.condition(series[0].method, task).task.levels
@@ -96,7 +96,7 @@ def compared(
     limits: tuple[float, float] | None = None,
     comparable: Sequence[str] = ("full", "smoke"),
 ) -> PanelOf:
-    """Return a panel of one measure, for each place on the axis one bar a method.
+    """Return a panel of one measure, with one bar per method at each place on the axis.
 
     Methods are compared with each other at each place, and each with itself between places.
 
@@ -109,7 +109,7 @@ def compared(
         title: of the panel.
         ylabel: the measure's name and unit.
         limits: what the axis shows at least.
-        comparable: tiers at which the published numbers are drawn; at others they are told below.
+        comparable: tiers at which the published numbers are drawn; at others they are listed below.
     """
 
     def made(scope: Scope) -> BarPanel:
@@ -139,7 +139,7 @@ def _measured(scope: Scope, panel: BarPanel) -> Measured:
 
 
 def _families(names: Iterable[str]) -> list[list[int]]:
-    """Return the indices of equal names, in the order of their first."""
+    """Return the indices of equal names, in order of first appearance."""
     found: dict[str, list[int]] = {}
     for i, name in enumerate(names):
         found.setdefault(name, []).append(i)
@@ -177,5 +177,5 @@ def _rows(measured: Measured) -> list[dict[str, Any]]:
 
 
 def _place(measured: Measured, bar: Bar) -> dict[str, str]:
-    """Return where a bar stands."""
+    """Return the columns that identify a bar."""
     return {"panel": measured.panel.title, "at": bar.at, "series": bar.series.label}

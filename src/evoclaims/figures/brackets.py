@@ -1,4 +1,4 @@
-"""Significance brackets as the paper draws them: Kruskal-Wallis, then Mann-Whitney U for each pair; none decides."""
+"""Significance brackets as in the paper: Kruskal-Wallis, then Mann-Whitney U for each pair; they decide no verdict."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ class PairTest:
 
     Attributes:
         left, right: their indices.
-        family: the indices of all samples of the family that hold something.
+        family: the indices of all samples of the family that are not empty.
         p: of the two-sided Mann-Whitney U test.
         overall: p of the family's Kruskal-Wallis test.
-        asterisks: for the figure; empty unless both tests find something.
+        asterisks: for the figure; empty unless both tests are significant.
     """
 
     left: int
@@ -43,7 +43,7 @@ def compare(samples: Sequence[Sequence[float]], families: Sequence[Sequence[int]
     """Compare every pair of each family.
 
     Args:
-        samples: numbers; empty where no trial has run, which is compared with nothing.
+        samples: numbers; a sample without trials is empty and not compared.
         families: indices of the samples that are compared with each other.
     """
     found = []
@@ -59,11 +59,11 @@ def compare(samples: Sequence[Sequence[float]], families: Sequence[Sequence[int]
 
 
 def stack(spans: Sequence[tuple[float, float]], tops: Sequence[tuple[float, float]], row: float) -> list[float]:
-    """Return the height of a bracket over each span, low ones first for short spans, so that none meets another.
+    """Return the height of a bracket over each span, the lowest for short spans, so that none overlap.
 
     Args:
         spans: left and right end of each bracket.
-        tops: place and height of what stands below, such as bars.
+        tops: place and height of what is below, such as bars.
         row: height of a bracket with its asterisks.
     """
     heights = [0.0] * len(spans)
@@ -82,7 +82,7 @@ def paint(axis: Any, span: tuple[float, float], height: float, row: float, aster
     left, right = span
     foot = height - 0.2 * row
     axis.plot([left, left, right, right], [foot, height, height, foot], color=INK, linewidth=0.6, clip_on=False)
-    # Asterisks are raised: their line of text starts below what is seen of them.
+    # Asterisks sit high in a line of text: the line starts below what is visible.
     axis.annotate(
         asterisks,
         ((left + right) / 2, height),

@@ -14,7 +14,7 @@ def names(reproduction: Reproduction) -> tuple[str, ...]:
 
 
 def load(reproduction: Reproduction, name: str) -> Figure:
-    """Return a figure by its name, which is its module's.
+    """Return a figure by its name, that of its module.
 
     Raises:
         UnknownNameError: for another name; it lists the known ones.

@@ -53,8 +53,8 @@ class ElitesMap:
     """Maps side by side, each of the first trial whose champion is stored; below, measures of all trials.
 
     Attributes:
-        grounds: one a panel.
-        told: what is told of all trials below each panel: measures by what they are called.
+        grounds: one per panel.
+        told: measures of all trials that are listed below each panel, by their labels.
         width: of the figure, inches.
     """
 
@@ -112,7 +112,7 @@ def _unmapped(scope: Scope, ground: Ground) -> str:
 def _paint(
     axis: Any, task: Maze, ground: Ground, found: Map | None, told: list[tuple[str, Readings]], wide: float
 ) -> None:
-    """Paint one map over its maze, and below it what is told of all trials, in lines of `wide` inches."""
+    """Paint one map over its maze, and below it the measures of all trials, in lines of `wide` inches."""
     paint_ground(axis, task, ())
     axis.set_anchor("NW")
     title = ground.title if found is None else f"{ground.title} (seed {found.seed})"
@@ -145,7 +145,7 @@ def _text(value: float) -> str:
 
 
 def _rows(ground: Ground, found: Map | None, told: list[tuple[str, Readings]]) -> Iterator[dict[str, Any]]:
-    """Yield a panel's rows of the table: what is told of all trials, then the elites of the map, by cell."""
+    """Yield a panel's rows of the table: the measures of all trials, then the elites of the map, by cell."""
     for name, readings in told:
         yield from readings.rows(panel=ground.title, at=name, series=ground.method)
     if found is not None:

@@ -1,4 +1,4 @@
-"""A figure or table of a paper, and the drawing that a reproduction's trials make of it."""
+"""A figure or table of a paper, and its drawing from a reproduction's trials."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ SIZES: Final = {
     "full": "full tier: the paper's size",
     "smoke": "smoke tier: smaller tasks and budgets than the paper's",
 }
-"""What the tiers are."""
+"""The tiers in words."""
 
 
 @dataclass(frozen=True)
@@ -40,12 +40,12 @@ class Scope:
 
     @property
     def seeds(self) -> tuple[int, ...]:
-        """Of the trials that the tier looks at."""
+        """Of the trials that the tier judges."""
         protocol = self.tier.protocol
         return protocol.seeds(protocol.last.n)
 
     def group(self, method: str, task: str) -> TrialGroup:
-        """Return a condition's trials as claims speak of them; those that there are."""
+        """Return a condition's available trials, with the measures that claims use."""
         return self.reproduction.trials(method, task, self.tier.condition(method, task), self._present)
 
     def _present(self, condition: Condition, seeds: Sequence[int]) -> list[TrialResult]:
@@ -60,9 +60,9 @@ class Drawing:
     Attributes:
         figure: a `matplotlib.figure.Figure`.
         table: a `pandas.DataFrame` with every number that is drawn, and the ids of the trials.
-        caption: sentences that say how to read it; they stand on the figure too.
-        missing: sentences that say what is not there, or broke; they stand on the figure too.
-        shown: how many numbers of ours are drawn; 0 when there was nothing to draw.
+        caption: sentences that say how to read it; the figure has them too.
+        missing: sentences that say what is missing or broke; the figure has them too.
+        shown: how many of our numbers are drawn; 0 if there was nothing to draw.
         title: what the figure shows, and its place in the paper.
     """
 
@@ -76,7 +76,7 @@ class Drawing:
 
 @dataclass(frozen=True)
 class Heading:
-    """What stands above a drawing.
+    """The text above a drawing.
 
     Attributes:
         title: what is shown.
@@ -111,7 +111,7 @@ class Figure:
 
         Raises:
             UnknownNameError: for another tier.
-            UserError: when a record is torn, or matplotlib is not installed.
+            UserError: when a record is damaged, or matplotlib is not installed.
         """
         scope = Scope(archive, reproduction, tier)
         reproduction.tier(tier)

@@ -1,4 +1,4 @@
-"""Histograms of what trials have collected, one panel a condition, over one axis."""
+"""Histograms of a measure of trials, one panel per condition, with a shared axis."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from evoclaims.figures.style import COLUMN, FAINT, SMALL, VERMILION, lighter, pl
 
 BINS: Final = 24
 HEIGHT: Final = 0.85
-"""Of a panel, inches."""
+"""Height of a panel, inches."""
 
 
 @dataclass(frozen=True)
@@ -44,10 +44,10 @@ class Threshold:
 
 @dataclass(frozen=True)
 class Histogram:
-    """Panels one below the other, with bins in common.
+    """Panels one below the other, with shared bins.
 
     Attributes:
-        conditions: one a panel.
+        conditions: one per panel.
         measure: what is counted.
         xlabel: its name and unit.
         mark: a value to compare with.

@@ -1,4 +1,4 @@
-"""Tables of settings: what conditions are run with, at each tier, beside what the paper has published."""
+"""Tables of settings: those of conditions at each tier, beside those that the paper has published."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class Setting:
 
     @property
     def cells(self) -> tuple[str, ...]:
-        """What stands in the columns."""
+        """The texts of the columns."""
         marked = [f"{value} {DIFFERS}" if self.paper and value != self.paper else value for value in self.ours]
         return (self.name, self.paper or SILENT, *marked)
 
@@ -141,7 +141,7 @@ class _Page:
             axis.text(left, top + STEP / 2, word, va="center", **style)
 
     def _line(self, cells: Sequence[str], **style: Any) -> None:
-        """Add a line, as high as its longest cell is when broken to the width of its column."""
+        """Add a line, as high as its longest cell when wrapped to its column."""
         bold = "fontweight" in style
         columns = zip(cells, self._widths, strict=False)
         broken = [sheet.wrap(cell, width - 0.1, TEXT, bold=bold) for cell, width in columns]

@@ -1,4 +1,4 @@
-"""What is read from each trial of a condition, with what cannot be read kept in sight."""
+"""The numbers read from each trial of a condition, with a note for each that is missing."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from evoclaims.trials.result import TrialResult
 from evoclaims.trials.spec import TrialSpec
 
 MeasureOf = Callable[[Any], Measure]
-"""What is read, of a `TrialGroup` with the measures of the reproduction."""
+"""Returns the measure to read, from a `TrialGroup` of the reproduction."""
 
 NOT_FINITE, NOT_RUN, NOT_MEASURED = "not finite", "not run", "not measured"
 PLACE, WHAT = ("panel", "at", "series", "method", "task"), ("what", "against", "n")
 COLUMNS = (*PLACE, *WHAT, "seed", "trial", "status", "value", "error")
-"""Of the table of a figure: one number a row. `what` is "trial", "mean" (`error`: the standard deviation), "reported"
+"""Of the table of a figure: one number per row. `what` is "trial", "mean" (`error`: the standard deviation), "reported"
 (`error`: as published), or the name of a test (`value`: p; `against`: the other side)."""
 
 
@@ -31,10 +31,10 @@ class Reading:
 
     Attributes:
         seed, trial: which trial; `trial` is its id.
-        status: the record's; "not finite" for a finished trial with such a number, "not measured" for one without the
-            number, "not run" for none.
+        status: the record's; "not finite" for a finished trial with such a number, "not measured" for one without a
+            number, "not run" without a trial.
         value: the number; None where there is none to draw.
-        rank: what rank tests see: the number, or -inf or inf, the worst, for a trial that diverged or ran out of time.
+        rank: what rank tests use: the number, or the worst (-inf or inf) for a trial that diverged or ran out of time.
     """
 
     seed: int
@@ -66,17 +66,17 @@ class Readings:
 
     @property
     def ranks(self) -> tuple[float, ...]:
-        """What rank tests see."""
+        """What rank tests use."""
         return tuple(reading.rank for reading in self.each if reading.rank is not None)
 
     @property
     def broken(self) -> int:
-        """How many trials have run and left no number."""
+        """How many trials ran and gave no number."""
         return sum(reading.value is None and reading.status != NOT_RUN for reading in self.each)
 
     @property
     def incomplete(self) -> bool:
-        """Whether some trials have left a number, and not all."""
+        """Whether some trials gave a number, but not all."""
         return 0 < len(self.values) < len(self.each)
 
     @property
@@ -112,14 +112,14 @@ def read(scope: Scope, method: str, task: str, measure_of: MeasureOf) -> Reading
 
 
 def frame(rows: Iterable[Mapping[str, Any]], *more: str) -> Any:
-    """Return rows as a `pandas.DataFrame` with `COLUMNS` and `more`; counts and seeds are whole or missing."""
+    """Return rows as a `pandas.DataFrame` with `COLUMNS` and `more`; counts and seeds are integers or missing."""
     import pandas as pd
 
     return pd.DataFrame(list(rows), columns=[*COLUMNS, *more]).astype(dict.fromkeys(("n", "seed", *more), "Int64"))
 
 
 def absences(readings: Iterable[Readings]) -> tuple[str, ...]:
-    """Say which trials are not there and which left no number, each condition once."""
+    """Say which trials are missing and which gave no number, each condition once."""
     kept = {(one.method, one.task): one for one in readings}
     absent = [_name(one) for one in kept.values() if all(r.status == NOT_RUN for r in one.each)]
     partial = [one for one in kept.values() if 0 < _count(one, NOT_RUN) < len(one.each)]
@@ -163,7 +163,7 @@ def _name(readings: Readings) -> str:
 
 
 def _end(status: str) -> str:
-    """Say how trials ended, and what became of them in means and rank tests."""
+    """Say how trials ended, and how means and rank tests treat them."""
     ends = {
         "diverged": "diverged (no value; the worst rank in tests)",
         "timeout": "ran out of time (no value; the worst rank in tests)",

@@ -18,7 +18,7 @@ class Reported:
     Attributes:
         value: the number.
         error: its error bar, as published; None where the source gives none.
-        place: where it stands.
+        place: in the paper.
     """
 
     value: float
@@ -31,9 +31,9 @@ class Published:
     """What a paper has published.
 
     Attributes:
-        plots: by task and quantity: its "place", and for each of its "methods" "mean", one number for each place on the
-            axis, and "error" where it has error bars.
-        tables: of each table its "place" and its "values" by name.
+        plots: by task and quantity: "place", and for each of its "methods" a "mean", one number for each place on the
+            axis, and an "error" if it has error bars.
+        tables: by name: "place" and "values" of each table.
     """
 
     plots: Mapping[str, Mapping[str, Mapping[str, Any]]]
@@ -59,7 +59,7 @@ def load_published(path: Path) -> Published:
     """Read a file of published numbers.
 
     Raises:
-        UserError: when it is missing, torn, or a number lacks its place.
+        UserError: when it is missing, damaged, or a number lacks its place.
     """
     try:
         plain = tomllib.loads(path.read_text(encoding="utf-8"))
@@ -80,7 +80,7 @@ def load_published(path: Path) -> Published:
 
 
 def _is_plot(plot: Any) -> bool:
-    """Whether a plot has its place, and every method numbers, and as many errors where it has any."""
+    """Whether a plot has its place, and each method has numbers and no or as many errors."""
     return bool(plot.get("place") and plot.get("methods")) and all(
         numbers.get("mean") and len(numbers.get("error", numbers["mean"])) == len(numbers["mean"])
         for numbers in plot["methods"].values()

@@ -1,7 +1,7 @@
 """The page of a figure: heading, legend, rows of panels, notes; sizes in inches, so that nothing is squeezed.
 
-Matplotlib's constrained layout shares out a page of a given height among panels, and knows no text that is broken into
-lines; here the page is as high as what stands on it.
+Matplotlib's constrained layout divides a page of a given height among panels, and cannot wrap text into lines; here the
+page is as high as its contents.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ def build(
     Args:
         heading: written above.
         width: of the whole.
-        rows: of panels; of none, the axes are those of the notes alone.
+        rows: of panels; without any, only the notes have axes.
         legend: handles with labels, for the line below the heading.
         notes: sentences written below.
     """

@@ -1,4 +1,4 @@
-"""How figures look: one style whatever the user's own is, and colours that all readers can tell apart."""
+"""How figures look: one style, whatever the user's settings, with colours that all readers can tell apart."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ INK, FAINT = "#222222", "#5f5f5f"
 TITLE, TEXT, SMALL = 8.5, 7.0, 6.5
 """Sizes of letters, pt."""
 COLUMN: Final = 3.5
-"""Width of a column of a page, inches: what a figure is drawn for unless it says otherwise."""
+"""Width of a column of a page, inches: the default width of a figure."""
 _SETTINGS: Final[dict[str, Any]] = {
-    "text.parse_math": False,  # a dollar sign is a dollar sign
+    "text.parse_math": False,  # dollar signs are plain text
     "font.size": TEXT,
     "text.color": INK,
     "axes.edgecolor": INK,

@@ -1,4 +1,4 @@
-"""Planted faults: claims that no fault of what they name can change say nothing (mutation analysis).
+"""Planted faults (mutation analysis): claims that no fault in their methods or tasks can change say nothing.
 
 DeMillo, Lipton and Sayward 1978, Hints on test data selection, IEEE Computer 11(4).
 """

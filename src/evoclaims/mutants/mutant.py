@@ -1,4 +1,4 @@
-"""Mutants: named faults, and the conditions that they make of a tier's."""
+"""Mutants: named faults, and the conditions with them at a tier."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class Mutant:
 
     Attributes:
         says: what is wrong, such as "minimizes".
-        part: what it is a fault of.
+        part: what has the fault.
         change: returns a condition with the fault, or None where it cannot be planted.
     """
 
@@ -63,7 +63,7 @@ def of_task(fault: type[Fault], only: type = object) -> Mutant:
 
 
 def _planted(fault: type[Fault], component: Any) -> Any:
-    """Plant a fault; that the result is a method or a task again, no type can say."""
+    """Plant a fault; types cannot say that the result is a method or task again."""
     return plant(fault, component)
 
 

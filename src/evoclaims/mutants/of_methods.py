@@ -1,4 +1,4 @@
-"""Faults of methods: what a bug in an algorithm does to how it learns, selects and remembers."""
+"""Faults of methods: bugs in how an algorithm learns, selects and remembers."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from evoclaims.mutants.planting import Fault, plant
 
 
 class LearnsNothing(Fault):
-    """Every step is thrown away."""
+    """Every step is discarded."""
 
     says: ClassVar[str] = "learns nothing"
 
     def step(self, key: PRNGKeyArray, task: Task, level: Int[Array, ""], state: Any) -> tuple[Any, Progress]:
-        """Take a step, and keep the state of before."""
+        """Take a step, but keep the old state."""
         return state, self.sound.step(key, task, level, state)[1]
 
 
@@ -38,7 +38,7 @@ class Minimizes(Fault):
 
 
 class SelectsAtRandom(Fault):
-    """Selection, or the gradient, is by random numbers instead of rewards."""
+    """Selection, or the gradient, uses random numbers instead of rewards."""
 
     says: ClassVar[str] = "selects at random"
 
@@ -49,12 +49,12 @@ class SelectsAtRandom(Fault):
 
 
 class ForgetsChampion(Fault):
-    """What is judged in the end is what training began with."""
+    """The untrained policy is judged in the end."""
 
     says: ClassVar[str] = "forgets its champion"
 
     def best(self, task: Task, state: Any) -> Policy:
-        """Return the policy of a state that has not learnt."""
+        """Return the policy of an untrained state."""
         policy: Policy = self.sound.best(task, self.sound.init(jax.random.key(0), task))
         return policy
 
@@ -71,7 +71,7 @@ class HasOneSeed(Fault):
     def step(
         self, key: PRNGKeyArray, task: Task, level: Int[Array, ""], state: tuple[Int[Array, ""], Any]
     ) -> tuple[tuple[Int[Array, ""], Any], Progress]:
-        """Take a step by the key that follows from its number alone."""
+        """Take a step with a key that depends only on its number."""
         number, inner = state
         inner, progress = self.sound.step(jax.random.fold_in(jax.random.key(1), number), task, level, inner)
         return (number + 1, inner), progress
@@ -83,13 +83,13 @@ class HasOneSeed(Fault):
 
 
 class KeepsItsStepSize(Fault):
-    """CMA-ES whose step size stays what it was in the beginning."""
+    """CMA-ES whose step size never changes."""
 
     says: ClassVar[str] = "keeps its step size"
 
     def step(
         self, key: PRNGKeyArray, task: Task, level: Int[Array, ""], state: CmaEsState
     ) -> tuple[CmaEsState, Progress]:
-        """Take a step, and put the step size back."""
+        """Take a step, and restore the step size."""
         after, progress = self.sound.step(key, task, level, state)
         return replace(after, distribution=after.distribution.replace(std=state.distribution.std)), progress

@@ -1,4 +1,4 @@
-"""Faults of tasks: what a bug in an environment does to what is seen, done, paid and asked."""
+"""Faults of tasks: bugs in an environment's observations, actions, rewards and levels."""
 
 from __future__ import annotations
 
@@ -17,22 +17,22 @@ from evoclaims.mutants.planting import Fault
 
 
 class FaultyTask(Fault):
-    """A task between which and the policy something gets lost; a subclass says what."""
+    """A task with wrong observations, actions, rewards or levels; a subclass says which."""
 
     def seen(self, observation: Float[Array, " observation"]) -> Float[Array, " observation"]:
         """Return what the policy sees of an observation."""
         return observation
 
     def done(self, action: Float[Array, " action"]) -> Float[Array, " action"]:
-        """Return what becomes of an action."""
+        """Return the action that is taken."""
         return action
 
     def paid(self, reward: Float[Array, ""], key: PRNGKeyArray) -> Float[Array, ""]:
-        """Return what is paid in the place of a reward, or of a whole episode's fitness."""
+        """Return the value that replaces a reward, or a whole episode's fitness."""
         return reward
 
     def asked(self, level: Int[Array, ""]) -> Int[Array, ""]:
-        """Return the level that is asked in the place of another."""
+        """Return the level that replaces a requested one."""
         return level
 
     def reset(self, key: PRNGKeyArray, level: Int[Array, ""]) -> TaskState:
@@ -41,7 +41,7 @@ class FaultyTask(Fault):
         return replace(state, observation=self.seen(state.observation))
 
     def step(self, state: TaskState, action: Float[Array, " action"]) -> TaskState:
-        """Act in the sound task; what is random follows from what is seen, since a step has no key."""
+        """Act in the sound task; random numbers follow from the observation, since a step has no key."""
         following: TaskState = self.sound.step(state, self.done(fitting(self.sound, action)))
         bits = jax.lax.bitcast_convert_type(jnp.sum(following.observation) + jnp.sum(action), jnp.uint32)
         return replace(
@@ -59,11 +59,11 @@ class FaultyTask(Fault):
         return self._settled(self.sound.examine(self._between(policy), key, self.asked(level)), key)
 
     def _between(self, policy: PolicyFn) -> PolicyFn:
-        """Return the policy as the sound task meets it."""
+        """Return the policy as the sound task calls it."""
         return lambda observation: self.done(fitting(self.sound, policy(self.seen(observation))))
 
     def _settled(self, episode: Episode, key: PRNGKeyArray) -> Episode:
-        """Return an episode with what is paid for it."""
+        """Return an episode with its fitness replaced."""
         return replace(episode, fitness=self.paid(episode.fitness, stream(key, "paid")))
 
 
@@ -118,7 +118,7 @@ class PaysAtRandom(FaultyTask):
 
 
 class StaysAtFirstLevel(FaultyTask):
-    """Whatever level is to be asked, the first one is."""
+    """Every episode is on the first level."""
 
     says: ClassVar[str] = "stays at the first level"
 
@@ -128,13 +128,13 @@ class StaysAtFirstLevel(FaultyTask):
 
 
 class IgnoresAnInput(Fault):
-    """A circuit whose truth table takes the first input that is ever 1 for 0."""
+    """A circuit whose truth table treats the first input that is ever 1 as 0."""
 
     says: ClassVar[str] = "ignores an input"
 
     @property
     def table(self) -> TruthTable:
-        """The table, in which a row has the targets of the row without that input, where there is one."""
+        """The table, where each row has the targets of the row with that input at 0, if there is one."""
         right: TruthTable = self.sound.table
         first = int(np.argmax(right.inputs.any(axis=0)))
         index = {row.tobytes(): number for number, row in enumerate(right.inputs)}
@@ -145,7 +145,7 @@ class IgnoresAnInput(Fault):
 
 
 class HasAWrongRow(Fault):
-    """A circuit in whose truth table the last row of the first level has the opposite targets."""
+    """A circuit whose truth table has the opposite targets in the last row of the first level."""
 
     says: ClassVar[str] = "has a wrong row"
 

@@ -13,8 +13,8 @@ F = TypeVar("F", bound="Fault")
 class Fault:
     """What a fault replaces; a subclass overrides functions of the method or task that it is planted in.
 
-    A faulty component is of the sound one's class as well, since methods and reports ask what a task is. Its name tells
-    the two apart, so that it has trials of its own, and code for sound components has no switch for faults.
+    A faulty component is also an instance of the sound one's class, since methods and reports check a task's class. Its
+    name differs, so that it has its own trials, and code for sound components has no switch for faults.
     """
 
     says: ClassVar[str]
@@ -35,7 +35,7 @@ class Fault:
 
 @cache
 def _faulty(fault: type[Fault], sound: type) -> type:
-    """Return the class of a faulty component; cached, since equal components have one class."""
+    """Return the class of a faulty component; cached, so that equal components have one class."""
     return type(f"{fault.__name__}{sound.__name__}", (fault, sound), {"_sound_class": sound})
 
 
@@ -43,7 +43,7 @@ def plant(fault: type[F], component: Any) -> F:
     """Return a component with the same parameters and the fault.
 
     Raises:
-        UserError: when there is a fault in it already: what two of them come to is nothing that one could name.
+        UserError: when there is a fault in it already: a combination of two has no clear meaning.
     """
     if isinstance(component, Fault):
         raise UserError(f"{component.name!r} has a fault already; plant each in a component without one.")

@@ -1,4 +1,4 @@
-"""Trying mutants on claims: the conditions that they make, and what each claim has noticed of them."""
+"""Trying mutants on claims: the faulty conditions, and which faults each claim notices."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class Planted:
 
     @property
     def name(self) -> str:
-        """Such as "cma_es: minimizes"."""
+        """A name such as "cma_es: minimizes"."""
         return f"{self.target}: {self.mutant}"
 
 
@@ -52,7 +52,7 @@ def plantings(sound: Conditions, mutants: Mapping[str, Mutant]) -> tuple[Planted
 
 
 def under_faults(reproduction: Reproduction, tier: str, planted: Sequence[Planted]) -> Reproduction:
-    """Return the reproduction whose variants are the faults, so that claims are judged under them as under variants."""
+    """Return the reproduction with the faults as its variants, so that claims are judged under each fault."""
     return replace(reproduction, variants={one.name: Variant(one.name, {tier: one.conditions}) for one in planted})
 
 
@@ -61,10 +61,10 @@ class Comparison:
     """Faulty trials against sound ones.
 
     Attributes:
-        archive: where both are.
+        archive: holds both.
         reproduction: without faults.
         tier: its name.
-        used: the conditions that claims of the tier are about: the drift check corrects for all of them.
+        used: the conditions that the tier's claims use: the drift check corrects for all of them.
     """
 
     archive: Archive
@@ -73,13 +73,13 @@ class Comparison:
     used: frozenset[Names]
 
     def equivalent(self, names: Names, faulty: Condition) -> bool:
-        """Whether every faulty trial ended as the sound one of its seed."""
+        """Whether every faulty trial has the results of the sound one of its seed."""
         sound = self._trials(self._sound(names))
         pairs = zip(sound, self._trials(faulty), strict=True)
         return all(a and b and (a.status, a.levels, a.metrics) == (b.status, b.levels, b.metrics) for a, b in pairs)
 
     def drifted(self, names: Names, faulty: Condition) -> bool:
-        """Whether the drift check tells faulty trials from the reference trials, at its strictest correction."""
+        """Whether faulty trials drift from the reference trials, at the drift check's strictest correction."""
         reference = load(path_of(self.reproduction.references, self.tier, *names))
         case = DriftCase(
             label=" on ".join(names),
@@ -108,7 +108,7 @@ def noticed(
     planted: Sequence[Planted],
     faulty: Sequence[Sequence[ClaimReport]],
 ) -> Matrix:
-    """Return what each claim notices of each fault that its conditions can have.
+    """Return which faults each claim notices, of those that its conditions can have.
 
     Args:
         comparison: of trials.
@@ -145,7 +145,7 @@ def noticed(
 
 
 def merged(before: Matrix, now: Matrix) -> Matrix:
-    """Return a matrix in which attempts of now take the place of those before; others stay while their claim does."""
+    """Return a matrix where new attempts replace old ones; others stay while their claim is unchanged."""
     rows = dict(before)
     for key, row in now.items():
         old = before.get(key)
