@@ -1,6 +1,6 @@
 """§5.2.1: what the paper says about the maze with stepping stones (Figs. 5 and 6).
 
-Smoke judges the sentences after a few generations of short episodes; so early no method has come far.
+Smoke judges the sentences after a few generations of short episodes; so early, no method gets far.
 """
 
 import pytest

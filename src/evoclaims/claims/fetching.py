@@ -90,7 +90,7 @@ class StoredOnly:
     archive: Archive
 
     def check(self) -> None:
-        """Check that the folder is a store."""
+        """Check that the store can be read."""
         self.archive.store.check()
 
     def __call__(self, condition: Condition, seeds: Sequence[int]) -> Sequence[TrialResult]:

@@ -1,4 +1,4 @@
-"""`evoclaims accept`: the verdicts that the trials at hand give become the accepted ones."""
+"""`evoclaims accept`: the verdicts from the trials at hand become the accepted ones."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from evoclaims.verdicts.acceptance import accept
 
 
 def main(options: argparse.Namespace) -> int:
-    """Write verdicts.toml and print what is new in it; 1 when anything is, so that no automation accepts unseen."""
+    """Write verdicts.toml and print what is new in it; 1 when anything is, so that no automation accepts it unseen."""
     project = open_project(options.storage)
     tiers = project.tiers(options.tier)
     path = project.reproduction.folder / history.FILE

@@ -22,7 +22,7 @@ from evoclaims.trials.champions import Replay
 
 
 def main(options: argparse.Namespace) -> int:
-    """Replay and, with --as, write; 1 when the replay is not what the record says."""
+    """Replay and, with --as, write; 1 when the replay differs from the record."""
     if options.form is not None and options.form not in FORMS:
         raise UnknownNameError("form of a network", options.form, FORMS)
     if options.out is not None and options.form is None:
@@ -57,7 +57,7 @@ def _json(trial: Stored) -> bytes | None:
 
 
 def _picture(trial: Stored, file_format: picture.Format) -> bytes | None:
-    """Draw a champion's network, and beside it the one that it draws on a substrate; None for one without a graph."""
+    """Draw a champion's network, beside it the one that it generates on a substrate; None for one without a graph."""
     network = champions.network_of(trial.condition, trial.parameters)
     if network is None:
         return None
@@ -72,7 +72,7 @@ FORMS: Final[Mapping[str, Callable[[Stored], bytes | None]]] = {
 
 
 def _table(replay: Replay) -> Table:
-    """Build the table of levels: each value as recorded, and as it is now, to the last digit of a float32."""
+    """Build the table of levels: each value as recorded and as replayed, to the last digit of a float32."""
     table = Table(box=None, pad_edge=False)
     for heading in ("level", "success", "recorded", "fitness", "recorded"):
         table.add_column(heading, justify="right")
@@ -83,7 +83,7 @@ def _table(replay: Replay) -> Table:
 
 
 def _judgement(replay: Replay) -> str:
-    """Say whether the record holds, and if not, what may be why."""
+    """Say whether the replay matches the record, and if not, what may be why."""
     if replay.exact:
         return "The replay equals the stored record exactly."
     if replay.elsewhere:

@@ -1,4 +1,4 @@
-"""`evoclaims compare`: verdicts and trials of now, of a git revision, or of a store, against others."""
+"""`evoclaims compare`: two sets of verdicts and trials, current, of a git revision, or of a store."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ from evoclaims.verdicts.timeline import timeline
 from evoclaims.verdicts.transitions import Kind
 
 UNSAID = (Kind.SAME, Kind.NOT_RUN)
-"""What is counted and not listed."""
+"""Kinds that are counted but not listed."""
 
 MOST_NAMES = 6
 """Most names of conditions that a line lists."""
 
 
 def main(options: argparse.Namespace) -> int:
-    """Print what changed, or a timeline; 1 when a change that --fail names is among it."""
+    """Print what changed, or a timeline; 1 when a change that --fail names is among them."""
     patterns = transitions.parse_patterns(options.fail) if options.fail is not None else ()
     if len(options.places) > 2:
         raise UserError(f"Two stores or two revisions can be compared, not {len(options.places)}.")
@@ -67,7 +67,7 @@ class _Places:
     tiers: Sequence[str]
 
     def sides(self, places: Sequence[str]) -> tuple[Side, Side]:
-        """Return old and new, as the names on the command line say."""
+        """Return the old and the new side that the command line names."""
         reproduction = self.project.reproduction
         if not places:
             accepted = comparison.working_tree(reproduction)
@@ -95,11 +95,11 @@ class _Places:
     def _place(self, name: str) -> GitRevision | Store:
         """Return what a name stands for."""
         path, revision = Path(name), None
-        if not path.is_absolute() and not name.startswith("."):  # git knows no revision of such a name
+        if not path.is_absolute() and not name.startswith("."):  # no git revision has such a name
             try:
                 revision = find_revision(name, self.project.reproduction.folder)
             except UserError:
-                if not path.is_dir():  # without a repository a folder is a folder
+                if not path.is_dir():  # without a repository, the name can still be a folder
                     raise
         if revision is not None and path.is_dir():
             raise UserError(
@@ -139,7 +139,7 @@ def _drift_lines(drift: DriftReport, digests: DigestCheck, new: Side) -> Iterato
 
 
 def _one_sided(old: Side, new: Side) -> Iterator[str]:
-    """Yield a line for the conditions that one side alone has trials of."""
+    """Yield a line for the conditions that only one side has trials of."""
     for word, names in (("old", old.trials.keys() - new.trials.keys()), ("new", new.trials.keys() - old.trials.keys())):
         rest = len(names) - MOST_NAMES
         listed = ", ".join(sorted(names)[:MOST_NAMES]) + (f" and {rest} more" if rest > 0 else "")

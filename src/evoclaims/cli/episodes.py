@@ -1,4 +1,4 @@
-"""The episodes by which a trial on a robot's task was judged, run again step by step."""
+"""The episodes of a trial's evaluation on a robot's task, run again step by step."""
 
 from __future__ import annotations
 

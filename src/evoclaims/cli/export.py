@@ -49,7 +49,7 @@ def main(options: argparse.Namespace) -> int:
 
 
 def _trials(project: Project, damaged: list[DamagedFileError]) -> list[TrialResult]:
-    """Return all records of the store, several of a trial that several versions have run, then further references."""
+    """Return all records of the store, one per trial and set of versions, then further reference trials."""
     found = {_key(trial): trial for trial in project.store.results(damaged)}
     for path in sorted(project.reproduction.references.rglob("*.jsonl")):
         for trial in references.load(path):
@@ -58,5 +58,5 @@ def _trials(project: Project, damaged: list[DamagedFileError]) -> list[TrialResu
 
 
 def _key(trial: TrialResult) -> tuple[str, str, str]:
-    """Return what tells a record from others: its trial, its outcome, and the versions that it was made with."""
+    """Return a record's key: its trial, its outcome, and the versions that it was made with."""
     return trial.id, trial.digest, content_hash(trial.provenance.get("versions"))

@@ -1,4 +1,4 @@
-"""Claims judged within a command: collected by one run of pytest, whatever the settings of other runs say."""
+"""Claims judged within a command: collected by one run of pytest, which ignores the settings of other runs."""
 
 from __future__ import annotations
 
@@ -32,8 +32,8 @@ _ALONE: Final = (
     "-pno:terminal",
     "-pno:cacheprovider",
     "-pno:xdist",
-    "-orequired_plugins=",  # one of them may be what was just left out
-    # this process has imported evoclaims before pytest could look at its asserts
+    "-orequired_plugins=",  # a plugin left out above may be required
+    # this process imported evoclaims before pytest could rewrite its asserts
     "-Wignore::pytest.PytestAssertRewriteWarning",
 )
 MOST_NAMES: Final = 3
@@ -43,7 +43,7 @@ MOST_NAMES: Final = 3
 def judge(config: SuiteConfig, asked: Sequence[tuple[Session, str]]) -> list[list[ClaimReport]]:
     """Return the reports of all claims of a tier, for each session and tier asked for; the claims are collected once.
 
-    Options in the project's settings (addopts) and in the environment have no say in which claims are judged.
+    Options in the project's settings (addopts) and in the environment do not change which claims are judged.
 
     Raises:
         UserError: when the claims cannot be collected, or something keeps one from being judged.
@@ -54,7 +54,7 @@ def judge(config: SuiteConfig, asked: Sequence[tuple[Session, str]]) -> list[lis
     with contextlib.redirect_stderr(said), _without(_ENVIRONMENT), _frozen():
         try:
             status = pytest.main([*run.arguments], plugins=[run])
-        except (Exception, SystemExit) as error:  # of a plugin that does not import, say
+        except (Exception, SystemExit) as error:  # such as a plugin that does not import
             run.troubles.append(_told(error, config.root))
             status = pytest.ExitCode.INTERNAL_ERROR
     if run.interrupted:
@@ -92,7 +92,7 @@ class _Run:
     def pytest_load_initial_conftests(
         self, early_config: pytest.Config, args: list[str]
     ) -> Generator[None, object, object]:
-        """Leave out all arguments but our own, except how files are imported; plugins are loaded by now."""
+        """Leave out all arguments but our own, except the import mode; plugins are loaded by now."""
         try:
             return (yield)
         except KeyboardInterrupt:
@@ -111,21 +111,21 @@ class _Run:
             self.troubles.append(_told(call.excinfo.value, self._root))
 
     def pytest_internalerror(self, excinfo: pytest.ExceptionInfo[BaseException]) -> bool:
-        """Keep what a plugin or a conftest.py has raised, and have nothing printed of it."""
+        """Keep what a plugin or a conftest.py has raised, and print nothing of it."""
         self.troubles.append(_told(excinfo.value, self._root))
         return True
 
     def pytest_keyboard_interrupt(self, excinfo: pytest.ExceptionInfo[BaseException]) -> None:
-        """Tell the user's Ctrl-C from pytest.exit(...), and from what pytest itself ends a run with."""
+        """Tell the user's Ctrl-C from pytest.exit(...), and from pytest's own ways to end a run."""
         self.interrupted = excinfo.type is KeyboardInterrupt
 
     def pytest_itemcollected(self, item: pytest.Item) -> None:
-        """Note what is collected before anything can leave it out."""
+        """Note each collected test before anything can leave it out."""
         self._collected.append(item)
 
     @pytest.hookimpl(tryfirst=True)
     def pytest_runtestloop(self, session: pytest.Session) -> bool:
-        """Run the claims of a tier once for each session that it is asked for with."""
+        """Run the claims of a tier once for each session that asks for it."""
         claims = claim_tests(session.items)
         for (judging, tier), reports in zip(self._asked, self.reports, strict=True):
             session.config.stash[SESSION], self._now = judging, reports
@@ -134,22 +134,22 @@ class _Run:
                 if self.troubles or session.shouldstop or session.shouldfail:
                     return True
                 session.config.hook.pytest_runtest_protocol(item=item, nextitem=following)
-                if isinstance(item.parent, pytest.Class):  # a test that runs again has a new object of its class, too
+                if isinstance(item.parent, pytest.Class):  # a test that runs again needs a new object of its class, too
                     vars(item).pop("_instance", None)
                     vars(item).pop("_obj", None)
         return True
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
-        """Keep what became of a claim."""
+        """Keep a claim's report."""
         plain = getattr(report, ATTRIBUTE, None)
         if plain is not None:
             self._now.append(ClaimReport.from_json(plain))
 
     def check_complete(self) -> None:
-        """Refuse to speak for claims that were collected and have no report.
+        """Raise if claims were collected but have no report.
 
         Raises:
-            UserError: when there are some.
+            UserError: when there are such claims.
         """
         tests = {item.nodeid: test for item, test in claim_tests(self._collected).items()}
         for (_, tier), reports in zip(self._asked, self.reports, strict=True):
@@ -169,7 +169,7 @@ def _told(error: BaseException, root: Path) -> str:
     """Return in one line what kept claims from being collected."""
     if isinstance(error, pytest.Collector.CollectError | pytest.UsageError | pytest.fail.Exception):
         cause = error.__cause__
-        if isinstance(cause, ImportError | SyntaxError) and cause.msg:  # pytest's words are their traceback
+        if isinstance(cause, ImportError | SyntaxError) and cause.msg:  # pytest's message is their traceback
             return in_one_line(cause, root)
         return " ".join(str(error).split()).removesuffix(".")
     return in_one_line(error, root)
@@ -187,7 +187,7 @@ def _without(names: Sequence[str]) -> Iterator[None]:
 
 @contextlib.contextmanager
 def _frozen() -> Iterator[None]:
-    """Keep what is imported out of the collection of garbage that a run of pytest ends with, which takes long else."""
+    """Keep imported objects out of the garbage collection at the end of a run of pytest, which else takes long."""
     gc.freeze()
     try:
         yield

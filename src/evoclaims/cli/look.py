@@ -60,12 +60,12 @@ class Subject:
 
     @property
     def motion(self) -> Motion:
-        """Of the chosen episode."""
+        """The motion of the chosen episode."""
         return motion(self.task.scene, self.outings.positions[self.options.episode])
 
     @property
     def difference(self) -> str:
-        """Say how the episodes differ from what was judged; nothing when as many reach the goal."""
+        """Say how the episodes differ from the judged ones; empty when as many reach the goal."""
         options, recorded = self.options, self.trial.result.levels["success"][0]
         again = float(np.mean(self.outings.reached))
         if np.isclose(again, recorded):
@@ -112,7 +112,7 @@ def _task_alone(options: argparse.Namespace, tier: Tier) -> tuple[Path, bytes]:
     """Return the file to write without --method, and its contents."""
     if options.form is not None:
         raise UserError(f"--as {options.form} shows what a champion does; name its method with --method.")
-    # Methods that see more of a task than others share its ground.
+    # Tasks of one name share a scene, even if some methods see more of it.
     tasks = {name: condition.task for (_, name), condition in tier.conditions.items()}
     if options.task not in tasks:
         raise UnknownNameError("task", options.task, tasks)

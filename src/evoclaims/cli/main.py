@@ -1,4 +1,4 @@
-"""Reading the command line, and ending every mistake of a user's in one sentence."""
+"""Reading the command line, and ending every user error with one sentence."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ USER_ERROR, INTERRUPTED, CLOSED_PIPE = 2, 130, 141
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run one command and return its exit status: 0, what the command says, 2 for a user's mistake."""
+    """Run one command and return its exit status: 0, the command's own, or 2 for a user error."""
     status = _status(arguments)
     end_without(status)
     return status
 
 
 def _status(arguments: Sequence[str] | None) -> int:
-    """Run one command, and print nothing that a terminal would obey."""
+    """Run one command, and print no terminal control characters."""
     try:
         with plain_output():
             return _ended(arguments)
@@ -32,7 +32,7 @@ def _status(arguments: Sequence[str] | None) -> int:
 
 
 def _ended(arguments: Sequence[str] | None) -> int:
-    """Run one command to its end, or to the sentence that says why there is none."""
+    """Run one command to its end, or print the sentence that says why it failed."""
     options = _parser().parse_args(arguments)
     try:
         run = _command(options.command)

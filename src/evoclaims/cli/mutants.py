@@ -55,10 +55,10 @@ def main(options: argparse.Namespace) -> int:
 
 
 def _planted(options: argparse.Namespace, sound: Conditions) -> tuple[Planted, ...]:
-    """Return the faults that are asked for, in the conditions that claims are about.
+    """Return the requested faults, in the conditions that claims use.
 
     Raises:
-        UnknownNameError: for a fault, a method or a task that is none.
+        UnknownNameError: for an unknown fault, method or task.
     """
     if options.mutant is not None and options.mutant not in MUTANTS:
         raise UnknownNameError("mutant", options.mutant, MUTANTS)
@@ -70,6 +70,6 @@ def _planted(options: argparse.Namespace, sound: Conditions) -> tuple[Planted, .
 
 
 def _told(row: Sensitivity) -> str:
-    """Return in a line what a claim notices."""
+    """Return a line on what a claim notices."""
     found = [f"{len(row.named(one))} {one} ({', '.join(row.named(one))})" for one in Fate if row.named(one)]
     return f"{'INSENSITIVE; ' * row.insensitive}{'; '.join(found)}"

@@ -58,9 +58,9 @@ def _conditions(
     paces: dict[tuple[str, str], Pace | None],
     limit: float,
 ) -> Table:
-    """Build the table of conditions; steps and times are upper bounds, since a trial that has solved all stops.
+    """Build the table of conditions; steps and times are upper bounds, since a trial that has solved all levels stops.
 
-    Missing are, too, trials that ran out of less time than `limit`, in seconds.
+    Trials that ran out of less time than `limit` (seconds) count as missing, too.
     """
     table = Table(box=None, pad_edge=False)
     for heading in ("condition", "cached", "missing", "environment steps", "time, at most"):

@@ -1,4 +1,4 @@
-"""The project around the current folder as commands work on it: its settings, reproduction, trials and verdicts."""
+"""The project around the current folder as commands use it: its settings, reproduction, trials and verdicts."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class Project:
 
     @cached_property
     def archive(self) -> Archive:
-        """The trials of the store, found from whatever folder a claim test goes to, and the reference trials."""
+        """The trials of the store, found even if a claim test changes the folder, and the reference trials."""
         return Archive(Store(self.store.root.absolute()), self.reproduction.references)
 
     def tiers(self, name: str) -> tuple[str, ...]:
@@ -91,7 +91,7 @@ def open_store(name: str) -> Store:
     """Return the store in the folder `name`, relative to the current one.
 
     Raises:
-        UserError: when that is there and is no store.
+        UserError: when it exists but is not a store.
     """
     store = Store(Path(name))
     store.check()

@@ -27,7 +27,7 @@ def main(options: argparse.Namespace) -> int:
     if options.variant:
         changes = reproduction.variants[options.variant].conditions.get(options.tier, {})
         used = [names for names in used if names in changes]
-    # A claim is judged after each look; the drift check wants as many as MIN_REFERENCES.
+    # A claim is judged after each look; the drift check needs MIN_REFERENCES trials.
     looks = [look.n for look in tier.protocol.looks[:-1]]
     sizes = [*looks, max(tier.protocol.last.n, MIN_REFERENCES)]
     written = 0
@@ -66,9 +66,9 @@ def main(options: argparse.Namespace) -> int:
 def _of_one_environment(
     records: Sequence[TrialResult], condition: Condition, seeds: Sequence[int], needed: int
 ) -> list[TrialResult]:
-    """Return the trials of the first seeds that one environment has made: this one if it has enough, else the newest.
+    """Return trials of the first seeds, made by one environment: this one if it has enough, else the newest.
 
-    Reference trials of mixed versions would be no reference for anything. Of one seed's the last record counts.
+    Reference trials of mixed versions would be useless. If a seed has several records, the last one counts.
     """
     environments = [condition.versions]
     for record in sorted(records, key=lambda record: str(record.timing.get("ended", "")), reverse=True):

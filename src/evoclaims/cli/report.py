@@ -75,7 +75,7 @@ def _tried(project: Project, tier: str) -> list[str]:
 
 
 def trajectory(condition: Condition, result: TrialResult, parameters: Any, title: str) -> bytes | None:
-    """Draw the ways that a champion on a robot's task takes in its evaluation, run again; None for other tasks."""
+    """Draw the paths of a champion on a robot's task in its evaluation, run again; None for other tasks."""
     if not isinstance(condition.task, RobotTask):
         return None
     trial = Stored(title, condition, result, parameters, Path())

@@ -1,6 +1,6 @@
 """`evoclaims reproduce`: a figure or table of the paper, redrawn from the trials at hand; nothing is run.
 
-A figure none of whose trials exist is written too, and says so. The status is 1 when nothing at all could be drawn.
+A figure without any trials is written too, and says so. The status is 1 when nothing at all could be drawn.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ ALL = "all"
 
 
 def main(options: argparse.Namespace) -> int:
-    """Draw, write and say what is missing; 1 when no figure that was asked for shows a number of ours."""
+    """Draw, write and say what is missing; 1 when no requested figure shows a number of ours."""
     project = open_project(options.storage)
     reproduction = project.reproduction
     reproduction.tier(options.tier)

@@ -24,7 +24,7 @@ from evoclaims.verdicts.robustness import matrix
 
 
 def main(options: argparse.Namespace) -> int:
-    """Run what is missing and list the trials; 1 when a condition failed, which keeps no other from running."""
+    """Run what is missing and list the trials; 1 when a condition failed, which does not stop the others."""
     project = open_project(options.storage)
     reproduction, store = project.reproduction, project.store
     tier = reproduction.tier(options.tier, options.variant)
@@ -44,7 +44,7 @@ def main(options: argparse.Namespace) -> int:
             "are run by another call, with --first-seed."
         )
     seeds = range(options.first_seed, options.first_seed + n)
-    for names in chosen[:1]:  # a seed that is none is so for every condition: it is said once, and nothing is run
+    for names in chosen[:1]:  # an invalid seed is so for every condition: it is reported once, and nothing is run
         _ = [TrialSpec(tier.condition(*names), seed) for seed in seeds]
     line = LiveLine(*terminal())
     fetch = RunMissing(store, options.device, line, project.config.seconds(options.time_limit))
@@ -75,7 +75,7 @@ def main(options: argparse.Namespace) -> int:
 def run_each(
     conditions: Iterable[tuple[str, Condition]], seeds: Sequence[int], fetch: RunMissing, line: LiveLine, root: Path
 ) -> Iterator[tuple[str, Sequence[TrialResult] | None]]:
-    """Run conditions one after the other; what one of them raises is said in a line and keeps no other from running.
+    """Run conditions one after the other; an error in one is printed in a line and does not stop the others.
 
     Yields:
         Each condition's name and its trials, or None for one that failed.
@@ -84,9 +84,9 @@ def run_each(
         try:
             with contextlib.closing(line):
                 results = fetch(condition, seeds)
-        except (KeyboardInterrupt, BrokenPipeError):  # the user, or who reads the output, has had enough
+        except (KeyboardInterrupt, BrokenPipeError):  # the user, or the reader of the output, has stopped
             raise
-        except BaseException as error:  # whatever a method or a task raises, the other conditions are not its matter
+        except BaseException as error:  # an error in a method or a task must not stop the other conditions
             print(f"evoclaims: {name} failed: {printable(in_one_line(error, root))}.", file=sys.stderr)
             yield name, None
             continue
@@ -107,9 +107,9 @@ def _print_matrix(project: Project, tier: str, variant: str) -> None:
 
 
 def choose(tier: Tier, method: str | None, task: str | None) -> list[tuple[str, str]]:
-    """Return the conditions that a method and a task leave; an unknown name raises with the known ones.
+    """Return the conditions that a method and a task select; an error for an unknown name lists the known ones.
 
-    A method that says `optional`, since it needs what may not be installed, runs only when it is named.
+    An `optional` method, which needs packages that may not be installed, runs only when it is named.
     """
     if method is not None and task is not None:
         tier.condition(method, task)

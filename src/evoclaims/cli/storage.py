@@ -11,19 +11,19 @@ from evoclaims.paper.config import find_root
 from evoclaims.trials.store_files import DEFAULT_ROOT
 
 BEGINNING: Final = frozenset({"run", "mutants"})
-"""Commands that begin a store where none is; the others read one."""
+"""Commands that create a missing store; the others read one."""
 
 
 def storage_of(named: str | None, command: str) -> str:
-    """Return the folder of a command's store, relative to the current one where that is how it was named.
+    """Return the folder of a command's store, relative to the current one if it was named so.
 
     Args:
-        named: as --storage says; None for the store in the root of the project that the current folder lies in (of
-            which a fresh clone has none yet).
+        named: as --storage says; None for the store in the root of the project around the current folder (a fresh
+            clone has none yet).
         command: the command's name.
 
     Raises:
-        UserError: for a name that is no folder's, and when a command that only reads is sent where nothing is.
+        UserError: for an empty name, and when a command that only reads finds no folder there.
     """
     if named is None:
         return os.path.relpath(_project() / DEFAULT_ROOT)

@@ -1,4 +1,4 @@
-"""A stored trial as commands take it, and the files that they write for its user."""
+"""A stored trial as commands use it, and the files that they write for the user."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class Stored:
 
 
 def load(storage: str, tier: Tier, tier_name: str, method: str, task: str, seed: int) -> Stored:
-    """Return a stored trial with its champion: this environment's, or else the newest that other versions have made.
+    """Return a stored trial with its champion: this environment's, or else the newest of other versions.
 
     Raises:
         UserError: for unknown names, a trial that is not stored (with the command that runs it), and as
@@ -70,7 +70,7 @@ def describe(result: TrialResult) -> str:
 
 
 def write(path: Path, data: bytes, name: str = "file") -> None:
-    """Write a file that the user has named with --out, or one in a folder so named: `name` says which.
+    """Write a file that the user named with --out, or a file in a folder named so: `name` says which.
 
     Raises:
         UserError: when it cannot be written there.

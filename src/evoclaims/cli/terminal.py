@@ -12,7 +12,7 @@ from evoclaims.core.printable import shown, spelled
 
 
 class Styled:
-    """A stream for text that may hold colours: signs that the terminal lacks are spelled out, and no more is done."""
+    """A stream for text that may hold colours: only characters that the terminal lacks are spelled out."""
 
     def __init__(self, stream: Any) -> None:
         """Write to `stream`."""
@@ -32,7 +32,7 @@ class Plain(Styled):
     """A stream for text from anywhere: control characters are escaped."""
 
     def write(self, text: str) -> int:
-        """Write text so that it steers nothing."""
+        """Write text with control characters escaped."""
         return super().write(shown(text))
 
 
@@ -44,11 +44,11 @@ def plain_output() -> Iterator[None]:
 
 
 def styled() -> Any:
-    """Return standard output for what the program itself has coloured or moves the cursor with."""
+    """Return standard output for the program's own colours and cursor movements."""
     return Styled(sys.stdout.stream if isinstance(sys.stdout, Plain) else sys.stdout)
 
 
 def terminal() -> tuple[Callable[[str], None], int | None]:
-    """Return what writes the progress line, and the columns of a terminal that a person looks at; None for a log."""
+    """Return the function that writes the progress line, and the columns of an interactive terminal, or None."""
     columns = shutil.get_terminal_size().columns if sys.stdout.isatty() else None
     return lambda text: print(text, end="", flush=True, file=styled()), columns

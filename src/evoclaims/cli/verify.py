@@ -1,6 +1,6 @@
 """`evoclaims verify`: every trial, champion and checkpoint of the store read back.
 
-Files of verdicts are not: nothing is ever judged from them, and each run with the same claims writes them anew.
+Files of verdicts are not read: nothing is judged from them, and each run with the same claims rewrites them.
 """
 
 from __future__ import annotations

@@ -39,7 +39,7 @@ class Archive:
             versions: preferred versions of its packages; None for no preference.
 
         Raises:
-            UserError: when a record, or a file of reference trials, is torn or edited.
+            UserError: when a record, or a file of reference trials, is damaged or edited.
         """
         here = None if versions is None else self.store.made_with(trial, versions)
         if is_final(here):

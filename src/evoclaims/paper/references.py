@@ -30,7 +30,7 @@ def load(path: Path) -> tuple[TrialResult, ...]:
     """Read reference trials; empty if there is no such file.
 
     Raises:
-        UserError: when the file cannot be read, or a line is torn or edited.
+        UserError: when the file cannot be read, or a line is damaged or edited.
     """
     try:
         lines = read_file(path).splitlines()

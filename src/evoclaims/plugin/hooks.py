@@ -81,7 +81,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
 
 def _wanted_tiers(config: pytest.Config) -> set[str]:
-    """Return the tiers that the options leave; "full" only when --claims-tier or -m names it positively."""
+    """Return the tiers that the options select; "full" only when --claims-tier or -m names it positively."""
     tier = config.getoption("claims_tier")
     if tier is not None:
         return {tier}
@@ -90,7 +90,7 @@ def _wanted_tiers(config: pytest.Config) -> set[str]:
 
 
 def _wanted_claims(config: pytest.Config, known: set[str]) -> set[str]:
-    """Return the ids that --claims-only leaves."""
+    """Return the ids that --claims-only selects."""
     option = config.getoption("claims_only")
     if option is None:
         return known
@@ -101,7 +101,7 @@ def _wanted_claims(config: pytest.Config, known: set[str]) -> set[str]:
 
 
 def _refuse(config: pytest.Config, items: list[pytest.Item], error: UserError) -> None:
-    """End the run with a sentence; a worker of xdist can only pass it on to its controller, and run nothing."""
+    """End the run with a sentence; an xdist worker only passes it on to its controller and runs nothing."""
     output: dict[str, Any] | None = getattr(config, "workeroutput", None)
     if output is None:
         raise pytest.UsageError(str(error)) from error
@@ -111,7 +111,7 @@ def _refuse(config: pytest.Config, items: list[pytest.Item], error: UserError) -
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_finish(session: pytest.Session) -> None:
-    """Find out before the first trial whether anything is in the way."""
+    """Check before the first trial that claims can be judged."""
     config = session.config
     if not any(item.get_closest_marker("claim") for item in session.items) or config.option.collectonly:
         return
@@ -175,7 +175,7 @@ def verdict(request: pytest.FixtureRequest, claim_tier: str) -> Verdicts:
 def pytest_runtest_makereport(
     item: pytest.Item, call: pytest.CallInfo[None]
 ) -> Generator[None, pytest.TestReport, pytest.TestReport]:
-    """Turn what became of a claim into the test's outcome, without a traceback."""
+    """Turn a claim's report into the test's outcome, without a traceback."""
     report = yield
     if item.get_closest_marker("claim") is None or (report.when != "call" and report.passed):
         return report
@@ -209,7 +209,7 @@ def pytest_runtest_makereport(
 
 
 def _claim_report(item: pytest.Item, call: pytest.CallInfo[None], report: pytest.TestReport) -> ClaimReport:
-    """Return what became of a claim test: its verdict, the error in the way of one, or why it was skipped."""
+    """Return the report of a claim test: its verdict, the error that prevented one, or why it was skipped."""
     from evoclaims.claims.claim import expectation_of
     from evoclaims.claims.collected import ClaimTest
     from evoclaims.claims.reporting import broken, skipped

@@ -1,4 +1,4 @@
-"""The options of the pytest plugin, and what is wrong with their values before anything is collected."""
+"""The options of the pytest plugin, and the check of their values before anything is collected."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def add(parser: pytest.Parser) -> None:
 
 
 def check(config: pytest.Config) -> None:
-    """Refuse values that no run can be made with.
+    """Refuse values with which no run is possible.
 
     Raises:
         pytest.UsageError: with a sentence.

@@ -1,4 +1,4 @@
-"""The session of a run of pytest: what its claims are judged with, as its options say.
+"""The session of a pytest run: what its claims are judged with, according to its options.
 
 Nothing heavy is imported here at the top: pytest loads this file in every run of an environment that has evoclaims.
 """
@@ -18,17 +18,17 @@ if TYPE_CHECKING:
     from evoclaims.report.live_line import LiveLine
 
 SESSION: pytest.StashKey[Session] = pytest.StashKey()
-"""Where a run keeps its session; who puts another one there has the claims that follow judged with that."""
+"""Where a run keeps its session; if another one is put there, it judges the claims that follow."""
 
 LINE: pytest.StashKey[LiveLine] = pytest.StashKey()
-"""Where a run that talks to a terminal keeps its progress line."""
+"""Where a run that writes to a terminal keeps its progress line."""
 
 
 def make_session(config: pytest.Config) -> Session:
     """Return the session of a run: made once, from the project's reproduction and the options, and checked.
 
     Raises:
-        UserError: when store, device, sizes or names are such that no claim could be judged.
+        UserError: when no claim can be judged with this store, device, sizes or names.
     """
     if SESSION in config.stash:
         return config.stash[SESSION]

@@ -23,14 +23,14 @@ if TYPE_CHECKING:
     from evoclaims.verdicts.upgrade import Upgrade
 
 ATTRIBUTE: Final = "claim_report"
-"""Name under which a test's report carries the claim's, also from an xdist worker to its controller."""
+"""Attribute of a test's report that holds the claim's, also from an xdist worker to its controller."""
 
 TROUBLE: Final = "claims_trouble"
 """Name under which an xdist worker tells its controller why it runs nothing."""
 
 
 class Summary:
-    """Gathers the claims' reports of a run, in the process that talks to the user, and ends the run with them."""
+    """Gathers the claims' reports of a run in the process that writes the output, and ends the run with them."""
 
     def __init__(self, config: pytest.Config) -> None:
         """Start empty."""
@@ -43,7 +43,7 @@ class Summary:
         self._died: list[str] = []
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
-        """Note what became of a claim."""
+        """Keep a claim's report."""
         plain = getattr(report, ATTRIBUTE, None)
         if plain is not None:
             from evoclaims.verdicts.claim_report import ClaimReport
@@ -59,9 +59,9 @@ class Summary:
 
     @pytest.hookimpl(optionalhook=True)
     def pytest_handlecrashitem(self, crashitem: str) -> None:
-        """Note that xdist's worker died over a claim, which has no report then: it must not be missing unsaid."""
+        """Note that an xdist worker died on a claim, which has no report then but must be mentioned."""
         parameters = crashitem.rpartition("[")[2].removesuffix("]").split("-")
-        if not set(TIERS).isdisjoint(parameters):  # what is no claim is in pytest's own summary
+        if not set(TIERS).isdisjoint(parameters):  # pytest's own summary has all other tests
             self._died.append(
                 f"The process that judged {crashitem} died (it was killed, crashed, or found no memory), so that this "
                 "claim has no verdict here. Its trials are kept as far as they are, and the same command goes on from "
@@ -70,12 +70,12 @@ class Summary:
 
     @pytest.hookimpl(tryfirst=True)
     def pytest_sessionfinish(self, session: pytest.Session) -> None:
-        """Compare with the reference trials, write the JSON report and settle the exit status.
+        """Compare with the reference trials, write the JSON report and set the exit status.
 
         0: nothing refuted, nothing drifted. 1: something was refuted without being accepted, broke, or drifted; or a
         verdict changed as --claims-compare-fail names it; or, with --claims-undecided=fail, no claim was judged.
-        4: xdist's workers refused to begin. 5 (pytest's "no tests"): claims were selected, but no trial was looked at
-        (all are skipped, say), so that nothing was measured.
+        4: xdist's workers refused to begin. 5 (pytest's "no tests"): claims were selected, but no trial was judged
+        (for example, all are skipped), so that nothing was measured.
         """
         refused = bool(self._troubles)
         for finish in (
@@ -99,12 +99,12 @@ class Summary:
             self._drift = make_session(self._config).drift(self.reports)
 
     def _compare_with_predecessors(self) -> None:
-        """Compare the trials of this environment with those that other versions have left in the store."""
+        """Compare the trials of this environment with the store's trials of other versions."""
         if self.reports:
             self._upgrade = make_session(self._config).upgrade(self.reports)
 
     def _compare_with_accepted(self) -> None:
-        """Compare the verdicts with those last accepted, which are of the protocol itself and not of a variant."""
+        """Compare the verdicts with the last accepted ones, which are for the protocol itself, not for a variant."""
         if self.reports and not self._config.getoption("claims_variant"):
             from evoclaims.verdicts.regression import regression
 
@@ -128,11 +128,11 @@ class Summary:
 
     @property
     def _judged(self) -> bool:
-        """Whether any claim has a verdict, be it that it is undecided or broken."""
+        """Whether any claim has a verdict, even an undecided or broken one."""
         return any(report.outcome != "not run" for report in self.reports)
 
     def pytest_terminal_summary(self, terminalreporter: Any) -> None:
-        """Print the verdict table and what lies behind it."""
+        """Print the verdict table and its details."""
         if not self.reports:
             for trouble in [*self._troubles, *self._died]:
                 terminalreporter.write_line(self._said(f"ERROR: {trouble}"), red=True)
@@ -164,16 +164,16 @@ class Summary:
             terminalreporter.write_line(f"{what}: nothing was measured.", red=True)
 
     def _said(self, text: str) -> str:
-        """Return a line for the terminal, whoever the words are from."""
+        """Return a line that is safe for the terminal."""
         return self._drawn(shown(text))
 
     def _drawn(self, text: str) -> str:
-        """Return what rich has drawn in characters that the terminal has."""
+        """Return rich's output in characters that the terminal has."""
         file: Any = getattr(self._config.get_terminal_writer(), "_file", None)
         return spelled(text, getattr(file, "encoding", None))
 
     def _notes(self) -> list[str]:
-        """Return in lines what comparisons found: with reference trials, trials of other versions, and verdicts."""
+        """Return lines on what comparisons found: with reference trials, trials of other versions, and verdicts."""
         from evoclaims.report import terminal_table
         from evoclaims.verdicts.upgrade import verdict_changes
 
@@ -187,7 +187,7 @@ class Summary:
         return [*notes, *(self._regression.lines if self._regression else ())]
 
     def _write_json(self) -> None:
-        """Write all verdicts to the file that --claims-json names; none, too, are said, and no old file is left."""
+        """Write all verdicts to the file that --claims-json names; even if there are none, so no old file stays."""
         from evoclaims.core.files import write_atomically
 
         name = self._config.getoption("claims_json")
@@ -202,9 +202,9 @@ class Summary:
         write_atomically(path, text.encode(), "Name a file that can be written with --claims-json.")
 
     def _write_step_summary(self, notes: Sequence[str]) -> str:
-        """Append the verdicts to the page that GitHub shows of a step; return why it cannot be written, if it cannot.
+        """Append the verdicts to GitHub's summary page of a step; return why it cannot be written, else nothing.
 
-        This is called where a terminal is talked to, so that the runs within commands of `evoclaims` add nothing.
+        This is called only by runs that write to a terminal, so that runs inside `evoclaims` commands add nothing.
         """
         from evoclaims.report.run_summary import run_summary
 

@@ -10,9 +10,9 @@ import pytest
 
 
 def uncaptured(config: pytest.Config) -> tuple[Callable[[str], None], int | None]:
-    """Return what writes behind pytest's capture, for a line that is seen while trials run, and a terminal's columns.
+    """Return a function that writes past pytest's capture, for a line shown while trials run, and a terminal's columns.
 
-    The columns are None where there is no terminal to rewrite a line on.
+    The columns are None if there is no terminal on which to rewrite a line.
     """
     capture: Any = config.pluginmanager.get_plugin("capturemanager")
     writer = config.get_terminal_writer()

@@ -1,1 +1,1 @@
-"""What became of the claims, for readers: a web page, Markdown, a badge."""
+"""Reports on the claims for readers: a web page, Markdown, a badge."""

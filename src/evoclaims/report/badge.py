@@ -15,7 +15,7 @@ from evoclaims.verdicts.claim_report import ClaimReport
 GREEN, BLUE, RED, GREY = "#2e7d32", "#1565c0", "#c62828", "#616161"
 _NARROW: Final = frozenset("fijlrtI.,:;|!'()[]{}/ ")
 _WIDTHS: Final = {"narrow": 4.2, "usual": 7.0, "wide": 12.0}
-"""Units that a character takes at 11 units of type; `textLength` makes the text fit this estimate."""
+"""Width of a character at font size 11, in units; `textLength` makes the text fit this estimate."""
 
 _SVG: Final = """\
 <svg xmlns="http://www.w3.org/2000/svg" width="{width}" height="20" role="img" aria-label="{label}: {message}">
@@ -53,7 +53,7 @@ def svg(label: str, message: str, colour: str) -> str:
 
 
 def message_of(reports: Sequence[ClaimReport]) -> str:
-    """Return how many claims ended how, such as "supported 24 / refuted 5 / inconclusive 2"."""
+    """Return the number of claims by outcome, such as "supported 24 / refuted 5 / inconclusive 2"."""
     counts = Counter(report.outcome for report in reports)
     return " / ".join(f"{outcome} {counts[outcome]}" for outcome in Outcome if counts[outcome]) or "no claims"
 

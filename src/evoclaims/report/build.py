@@ -1,4 +1,4 @@
-"""Making a report's data from verdicts, trials and the history of accepted verdicts."""
+"""Build a report's data from verdicts, trials and the history of accepted verdicts."""
 
 from __future__ import annotations
 
@@ -44,13 +44,13 @@ def gather(
 
     Args:
         reproduction: the paper under test.
-        verdicts: what became of its claims.
-        archive: where trials are read; each is read once.
+        verdicts: reports of its claims.
+        archive: source of trials; each is read once.
         history: accepted verdicts.
         sentences: the paper's own sentences by claim, such as "G1[n_parity]".
         draws: ways of drawing a champion, in the order in which they are tried.
         figures: of the paper.
-        missing: sentences about figures that are not among them.
+        missing: sentences about figures that are missing.
         robustness: how claims end under variants of the protocol.
         generated: when, and by which version.
     """
@@ -79,7 +79,7 @@ def _order(report: ClaimReport) -> tuple[Any, ...]:
 
 
 def _notices(boards: Sequence[Board], reader: Reader) -> list[str]:
-    """Say what concerns the report as a whole."""
+    """Return notices about the whole report."""
     sections = [section for board in boards for section in board.sections]
     notices = []
     if not sections:
@@ -98,7 +98,7 @@ def _notices(boards: Sequence[Board], reader: Reader) -> list[str]:
 
 
 class _Gathering:
-    """What is shared by the sections of a report while it is made."""
+    """What a report's sections share while it is built."""
 
     def __init__(
         self,
@@ -137,7 +137,7 @@ class _Gathering:
         )
 
     def _condition(self, tier: str, source: SourceTrials) -> str:
-        """Return the key of a condition with so many trials, after gathering what is shown of it."""
+        """Return the key of a condition with this number of trials, after gathering its data."""
         key = f"{source.condition}-{len(source.trials)}"
         if key not in self.conditions:
             trials = self._trials(source)
@@ -153,7 +153,7 @@ class _Gathering:
         return self.reader.read(source.trials, source.installed)
 
     def _champion(self, tier: str, source: SourceTrials, trials: Sequence[TrialSummary]) -> ShownChampion:
-        """Return a condition's champion; the condition itself is known by its names."""
+        """Return a condition's champion; the condition is found by its names."""
         try:
             condition = self._reproduction.tier(tier).condition(source.method, source.task)
         except UserError as error:
@@ -162,14 +162,14 @@ class _Gathering:
 
 
 def _parts(report: ClaimReport, read: Mapping[str, Sequence[TrialSummary]]) -> tuple[Part, ...]:
-    """Return the evidence; where there is none, the trials as they are."""
+    """Return the evidence; if there is none, only the trials."""
     if report.verdict is not None and report.verdict.evidence:
         return judged_parts(report.verdict)
     return tuple(unjudged_part(label, trials) for label, trials in read.items() if trials)
 
 
 def _change(entries: Sequence[Entry], report: ClaimReport) -> str:
-    """Say what differs from the verdict that was accepted last; nothing where that cannot be told."""
+    """Say what differs from the last accepted verdict; empty if there is nothing to say."""
     if not entries or report.verdict is None or report.outcome in UNDECIDED:
         return ""
     last = entries[-1]
@@ -181,7 +181,7 @@ def _change(entries: Sequence[Entry], report: ClaimReport) -> str:
 
 
 def _broken(trials: Sequence[TrialSummary]) -> tuple[str, ...]:
-    """Say which trials have not come to a result of their own."""
+    """Say which trials have no valid result."""
     failed = [trial for trial in trials if trial.status != "done"]
     found = []
     if failed:

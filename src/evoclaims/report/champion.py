@@ -17,7 +17,7 @@ from evoclaims.trials.spec import Condition
 from evoclaims.trials.store import Store
 
 LARGEST: Final = 400_000
-"""Most bytes of a drawing that a page takes in."""
+"""Largest size of a drawing in a page, bytes."""
 
 
 Draw = Callable[[Condition, TrialResult, Any, str], bytes | None]
@@ -42,8 +42,8 @@ def champion_of(
     """Return the champion of the median trial, with the first drawing that can be made of it.
 
     Args:
-        store: holds its parameters, or does not.
-        condition: the trials'.
+        store: may hold the champion's parameters.
+        condition: of the trials.
         trials: of one condition.
         draws: ways of drawing, in the order in which they are tried.
     """
@@ -69,9 +69,9 @@ def champion_of(
 
 
 def typical(trials: Sequence[TrialSummary]) -> tuple[TrialSummary, str] | None:
-    """Return the trial whose mean success is the median (the lower one of two), and words that say so.
+    """Return the trial whose mean success is the median (the lower of two), and a text that says so.
 
-    Only finished trials count; of equals the one with the lowest seed is taken.
+    Only finished trials count; of equal ones, the lowest seed is taken.
     """
     scored = [(t.score, t.seed, t) for t in trials if t.status == "done" and t.score is not None]
     ranked = sorted((one for one in scored if math.isfinite(one[0])), key=lambda one: one[:2])
@@ -83,7 +83,7 @@ def typical(trials: Sequence[TrialSummary]) -> tuple[TrialSummary, str] | None:
 
 
 def network_panels(condition: Condition, network: GraphNetwork, genome: Any) -> list[picture.Panel]:
-    """Return the network that a genome describes, beside it the one that this draws on a substrate, if it does.
+    """Return the network of a genome, and the network that it generates on a substrate, if any.
 
     Raises:
         UserError: when networkx is not installed.

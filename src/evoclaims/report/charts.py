@@ -14,11 +14,11 @@ from evoclaims.report.formatting import large, number, plural
 from evoclaims.report.training_curves import CurvePanel, Line
 
 WIDTH, HEIGHT, EDGE, APART = 340.0, 44.0, 24.0, 70.0
-"""Of a strip of dots; `APART` is the width of the column of trials without a finite value."""
+"""Size of a strip of dots; `APART` is the width of the column of trials without a finite value."""
 
 AXIS: Final = 30.0
 MOST_DOTS: Final = 200
-"""Most trials that are drawn one by one; beyond, quantiles stand for them."""
+"""Most trials that are drawn one by one; beyond that, quantiles are drawn."""
 
 MOST: Final = 1e300
 """The largest number that an axis shows, so that differences stay finite."""
@@ -27,7 +27,7 @@ LEAST: Final = 1e-300
 """The smallest difference that ticks tell apart: below, floats run out of digits."""
 
 DOT, BLOCK = 7.0, 44.0
-"""Room for a dot, and the widest block of near values, which the edges have room for."""
+"""Width of a dot, and of the widest block of close values, which fits into the edges."""
 
 PANEL, LEFT, RIGHT, TOP, BOTTOM = (240.0, 132.0), 34.0, 8.0, 8.0, 20.0
 """Size and margins of a panel of curves."""
@@ -48,7 +48,7 @@ def part_scale(part: Part) -> tuple[float, float]:
 
 
 def strip_svg(part: Part, strip: Strip) -> Markup:
-    """Draw a strip: a dot a trial, the median, what the assertion compares with, and broken trials apart."""
+    """Draw a strip: a dot per trial, the median, what the assertion compares with, and broken trials apart."""
     scale = _Scale(*part_scale(part), right=_right(part))
     pieces: list[Markup] = [Markup('<path class="rule" d="M{} {}H{}"/>').format(EDGE, HEIGHT - 1, scale.right)]
     for bound in part.bounds:
@@ -113,7 +113,7 @@ def curve_symbol(panel: CurvePanel, name: str) -> Markup:
 
 
 def ticks(low: float, high: float, most: int = 5) -> list[float]:
-    """Return at most `most` + 1 round values from `low` to `high`; one, where they are too near for floats between."""
+    """Return at most `most` + 1 round values from `low` to `high`; one if no floats lie between."""
     if high - low < max(LEAST, 1e-9 * max(abs(low), abs(high))):
         return [low]
     rough = (high - low) / most
@@ -124,19 +124,19 @@ def ticks(low: float, high: float, most: int = 5) -> list[float]:
 
 
 class _Scale:
-    """A linear map from values to places."""
+    """A linear map from values to positions."""
 
     def __init__(self, low: float, high: float, left: float = EDGE, right: float = WIDTH - EDGE) -> None:
         self.low, self.high, self.left, self.right = low, high, left, right
 
     def __call__(self, value: float) -> float:
-        """Return the place of a value; one beyond the ends is put at the end."""
-        shown = min(max(value, self.low), self.high)  # before any arithmetic, which an enormous value would overflow
+        """Return the position of a value; one beyond an end is put at that end."""
+        shown = min(max(value, self.low), self.high)  # first of all: in arithmetic, an enormous value would overflow
         return self.left + (shown - self.low) / ((self.high - self.low) or 1.0) * (self.right - self.left)
 
 
 def _shown(value: float) -> float:
-    """Return the end of an axis for an extreme value."""
+    """Limit an end of an axis to what can be shown."""
     return min(max(value, -MOST), MOST)
 
 
@@ -146,7 +146,7 @@ def _right(part: Part) -> float:
 
 
 def _dots(dots: Sequence[Dot], scale: _Scale) -> Iterator[Markup]:
-    """Draw a dot a trial; values too near each other for two dots side by side share a block around their mean."""
+    """Draw a dot per trial; values too close for two dots side by side share a block around their mean."""
     ordered = sorted(dots, key=lambda dot: (dot.value, dot.seed))
     places = [scale(dot.value) for dot in ordered]
     start = 0
@@ -168,11 +168,11 @@ def _dots(dots: Sequence[Dot], scale: _Scale) -> Iterator[Markup]:
 
 
 def _block(total: float, count: int) -> tuple[float, float, float, int]:
-    """Return where a block of dots begins and where the next dot may, the room for a dot, and the number of rows.
+    """Return where a block of dots begins, where the next dot may begin, the width of a dot, and the number of rows.
 
     Args:
-        total: sum of the dots' places.
-        count: of the dots.
+        total: sum of the dots' positions.
+        count: of dots.
     """
     room = min(DOT, math.sqrt((HEIGHT - 12) * BLOCK / count))
     columns = math.ceil(count / max(int((HEIGHT - 9) / room), 1))
@@ -182,7 +182,7 @@ def _block(total: float, count: int) -> tuple[float, float, float, int]:
 
 
 def _numbers_alone(drawn: str) -> Markup:
-    """Take a drawing in which no text but numbers was filled in, and which so needs no escaping."""
+    """Mark a drawing as safe: only numbers were filled in, so it needs no escaping."""
     return Markup(drawn)  # noqa: S704
 
 
@@ -229,7 +229,7 @@ def _ends(series: Sequence[np.ndarray[tuple[int, ...], np.dtype[np.float64]]]) -
 
 
 def _path(line: Line, x: _Scale, y: _Scale) -> str:
-    """Return a curve as path data, with a gap where a value is no finite number; flat stretches take two points."""
+    """Return a curve as path data, with a gap where a value is not finite; flat stretches take two points."""
     path, pen = [], "M"
     values = line.y
     for index, (across, up) in enumerate(zip(line.x, values, strict=True)):
@@ -254,12 +254,12 @@ def _band(low: Line, high: Line, x: _Scale, y: _Scale) -> Iterator[Markup]:
 
 
 def _mark(kind: str, path: str, title: str) -> Markup:
-    """Draw a path that says what it is when it is pointed at."""
+    """Draw a path with a title that is shown under the pointer."""
     return Markup('<path class="{}" d="{}"><title>{}</title></path>').format(kind, path, title)
 
 
 def _text(kind: str, x: float, y: float, text: str, anchor: str = "middle") -> Markup:
-    """Write a text at a place."""
+    """Write a text at a position."""
     drawn = Markup('<text class="{}" x="{}" y="{}" text-anchor="{}">{}</text>')
     return drawn.format(kind, _at(x), _at(y), anchor, text)
 

@@ -1,6 +1,6 @@
-"""Tables and other rich content as text: the content's own characters steer nothing, rich's colours do.
+"""Tables and other rich content as text: control characters in it are escaped, rich's colours are kept.
 
-Rich itself drops five control characters and lets all others through, among them the one that begins commands.
+Rich itself drops five control characters and lets all others through, including the one that begins commands.
 """
 
 from __future__ import annotations
@@ -15,10 +15,10 @@ from evoclaims.core.printable import shown
 
 
 class PlainSpokenConsole(Console):
-    """A console that escapes control characters in whatever it is given, after they were laid out."""
+    """A console that escapes control characters in all content, after its layout."""
 
     def __init__(self, **settings: Any) -> None:
-        """Take no word for an emoji."""
+        """Turn no word into an emoji."""
         super().__init__(emoji=False, **settings)
 
     def render(self, renderable: RenderableType, options: ConsoleOptions | None = None) -> Iterable[Segment]:

@@ -33,7 +33,7 @@ class Strip:
         label: such as "cma_es on n_parity: mean success".
         dots: trials with a finite value.
         apart: trials without one, as (seed, why): "diverged", "NaN".
-        median: of all values that the judge saw; None where it saw none.
+        median: of all values that the judge used; None if there are none.
     """
 
     label: str
@@ -49,18 +49,18 @@ class Strip:
 
 @dataclass(frozen=True)
 class Part:
-    """One part of an assertion, or trials that no verdict came of.
+    """One part of an assertion, or trials without a verdict.
 
     Attributes:
         describe: the assertion in plain English.
         outcome: what this part says by itself; None without a verdict.
         numbers: names and values for a table.
         detail: what else is known.
-        event: whether values say that something held (1) or did not (0).
+        event: whether values are 1 (something held) or 0 (it did not).
         strips: the trials.
         bounds: what the assertion compares with, on the strips' axis.
         spans: intervals on the strips' axis.
-        decided: whether it is the one of several parts that the verdict rests on.
+        decided: whether the verdict rests on this one of several parts.
     """
 
     describe: str
@@ -75,7 +75,7 @@ class Part:
 
     @property
     def rows(self) -> tuple[tuple[int, tuple[str, ...]], ...]:
-        """Every trial's value as text, one row a seed and one column a strip; none where a table would be too long."""
+        """Every trial's value as text, one row per seed and one column per strip; empty if there are too many."""
         columns = [
             {**{dot.seed: number(dot.value) for dot in strip.dots}, **dict(strip.apart)} for strip in self.strips
         ]
@@ -108,7 +108,7 @@ def _judged_part(evidence: Evidence) -> Part:
 
 
 def unjudged_part(label: str, trials: Sequence[TrialSummary]) -> Part:
-    """Return the mean success of trials that no verdict came of, so that a reader sees which of them is broken."""
+    """Return the mean success of trials without a verdict, so that a reader sees which of them are broken."""
     dots = tuple(Dot(t.seed, t.score) for t in trials if t.score is not None and math.isfinite(t.score))
     shown = {dot.seed for dot in dots}
     apart = tuple((t.seed, _why(t)) for t in trials if t.seed not in shown)
@@ -135,7 +135,7 @@ def _strip(sample: Sample) -> Strip:
 
 
 def _numbers(evidence: Evidence) -> tuple[tuple[str, str], ...]:
-    """Return what was computed, the p that decided first, without what the kind does not have."""
+    """Return what was computed, the p that decided first, without what its kind lacks."""
     tests = [
         ("p for", evidence.p, evidence.attainable_p),
         ("p against", evidence.p_refuted, evidence.attainable_p_refuted),

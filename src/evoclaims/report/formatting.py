@@ -1,4 +1,4 @@
-"""Numbers and texts as a reader meets them."""
+"""Numbers and texts as readers see them."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _PLACE: Final = re.compile(r"§\s*(\d+(?:\.\d+)*)")
 
 
 def clean(text: object) -> str:
-    """Return a text on one line, without characters that steer a display or that no file can hold."""
+    """Return a text on one line, without control characters or characters that no file can hold."""
     return printable(" ".join(str(text).split()))
 
 
@@ -43,13 +43,13 @@ def large(value: float) -> str:
 
 
 def places(where: str) -> tuple[str, ...]:
-    """Return the sections that a place in the paper names, such as ("§5.1",); the words themselves without any."""
+    """Return the sections that a place in the paper names, such as ("§5.1",); without any, its own words."""
     found = tuple(dict.fromkeys(f"§{digits}" for digits in _PLACE.findall(where)))
     return found or (clean(where) or "elsewhere",)
 
 
 def place_key(place: str) -> tuple[bool, list[int], str]:
-    """Return what sorts places as the paper has them: numbered sections first, §5.2 before §5.10."""
+    """Return a sort key for places in the paper: numbered sections first, §5.2 before §5.10."""
     return place[:1] != "§", [int(digits) for digits in re.findall(r"\d+", place)], place
 
 
@@ -71,7 +71,7 @@ def counted(values: Iterable[str]) -> str:
 
 
 class Anchors:
-    """Names of places in a page: readable, safe in an address, and each given once."""
+    """Names of places in a page: readable, safe in a URL, and each used once."""
 
     def __init__(self) -> None:
         """Start without any."""

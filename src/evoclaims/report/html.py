@@ -1,4 +1,4 @@
-"""The report as one HTML page that needs no network: style, script and pictures are in it."""
+"""The report as one HTML page that needs no network: it includes style, script and pictures."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def html(page: Page) -> str:
 
 @functools.cache
 def _environment() -> Environment:
-    """Return the templates, with what they call."""
+    """Return the templates, with the functions that they call."""
     environment = Environment(
         loader=PackageLoader("evoclaims.report"),
         autoescape=True,
@@ -82,7 +82,7 @@ def _environment() -> Environment:
 
 
 def _cleaned(value: object) -> object:
-    """Return what a template shows without characters that steer a display; markup is taken as it is."""
+    """Return what a template shows without control characters; markup is unchanged."""
     return formatting.clean(value) if isinstance(value, str) and not isinstance(value, Markup) else value
 
 
@@ -95,7 +95,7 @@ def policy(style: str, script: str) -> str:
 
 
 def data_uri(svg: bytes) -> str:
-    """Return an SVG as an address that holds it; as an image it can neither run scripts nor load anything."""
+    """Return an SVG as a data URI; as an image it can neither run scripts nor load anything."""
     return f"data:image/svg+xml;base64,{base64.b64encode(svg).decode()}"
 
 

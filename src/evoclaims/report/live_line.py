@@ -1,4 +1,4 @@
-"""One line that shows how a run is getting on: rewritten in place on a terminal, now and then in a log.
+"""A progress line of a run: rewritten in place on a terminal, printed now and then in a log.
 
 Rich's live displays write nothing to a log before they end, and hide the cursor, which a killed process leaves hidden.
 """
@@ -22,7 +22,7 @@ class LiveLine:
     def __init__(
         self, write: Callable[[str], None], columns: int | None, clock: Callable[[], float] = time.monotonic
     ) -> None:
-        """Draw by `write`: in place on a terminal of so many columns, or as a log where that is None."""
+        """Draw with `write`: in place on a terminal of `columns` columns, or as a log if None."""
         self._write = write
         self._width = None if columns is None else max(columns - 1, 20)
         self._clock = clock
@@ -51,7 +51,7 @@ class LiveLine:
 
 
 def describe(progress: RunProgress) -> str:
-    """Return the line: condition, trials, step, level, best, time left; safe to print, whoever the words are from."""
+    """Return the line: condition, trials, step, level, best, time left; safe to print, whatever the names contain."""
     if progress.best is None:
         count = f" ({progress.trials} trials)" if progress.trials else ""
         return printable(f"{progress.condition}: {progress.phase}{count}")

@@ -40,7 +40,7 @@ def _details(page: Page) -> str:
 
 
 def _robustness(page: Page) -> str:
-    """Return one line a claim, and a column a variant."""
+    """Return one line per claim and a column per variant."""
     return table(
         ("claim", "tier", "the protocol", *map(literal, page.tried)),
         (
@@ -61,7 +61,7 @@ def _robustness(page: Page) -> str:
 
 
 def _overview(board: Board) -> str:
-    """Return one line a claim."""
+    """Return one line per claim."""
     cells = (table_cells.verdict, table_cells.trials, table_cells.effect, table_cells.p)
     return table(
         ("claim", "place", "verdict", "n", "A12", "p (attainable)"),

@@ -1,4 +1,4 @@
-"""Texts and tables in Markdown that shows them as they are."""
+"""Texts and tables in Markdown, shown as they are."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from typing import Final
 from evoclaims.report.formatting import clean
 
 _MARKS: Final = re.compile(r"([\\`*_\[\]#|~$@]|^[-+=]|:(?=[/\w]))")
-"""What means something to Markdown, or to a forge that links names and addresses."""
+"""Characters with a meaning in Markdown, or on a forge that links names and addresses."""
 
 _ITEM: Final = re.compile(r"^(\d+)([.)])(?=\s|$)")
 
 
 def literal(text: str) -> str:
-    """Return a text that Markdown, and HTML within it, shows as it is, on one line."""
+    """Escape a text so that Markdown, and HTML in it, shows it unchanged, on one line."""
     marked = escape(_MARKS.sub(r"\\\1", clean(text)), quote=False)
     return _ITEM.sub(r"\1\\\2", marked).replace("www.", "www\\.")
 
@@ -25,9 +25,9 @@ def table(header: Iterable[str], rows: Iterable[Iterable[str]], numbers: Iterabl
     """Return a table of cells that are Markdown already.
 
     Args:
-        header: one heading a column.
-        rows: one cell a column.
-        numbers: headings of columns that are set to the right.
+        header: one heading per column.
+        rows: one cell per column.
+        numbers: headings of columns that are aligned right.
     """
     head, right = list(header), set(numbers)
     lines = [head, ["---:" if name in right else "---" for name in head], *map(list, rows)]

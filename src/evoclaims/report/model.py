@@ -1,4 +1,4 @@
-"""What a report shows, as data: no HTML, no Markdown; texts are as they came, for renderers to clean and escape."""
+"""What a report shows, as data: no HTML, no Markdown; texts are raw; renderers clean and escape them."""
 
 from __future__ import annotations
 
@@ -52,9 +52,9 @@ class Section:
     """One claim at one tier.
 
     Attributes:
-        report: what became of it.
+        report: of the claim.
         anchor: its name in the page's address.
-        methods: that it is about.
+        methods: that it names.
         places: the sections of the paper that it names.
         paper: the paper's own sentence, where another one was judged; else empty.
         protocol: how it was judged, in words.
@@ -98,7 +98,7 @@ class Board:
     sections: tuple[Section, ...]
 
     def count(self, outcome: Outcome) -> int:
-        """Return how many claims ended so."""
+        """Return how many claims have an outcome."""
         return sum(section.report.outcome is outcome for section in self.sections)
 
     @property
@@ -139,7 +139,7 @@ class Page:
         conditions: by key.
         notices: what a reader should know about the whole.
         figures: of the paper.
-        missing: sentences about figures that are not among them.
+        missing: sentences about figures that are missing.
         variants: of the protocol, by name: what differs.
         robustness: claims that were judged under a variant too.
         generated: when, and by which version; free text.

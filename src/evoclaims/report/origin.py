@@ -1,4 +1,4 @@
-"""Where trials were made, in words; a provenance is free JSON, so nothing is taken for granted."""
+"""Where trials were made, in words; a provenance is free JSON, so nothing in it is certain."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ class Made:
     """Trials of one origin.
 
     Attributes:
-        origin: theirs.
+        origin: of them.
         count: how many.
     """
 

@@ -13,7 +13,7 @@ from evoclaims.report.model import PaperFigure
 def paper_figures(
     reproduction: Reproduction, archive: Archive, tier: str
 ) -> tuple[tuple[PaperFigure, ...], tuple[str, ...]]:
-    """Return the figures of which there is something to draw at a tier, and sentences about the others."""
+    """Return the figures with something to draw at a tier, and sentences about the others."""
     drawn: list[PaperFigure] = []
     empty: list[str] = []
     broken: dict[str, list[str]] = {}

@@ -1,4 +1,4 @@
-"""The verdicts of a run as Markdown, for the page that a continuous integration shows of it."""
+"""The verdicts of a run as Markdown, for its summary page in continuous integration."""
 
 from __future__ import annotations
 

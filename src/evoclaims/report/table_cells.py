@@ -1,4 +1,4 @@
-"""What every table of verdicts shows of a claim, whatever it is written in: plain texts, not yet escaped."""
+"""The cells that every table of verdicts shows for a claim, in any format: plain texts, not yet escaped."""
 
 from __future__ import annotations
 
@@ -12,26 +12,26 @@ from evoclaims.verdicts.claim_report import ClaimReport
 from evoclaims.verdicts.history import in_order, key_of
 
 NONE = "–"
-"""What was not measured."""
+"""Not measured."""
 
 
 def ordered(reports: Iterable[ClaimReport]) -> list[ClaimReport]:
-    """Return reports by tier, and as people count."""
+    """Return reports by tier, G9 before G10."""
     return sorted(reports, key=lambda report: in_order(key_of(report)))
 
 
 def verdict(report: ClaimReport) -> str:
-    """Return the outcome, such as "✗ refuted"; with an asterisk where it was looked into and accepted."""
+    """Return the outcome, such as "✗ refuted"; with an asterisk if it was examined and accepted."""
     return f"{report.outcome.symbol} {report.outcome}{'*' * report.as_expected}"
 
 
 def verdict_of_versions(report: ClaimReport) -> str:
-    """Return the outcome with a dagger where trials are of mixed versions, which `mixed_versions.lines` tells of."""
+    """Return the outcome with a dagger if trials are of mixed versions (see `mixed_versions.lines`)."""
     return verdict(report) + mixed_versions.MARK * mixed_versions.is_mixed(report)
 
 
 def trials(report: ClaimReport) -> str:
-    """Return the trials a side that were looked at."""
+    """Return the number of judged trials per side."""
     return str(report.n) if report.n else NONE
 
 

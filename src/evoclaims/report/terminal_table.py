@@ -20,7 +20,7 @@ from evoclaims.verdicts import mixed_versions
 from evoclaims.verdicts.claim_report import ClaimReport
 
 WIDE = 120
-"""Columns from which there is room to name each claim's file of evidence."""
+"""Columns from which each claim's file of evidence is shown too."""
 
 _COLOURS = {
     Outcome.SUPPORTED: "green",
@@ -40,7 +40,7 @@ def verdict_table(reports: Sequence[ClaimReport], width: int, colour: bool) -> s
     table.add_column("what is claimed", ratio=1, min_width=16)
     for heading in ("verdict", "n", "A12"):
         table.add_column(heading, no_wrap=True, justify="left" if heading == "verdict" else "right")
-    # "against 5.4e-06 (5.4e-06)" takes a second line, as most sentences do, and no room from them.
+    # "against 5.4e-06 (5.4e-06)" wraps to a second line, as most sentences do, and leaves them room.
     table.add_column("p (attainable)", max_width=17)
     if wide:
         table.add_column("evidence", no_wrap=True, style="dim")

@@ -13,7 +13,7 @@ from evoclaims.report.formatting import clean, number
 from evoclaims.report.trial_summary import POINTS, TrialSummary
 
 AXES: Final = ("environment_steps", "steps")
-"""Curves that count what was spent; the first is the panels' axis."""
+"""Curves that count the spent budget; the first is the panels' axis."""
 
 FIRST: Final = ("success", "fitness", "level")
 """Curves that every method has; they come first."""
@@ -44,9 +44,9 @@ class CurvePanel:
 
     Attributes:
         name: of the quantity.
-        lines: one a trial, or the median over trials alone.
+        lines: one per trial, or only the median over trials.
         band: lower and upper decile over trials; None where each trial has its line.
-        broken: how many curves hold a value that is no finite number, which leaves a gap.
+        broken: how many curves hold a value that is not finite, which leaves a gap.
     """
 
     name: str
@@ -114,7 +114,7 @@ def _quantiles(values: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _held(trial: TrialSummary, name: str, x: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return a curve at other places: each value holds until the next, the last for good, NaN before the first."""
+    """Return a curve at other positions: each value holds until the next, the last forever; NaN before the first."""
     places = np.searchsorted(trial.curves[AXES[0]], x, side="right") - 1
     held = np.where(places >= 0, trial.curves[name][np.maximum(places, 0)], np.nan)
     return np.where(np.isfinite(held), held, np.nan)

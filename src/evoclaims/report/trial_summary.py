@@ -1,4 +1,4 @@
-"""Trials as a report looks at them: read once, and of each no more kept than is drawn or said."""
+"""Trials for a report: each is read once, and only what is shown is kept."""
 
 from __future__ import annotations
 
@@ -53,14 +53,14 @@ class Reader:
         self.settings: dict[str, Mapping[str, Any]] = {}
         """What was run, as plain JSON, by the condition's id."""
         self.troubles: dict[str, None] = {}
-        """Why trials could not be read: sentences in the order of their coming."""
+        """Why trials could not be read: sentences in order of appearance."""
 
     def read(self, trials: Sequence[str], versions: Versions | None = None) -> tuple[TrialSummary, ...]:
-        """Return those of the trials that can be read; `troubles` says why others cannot.
+        """Return the trials that can be read; `troubles` says why others cannot.
 
         Args:
             trials: ids.
-            versions: of a trial's several records the one made with these comes first (see `Archive.get`).
+            versions: if a trial has several records, one made with these comes first (see `Archive.get`).
         """
         summaries = (self._one(trial, versions) for trial in trials)
         return tuple(summary for summary in summaries if summary is not None)

@@ -58,7 +58,7 @@ def working_tree(reproduction: Reproduction) -> Side:
     """Return the accepted verdicts and the reference trials in the reproduction's folder.
 
     Raises:
-        UserError: when one of the files is torn.
+        UserError: when one of the files is damaged.
     """
     top = reproduction.references
     trials = {_named(path.relative_to(top)): references.load(path) for path in sorted(top.rglob("*.jsonl"))}
@@ -74,7 +74,7 @@ def revision(reproduction: Reproduction, at: GitRevision) -> Side:
         at: the revision, read in the reproduction's folder.
 
     Raises:
-        UserError: when the revision has neither, or one of the files is torn.
+        UserError: when the revision has neither, or one of the files is damaged.
     """
     top = reproduction.references.relative_to(reproduction.folder).as_posix()
     verdicts = at.read(history.FILE)

@@ -85,7 +85,7 @@ def load(path: Path) -> History:
     """Read accepted verdicts; empty if there is no such file.
 
     Raises:
-        UserError: when the file is torn, of another schema, or has an invalid entry.
+        UserError: when the file is damaged, of another schema, or has an invalid entry.
     """
     try:
         data = read_file(path)

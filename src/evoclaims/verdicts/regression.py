@@ -45,7 +45,7 @@ def regression(folder: Path, reports: Sequence[ClaimReport], changes: str | None
         changes: the changes of verdicts to fail on (see `transitions.parse_patterns`); None for none.
 
     Raises:
-        UserError: when the accepted verdicts are torn, or missing although the run should fail on their changes.
+        UserError: when the accepted verdicts are damaged, or missing although the run should fail on their changes.
     """
     path = folder / history.FILE
     patterns = transitions.parse_patterns(changes) if changes is not None else ()

@@ -1,4 +1,4 @@
-// Filters: what they leave is shown, and kept in the address after "#?", so that it can be sent and comes back.
+// Filters: they are kept in the address after "#?", so that a view can be shared and restored.
 (() => {
   "use strict";
   const form = document.getElementById("filters");
