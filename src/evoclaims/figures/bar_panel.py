@@ -118,7 +118,7 @@ class Layout:
         limits: of the vertical axis.
         bracket: height of a bracket, in the axis' units.
         brackets: for each bracket its comparison, and its height.
-        slanted: whether the axis labels are.
+        slanted: whether axis labels are slanted.
     """
 
     measured: Measured
@@ -192,7 +192,7 @@ def paint(axis: Any, layout: Layout) -> None:
 
 
 def _number(axis: Any, layout: Layout) -> None:
-    """Put ticks on the vertical axis only up to the largest number, not beside the brackets: no success is 1.4."""
+    """Put ticks on the vertical axis only up to the largest number: no success is 1.4, as high as the brackets."""
     one, (low, high) = layout.measured, layout.limits
     top = max([*(one.panel.limits or ()), *(_top(bar, one) for bar in one.bars)])
     locator = optional("matplotlib.ticker").MaxNLocator(5, steps=[1, 2, 5, 10])

@@ -40,7 +40,7 @@ class Scope:
 
     @property
     def seeds(self) -> tuple[int, ...]:
-        """Of the trials that the tier judges."""
+        """The seeds of the trials that the tier judges."""
         protocol = self.tier.protocol
         return protocol.seeds(protocol.last.n)
 

@@ -21,7 +21,7 @@ MeasureOf = Callable[[Any], Measure]
 NOT_FINITE, NOT_RUN, NOT_MEASURED = "not finite", "not run", "not measured"
 PLACE, WHAT = ("panel", "at", "series", "method", "task"), ("what", "against", "n")
 COLUMNS = (*PLACE, *WHAT, "seed", "trial", "status", "value", "error")
-"""Of the table of a figure: one number per row. `what` is "trial", "mean" (`error`: the standard deviation), "reported"
+"""Columns of figures' tables: a number per row. `what` is "trial", "mean" (`error`: the standard deviation), "reported"
 (`error`: as published), or the name of a test (`value`: p; `against`: the other side)."""
 
 

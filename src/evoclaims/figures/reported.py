@@ -18,7 +18,7 @@ class Reported:
     Attributes:
         value: the number.
         error: its error bar, as published; None where the source gives none.
-        place: in the paper.
+        place: where the paper has it.
     """
 
     value: float
@@ -80,7 +80,7 @@ def load_published(path: Path) -> Published:
 
 
 def _is_plot(plot: Any) -> bool:
-    """Whether a plot has its place, and each method has numbers and no or as many errors."""
+    """Whether a plot has its place, and each method has numbers and, if any errors, as many."""
     return bool(plot.get("place") and plot.get("methods")) and all(
         numbers.get("mean") and len(numbers.get("error", numbers["mean"])) == len(numbers["mean"])
         for numbers in plot["methods"].values()

@@ -24,7 +24,7 @@ class Archive:
     then the store's newest, then the committed one.
 
     Attributes:
-        store: searched first; a trial that ran out of time there may still be a reference trial.
+        store: searched first; a trial that ran out of time there may be complete in `references`.
         references: folder of the committed reference trials, or None.
     """
 

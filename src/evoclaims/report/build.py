@@ -50,7 +50,7 @@ def gather(
         sentences: the paper's own sentences by claim, such as "G1[n_parity]".
         draws: ways of drawing a champion, in the order in which they are tried.
         figures: of the paper.
-        missing: sentences about figures that are missing.
+        missing: sentences about missing figures.
         robustness: how claims end under variants of the protocol.
         generated: when, and by which version.
     """

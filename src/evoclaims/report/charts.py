@@ -131,7 +131,7 @@ class _Scale:
 
     def __call__(self, value: float) -> float:
         """Return the position of a value; one beyond an end is put at that end."""
-        shown = min(max(value, self.low), self.high)  # first of all: in arithmetic, an enormous value would overflow
+        shown = min(max(value, self.low), self.high)  # before any arithmetic: an enormous value would overflow
         return self.left + (shown - self.low) / ((self.high - self.low) or 1.0) * (self.right - self.left)
 
 

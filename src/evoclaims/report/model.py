@@ -54,7 +54,7 @@ class Section:
     Attributes:
         report: of the claim.
         anchor: its name in the page's address.
-        methods: that it names.
+        methods: those that it names.
         places: the sections of the paper that it names.
         paper: the paper's own sentence, where another one was judged; else empty.
         protocol: how it was judged, in words.
@@ -139,7 +139,7 @@ class Page:
         conditions: by key.
         notices: what a reader should know about the whole.
         figures: of the paper.
-        missing: sentences about figures that are missing.
+        missing: sentences about missing figures.
         variants: of the protocol, by name: what differs.
         robustness: claims that were judged under a variant too.
         generated: when, and by which version; free text.

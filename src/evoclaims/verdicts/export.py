@@ -1,6 +1,6 @@
 """Trials and verdicts as flat tables, for analysis with pandas.
 
-They are not written by pandas, which turns None (not measured) into NaN (measured).
+They are not written by pandas, which turns None (not measured) into NaN (measured as NaN).
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What changes of package versions have changed: trials of this environment compared with those of earlier ones."""
+"""What other versions of packages have changed: trials of this environment compared with those of earlier ones."""
 
 from __future__ import annotations
 
