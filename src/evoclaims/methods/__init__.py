@@ -1,4 +1,4 @@
-"""Algorithms: pure functions of an explicit state, one a file."""
+"""Algorithms: pure functions of an explicit state, one per file."""
 
 from evoclaims.core.lazy import exported
 

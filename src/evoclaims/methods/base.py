@@ -1,4 +1,4 @@
-"""What a method is: pure functions of an explicit state, so that one engine runs them all."""
+"""The interface of a method: pure functions of an explicit state, so that one engine can run all."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ S = TypeVar("S")
 
 @pytree
 class Policy:
-    """A trained policy: its parameters as data, and the function that uses them as structure.
+    """A trained policy: its parameters are data (leaves), the function that uses them is static.
 
     Attributes:
         parameters: any tree of arrays.
@@ -32,14 +32,14 @@ class Policy:
 
 @pytree
 class Progress:
-    """What one step of a method tells the engine.
+    """What one step of a method reports to the engine.
 
     Attributes:
         fitness: of the best candidate of this step, on the current level.
-        success: its success on the current level, by the task's examination or training episode; exactly 1 moves the
-            trial up a level.
-        healthy: False once a number that matters has stopped being finite; ends the trial as diverged.
-        metrics: further scalars for the training curve; the same names at every step.
+        success: its success on the current level, in the task's examination or training episode; exactly 1 moves
+            the trial up a level.
+        healthy: False if a relevant number is not finite; the trial then ends as diverged.
+        metrics: more scalars for the training curve; the same names at every step.
     """
 
     fitness: Float[Array, ""]
@@ -61,7 +61,7 @@ class Method(Protocol[S]):
 
     @property
     def revision(self) -> int:
-        """Raised whenever the method computes something else."""
+        """Raised whenever the method's results change."""
 
     def init(self, key: PRNGKeyArray, task: Task) -> S:
         """Return the state before the first step."""
@@ -78,10 +78,10 @@ class Method(Protocol[S]):
 
 @runtime_checkable
 class PartlyUsed(Protocol):
-    """A method whose policies' parameters hold more than the numbers they act by: padding, or what is stored beside.
+    """A method whose policies do not use all their parameters: some are padding, or only stored with the champion.
 
-    All numbers that a policy acts by are finite; a trial whose champion has others ends as diverged.
+    All used parameters must be finite; otherwise the trial ends as diverged.
     """
 
     def used(self, parameters: Any) -> Any:
-        """Return the arrays of a policy's parameters (on the host) that it acts by; of another method, all are."""
+        """Return the used arrays of a policy's parameters (on the host); other methods use all of them."""

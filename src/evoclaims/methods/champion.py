@@ -1,4 +1,4 @@
-"""Evaluating populations of flat parameter vectors, and remembering the best one seen."""
+"""Evaluating populations of flat parameter vectors, and keeping the best one seen."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class Champion:
 
     Attributes:
         parameters: its flat vector.
-        episode: how it did when it was last evaluated.
+        episode: its last evaluation.
     """
 
     parameters: Float[Array, " parameters"]
@@ -39,7 +39,7 @@ def evaluate(
 
 
 def no_episode() -> Episode:
-    """Return an episode that any other is better than."""
+    """Return an episode that is worse than any other."""
     return Episode(fitness=jnp.full((), -jnp.inf, jnp.float32), success=jnp.zeros((), jnp.float32))
 
 
@@ -56,9 +56,9 @@ def evaluate_with_champion(
     population: Float[Array, "n parameters"],
     champion: Champion,
 ) -> tuple[Episode, Champion, Bool[Array, ""]]:
-    """Evaluate a population and its champion together, and let the best of them be champion.
+    """Evaluate a population and its champion together, and return the best as the new champion.
 
-    The old champion is evaluated anew, because the level may have moved since. A tie goes to the newcomer.
+    The old champion is evaluated again, because the level may have changed. A tie goes to the newcomer.
 
     Returns:
         The population's episodes (leaves [n]), the new champion, and whether all fitnesses and parameters are finite.

@@ -32,11 +32,10 @@ class CmaEsState:
 def ordinal_weights(
     population: Float[Array, "n parameters"], fitness: Float[Array, " n"], state: Any, params: Any
 ) -> Float[Array, " n"]:
-    """Give the i-th best individual the i-th recombination weight, ties in order of index.
+    """Give the i-th best individual the i-th recombination weight; ties are ordered by index.
 
-    evosax's default averages the ranks of ties; on a thresholded fitness most of a population ties, the averaged
-    weights cancel, and the step size collapses. Individuals are drawn independently, so breaking ties by index is
-    breaking them at random.
+    evosax's default averages the ranks of ties. With a thresholded fitness most of a population ties, the averaged
+    weights cancel, and the step size collapses. Individuals are drawn independently, so the order by index is random.
     """
     return params.weights[jnp.argsort(jnp.argsort(fitness, stable=True), stable=True)]
 
@@ -58,7 +57,7 @@ class CmaEs:
     network: Network = AllSkips()
 
     def __post_init__(self) -> None:
-        """Check the size: half of a population recombines, weighted by how much better it is than the other."""
+        """Check the population size: the better half recombines, with weights by rank."""
         if self.population < 4:
             raise UserError(f"CMA-ES needs a population of at least 4, not {self.population}.")
 

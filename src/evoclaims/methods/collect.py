@@ -1,4 +1,4 @@
-"""Collecting experience: parallel environments that restart by themselves, in Brax's `Transition` layout."""
+"""Collecting experience from parallel environments that reset themselves, in Brax's `Transition` layout."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ Act = Callable[[Array, Array], tuple[Array, Any]]
 
 @pytree
 class Interaction:
-    """Parallel episodes under way.
+    """Parallel running episodes.
 
     Attributes:
         states: leaves have a leading axis [environments].
-        level: the level they were started at.
+        level: the level they started at.
     """
 
     states: TaskState
@@ -40,7 +40,7 @@ class Interaction:
         )
 
     def at_level(self, task: Task, key: PRNGKeyArray, level: Int[Array, ""]) -> Interaction:
-        """Return the same episodes, or fresh ones when the level has moved."""
+        """Return the same episodes, or new ones when the level has changed."""
         fresh = Interaction.start(task, key, level, self.states.reward.shape[0])
         return select(level != self.level, fresh, self)
 
@@ -51,8 +51,8 @@ def collect(
     """Act for `rounds` × `unroll_length` steps in every environment.
 
     Returns:
-        The episodes as they stand, and transitions whose leaves have shape [rounds × environments, unroll_length, …]:
-        one trajectory a row, as Brax's loss wants them.
+        The episodes' current state, and transitions with leaves [rounds × environments, unroll_length, …]: one
+        trajectory per row, as Brax's loss expects.
     """
 
     def one_step(interaction: Interaction, key: Array) -> tuple[Interaction, Transition]:

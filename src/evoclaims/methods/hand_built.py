@@ -1,8 +1,7 @@
-"""Circuits written down by hand from the definitions of the gates: the positive control (C2).
+"""Circuits built by hand from the definitions of the gates: the positive control (C2).
 
-They learn nothing; they go through the same engine and the same judging as every method, so that a harness in which a
-right circuit fails, or a wrong one passes, gives itself away. They never look at the task's own truth table, so that a
-wrong one gives itself away as well.
+They learn nothing, but use the same engine and judging as every method. A harness in which a correct circuit fails, or
+a wrong one passes, is thus exposed. They never read the task's own truth table, so an error there is exposed as well.
 """
 
 from __future__ import annotations
@@ -26,10 +25,10 @@ from evoclaims.methods.base import Policy, Progress
 
 @dataclass(frozen=True)
 class HandBuilt:
-    """A circuit that answers every row rightly, or its negation.
+    """A circuit that answers every row correctly, or its negation.
 
     Attributes:
-        negated: whether the outputs are negated: wrong on every active output of every row.
+        negated: whether to negate the outputs: then every active output of every row is wrong.
     """
 
     revision: ClassVar[int] = 2
@@ -39,7 +38,7 @@ class HandBuilt:
 
     @property
     def name(self) -> str:
-        """The registered name, which tells the circuit from its negation."""
+        """The registered name; the negated circuit has its own."""
         return "hand_built_negated" if self.negated else "hand_built"
 
     def init(self, key: PRNGKeyArray, task: Task) -> Int[Array, ""]:
@@ -65,7 +64,7 @@ class HandBuilt:
 
 @dataclass(frozen=True)
 class ThresholdCircuit:
-    """Two layers of threshold neurons: neuron h fires where weights_h · x > thresholds_h, outputs sum what fires.
+    """Two layers: neuron h fires where weights_h · x > thresholds_h, and outputs sum the readouts of what fires.
 
     Attributes:
         weights: shape [neurons, inputs].
@@ -91,7 +90,7 @@ class ThresholdCircuit:
 def parity_circuit(bits: int) -> ThresholdCircuit:
     """Return the circuit that counts ones: neuron k fires at k ones or more, and the signs alternate (§3.1.1).
 
-    The sum of what fires is 1 for an odd number of ones and 0 for an even one; a neuron that always fires takes off ½.
+    These sum to 1 for an odd number of ones and to 0 for an even one; a neuron that always fires subtracts ½.
     """
     counts = np.arange(bits + 1, dtype=np.float32)  # at least 0, 1, ..., bits ones
     readout = np.where(counts % 2 == 1, 1.0, -1.0).astype(np.float32)
@@ -112,7 +111,7 @@ _ANSWERS: Final[dict[str, str]] = {
     "shift left": "0000 0010 0100 0110 1000 1010 1100 1110 0000 0010 0100 0110 1000 1010 1100 1110",
     "shift right": "0000 0000 0001 0001 0010 0010 0011 0011 0100 0100 0101 0101 0110 0110 0111 0111",
 }
-"""Each operation's outputs for its inputs in counting order, written down from §3.1.2 and not computed by the task."""
+"""Each operation's outputs for its inputs in counting order, taken from §3.1.2 and not computed by the task."""
 
 _LISTS: Final = {
     "paper": ("multiplexer", "nand", "not", "and", "xor", "increment", "decrement", "shift left", "shift right"),
@@ -122,10 +121,10 @@ _MULTIPLEXERS: Final = {"paper": "multiplexer", "published_code": "multiplexer t
 
 
 def alu_circuit(operations: Sequence[str]) -> ThresholdCircuit:
-    """Return the circuit with a neuron for every operation and every value of its inputs (§3.1.2).
+    """Return the circuit with one neuron per operation and value of its inputs (§3.1.2).
 
-    A neuron fires on its own eight bits alone: x · (2 bits − 1) exceeds Σ bits − ½ for no others. It puts +1 on the
-    outputs that are to be 1, and −1 on the others.
+    A neuron fires only on its own eight bits: x · (2 bits − 1) exceeds Σ bits − ½ for no others. It adds +1 to the
+    outputs that must be 1, and −1 to the others.
 
     Args:
         operations: names, in the order of their indices in the four control bits.
@@ -141,10 +140,10 @@ def alu_circuit(operations: Sequence[str]) -> ThresholdCircuit:
 
 
 def circuit_for(task: Task) -> ThresholdCircuit:
-    """Return the circuit that somebody has built by hand for a task.
+    """Return the hand-built circuit for a task.
 
     Raises:
-        UserError: when nobody has.
+        UserError: when there is none.
     """
     if isinstance(task, NParity):
         return parity_circuit(task.bits)

@@ -29,9 +29,9 @@ PAPER = replace(neat.PAPER, activations=CPPN_FUNCTIONS)
 
 @dataclass(frozen=True)
 class SubstrateNetwork:
-    """Policies whose weights a genome's network (the CPPN) draws from the places of the neurons.
+    """Policies whose weights a genome's network (the CPPN) computes from the neurons' positions.
 
-    The CPPN maps the coordinates of a connection's ends to q; the connection's weight is 0 for |q| < threshold, and
+    The CPPN maps the coordinates of a connection's ends to q; the connection's weight is 0 for |q| < threshold,
     else sign(q) (|q| - threshold) / (1 - threshold) · max_weight (Stanley et al. 2009, §3.2). All neurons are tanh.
     """
 
@@ -44,7 +44,7 @@ class SubstrateNetwork:
     outputs: int = 1
 
     def express(self, genome: Genome) -> list[Float[Array, "to from"]]:
-        """Return the weights into each layer but the first."""
+        """Return the weights into each layer except the first."""
         cppn = GraphNetwork(self.inputs, self.outputs, self.activations, self.output)
         q = cppn.apply_rows(cppn.express(genome), jnp.asarray(self.substrate.queries))[:, 0]
         size = jnp.maximum(jnp.abs(q) - self.threshold, 0.0) / (1 - self.threshold) * self.max_weight
@@ -68,11 +68,11 @@ class HyperNeat:
     """HyperNEAT on a layered substrate, or on one whose neurons are placed by hand.
 
     Attributes:
-        settings: NEAT's, for the CPPN.
+        settings: NEAT's settings for the CPPN.
         hidden: neurons in each hidden layer of a layered substrate.
         extent: see `layered`.
-        substrate: neurons placed by hand; then `hidden` and `extent` are not used.
-        threshold: a connection is drawn where the CPPN's |q| exceeds it.
+        substrate: neurons placed by hand; if given, `hidden` and `extent` are unused.
+        threshold: a connection exists where the CPPN's |q| exceeds it.
         max_weight: weight at |q| = 1.
     """
 
@@ -114,7 +114,7 @@ class HyperNeat:
         return self.settings.population * task.horizon
 
     def encoding(self, task: Task) -> SubstrateNetwork:
-        """Return how a genome stands for a policy of the task's size."""
+        """Return how a genome encodes a policy of the task's size."""
         inputs, outputs = task.observation_size + 1, task.action_size
         substrate = self.substrate or layered((inputs, *self.hidden, outputs), self.extent)
         ends = len(substrate.layers[0]), len(substrate.layers[-1])

@@ -1,4 +1,4 @@
-"""HyperNEAT (Stanley et al. 2009) of the real TensorNEAT, where a user has installed it."""
+"""The real TensorNEAT's HyperNEAT (Stanley et al. 2009), if it is installed."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ class HyperneatTensorneat(NeatTensorneat):
     """TensorNEAT's HyperNEAT on a layered substrate.
 
     Attributes:
-        settings: NEAT's, for the CPPN.
+        settings: NEAT's settings for the CPPN.
         hidden: neurons in each hidden layer.
         extent: see `networks.substrate.layered`.
-        threshold: a connection is drawn where the CPPN's |q| exceeds it.
+        threshold: a connection exists where the CPPN's |q| exceeds it.
         max_weight: weight at |q| = 1.
     """
 
@@ -64,13 +64,13 @@ class HyperneatTensorneat(NeatTensorneat):
                 max_weight=self.max_weight,
                 output_transform=ACTIVATIONS["tanh"],
             )
-        # Its own gene does not take the arguments that its genome calls genes with (commit ee20490).
+        # TensorNEAT's node gene does not accept the arguments that its genome passes (commit ee20490).
         algorithm.hyper_genome.node_gene = _neuron()
         return algorithm
 
 
 def _neuron() -> Any:
-    """Make a gene of the substrate's neurons: tanh of the sum, and for outputs the sum."""
+    """Make the node gene for a substrate: hidden nodes give tanh of the sum, outputs the sum."""
     from tensorneat.genome import BaseNode
 
     class Neuron(BaseNode):  # type: ignore[misc]
@@ -82,7 +82,7 @@ def _neuron() -> Any:
             is_output_node: Bool[Array, ""],
             valid_mask: Bool[Array, " nodes"],
         ) -> Float[Array, ""]:
-            """Return what a neuron emits; `inputs` are its weighted inputs where `valid_mask` says so."""
+            """Return a neuron's output; `inputs` are weighted and valid where `valid_mask` is true."""
             z = jnp.sum(inputs, where=valid_mask)
             return jnp.where(is_output_node, z, jnp.tanh(z))
 

@@ -1,4 +1,4 @@
-"""MAP-Elites (Mouret and Clune 2015, arXiv:1504.04909) by QDax, over the ground where a robot ends its episode."""
+"""QDax's MAP-Elites (Mouret and Clune 2015, arXiv:1504.04909) over the position where a robot ends its episode."""
 
 from __future__ import annotations
 
@@ -34,9 +34,9 @@ from evoclaims.networks.mlp import Mlp
 
 @runtime_checkable
 class MappedTask(Protocol):
-    """A task on a piece of ground; its episodes' metrics hold "x" and "y", where the robot was at the end, in metres.
+    """A task with an area; its episodes' metrics hold "x" and "y", the robot's last position, in metres.
 
-    An episode may also hold "reached": 1 when the robot got to the task's target.
+    They may also hold "reached": 1 when the robot reached the task's target.
     """
 
     @property
@@ -44,15 +44,15 @@ class MappedTask(Protocol):
         """Lowest and highest x, lowest and highest y, in metres."""
 
     def reachable(self, cells: tuple[int, int]) -> NDArray[np.bool_]:
-        """Return which cells of a grid over the area the robot can get to, shape [cells along x, cells along y]."""
+        """Return which cells of a grid over the area the robot can reach, shape [cells along x, cells along y]."""
 
 
 @pytree
 class MapElitesState:
-    """The archive, and what has happened so far.
+    """The archive and the progress so far.
 
     Attributes:
-        archive: QDax's repertoire; genotypes [cells, parameters], fitnesses [cells, 1] (-inf where no elite is),
+        archive: QDax's repertoire; genotypes [cells, parameters], fitnesses [cells, 1] (-inf without an elite),
             descriptors [cells, 2] in metres, and each elite's success [cells].
         evaluated: individuals evaluated so far.
         reached: 1 once any individual has reached the task's target, else 0.
@@ -68,8 +68,8 @@ class MapElites:
     """QDax's MAP-Elites with iso+line variation of uniformly drawn elites (Vassiliades and Mouret 2018, GECCO).
 
     The descriptor is where the episode ended, on a euclidean grid over the task's area. The first batches are drawn as
-    QDax's examples initialize their policies: LeCun-uniform weights, no biases. An individual that is not finite or
-    ended outside the area is evaluated for nothing. Elites keep the fitness of the level they were evaluated on.
+    in QDax's examples: LeCun-uniform weights, zero biases. An individual that is not finite or ends outside the area
+    counts as evaluated, but is dropped. Elites keep the fitness of the level they were evaluated on.
 
     Attributes:
         network: the encoding: its weights and biases.
@@ -92,7 +92,7 @@ class MapElites:
     initial: int = 100
 
     def __post_init__(self) -> None:
-        """Check the sizes and the spreads."""
+        """Check the sizes and standard deviations."""
         if self.batch < 1 or self.initial < 1:
             raise UserError(
                 f"MAP-Elites needs at least 1 individual in a batch and 1 to begin with, not {self.batch} and "
@@ -135,7 +135,7 @@ class MapElites:
         "reached" (see `MapElitesState`). Fitness and success are the best elite's; -inf and 0 where there is none.
 
         Raises:
-            UserError: when the task's episodes do not tell where they end.
+            UserError: when the task's episodes do not report where they end.
         """
         draw_key, vary_key, episode_key = streams(key, "draw", "vary", "episode")
         drawn = lecun_uniform(draw_key, self.network, task.observation_size, task.action_size, self.batch)
@@ -143,7 +143,7 @@ class MapElites:
             varied, _ = self._algorithm().ask(state.archive, None, vary_key)
         population = jnp.where(state.evaluated < self.initial, drawn, varied)
         after = self.insert(task, state, population, self._evaluate(task, episode_key, level, population))
-        # Whatever is in the archive was in a batch.
+        # All elites come from checked batches.
         return after, self._progress(task, after, healthy=jnp.all(jnp.isfinite(population)))
 
     def insert(
@@ -151,7 +151,7 @@ class MapElites:
     ) -> MapElitesState:
         """Return the state after a batch with the given episodes, leaves [batch].
 
-        An individual becomes its cell's elite when it is fitter than the last one; of a batch, the first of the best.
+        An individual becomes its cell's elite when it is fitter than the old one; within a batch, the first best one.
         """
         descriptors = jnp.stack([episodes.metrics["x"], episodes.metrics["y"]], axis=-1)
         valid = _inside(_mapped(task), descriptors) & jnp.isfinite(episodes.fitness)
@@ -172,7 +172,7 @@ class MapElites:
     def best(self, task: Task, state: MapElitesState) -> Policy:
         """Return the fittest elite; its parameters are (its vector, the map of all elites' fitnesses).
 
-        The map, as of `fitness_map`, is not used by the policy: it is there to be stored with the champion.
+        The policy does not use the map (see `fitness_map`): it is there to be stored with the champion.
         """
         elite = jnp.argmax(state.archive.fitnesses)
         return Policy(
@@ -181,7 +181,7 @@ class MapElites:
         )
 
     def used(self, parameters: Any) -> Any:
-        """Return the elite's vector; the map beside it is -inf where no elite is."""
+        """Return the elite's vector; not the map, which is -inf where there is no elite."""
         return parameters[0]
 
     def cost(self, task: Task) -> int:
@@ -191,12 +191,12 @@ class MapElites:
     def fitness_map(self, state: MapElitesState) -> Float[Array, "x y"]:
         """Return the elites' fitnesses, shape [cells along x, cells along y]; -inf where there is none."""
         along_x, along_y = self.cells
-        # QDax counts cells along x first.
+        # In QDax's cell index, x varies fastest.
         fitnesses: Float[Array, "x y"] = state.archive.fitnesses.reshape(along_y, along_x).T
         return fitnesses
 
     def _algorithm(self) -> MAPElites:
-        """Build QDax's algorithm, which is asked and told: it evaluates nothing itself."""
+        """Build QDax's algorithm for ask and tell: it evaluates nothing itself."""
         variation = partial(isoline_variation, iso_sigma=self.iso_sigma, line_sigma=self.line_sigma)
         emitter = MixingEmitter(
             mutation_fn=None, variation_fn=variation, variation_percentage=1.0, batch_size=self.batch
@@ -217,7 +217,7 @@ class MapElites:
         return episodes
 
     def _progress(self, task: Task, state: MapElitesState, healthy: Bool[Array, ""]) -> Progress:
-        """Tell of the best elite and of the archive."""
+        """Report the best elite and the archive."""
         archive, fitnesses = state.archive, self.fitness_map(state)
         elite = jnp.argmax(archive.fitnesses)
         filled = fitnesses > -jnp.inf
@@ -250,10 +250,10 @@ def lecun_uniform(
 
 
 def beaten(cell: Int[Array, " batch"], fitness: Float[Array, " batch"]) -> Bool[Array, " batch"]:
-    """Return who is not the first of the fittest of the batch in its cell.
+    """Return which individuals are not the first of the fittest of the batch in their cell.
 
-    QDax writes all that tie into the cell, in an order that an accelerator does not promise: the elite's genotype could
-    be one individual's and its descriptor another's.
+    QDax writes all tied individuals into the cell, in no guaranteed order on an accelerator: the elite could get one
+    individual's genotype and another's descriptor.
     """
     index = jnp.arange(cell.shape[0])
     fitter = fitness[None, :] > fitness[:, None]
@@ -272,6 +272,6 @@ def _mapped(task: Task) -> MappedTask:
 
 
 def _inside(task: MappedTask, descriptors: Float[Array, "batch 2"]) -> Bool[Array, " batch"]:
-    """Return whose descriptor is in the area; one that is not finite is not."""
+    """Return which descriptors are finite and in the area."""
     low, high = jnp.asarray(task.area, jnp.float32).T
     return jnp.all((descriptors >= low[None]) & (descriptors <= high[None]), axis=1)

@@ -1,7 +1,7 @@
-"""PPO (Schulman et al. 2017, arXiv:1707.06347): Brax's networks, loss and running statistics in a loop of our own.
+"""PPO (Schulman et al. 2017, arXiv:1707.06347): Brax's networks, loss and running statistics in our own loop.
 
-Brax's `ppo.train` drives the device from the host and trains one agent; here one training step is a pure function, so
-that the engine can run many trials in one program and move the curriculum's level on the device.
+Brax's `ppo.train` drives the device from the host and trains one agent. Here one training step is a pure function, so
+that the engine can run many trials in one program and raise the curriculum's level on the device.
 """
 
 from __future__ import annotations
@@ -41,9 +41,9 @@ class LevelTest:
     """When and how PPO's policy is tested for moving up a level.
 
     Attributes:
-        every: training steps between tests; 0 for none: no level is left, and the fitness that is told while training
-            is the mean training reward times the horizon. For tasks of one level whose episodes are long.
-        sampled_episodes: 0 for the deterministic policy under the task's own examination; otherwise how many training
+        every: training steps between tests. 0 means no tests: the trial stays on its level, and its reported fitness is
+            the mean training reward times the horizon. For one-level tasks with long episodes.
+        sampled_episodes: 0 tests the deterministic policy with the task's own examination; otherwise, how many training
             episodes of the *stochastic* policy must all be without error, as in the authors' published code (128).
             Such an episode is one step, on a row drawn from the level.
     """
@@ -66,11 +66,11 @@ class Ppo:
 
     Attributes:
         policy_layers: widths of the policy's hidden layers (swish).
-        value_layers: widths of the value network's hidden layers; the paper is silent, the published code has 7 × 32.
+        value_layers: widths of the value network's hidden layers; the paper gives none, the published code has 7 × 32.
         environments: episodes run in parallel.
-        unroll_length: steps of each environment between two looks at the policy.
-        batch_size: trajectories in a minibatch.
-        minibatches: minibatches in a pass.
+        unroll_length: steps of each environment in one trajectory.
+        batch_size: trajectories per minibatch.
+        minibatches: minibatches per pass.
         updates_per_batch: passes over the collected data.
         discounting, learning_rate, entropy_cost, reward_scaling, gae_lambda, clipping: as in Brax.
         normalize_observations: whether running statistics whiten the observation.
@@ -98,7 +98,7 @@ class Ppo:
     level_test: LevelTest = LevelTest()
 
     def __post_init__(self) -> None:
-        """Check the sizes, and that the collected data fill the minibatches."""
+        """Check the sizes, and that the collected data fills the minibatches."""
         sizes = ("environments", "unroll_length", "batch_size", "minibatches", "updates_per_batch")
         for name in sizes:
             if getattr(self, name) < 1:
@@ -118,7 +118,7 @@ class Ppo:
         """Draw the networks' parameters and start the environments at level 0.
 
         Raises:
-            UserError: when the level test samples episodes and those of `task` are longer than the one step it plays.
+            UserError: when the level test samples episodes, which are one step, but those of `task` are longer.
         """
         if self.level_test.sampled_episodes and task.horizon > 1:
             raise UserError(
@@ -143,7 +143,7 @@ class Ppo:
         )
 
     def step(self, key: PRNGKeyArray, task: Task, level: Int[Array, ""], state: PpoState) -> tuple[PpoState, Progress]:
-        """Collect batch_size × minibatches trajectories, then pass over them updates_per_batch times."""
+        """Collect batch_size × minibatches trajectories, then train on them in updates_per_batch passes."""
         reset_key, act_key, train_key, test_key = streams(key, "reset", "act", "train", "test")
         interaction = state.interaction.at_level(task, reset_key, level)
         act = self._act(task, state)
@@ -167,7 +167,7 @@ class Ppo:
             tested = self._test(test_key, task, level, after)
         else:
             tested = Episode(fitness=jnp.mean(data.reward) * task.horizon, success=jnp.zeros(()))
-        # A policy of NaNs still answers something, so that its fitness looks finite: ask the parameters themselves.
+        # A policy with NaN parameters can still have a finite fitness: check the parameters themselves.
         finite = jax.tree.map(lambda leaf: jnp.all(jnp.isfinite(leaf)), parameters)
         return after, Progress(
             fitness=tested.fitness,
@@ -234,7 +234,7 @@ class Ppo:
         def descend(carry: tuple[Any, Any], minibatch: tuple[Array, Array]) -> tuple[tuple[Any, Any], None]:
             parameters, optimizer = carry
             chosen, loss_key = minibatch
-            # Gathering rows here, minibatch by minibatch, moves each row once; the order is drawn once for all leaves.
+            # Gathering rows per minibatch moves each row once; the order is drawn once for all leaves.
             rows = jax.tree.map(lambda leaf: jnp.take(leaf, chosen, axis=0), data)
             with implicit_promotions():
                 gradient, _ = jax.grad(loss, has_aux=True)(parameters, statistics, rows, loss_key)
@@ -252,7 +252,7 @@ class Ppo:
         return parameters, optimizer
 
     def _test(self, key: PRNGKeyArray, task: Task, level: Int[Array, ""], state: PpoState) -> Episode:
-        """Test the policy on the current level; between tests success is 0, so that the level stays."""
+        """Test the policy on the current level; between tests, success is 0, so the level stays."""
         examined = task.examine(self.best(task, state), stream(key, "examination"), level)
         success = examined.success
         if self.level_test.sampled_episodes:

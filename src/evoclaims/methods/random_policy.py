@@ -1,4 +1,4 @@
-"""A random policy: one network with random weights and no training, which a learner must beat to have learnt."""
+"""A random policy: one network with random weights and no training; a learner must beat it."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""The real TensorNEAT (Wang et al. 2024) as a method, where a user has installed it: what ours is compared with.
+"""The real TensorNEAT (Wang et al. 2024) as a method, if it is installed; our NEAT is compared with it.
 
-Its own code does everything but the evaluation, which is the task's. It marks genes by 32-bit floats: past
-2²⁴ / population generations the markings of new nodes are no longer all different.
+Its own code does everything except evaluation, which the task does. It stores the historical markings of genes as
+32-bit floats: after 2²⁴ / population generations, markings of new nodes are no longer unique.
 """
 
 from __future__ import annotations
@@ -34,10 +34,10 @@ class TensorneatState:
     """TensorNEAT between two generations.
 
     Attributes:
-        library: its own state as plain dictionaries, without its random key.
+        library: TensorNEAT's state as plain dictionaries, without its random key.
         level: the level of the last evaluation.
-        champion: the best genome of the last evaluation; of equals the newest.
-        episode: how the champion did.
+        champion: the best genome of the last evaluation; the newest of equals.
+        episode: the champion's episode.
     """
 
     library: Mapping[str, Any]
@@ -72,7 +72,7 @@ class NeatTensorneat:
         return policy(self._algorithm(task), state)
 
     def used(self, parameters: Genes) -> Any:
-        """Return the genes; NaN stands where there is none."""
+        """Return only the rows that hold a gene."""
         return present(parameters)
 
     def cost(self, task: Task) -> int:
@@ -87,7 +87,7 @@ class NeatTensorneat:
 def library() -> Any:
     """Import TensorNEAT; a `UserError` gives the line that installs it."""
     try:
-        # It may be first needed inside a program that is being traced, which its constants must not be part of.
+        # The first import may happen during tracing; its constants must not become part of the traced program.
         with warnings.catch_warnings(), jax.ensure_compile_time_eval():
             warnings.simplefilter("ignore")
             import tensorneat
@@ -174,7 +174,7 @@ def begin(key: PRNGKeyArray, algorithm: Any) -> TensorneatState:
 def evolve(
     key: PRNGKeyArray, algorithm: Any, species: Species, task: Task, level: Int[Array, ""], state: TensorneatState
 ) -> tuple[TensorneatState, Progress]:
-    """Evaluate the population on `level`, and let TensorNEAT replace it by the next."""
+    """Evaluate the population on `level` and let TensorNEAT replace it by the next."""
     episode_key, reproduction_key = streams(key, "episode", "reproduction")
     now = _restored(state.library, reproduction_key)
     if species.on_level_up == "reset":
@@ -210,7 +210,7 @@ def policy(algorithm: Any, state: TensorneatState) -> Policy:
 
 
 def _acting(algorithm: Any, genes: Genes) -> PolicyFn:
-    """Bind a genome to TensorNEAT's forward pass; an output that emits nothing is read as 0."""
+    """Bind a genome to TensorNEAT's forward pass; an output of NaN is read as 0."""
     stateless = library().common.State()
     with implicit_promotions():
         network = algorithm.transform(stateless, (genes.nodes, genes.connections))
@@ -224,7 +224,7 @@ def _acting(algorithm: Any, genes: Genes) -> PolicyFn:
 
 
 def _plain(state: Any) -> dict[str, Any]:
-    """Turn TensorNEAT's state into dictionaries, and leave out its key."""
+    """Turn TensorNEAT's state into dictionaries, without its key."""
     return {
         name: _plain(value) if isinstance(value, type(state)) else value
         for name, value in state.state_dict.items()
@@ -233,7 +233,7 @@ def _plain(state: Any) -> dict[str, Any]:
 
 
 def _restored(plain: Mapping[str, Any], key: PRNGKeyArray) -> Any:
-    """Turn dictionaries back into TensorNEAT's state, which draws from `key` from here on."""
+    """Turn dictionaries back into TensorNEAT's state, with `key` as its random key."""
     State = library().common.State
 
     def restore(value: Any) -> Any:
@@ -243,7 +243,7 @@ def _restored(plain: Mapping[str, Any], key: PRNGKeyArray) -> Any:
 
 
 def _without_records(state: Any, forget: Bool[Array, ""]) -> Any:
-    """If told to, let every species count as improved in the next generation, as ours does on a new level."""
+    """If `forget`, let every species count as improved in the next generation, as ours does on a new level."""
     best = state.species.best_fitness
     forgotten = jnp.where(forget & ~jnp.isnan(best), -jnp.inf, best)
     return state.update(species=state.species.update(best_fitness=forgotten))
@@ -255,7 +255,7 @@ def _count(genes: Float[Array, "population rows columns"]) -> Float[Array, " pop
 
 
 def _is_whole(genes: Genes) -> Bool[Array, ""]:
-    """Whether there are nodes, and each is there with all its numbers or not at all."""
+    """Whether there are nodes, and no node is partly NaN."""
     missing = jnp.isnan(genes.nodes)
     absent = jnp.all(missing, axis=1)
     return ~jnp.all(absent) & jnp.all(jnp.any(missing, axis=1) == absent)

@@ -1,4 +1,4 @@
-"""TensorNEAT's form of a genome, and ours written in it: what the two implementations are compared by."""
+"""TensorNEAT's genome format, and translation of our genomes to it, to compare the two implementations."""
 
 from __future__ import annotations
 
@@ -31,10 +31,10 @@ def present(genes: Genes) -> list[NDArray[np.float32]]:
 
 
 def translated(genome: Genome) -> Genes:
-    """Write one of our genomes in TensorNEAT's form; keys from 2²⁴ on are not exact there."""
+    """Translate one of our genomes to TensorNEAT's format, where keys from 2²⁴ on are not exact."""
     nodes, genes = genome.nodes, genome.connections
     absent = np.iinfo(np.int32).max
-    # Rising keys put inputs before outputs and these before hidden nodes.
+    # Sorting by key puts inputs first, then outputs, then hidden nodes.
     order = jnp.argsort(jnp.where(genome.has_node, nodes.key, absent), stable=True)
     columns = (nodes.key, nodes.bias, nodes.response, jnp.zeros_like(nodes.bias), nodes.activation)
     rows = jnp.stack([column.astype(jnp.float32) for column in columns], axis=1)

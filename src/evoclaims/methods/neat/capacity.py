@@ -1,4 +1,4 @@
-"""Programs for small genomes: arrays as large as the genomes are, instead of as large as they may become."""
+"""Programs for small genomes: arrays sized for the current genomes, not for the largest possible ones."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from evoclaims.methods.neat.settings import Settings
 from evoclaims.networks.genome import Genome
 
 SMALLER: Final = ((32, 96),)
-"""Capacities (nodes, connections) to have programs for, besides the largest: each costs compiling. This one is six
-times as fast as the paper's 100 nodes and 400 connections."""
+"""Capacities (nodes, connections) to compile for, besides the largest; each costs compile time. This one is six times
+as fast as the paper's 100 nodes and 400 connections."""
 
 
 def capacities(settings: Settings, inputs: int, outputs: int) -> list[tuple[int, int]]:
     """Return the capacities (nodes, connections) that generations are compiled for, the largest last.
 
-    None is so small that not even the first networks, which connect all inputs with all outputs, have room to grow.
+    In each of them, the first networks, which connect all inputs with all outputs, have room to grow.
     """
     most = settings.nodes, settings.connections
     least = inputs + outputs + 1, inputs * outputs + 2
@@ -32,7 +32,7 @@ def capacities(settings: Settings, inputs: int, outputs: int) -> list[tuple[int,
 def in_capacity(
     sizes: Sequence[tuple[int, int]], genomes: tuple[Genome, ...], function: Callable[..., Any], *operands: Any
 ) -> Any:
-    """Call `function(nodes, connections, *operands)` with the least of the `sizes` that holds the genomes' children.
+    """Call `function(nodes, connections, *operands)` with the smallest of the `sizes` that fits the genomes' children.
 
     A child may have one node and two connections more than its parent. The result must not depend on the capacity.
     """

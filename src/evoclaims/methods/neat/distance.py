@@ -16,7 +16,7 @@ def distance(
     """Return the distance of nodes plus that of connections.
 
     Each is (c_disjoint · D + c_difference · Σ |Δ attributes|) / max(n₁, n₂), where D counts the genes without a
-    counterpart and the sum runs over homologous genes; 0 when neither genome has such genes. The other genome is given
+    counterpart and the sum is over homologous genes; 0 when neither genome has such genes. The other genome is given
     by its index and its counts of nodes and connections.
     """
     found = counterparts(genome, other)

@@ -1,4 +1,4 @@
-"""One generation: express, evaluate, reproduce; the same for every encoding of networks in genomes."""
+"""One generation: express, evaluate, reproduce; the same for every encoding."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from evoclaims.networks.genome import Genome, resized
 
 
 class Encoding(Protocol):
-    """How a genome stands for a policy; frozen and hashable.
+    """How a genome encodes a policy; frozen and hashable.
 
     Attributes:
         inputs, outputs: of the network that the genome itself describes.
@@ -36,7 +36,7 @@ class Encoding(Protocol):
         """Outputs of the genome's network."""
 
     def express(self, genome: Genome) -> Any:
-        """Turn a genome into what acts: a tree of arrays."""
+        """Turn a genome into its phenotype: a tree of arrays."""
 
     def apply(self, phenotype: Any, observation: Float[Array, " observation"]) -> Float[Array, " action"]:
         """Act on one observation."""
@@ -50,7 +50,7 @@ class Evolution:
         population: not yet evaluated.
         level: the level of the last evaluation.
         champion: the best genome of the last evaluation; leaves [nodes] and [connections].
-        episode: how the champion did.
+        episode: the champion's episode.
     """
 
     population: Population
@@ -82,7 +82,7 @@ def evolve(
     sizes = capacities(settings, encoding.inputs, encoding.outputs)
     episodes = in_capacity(sizes, (population.genomes,), run, episode_key, level, population.genomes)
     fitness = jnp.where(jnp.isnan(episodes.fitness), -jnp.inf, episodes.fitness)
-    # Of equals the newest, as everywhere in NEAT.
+    # The newest of equals, as everywhere in NEAT.
     best = settings.population - 1 - jnp.argmax(fitness[::-1])
     champion, episode = jax.tree.map(lambda leaf: leaf[best], (population.genomes, episodes))
     following = next_population(reproduction_key, settings, population, fitness, encoding.inputs, encoding.outputs)

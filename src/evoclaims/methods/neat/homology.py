@@ -54,7 +54,7 @@ def index(genome: Genome) -> Index:
 def counterparts(genome: Genome, other: Index) -> Counterparts:
     """Find the counterparts of `genome`'s genes in `other`."""
     same = (genome.nodes.key[:, None] == other.nodes.key[None, :]) & genome.has_node[:, None]
-    # One reduction of a comparison that is never written to memory; -1 where nothing is the same.
+    # One reduction; the comparison is never written to memory. -1 where nothing matches.
     slot: Int[Array, " nodes"] = jnp.max(jnp.where(same, jnp.arange(same.shape[1]), -1), axis=1)
     has_node = slot >= 0
     source, target = genome.connections.source, genome.connections.target

@@ -43,5 +43,5 @@ class Neat:
         return self.settings.population * task.horizon
 
     def encoding(self, task: Task) -> GraphNetwork:
-        """Return how a genome stands for a policy of the task's size."""
+        """Return how a genome encodes a policy of the task's size."""
         return GraphNetwork(task.observation_size, task.action_size, self.settings.activations, self.settings.output)

@@ -1,4 +1,4 @@
-"""A population of genomes, and how the next one comes about."""
+"""A population of genomes, and how the next one is made."""
 
 from __future__ import annotations
 
@@ -28,9 +28,8 @@ class Population:
     Attributes:
         genomes: leaves [population, …].
         species: how they are grouped.
-        generation: how many populations came before.
-        next_key: the historical marking of the next new node; as 32-bit integers, exact for 2³¹ / population
-            generations.
+        generation: number of populations before this one.
+        next_key: the historical marking of the next new node; a 32-bit integer lasts for 2³¹ / population generations.
     """
 
     genomes: Genome
@@ -64,7 +63,7 @@ def next_population(
     inputs: int,
     outputs: int,
 ) -> Population:
-    """Replace all genomes by the offspring of the best of each species, but for its elites.
+    """Replace all genomes except elites by offspring of the best of each species.
 
     A fitness of NaN counts as -inf.
     """
@@ -82,7 +81,7 @@ def next_population(
 
 
 def forget_records(population: Population) -> Population:
-    """Let every species count as improved in the next generation: fitness has become another quantity."""
+    """Let every species count as improved in the next generation: fitness is not comparable across levels."""
     best = jnp.full_like(population.species.best, -jnp.inf)
     return replace(population, species=replace(population.species, best=best))
 
@@ -134,7 +133,7 @@ def _crossed(key: PRNGKeyArray, genomes: Genome, parents: Parents) -> Genome:
     """Return the children before mutation."""
     keys = jax.random.split(key, parents.fitter.shape[0])
     fitter = jax.tree.map(lambda leaf: leaf[parents.fitter], genomes)
-    # With the paper's survival threshold most species have one parent, whose children inherit all of it.
+    # With the paper's survival threshold most species have a single parent: no crossover is needed.
     return jax.lax.cond(
         jnp.any(parents.fitter != parents.other),
         lambda: jax.vmap(crossover)(keys, fitter, jax.tree.map(lambda leaf: leaf[parents.other], genomes)),

@@ -1,4 +1,4 @@
-"""Who has offspring, and how many (TensorNEAT; ties are broken towards the newest genome)."""
+"""Which genomes have offspring, and how many (TensorNEAT; ties go to the newest genome)."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from evoclaims.methods.neat.species import SpeciesState
 
 @pytree
 class Parents:
-    """The parents of the next population, by their places in the current one.
+    """The parents of the next population, as indices into the current one.
 
     Attributes:
-        fitter, other: the two parents of each child; the first's structure is inherited.
+        fitter, other: the two parents of each child, which inherits the structure of `fitter`.
         elite: whether the child is `fitter` itself, unchanged.
     """
 
@@ -32,7 +32,7 @@ def survive(
     """Let stagnant species die, and sort the others by their best member, the best first.
 
     A species is stagnant when no member beats its record and the record is older than `settings.stagnation`
-    generations; the `settings.exempt` best never die. Of two equal species the later comes first.
+    generations; the `settings.exempt` best never die. Of equal species the later comes first.
     """
     places = jnp.arange(settings.most, dtype=jnp.int32)
     alive = places < species.count
@@ -57,8 +57,8 @@ def survive(
 def offspring(settings: Species, species: SpeciesState, population: int) -> Int[Array, " species"]:
     """Return how many members each species gets; `species` is sorted, the best first.
 
-    Of V species, the one of rank i aims at floor(P (V - i) / (V (V + 1) / 2)), and moves part of the way there from
-    its size; what rounding leaves goes to the first.
+    Of V species, the one of rank i has the target floor(P (V - i) / (V (V + 1) / 2)), and moves part of the way to it
+    from its size; the rest from rounding goes to the first.
     """
     places = jnp.arange(settings.most, dtype=jnp.int32)
     alive = places < species.count
@@ -74,7 +74,7 @@ def choose_parents(
 ) -> Parents:
     """Draw two parents for every child from the best of its species; a species' first children are its elites.
 
-    Children of the first species come first. The elites of a species are its best members, as many as it has.
+    Children of the first species come first. A species has at most as many elites as members.
     """
     population = fitness.shape[0]
     count = offspring(settings, species, population)
@@ -82,7 +82,7 @@ def choose_parents(
     ends = jnp.cumsum(count, dtype=jnp.int32)
     family = jnp.searchsorted(ends, children, side="right").astype(jnp.int32)
     rank = children - (ends - count)[family]
-    # Members of each species in a row, the fittest first and of equals the newest.
+    # Sort members by species, then by fitness (best first), then newest first.
     order = jnp.lexsort((-children, -fitness, species.member_of)).astype(jnp.int32)
     first = jnp.cumsum(species.size, dtype=jnp.int32) - species.size
     pool = jnp.maximum(jnp.floor(settings.survival * species.size.astype(jnp.float32)).astype(jnp.int32), 1)

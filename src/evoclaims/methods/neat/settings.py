@@ -1,6 +1,6 @@
 """NEAT's hyperparameters, as frozen records with the paper's values as defaults.
 
-"TensorNEAT" marks defaults of the library that the paper used (Wang et al. 2024), which the paper does not change.
+"TensorNEAT" marks defaults of the library that the paper used (Wang et al. 2024) and did not change.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ class Attribute:
     """How one real-valued attribute of a gene is drawn and mutated (TensorNEAT).
 
     Attributes:
-        mean, std: of the normal distribution that it is drawn from at first and when it is replaced.
+        mean, std: of the normal distribution for initial values and replacements.
         power: standard deviation of the noise that a mutation adds.
         mutate_rate, replace_rate: probabilities of noise and of a new draw; they exclude each other.
         bound: values are clipped to ± this.
@@ -69,20 +69,20 @@ class Mutation:
 
 @dataclass(frozen=True)
 class Species:
-    """How genomes are compared, grouped and given offspring (TensorNEAT, but for the paper's numbers).
+    """How genomes are compared, grouped and given offspring (TensorNEAT, with the paper's numbers).
 
     Attributes:
-        most: number of species at most.
+        most: maximum number of species.
         threshold: a genome joins a species whose centre is nearer than this.
-        disjoint, difference: weights in the distance of a gene without a counterpart, and of a unit of difference in
+        disjoint, difference: weights in the distance: per gene without a counterpart, and per unit of difference in
             an attribute of homologous genes.
         stagnation: generations without improvement after which a species dies.
-        exempt: best species that never die.
-        on_level_up: "reset" forgets all improvements when the task's level changes, since fitness on another level
-            is another quantity; "keep" is TensorNEAT's behaviour, by which every other species may die then.
-        elites: best members of each species that are carried over unchanged.
-        survival: share of a species' members, the best, that become parents; at least one does.
-        change: how far a species moves from its size to the size that its rank deserves, in one generation.
+        exempt: number of best species that never die.
+        on_level_up: "reset" forgets all improvements when the task's level changes, since fitness is not comparable
+            across levels; "keep" is TensorNEAT's behaviour: all species that are not exempt may then die.
+        elites: number of best members of each species that are kept unchanged.
+        survival: share of a species' members, the best, that become parents; at least one.
+        change: share of the way from a species' size to the target size of its rank, moved in one generation.
     """
 
     most: int = 50  # paper's table
@@ -117,9 +117,9 @@ class Settings:
 
     Attributes:
         population: number of genomes.
-        nodes, connections: the most a genome may have.
-        activations: the set that hidden nodes' activation functions are drawn from; the first is a new node's.
-        output: the function of the output nodes.
+        nodes, connections: maximum numbers per genome.
+        activations: the set that hidden nodes' activation functions are drawn from; a new node has the first.
+        output: activation function of the output nodes.
     """
 
     population: int = 5_000  # paper's table

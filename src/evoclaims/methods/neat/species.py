@@ -1,6 +1,6 @@
-"""Species: groups of similar genomes that compete among themselves (Stanley and Miikkulainen 2002, §3.3).
+"""Species: groups of similar genomes that compete with each other (Stanley and Miikkulainen 2002, §3.3).
 
-TensorNEAT's variant: a species is known by a centre; a genome joins the nearest centre within the threshold.
+TensorNEAT's variant: a species has a centre; a genome joins the nearest centre within the threshold.
 """
 
 from __future__ import annotations
@@ -25,11 +25,11 @@ class SpeciesState:
     """The species alive, packed into the first places.
 
     Attributes:
-        centres: the genome that stands for each species; leaves [species, …].
+        centres: the genome that represents each species; leaves [species, …].
         count: how many are alive.
-        best: the best fitness a species has had; -inf for a new one.
-        improved_at: the generation in which it had it.
-        size: members in the current population; 0 for no species.
+        best: the best fitness of each species so far; -inf for a new one.
+        improved_at: the generation that reached `best`.
+        size: members in the current population; 0 for unused places.
         member_of: the species of each genome of the population.
     """
 
@@ -56,7 +56,7 @@ def one_species(settings: Species, population: Genome) -> SpeciesState:
 
 @pytree
 class _Grouping:
-    """A population being divided.
+    """A partly grouped population.
 
     Attributes:
         centre_of: the genome that is each species' centre.
@@ -73,9 +73,9 @@ class _Grouping:
 def speciate(settings: Species, species: SpeciesState, population: Genome, generation: Int[Array, ""]) -> SpeciesState:
     """Divide a population among the species that are alive, and found new ones where there is room.
 
-    First the genome nearest to each old centre becomes the new centre; then every genome joins the nearest centre
-    within the threshold; then, one by one, the first genome that has joined none founds a species, as long as there
-    is room. What is left joins the last species.
+    First the genome nearest to each old centre becomes the new centre. Then every genome joins the nearest centre
+    within the threshold. Then, one by one, the first genome without a species founds one, while there is room. The
+    remaining genomes join the last species.
     """
     everyone = jnp.arange(population.node_count.shape[0], dtype=jnp.int32)
 
@@ -145,7 +145,7 @@ def _join(grouping: _Grouping, place: Int[Array, ""], chosen: Int[Array, ""]) ->
 def _attract(
     settings: Species, grouping: _Grouping, place: Int[Array, ""], distances: Float[Array, " population"]
 ) -> _Grouping:
-    """Let all genomes join the species at `place` that are within the threshold and in no nearer one."""
+    """Add to the species at `place` all genomes within the threshold that are not in a nearer one."""
     free = grouping.member_of == NONE
     joins = (distances < settings.threshold) & (free | (distances < grouping.nearest))
     return _Grouping(

@@ -21,9 +21,9 @@ def mutate_structure(
 ) -> Genome:
     """Add a node, delete a node, add a connection, delete a connection, each with its own probability.
 
-    `new_key` is the historical marking of a node that is added; nobody else's.
+    `new_key` is the historical marking of an added node; it must be unique.
     """
-    # All draws in one go: they are few, and each call of a generator costs compiling.
+    # All draws in one call: they are few, and each generator call costs compile time.
     happens, which = jnp.split(jax.random.uniform(key, (9,)), [4])
     grown = add_node(which[0], genome, new_key)
     genome = select(happens[0] < settings.node_add, grown, genome)
@@ -73,7 +73,7 @@ def add_node(u: Float[Array, ""], genome: Genome, new_key: Int[Array, ""]) -> Ge
 
 
 def delete_node(u: Float[Array, ""], genome: Genome, inputs: int, outputs: int) -> Genome:
-    """Delete the hidden node that `u` in [0, 1) picks, with its connections; nothing happens without one."""
+    """Delete the hidden node that `u` in [0, 1) picks, with its connections; if there is none, do nothing."""
     nodes, genes = genome.nodes, genome.connections
     slots = jnp.arange(nodes.key.shape[0])
     hidden = nodes.key >= inputs + outputs
@@ -105,14 +105,14 @@ def delete_node(u: Float[Array, ""], genome: Genome, inputs: int, outputs: int) 
 
 
 def packed(genes: Connections, kept: Bool[Array, " connections"]) -> Connections:
-    """Move the connections that are kept to the front, in their order."""
+    """Move the kept connections to the front, in their order."""
     size = kept.shape[0]
     place = jnp.where(kept, jnp.cumsum(kept, dtype=jnp.int32) - 1, size)
     return jax.tree.map(lambda leaf: jnp.zeros_like(leaf).at[place].set(leaf, mode="drop"), genes)
 
 
 def add_connection(u: Float[Array, ""], v: Float[Array, ""], genome: Genome, inputs: int) -> Genome:
-    """Connect two nodes with weight 0; one try.
+    """Try once to connect two nodes, with weight 0.
 
     `u` and `v` in [0, 1) pick the source from all nodes, and the target from those that are not inputs. Nothing happens
     when the connection exists, would close a cycle, or has no room.
@@ -121,7 +121,7 @@ def add_connection(u: Float[Array, ""], v: Float[Array, ""], genome: Genome, inp
     genes = genome.connections
     exists = jnp.any((genes.source == source) & (genes.target == target) & genome.has_connection)
     room = genome.connection_count < genes.weight.shape[0]
-    # Against the order of slots, only if the target does not lead to the source.
+    # A link against the order of slots is allowed only if the target does not lead to the source.
     downstream = descendants(genome, target)
     place = position_after(downstream, target, source)
     ordered = reordered(genome, place)
@@ -139,7 +139,7 @@ def add_connection(u: Float[Array, ""], v: Float[Array, ""], genome: Genome, inp
 
 
 def descendants(genome: Genome, start: Int[Array, ""]) -> Bool[Array, " nodes"]:
-    """Return which nodes `start` leads to, itself among them."""
+    """Return which nodes `start` leads to, itself included."""
     size = genome.nodes.key.shape[0]
     genes = genome.connections
     target = jnp.where(genome.has_connection, genes.target, size)
@@ -154,10 +154,10 @@ def descendants(genome: Genome, start: Int[Array, ""]) -> Bool[Array, " nodes"]:
 def position_after(
     downstream: Bool[Array, " nodes"], target: Int[Array, ""], source: Int[Array, ""]
 ) -> Int[Array, " nodes"]:
-    """Return each slot's place in an order that has `source` before `target` (Pearce and Kelly 2006, §3).
+    """Return each slot's new place, such that `source` comes before `target` (Pearce and Kelly 2006, §3).
 
-    Between the two, whatever `target` does not lead to moves to the front, in its order; the rest follows. Without a
-    slot between them (target after source) nothing moves. `downstream` is what `target` leads to, without `source`.
+    Among the slots from `target` to `source`, those that `target` does not lead to move to the front; both parts keep
+    their order. If target is after source, nothing moves. `downstream`: what `target` leads to, without `source`.
     """
     slots = jnp.arange(downstream.shape[0], dtype=jnp.int32)
     between = (slots >= target) & (slots <= source)

@@ -22,9 +22,9 @@ def draw(key: PRNGKeyArray, attribute: Attribute, size: int) -> Float[Array, " s
 def mutate(
     attribute: Attribute, values: Float[Array, "*genes"], u: Float[Array, "*genes"], z: Float[Array, "*genes"]
 ) -> Float[Array, "*genes"]:
-    """Mutate each value: u < rate adds N(0, power²), u < rate + replace draws anew; then clip.
+    """Mutate each value: u < rate adds N(0, power²), u < rate + replace draws a new value; then clip.
 
-    `u` and `z` are uniform and normal numbers; noise and a new draw exclude each other, so that one z serves both.
+    `u` and `z` are uniform and normal numbers; noise and a new draw exclude each other, so both can use one z.
     """
     changed = jnp.where(u < attribute.mutate_rate, values + attribute.power * z, values)
     new = (u >= attribute.mutate_rate) & (u < attribute.mutate_rate + attribute.replace_rate)
@@ -33,10 +33,10 @@ def mutate(
 
 
 def mutate_values(key: PRNGKeyArray, settings: Mutation, activations: int, genome: Genome) -> Genome:
-    """Mutate every gene's numbers, those of inputs and outputs too.
+    """Mutate every gene's numbers, including those of inputs and outputs.
 
-    A gene's draws do not depend on how many others there are, so that capacity is no part of the result. `activations`
-    is how many functions a node may choose from.
+    A gene's draws do not depend on the number of other genes, so capacity does not change the result. `activations` is
+    how many functions a node may choose from.
     """
     nodes, genes = genome.nodes, genome.connections
     node_choice, node_noise, choice, noise, function = streams(
