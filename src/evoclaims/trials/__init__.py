@@ -1,1 +1,1 @@
-"""Running trials: specification, the one loop, records and store."""
+"""Running trials: specification, run loop, records and store."""

@@ -1,7 +1,7 @@
-"""Time that may be spent on work which may never return, and the end of a process that has left such work behind.
+"""A time limit for work that may never return, and the exit of a process that has abandoned such work.
 
-Nothing interrupts a compiled program that loops for ever, or a callback that waits for ever. So the work has a thread
-of its own; when the time is over, the thread is left behind, and the process goes on without it.
+Nothing can interrupt a compiled program or a callback that never returns. So the work runs on its own thread; when the
+time is over, the thread is abandoned, and the process continues without it.
 """
 
 from __future__ import annotations
@@ -18,33 +18,33 @@ from typing import Any, Final, TypeVar
 T = TypeVar("T")
 
 LOOK_SECONDS: Final = 1.0
-"""Time between two looks at the clock; what passes beyond twice this did not pass for the work: a stopped process."""
+"""Time between two looks at the clock; more than twice this is not counted: the process was stopped."""
 
 _left_behind: list[threading.Thread] = []
 
 
 class OutOfTimeError(Exception):
-    """The time allowed is over, and the work has not returned."""
+    """The allowed time is over, and the work has not returned."""
 
 
 class Allowance:
-    """So many seconds of work, infinitely many for no limit.
+    """A number of seconds for work; infinity means no limit.
 
     Attributes:
-        left: seconds that have not been spent.
+        left: seconds not yet spent.
     """
 
     def __init__(self, seconds: float) -> None:
-        """Start with all of them."""
+        """Start with all `seconds`."""
         self.left = seconds
 
     def spend(self, work: Callable[[], T]) -> T:
-        """Return what `work` returns, or raise what it raises; with a limit it runs on a thread of its own.
+        """Return what `work` returns, or raise what it raises; with a limit it runs on its own thread.
 
-        Settings of jax that hold for one thread only (its context managers) do not hold there.
+        Settings of jax for one thread only (its context managers) have no effect there.
 
         Raises:
-            OutOfTimeError: when it does not return before the time is over. Its thread is left behind.
+            OutOfTimeError: when it does not return in time. Its thread is abandoned.
         """
         if math.isinf(self.left):
             return work()
@@ -55,7 +55,7 @@ class Allowance:
         thread.start()
         try:
             self._wait(thread)
-        except BaseException:  # an interrupt: the work ends first, as it would on this thread, unless there is another
+        except BaseException:  # on an interrupt, wait for the work, as on this thread; a second one ends the wait
             self._wait(thread)
             raise
         finally:
@@ -74,9 +74,9 @@ class Allowance:
 
 
 def end_without(status: int) -> None:
-    """End the process at once if it has left work behind, else do nothing.
+    """Exit the process at once if it has abandoned work that still runs, else do nothing.
 
-    The interpreter's own way out would wait for such a thread, or end its Python from under it (a segmentation fault).
+    The interpreter's normal exit would wait for such a thread, or crash it (a segmentation fault).
     """
     if any(thread.is_alive() for thread in _left_behind):
         sys.stdout.flush()
@@ -85,7 +85,7 @@ def end_without(status: int) -> None:
 
 
 def _do(work: Callable[[], Any], made: Future[Any]) -> None:
-    """Do the work and keep what becomes of it."""
+    """Do the work and keep its result or error."""
     try:
         made.set_result(work())
     except BaseException as error:

@@ -1,4 +1,4 @@
-"""Named arrays as npz bytes: the same arrays give the same bytes, and nothing is ever pickled or unpacked."""
+"""Named arrays as npz bytes: equal arrays give equal bytes, and nothing is ever pickled or unpickled."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ Kind = tuple[tuple[int, ...], np.dtype[Any]]
 
 
 def pack(arrays: Mapping[str, Any]) -> bytes:
-    """Return `arrays` (any shapes) as an npz file whose bytes depend on names and values only.
+    """Return `arrays` (any shapes) as an npz file whose bytes depend only on names and values.
 
-    `numpy.savez` stamps the time into the file, so that two processes storing the same champion would disagree
-    about its hash.
+    `numpy.savez` writes the time into the file, so two processes that store the same champion would get different
+    hashes.
 
     Raises:
-        ValueError: for an array of objects, or of a type that npz cannot name (such as bfloat16).
+        ValueError: for an array of objects, or of a type that npz does not support (such as bfloat16).
     """
     file = io.BytesIO()
     with zipfile.ZipFile(file, "w", zipfile.ZIP_STORED) as archive:
@@ -52,14 +52,14 @@ def unpack(data: bytes) -> dict[str, NDArray[Any]]:
 
 
 class Packed(Mapping[str, NDArray[Any]]):
-    """The arrays of an npz file as `pack` writes it, each read only when it is asked for.
+    """The arrays of an npz file written by `pack`, each read only on request.
 
     A file of unknown origin may claim arrays of any size, or hold gigabytes in a few compressed bytes. Here nothing is
-    compressed and no array is larger than its part of the file, which is found out before any memory is taken.
+    compressed and no array is larger than its part of the file; this is checked before any memory is allocated.
     """
 
     def __init__(self, file: IO[bytes]) -> None:
-        """Read what the file says of its arrays; it has to stay open for as long as they are asked for.
+        """Read the headers of the arrays; the file must stay open while arrays are read.
 
         Raises:
             ValueError: when it is not such a file.
@@ -72,11 +72,11 @@ class Packed(Mapping[str, NDArray[Any]]):
             self.kinds: Mapping[str, Kind] = {
                 entry.filename.removesuffix(_SUFFIX): self._kind(entry) for entry in entries
             }
-        except Exception as error:  # bytes of unknown origin fail in many ways: zip, struct, header, memory
+        except Exception as error:  # unknown bytes fail in many ways: zip, struct, header, memory
             raise ValueError(f"not a readable npz file ({type(error).__name__})") from error
 
     def _kind(self, entry: zipfile.ZipInfo) -> Kind:
-        """Return shape and dtype of an array; a ValueError when its part of the file is not just as long."""
+        """Return shape and dtype of an array; raise a ValueError if its part of the file has another length."""
         if entry.compress_type != zipfile.ZIP_STORED or not entry.filename.endswith(_SUFFIX):
             raise ValueError("a part of it is not an array as it is")
         with self._archive.open(entry) as member:
@@ -91,7 +91,7 @@ class Packed(Mapping[str, NDArray[Any]]):
         return math.prod(shape) * dtype.itemsize
 
     def is_whole(self) -> bool:
-        """Whether every byte agrees with the file's checksums; takes little memory, however long the file is."""
+        """Whether every byte matches the file's checksums; uses little memory for files of any length."""
         try:
             return self._archive.testzip() is None
         except Exception:  # as above
@@ -102,7 +102,7 @@ class Packed(Mapping[str, NDArray[Any]]):
 
         Raises:
             KeyError: when there is none of this name.
-            ValueError: when it does not agree with its checksum.
+            ValueError: when it does not match its checksum.
         """
         self.kinds[name]
         try:

@@ -1,4 +1,4 @@
-"""Batches of trials: gone on with from their checkpoints, or started with what is missing."""
+"""Batches of trials: resumed from their checkpoints, or started with the missing trials."""
 
 from __future__ import annotations
 
@@ -27,13 +27,13 @@ from evoclaims.trials.time_limit import answers, is_final
 
 @dataclass(frozen=True)
 class StoredTrials:
-    """The trials of a condition that need not be run, since the store has them.
+    """The stored trials of a condition, which need not be run.
 
     Attributes:
-        store: where they are kept.
-        condition: whose trials.
-        any_version: take a trial whatever it was made with; else only what this environment's versions have made.
-        time_limit: seconds that a batch may take; a trial that ran out of less time has to be run again.
+        store: where they are stored.
+        condition: their condition.
+        any_version: accept trials made with any versions; else only with this environment's versions.
+        time_limit: seconds that a batch may take; a trial that timed out under a smaller limit must be run again.
     """
 
     store: Store
@@ -42,25 +42,25 @@ class StoredTrials:
     time_limit: float = math.inf
 
     def get(self, seed: int) -> TrialResult | None:
-        """Return the stored trial of a seed, or None; a `DamagedFileError` for one that cannot be read."""
+        """Return the stored trial of a seed, or None; raise a `DamagedFileError` if it cannot be read."""
         look = self.store.get if self.any_version else self.store.made_with
         return look(TrialSpec(self.condition, seed).id, self.condition.versions)
 
     def lacks(self, seed: int) -> bool:
-        """Whether the trial of a seed has to be run."""
+        """Whether the trial of a seed must be run."""
         return not answers(self.get(seed), self.time_limit)
 
     def answer(self, results: Iterable[TrialResult | None]) -> bool:
-        """Whether none of these trials has to be run."""
+        """Whether none of these trials must be run."""
         return all(answers(result, self.time_limit) for result in results)
 
 
 @dataclass(frozen=True)
 class Run:
-    """Where a condition's trials run, where they are kept, which of them are there, and who watches.
+    """Where a condition's trials run, where they are stored, and who watches.
 
     Attributes:
-        checkpoint_seconds: least time between two checkpoints.
+        checkpoint_seconds: minimum time between two checkpoints.
         time_limit: seconds that a batch may take.
     """
 
@@ -77,21 +77,21 @@ class Run:
 
     @property
     def store(self) -> Store:
-        """Where its trials are kept."""
+        """Where its trials are stored."""
         return self.stored.store
 
 
 @dataclass(frozen=True)
 class Batch:
-    """Trials under way.
+    """Running trials.
 
     Attributes:
-        header: what a checkpoint says of them.
-        state: their state on the devices, share by share.
-        stored: seeds in the lanes whose records are there already. An interrupted batch has them where trials ended
-            after its last checkpoint and trials run side by side: their bits depend on the number of lanes, so these
-            trials run along until they end again, and the batch narrows when it would have without the interruption.
-        steps: what the running trials have taken, which may be more than whole chunks.
+        header: what a checkpoint says about them.
+        state: their state on the devices, one entry per share.
+        stored: seeds in the lanes that already have records. This happens in a resumed batch where trials run side by
+            side and some ended after its last checkpoint. Bits depend on the number of lanes, so these trials run
+            until they end again, and the batch narrows at the same steps as without the interruption.
+        steps: steps the running trials have taken, which may be more than whole chunks.
     """
 
     header: Header
@@ -111,10 +111,10 @@ class Batch:
 
 
 def batches(run: Run, missing: Sequence[int]) -> Iterator[tuple[Header, Callable[[], Batch | None]]]:
-    """Give the interrupted batches that owe one of the missing trials, then the trials that none of them has.
+    """Yield the interrupted batches that contain a missing trial, then a batch of all other missing trials.
 
-    Each comes as its header and what begins it, which may take long: it traces and compiles. That gives None for an
-    interrupted batch whose checkpoint is gone by then, since another process has ended it.
+    Each comes as its header and a function that begins it, which may take long: it traces and compiles. It returns
+    None if the checkpoint of an interrupted batch is gone by then, because another process has finished it.
     """
     remaining = list(missing)
     for header in checkpoint.find(run.store.checkpoints, run.condition.id, _platform(run.lanes)):
@@ -122,7 +122,7 @@ def batches(run: Run, missing: Sequence[int]) -> Iterator[tuple[Header, Callable
         if not set(held).isdisjoint(remaining):
             remaining = [seed for seed in remaining if seed not in held]
             yield header, partial(_resumed, run, header)
-    # A batch that took hours: another process may have stored the rest meanwhile.
+    # Earlier batches may take hours: another process may have stored the rest meanwhile.
     remaining = [seed for seed in remaining if not is_final(run.stored.get(seed))]
     if remaining:
         header = _planned(run.lanes, remaining)
@@ -130,10 +130,10 @@ def batches(run: Run, missing: Sequence[int]) -> Iterator[tuple[Header, Callable
 
 
 def drop_finished_checkpoints(stored: StoredTrials) -> None:
-    """Delete a condition's checkpoints, of whatever device, whose every trial is stored.
+    """Delete a condition's checkpoints, of any device, whose trials are all stored.
 
-    A kill between the last record and the checkpoint's removal leaves one, and so does a batch that was interrupted on
-    other hardware. What is damaged stays for `evoclaims verify`, and what other versions have begun stays for them.
+    They come from a kill between the last record and the checkpoint's removal, or from a batch that was interrupted on
+    other hardware. Damaged checkpoints stay for `evoclaims verify`, and those of other versions stay for them.
     """
 
     def is_stored(seed: int) -> bool:
@@ -149,7 +149,7 @@ def drop_finished_checkpoints(stored: StoredTrials) -> None:
 
 
 def _resumed(run: Run, interrupted: Header) -> Batch | None:
-    """Return an interrupted batch as its checkpoint has it, on the devices; None when another process has ended it."""
+    """Load an interrupted batch from its checkpoint onto the devices; None when another process has finished it."""
     restored = _restored(run, interrupted)
     if restored is None:
         return None
@@ -158,7 +158,7 @@ def _resumed(run: Run, interrupted: Header) -> Batch | None:
     held = [seed for seed in header.lanes if seed is not None]
     stored = frozenset(seed for seed in held if is_final(run.stored.get(seed)))
     if lanes.layout == "alone":
-        # A trial's bits are its own: a lane whose trial is stored goes idle, and costs nothing.
+        # Bits do not depend on other lanes: a lane whose trial is stored becomes idle, and costs nothing.
         header = replace(header, lanes=[None if seed in stored else seed for seed in header.lanes])
         state = replace(state, idle=state.idle | np.array([seed is None for seed in header.lanes]))
         stored = frozenset()
@@ -166,10 +166,10 @@ def _resumed(run: Run, interrupted: Header) -> Batch | None:
 
 
 def _restored(run: Run, interrupted: Header) -> tuple[Header, TrialState] | None:
-    """Return header and state of an interrupted batch as its checkpoint has them, or None when that is gone.
+    """Return header and state of an interrupted batch from its checkpoint, or None when that is gone.
 
-    A process that was taken for dead may have gone on with the batch since its header was read, hours ago if another
-    batch came first: header and state are read anew, since those of two moments would make a trial that never was.
+    A process that seemed dead may have continued the batch since its header was read, perhaps hours ago. So header
+    and state are read again, together: from two different moments they would mix into a wrong trial.
     """
     folder = run.store.checkpoints
     held = [seed for seed in interrupted.lanes if seed is not None]
@@ -185,7 +185,7 @@ def _restored(run: Run, interrupted: Header) -> tuple[Header, TrialState] | None
 
 
 def _planned(lanes: Lanes, seeds: Sequence[int]) -> Header:
-    """Return the header of a batch that is about to begin."""
+    """Return the header of a new batch."""
     width = lanes.width(len(seeds), len(seeds))
     order = lanes.arrangement(range(len(seeds)), width)
     return Header(
@@ -211,6 +211,6 @@ def _started(run: Run, header: Header) -> Batch:
 
 
 def _platform(lanes: Lanes) -> str:
-    """Hash what fixes a computation's bits; side by side on several devices, also how many these are."""
+    """Hash what determines a computation's bits; in the layout "vector", also the number of devices."""
     devices = len(lanes.devices) if lanes.layout == "vector" else None
     return content_hash([what_fixes_bits(provenance(lanes.devices, lanes.condition)), lanes.layout, devices])

@@ -9,10 +9,10 @@ from evoclaims.core.errors import UserError
 
 @dataclass(frozen=True)
 class Budget:
-    """The training length of one trial, in the method's own unit; exactly one of the two is set.
+    """The training length of one trial, in the method's own unit: set `generations` or `environment_steps`.
 
     Attributes:
-        generations: steps of the method, for evolution (one generation a step).
+        generations: steps of the method, for evolution (one generation per step).
         environment_steps: interactions with the task, for reinforcement learning; rounded up to whole steps of
             the method.
         reports: points on the training curve.
@@ -23,7 +23,7 @@ class Budget:
     reports: int = 50
 
     def __post_init__(self) -> None:
-        """Reject budgets that name no length, two lengths, or one below 1."""
+        """Reject budgets with no length, two lengths, or one below 1."""
         lengths = [x for x in (self.generations, self.environment_steps) if x is not None]
         if len(lengths) != 1 or lengths[0] < 1 or self.reports < 1:
             raise UserError(
@@ -33,7 +33,7 @@ class Budget:
             )
 
     def steps(self, cost: int) -> int:
-        """Return the number of steps of a method that spends `cost` environment steps on each."""
+        """Return the number of steps of a method that spends `cost` environment steps per step."""
         if self.generations is not None:
             return self.generations
         assert self.environment_steps is not None

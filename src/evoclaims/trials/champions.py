@@ -1,4 +1,4 @@
-"""Champions taken out of the store again: their parameters as the method's own tree, and what they score."""
+"""Champions loaded from the store: their parameters as the method's own tree, and their scores."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ from evoclaims.trials.store import Store
 
 
 class GenomeNetwork(Protocol):
-    """What the network that a genome itself describes is made of (see `GraphNetwork`)."""
+    """The network that a genome itself describes (see `GraphNetwork`)."""
 
     @property
     def inputs(self) -> int:
@@ -42,11 +42,11 @@ class GenomeNetwork(Protocol):
 
     @property
     def activations(self) -> tuple[str, ...]:
-        """Functions that node genes index."""
+        """Activation functions that node genes index."""
 
     @property
     def output(self) -> str:
-        """The outputs' function."""
+        """Activation function of the outputs."""
 
 
 @runtime_checkable
@@ -54,28 +54,28 @@ class Encoded(Protocol):
     """A method whose policies' parameters may be genomes."""
 
     def encoding(self, task: Task) -> GenomeNetwork:
-        """Return how a genome stands for a policy of the task's size."""
+        """Return how a genome encodes a policy of the task's size."""
 
 
 @runtime_checkable
 class OnSubstrate(Protocol):
-    """An encoding by which a genome draws another network's weights."""
+    """An encoding in which a genome computes another network's weights."""
 
     @property
     def substrate(self) -> Substrate:
-        """Where that network's neurons lie."""
+        """The positions of that network's neurons."""
 
     def express(self, genome: Genome) -> Sequence[Array]:
-        """Return the weights into each layer but the first, shapes [to, from]."""
+        """Return the weights into each layer except the first, shapes [to, from]."""
 
 
 @dataclass(frozen=True)
 class Replay:
-    """What a champion has scored, then and now.
+    """A champion's recorded and repeated scores.
 
     Attributes:
-        recorded, again: "success" and "fitness" by name, a value per level.
-        elsewhere: parts of the provenance that bits depend on and that are not the record's.
+        recorded, again: "success" and "fitness" by name, one value per level.
+        elsewhere: parts of the provenance that bits depend on and that differ from the record.
     """
 
     recorded: Mapping[str, tuple[float, ...]]
@@ -84,16 +84,16 @@ class Replay:
 
     @property
     def exact(self) -> bool:
-        """Whether every value is the recorded one; NaN is NaN."""
+        """Whether every value equals the recorded one; NaN equals NaN."""
         return all(np.array_equal(self.recorded[name], values, equal_nan=True) for name, values in self.again.items())
 
 
 def load(store: Store, condition: Condition, result: TrialResult) -> Any:
-    """Return a stored champion's parameters as the tree that the condition's policies take; leaves on the host.
+    """Return a stored champion's parameters as the tree that the condition's policies use; leaves on the host.
 
     Raises:
         DamagedFileError: when the champion's file is missing, torn or not the one that the record names.
-        UserError: when the trial has no champion, or one that is not such a tree.
+        UserError: when the trial has no champion, or one that does not fit this tree.
     """
     arrays = store.champion_of(result)
     shapes = jax.eval_shape(lambda: _policy(condition).parameters)
@@ -103,7 +103,7 @@ def load(store: Store, condition: Condition, result: TrialResult) -> Any:
 
 
 def replay(condition: Condition, result: TrialResult, parameters: Any, devices: Sequence[jax.Device]) -> Replay:
-    """Examine a champion on every level once more, with the keys of its trial's evaluation."""
+    """Examine a champion on every level again, with the keys of its trial's evaluation."""
 
     def score(seed: Int[Array, ""], parameters: Any) -> Episode:
         policy = replace(_policy(condition), parameters=parameters)
@@ -130,7 +130,7 @@ def replay(condition: Condition, result: TrialResult, parameters: Any, devices: 
 
 
 def network_of(condition: Condition, parameters: Any) -> GraphNetwork | None:
-    """Return the network that describes a champion which is a genome; None for any other."""
+    """Return the network of a champion that is a genome; None for any other champion."""
     if not isinstance(parameters, Genome) or not isinstance(condition.method, Encoded):
         return None
     encoding = condition.method.encoding(condition.task)
@@ -138,7 +138,7 @@ def network_of(condition: Condition, parameters: Any) -> GraphNetwork | None:
 
 
 def substrate_of(condition: Condition, parameters: Any) -> tuple[Substrate, list[NDArray[Any]]] | None:
-    """Return the substrate of a champion that draws a network on one, and the weights that it draws, layer by layer."""
+    """Return a champion's substrate and the weights that it computes there, by layer; None without a substrate."""
     if network_of(condition, parameters) is None:
         return None
     encoding = condition.method.encoding(condition.task)  # type: ignore[attr-defined]
@@ -149,13 +149,13 @@ def substrate_of(condition: Condition, parameters: Any) -> tuple[Substrate, list
 
 
 def _policy(condition: Condition) -> Policy:
-    """Return an untrained policy of the condition, whose parameters alone tell it from any other."""
+    """Return an untrained policy of the condition; its trained policies differ only in their parameters."""
     method, task = condition.method, condition.task
     return method.best(task, method.init(trial_key(0, TRAINING), task))
 
 
 def _filled(shapes: Any, arrays: Mapping[str, NDArray[Any]], what: str) -> Any:
-    """Return the tree of `shapes` with its leaves taken from `arrays` by their names."""
+    """Return the tree of `shapes` with its leaves taken from `arrays` by name."""
     leaves, structure = jax.tree.flatten(shapes)
     places = {int(i): name for name, i in named_leaves(jax.tree.unflatten(structure, range(len(leaves)))).items()}
     names = [places[i] for i in range(len(leaves))]

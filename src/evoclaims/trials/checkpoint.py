@@ -1,4 +1,4 @@
-"""Interrupted batches: some trials after a call of the device, from which they go on to the same bits."""
+"""Checkpoints of batches, written between device calls; resumed trials give the same bits."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from evoclaims.trials.store_mark import ADVICE
 SCHEMA: Final = 1
 _HEADER: Final = "header"
 _HEADER_BYTES: Final = 1 << 26
-"""More than the header of any batch takes: a hundred trials with ten curves of fifty points take two megabytes."""
+"""Larger than any batch's header: a hundred trials with ten curves of fifty points take two megabytes."""
 
 
 @dataclass(frozen=True)
@@ -34,14 +34,14 @@ class Header:
 
     Attributes:
         condition: id of the trials' condition.
-        platform: what it was computed on and with (device kind and versions): other hardware would go on to other
-            bits, so that such a checkpoint is passed over.
-        batch: seeds that the batch was started with; it fixes the widths the batch goes through.
-        lanes: for each lane, the seed of the trial that has not ended in it, or None.
+        platform: the device kind and versions that computed it; checkpoints of other platforms are ignored, since
+            they would continue to other bits.
+        batch: seeds that the batch was started with; they determine the widths of the batch over time.
+        lanes: for each lane, the seed of its running trial, or None.
         chunks: whole chunks of the budget done; the state may be further.
         curves: for each seed (as text), the points of its training curve so far, by name.
         run_seconds: spent on running so far.
-        compile_seconds: spent on compiling by the processes that had the batch before.
+        compile_seconds: spent on compiling by all processes that ran the batch.
         started: when the batch began (UTC, ISO 8601).
         versions: hash of the versions that the condition depends on (`packages.short_hash`); empty in old checkpoints.
         schema: version of this format.
@@ -61,7 +61,7 @@ class Header:
 
 
 def path_of(folder: Path, condition: str, batch: list[int], platform: str) -> Path:
-    """Return where the checkpoint of a batch lies."""
+    """Return the path of a batch's checkpoint."""
     return folder / f"{condition}-{content_hash([batch, platform])[:16]}.npz"
 
 
@@ -73,12 +73,12 @@ def save(folder: Path, header: Header, state: TrialState) -> None:
 
 
 def _text(header: Header) -> str:
-    """Return a header as it is written; texts can be compared where curves hold NaN."""
+    """Return a header as it is written; texts can be compared even if curves hold NaN."""
     return json.dumps(asdict(header))
 
 
 def find(folder: Path, condition: str, platform: str) -> list[Header]:
-    """Return the headers of the checkpoints that trials of `condition` can go on from on this platform.
+    """Return the headers of the checkpoints from which trials of `condition` can resume on this platform.
 
     Raises:
         DamagedFileError: when one of them is torn or edited.
@@ -89,7 +89,7 @@ def find(folder: Path, condition: str, platform: str) -> list[Header]:
 
 
 def sound_ones(folder: Path, condition: str) -> list[Header]:
-    """Return the headers of a condition's checkpoints of every platform, passing over what is torn or edited."""
+    """Return the headers of a condition's checkpoints of every platform; skip those that are torn or edited."""
     headers: list[Header | None] = []
     for path in sorted(folder.glob(f"{condition}-*.npz")):
         with contextlib.suppress(DamagedFileError):
@@ -100,10 +100,10 @@ def sound_ones(folder: Path, condition: str) -> list[Header]:
 
 
 def newest(folder: Path, header: Header) -> Header | None:
-    """Return the header that a batch's checkpoint has now, or None when it is gone.
+    """Return the current header of a batch's checkpoint, or None when it is gone.
 
-    A process that others have taken for dead (stopped for long, or on a machine with another clock) may have gone on
-    with the batch meanwhile, or ended it.
+    A process that seemed dead (stopped for long, or on a machine with another clock) may have continued or finished
+    the batch meanwhile.
 
     Raises:
         DamagedFileError: as for `find`.
@@ -112,7 +112,7 @@ def newest(folder: Path, header: Header) -> Header | None:
 
 
 def _header(path: Path) -> Header | None:
-    """Return a checkpoint's header, or None when the file is gone; its state is not looked at."""
+    """Return a checkpoint's header, or None when the file is gone; its state is not read."""
     try:
         with _opened(path) as (header, _):
             return header
@@ -132,16 +132,16 @@ def read(path: Path) -> tuple[Header, list[NDArray[Any]]]:
 
 
 def _leaves(packed: Packed) -> list[str]:
-    """Return the names of the state's leaves in their order."""
+    """Return the names of the state's leaves in order."""
     return sorted(packed.kinds.keys() - {_HEADER})
 
 
 @contextlib.contextmanager
 def _opened(path: Path) -> Iterator[tuple[Header, Packed]]:
-    """Open a checkpoint, and give its header and its arrays, which are read while it is open.
+    """Open a checkpoint and yield its header and its arrays, which can be read while it is open.
 
     Raises:
-        DamagedFileError: as for `read`, also for what is found out within the block.
+        DamagedFileError: as for `read`, also for errors found inside the block.
         FileNotFoundError: when the file is gone.
     """
     try:
@@ -183,11 +183,11 @@ def _is_sound(header: Header) -> bool:
 def restore(folder: Path, header: Header, like: Any) -> TrialState | None:
     """Return the state of a checkpoint on the host, in the structure of `like` (leaves with shape and dtype).
 
-    None when the checkpoint is no longer the one with this header: see `newest`.
+    None when the checkpoint no longer has this header: see `newest`.
 
     Raises:
         DamagedFileError: when the file is torn or edited.
-        UserError: when its arrays are not those of such a state, which nothing but the condition's program can tell.
+        UserError: when its arrays do not fit `like`, which only the condition's program can tell.
     """
     path = path_of(folder, header.condition, header.batch, header.platform)
     expected, structure = jax.tree.flatten(like)
@@ -196,7 +196,7 @@ def restore(folder: Path, header: Header, like: Any) -> TrialState | None:
             if _text(there) != _text(header):
                 return None
             names = _leaves(packed)
-            # Compared before anything is read: a file must not take more memory than the state that it stands for.
+            # Compare before reading: a file must not take more memory than the state it represents.
             if [packed.kinds[name] for name in names] != [(x.shape, x.dtype) for x in expected]:
                 raise UserError(
                     f"Cannot go on from {path}: its arrays are not those of this condition's state, so it "
@@ -209,13 +209,13 @@ def restore(folder: Path, header: Header, like: Any) -> TrialState | None:
 
 
 def remove(folder: Path, header: Header) -> None:
-    """Delete the checkpoint of a batch whose trials are all stored; on a read-only disk it stays, and harms nobody."""
+    """Delete the checkpoint of a batch whose trials are all stored; on a read-only disk it stays, harmlessly."""
     with contextlib.suppress(OSError):
         path_of(folder, header.condition, header.batch, header.platform).unlink(missing_ok=True)
 
 
 def fault(path: Path) -> str | None:
-    """Return why a checkpoint cannot be gone on from, or None when it can (or is gone)."""
+    """Return why a checkpoint cannot be resumed, or None when it can (or is gone)."""
     try:
         with _opened(path) as (header, packed):
             if not packed.is_whole():

@@ -1,6 +1,6 @@
-"""Whether a method and a task fit together: shapes and types where they meet, found by tracing and before compiling.
+"""Whether a method and a task fit together: the shapes and types they exchange, checked by tracing before compiling.
 
-jax broadcasts what does not fit. A policy whose action is a scalar would be scored, wrongly, and its claim refuted.
+jax broadcasts silently. A policy whose action is a scalar would be scored wrongly, and its claim refuted.
 """
 
 from __future__ import annotations
@@ -25,10 +25,10 @@ _NUMBER = jax.ShapeDtypeStruct((), jnp.int32)
 
 @contextmanager
 def both_named(method: Method[Any], task: Task) -> Iterator[None]:
-    """Name method and task in the sentence about what does not fit.
+    """Name method and task in the error about a misfit.
 
     Raises:
-        UserError: in the place of a `MisfitError`.
+        UserError: instead of a `MisfitError`.
     """
     try:
         yield
@@ -37,12 +37,12 @@ def both_named(method: Method[Any], task: Task) -> Iterator[None]:
 
 
 def traced_progress(method: Method[Any], task: Task) -> Progress:
-    """Return the shapes of what a step of `method` on `task` reports, after checking all that they give each other.
+    """Return the shapes of what a step of `method` on `task` reports, after checking all that they exchange.
 
-    Each part is traced once, the parts that take seconds last. Nothing is compiled.
+    Each part is traced once, the slowest parts last. Nothing is compiled.
 
     Raises:
-        UserError: when something has another shape, type or structure than it must have; names both.
+        UserError: when something has a wrong shape, type or structure; names both.
     """
     with both_named(method, task):
         shown: TaskState = jax.eval_shape(lambda seed, level: task.reset(_key(seed), level), _NUMBER, _NUMBER)
@@ -64,7 +64,7 @@ def traced_progress(method: Method[Any], task: Task) -> Progress:
 
 
 def check_scores(task: Task, final: Episode) -> None:
-    """Check an examination's results of every level, leaves [levels].
+    """Check an examination's results on every level, leaves [levels].
 
     Raises:
         MisfitError: when one is not a number for each level.
@@ -81,7 +81,7 @@ def _key(seed: Int[Array, ""]) -> Array:
 
 
 def _check_task_state(task: Task, function: str, state: TaskState) -> None:
-    """Check what `reset` or `step` gives to a policy and to a method."""
+    """Check the task state that `reset` or `step` returns."""
     what = f"the {function} of {task.name!r} gives"
     _check(f"{what} an observation", state.observation, (task.observation_size,), jnp.float32)
     _check(f"{what} a reward", state.reward, (), jnp.float32)
@@ -90,7 +90,7 @@ def _check_task_state(task: Task, function: str, state: TaskState) -> None:
 
 
 def _checked_progress(method: Method[Any], progress: object) -> Progress:
-    """Return what a step tells the engine, once it is what it should be."""
+    """Check and return what a step reports to the engine."""
     what = f"a step of {method.name!r} reports"
     if not isinstance(progress, Progress):
         raise MisfitError(f"{what} a {type(progress).__name__}, and the engine takes a Progress")
@@ -115,7 +115,7 @@ def _check(what: str, leaf: Any, shape: tuple[int, ...], dtype: Any) -> None:
 
 
 def _check_unchanged(what: str, before: Any, after: Any) -> None:
-    """Check that a state keeps its structure, and every array in it its shape and type."""
+    """Check that a state keeps its structure, and each of its arrays its shape and type."""
     structure: Any = jax.tree.structure(before)
     if structure != jax.tree.structure(after):
         raise MisfitError(f"{what}: its structure is another one afterwards")

@@ -1,4 +1,4 @@
-"""Climbing levels on the device: one rule for every method."""
+"""Moving up levels on the device: one rule for every method."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ NEVER = -1
 
 @pytree
 class Ascent:
-    """Where a trial stands in its task's levels.
+    """A trial's position in its task's levels.
 
     Attributes:
-        level: the level trained on now.
-        solved_at: for each level, how many steps of the method it had taken when it was first solved, or `NEVER`.
+        level: the current training level.
+        solved_at: for each level, the number of method steps when it was first solved, or `NEVER`.
         finished: whether the last level is solved.
     """
 

@@ -1,4 +1,4 @@
-"""Choosing the hardware, and the settings of jax that every trial runs under."""
+"""Choosing the hardware and the jax settings for every trial."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from evoclaims.core.errors import UnknownNameError, UserError
 
 DEVICE_NAMES: Final = ("auto", "cpu", "gpu")
 MATMUL_PRECISION: Final = "highest"
-"""Full float32: the tensor cores' default of 10-bit mantissas would make CMA-ES's covariances noise."""
+"""Full float32: with the tensor cores' default of 10-bit mantissas, CMA-ES's covariances would be noise."""
 
 
 def configure() -> None:
-    """Prepare jax before its first use: a compilation cache that outlives the process.
+    """Prepare jax before its first use: set a persistent compilation cache.
 
-    A cache that a user has chosen (JAX_COMPILATION_CACHE_DIR) stays.
+    A cache that the user has set (JAX_COMPILATION_CACHE_DIR) stays.
 
     Raises:
-        UserError: when JAX_PLATFORMS names hardware that is not there.
+        UserError: when JAX_PLATFORMS names missing hardware.
     """
     config: Any = jax.config
     if config.jax_compilation_cache_dir is None:
@@ -32,7 +32,7 @@ def configure() -> None:
         config.update("jax_persistent_cache_min_compile_time_secs", 0.2)
         # jax would otherwise evict nothing and warn about nothing; a broken cache must not break a run.
         config.update("jax_raise_persistent_cache_errors", False)
-    choose("auto")  # now, before an import that computes something fails with a traceback
+    choose("auto")  # fail here with a clear error, not with a traceback in a later import
 
 
 def usable_cores() -> int:
@@ -41,10 +41,10 @@ def usable_cores() -> int:
 
 
 def single_threaded_linear_algebra() -> AbstractContextManager[object]:
-    """Keep LAPACK, which jax calls for eigenvalues on a CPU, on the thread of the trial that calls it.
+    """Keep LAPACK, which jax calls for eigenvalues on a CPU, on the thread of the calling trial.
 
-    Trials already fill the cores. With threads of its own, OpenBLAS waits in busy loops for cores that other trials
-    hold: measured, 50 times slower; and its bits would depend on the number of cores.
+    Trials already fill the cores. With its own threads, OpenBLAS waits in busy loops for cores that other trials use
+    (measured: 50 times slower), and its bits would depend on the number of cores.
     """
     import scipy.linalg  # noqa: F401  (loads the library that is limited)
 
@@ -53,10 +53,10 @@ def single_threaded_linear_algebra() -> AbstractContextManager[object]:
 
 
 def choose(name: str) -> list[jax.Device]:
-    """Return the devices called `name`: "auto" takes GPUs where there are any.
+    """Return the devices called `name`: "auto" takes GPUs if there are any.
 
     Raises:
-        UserError: when a GPU is asked for, here or by JAX_PLATFORMS, and jax sees none.
+        UserError: when a GPU is requested, here or by JAX_PLATFORMS, and jax sees none.
     """
     if name not in DEVICE_NAMES:
         raise UnknownNameError("device", name, DEVICE_NAMES)

@@ -1,4 +1,4 @@
-"""Reading a whole store back: every record and champion checked, leftovers listed, bad files moved aside."""
+"""Checking a whole store: read every record and champion, list leftovers, move bad files aside."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from evoclaims.trials.store import DamagedFileError, Store
 from evoclaims.trials.store_files import SPARE_DIGITS, record_id
 
 SETTLED_SECONDS: Final = 60.0
-"""A half-written file younger than this may be another process at work, so it is no leftover yet."""
+"""A half-written file younger than this may belong to a running process, so it is not a leftover yet."""
 
 _CHAMPION: Final = re.compile(rf"[0-9a-f]{{64}}(\.[0-9a-f]{{{SPARE_DIGITS}}})?\.npz")
 
@@ -29,13 +29,13 @@ Kind = Literal["record", "champion", "checkpoint", "leftover"]
 
 @dataclass(frozen=True)
 class Problem:
-    """One file that should not be as it is.
+    """One file with a problem.
 
     Attributes:
         path: the file.
         kind: "record", "champion" or "checkpoint" for a bad one; "leftover" for harmless remains of a kill.
         reason: a clause that says what is wrong.
-        moved_to: where the repair has put the file, or None.
+        moved_to: where the repair moved the file, or None.
     """
 
     path: Path
@@ -52,18 +52,18 @@ class Problem:
 def verify(
     store: Store, repair: bool, checkpoint_fault: Callable[[Path], str | None] = lambda path: None
 ) -> list[Problem]:
-    """Read everything in `store` back and list what is wrong with it.
+    """Read everything in `store` and list the problems.
 
     Args:
         store: the store; one that does not exist yet has no problems.
-        repair: move every file listed into `<root>/quarantine/`; nothing is ever deleted.
+        repair: move every listed file into `<root>/quarantine/`; nothing is ever deleted.
         checkpoint_fault: says what is wrong with a checkpoint file, or None when it can be resumed.
 
     Returns:
         One problem per file, records first.
 
     Raises:
-        UserError: when the folder is no store, in which case nothing is moved; or when a bad file cannot be moved.
+        UserError: when the folder is not a store (nothing is moved then), or a bad file cannot be moved.
     """
     store.check()
     checks = (_records(store), _champions(store), _checkpoints(store, checkpoint_fault), _leftovers(store))
@@ -80,7 +80,7 @@ _ORDER: Final[dict[Kind, int]] = {"record": 0, "champion": 1, "checkpoint": 2, "
 
 
 def _records(store: Store) -> Iterator[Problem]:
-    """Check every record, and its champion with it: neither is of use without the other."""
+    """Check every record together with its champion: neither is useful without the other."""
     for path in store.record_paths():
         try:
             result = store.read(path)
@@ -100,7 +100,7 @@ def _records(store: Store) -> Iterator[Problem]:
 
 
 def _champions_of(store: Store, path: Path) -> tuple[Path, ...]:
-    """Return the champions that go with a record that cannot be read: those that no other record names."""
+    """Return the champions of an unreadable record: those that no other record names."""
     trial_id = record_id(path)
     if trial_id is None or path.parent != store.record_path(trial_id).parent:
         return ()
@@ -109,7 +109,7 @@ def _champions_of(store: Store, path: Path) -> tuple[Path, ...]:
 
 
 def _sound_records(store: Store, trial_id: str) -> Iterator[TrialResult]:
-    """Read the records of a trial that can be read; what cannot is told of by itself."""
+    """Yield the readable records of a trial; unreadable ones are reported elsewhere."""
     for path in store.record_files(trial_id):
         with contextlib.suppress(DamagedFileError):
             result = store.read(path)
@@ -118,7 +118,7 @@ def _sound_records(store: Store, trial_id: str) -> Iterator[TrialResult]:
 
 
 def _champions(store: Store) -> Iterator[Problem]:
-    """Find champions that belong to no record: foreign ones, and those of a run killed between the two files."""
+    """Find champions without a record: foreign ones, and those of a run killed between writing the two files."""
     for path in store.champion_paths():
         trial_id = path.name.partition(".")[0]
         if not _CHAMPION.fullmatch(path.name) or path.parent != store.champion_path(trial_id).parent:
@@ -130,7 +130,7 @@ def _champions(store: Store) -> Iterator[Problem]:
 
 
 def _is_named(store: Store, path: Path, trial_id: str) -> bool:
-    """Whether `path` is the champion that a record of the trial names; what cannot be read is told of elsewhere."""
+    """Whether a record of the trial names the champion in `path`; unreadable files are reported elsewhere."""
     try:
         records = store.records(trial_id)
     except DamagedFileError:
@@ -148,17 +148,17 @@ def _checkpoints(store: Store, fault: Callable[[Path], str | None]) -> Iterator[
 
 
 def _leftovers(store: Store) -> Iterator[Problem]:
-    """Find files that a kill left half-written, and notices of processes that are no longer at work."""
+    """Find files that a kill left half-written, and notices of processes that no longer run."""
     for path in sorted(store.root.rglob(".*.tmp")):
         if _quarantine(store) not in path.parents and _settled(path):
             yield Problem(path, "leftover", "its writer was stopped before the file was whole")
     for path in sorted((store.root / "running").glob("*")):
-        if not path.name.startswith(".") and _settled(path):  # a process at work refreshes its notice
+        if not path.name.startswith(".") and _settled(path):  # a running process refreshes its notice
             yield Problem(path, "leftover", "the process that it announces is no longer at work")
 
 
 def _settled(path: Path) -> bool:
-    """Whether `path` is old enough that nobody can still be busy with it."""
+    """Whether `path` is so old that no process can still be writing it."""
     try:
         return time.time() - path.lstat().st_mtime > SETTLED_SECONDS
     except OSError:
@@ -171,7 +171,7 @@ def _quarantine(store: Store) -> Path:
 
 
 def _set_aside(store: Store, path: Path) -> Path | None:
-    """Move `path` into the quarantine under a free name; None when it is gone already."""
+    """Move `path` into the quarantine under a free name; None when it is already gone."""
     folder = _quarantine(store)
     name = path.name.lstrip(".")
     target, count = folder / name, 0

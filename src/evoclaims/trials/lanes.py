@@ -1,7 +1,7 @@
-"""A batch of trials in compiled programs: a lane per trial, and a program for each device that knows of no other.
+"""A batch of trials in compiled programs: one lane per trial, and an independent program for each device.
 
-No program spans devices, so that nothing has to be partitioned: on a CPU each trial is a call of its own, and as many
-run at a time as there are cores; on accelerators each device runs its share of the lanes side by side.
+No program spans devices, so nothing must be partitioned. On a CPU each trial is its own call, and as many run at a
+time as there are cores; on accelerators each device runs its share of the lanes side by side.
 """
 
 from __future__ import annotations
@@ -24,23 +24,23 @@ from evoclaims.trials.program import Program, Report, Score, TrialState, over_tr
 from evoclaims.trials.spec import Condition
 
 SHORT: Final = 100_000
-"""Environment steps of a trial up to which, on a CPU, compiling fast is worth more than running fast."""
+"""On a CPU, trials of up to so many environment steps are compiled fast rather than run fast."""
 
 FAST_TO_COMPILE: Final = {"xla_backend_optimization_level": 1, "xla_llvm_disable_expensive_passes": True}
 
 Shares = tuple[TrialState, ...]
-"""The states of a batch, leaves [lanes of the share]: each share lies on one device, and one call advances it."""
+"""The states of a batch, leaves [lanes of the share]: each share is on one device, and one call advances it."""
 
 
 def options_for(condition: Condition, layout: str) -> dict[str, Any] | None:
-    """Return how programs are compiled: it depends on condition and kind of device alone, so that bits do, too."""
+    """Return the compiler options; they depend only on condition and layout, so that bits do, too."""
     return FAST_TO_COMPILE if layout == "alone" and condition.environment_steps <= SHORT else None
 
 
 def width_for(active: int, devices: int, full: int) -> int:
-    """Return the lanes to run `active` trials in: `full` halved while they fit, a multiple of the devices.
+    """Return the number of lanes for `active` trials: `full` halved while they fit, a multiple of the devices.
 
-    It depends on nothing but these counts, so that a resumed run goes through the same programs.
+    It depends only on these counts, so that a resumed run uses the same programs.
     """
     lanes = max(full, 1)
     while active <= lanes // 2:
@@ -63,17 +63,17 @@ class Compiled:
 
 
 class Lanes:
-    """Compiles a condition's programs for given devices, each size of a share at most once a device, and runs them.
+    """Compiles a condition's programs for given devices, at most once per share size and device, and runs them.
 
     Attributes:
-        condition: what is compiled.
+        condition: the condition to compile.
         devices: where it runs.
         layout: see `program.over_trials`.
         seconds: spent on compiling so far.
     """
 
     def __init__(self, condition: Condition, devices: Sequence[jax.Device]) -> None:
-        """Remember the condition and the devices; nothing is compiled yet."""
+        """Store the condition and the devices; nothing is compiled yet."""
         self.condition = condition
         self.devices = list(devices)
         self.layout = layout_for(self.devices)
@@ -84,12 +84,12 @@ class Lanes:
     def width(self, active: int, full: int) -> int:
         """Return the number of lanes for `active` of `full` trials.
 
-        Where each trial is a call of its own an idle lane costs nothing, so that there is nothing to gain from fewer.
+        Where each trial is its own call, idle lanes cost nothing, so the number stays.
         """
         return full if self.layout == "alone" else width_for(active, min(len(self.devices), full), full)
 
     def programs(self, width: int) -> list[Compiled]:
-        """Return the programs of each share of `width` lanes, compiling those that have not been."""
+        """Return the programs of each share of `width` lanes, compiling missing ones."""
         size, homes = self._size(width), self._homes(width)
         missing = [home for home in dict.fromkeys(homes) if (size, home) not in self._compiled]
         if missing:
@@ -99,13 +99,13 @@ class Lanes:
         return [self._compiled[size, home] for home in homes]
 
     def shapes(self, lanes: int) -> Any:
-        """Return shapes and dtypes of the state of so many lanes, as `gather` gives it."""
+        """Return shapes and dtypes of the state of `lanes` lanes, as `gather` returns it."""
         with self._settings():
             one = jax.eval_shape(over_trials(self._program.start, self.layout), *_seeds(1))
         return jax.tree.map(lambda leaf: jax.ShapeDtypeStruct((lanes, *leaf.shape[1:]), leaf.dtype), one)
 
     def place(self, tree: Any, width: int) -> tuple[Any, ...]:
-        """Deal a tree of host arrays with leading axis [width] out to the shares, each on its device."""
+        """Split a tree of host arrays with leading axis [width] into shares, each on its device."""
         leaves, structure = jax.tree.flatten(tree)
         size = self._size(width)
         shares = [[leaf[first : first + size] for leaf in leaves] for first in range(0, width, size)]
@@ -114,7 +114,7 @@ class Lanes:
 
     @staticmethod
     def gather(shares: Sequence[Any]) -> Any:
-        """Return as one tree with leading axis [width], on the host, what `place` has dealt out."""
+        """Undo `place`: join the shares into one tree with leading axis [width], on the host."""
         return jax.tree.map(lambda *leaves: np.concatenate(leaves), *jax.device_get(list(shares)))
 
     def start(self, seeds: Sequence[int | None], width: int) -> Shares:
@@ -130,7 +130,7 @@ class Lanes:
         return tuple(starts[home](*share) for home, share in zip(homes, self.place((known, idle), width), strict=True))
 
     def advance(self, state: Shares, until: int, width: int) -> tuple[Shares, Report]:
-        """Take every trial to its end or to `until` steps; `state` is donated. The report is on the host."""
+        """Advance every trial to its end or to `until` steps; `state` is donated. The report is on the host."""
 
         def one(program: Compiled, share: TrialState, bound: Any) -> tuple[TrialState, Report]:
             share, report = program.advance(share, bound)
@@ -157,40 +157,40 @@ class Lanes:
         return self.place(dataclasses.replace(host, idle=host.idle | idle), width)
 
     def arrangement(self, active: Sequence[int], width: int) -> list[int | None]:
-        """Deal active lanes out to the shares like cards, so that none works while another has nothing to do."""
+        """Deal active lanes to the shares in turn, so that all shares have about equal work."""
         size = self._size(width)
         shares = width // size
         hands = [list(active[share::shares]) for share in range(shares)]
         return [lane for hand in hands for lane in [*hand, *[None] * (size - len(hand))]]
 
     def _size(self, width: int) -> int:
-        """Return the lanes of one share of `width`: one, or all that a device runs side by side."""
+        """Return the number of lanes per share: one, or all that a device runs side by side."""
         if self.layout == "alone":
             return 1
         return width // max(count for count in range(1, len(self.devices) + 1) if width % count == 0)
 
     def _homes(self, width: int) -> list[jax.Device]:
-        """Return the device of each share. A CPU's cores are one device: all its trials share the programs."""
+        """Return the device of each share. A CPU is one device: all its trials share the programs."""
         shares = width // self._size(width)
         return [self.devices[0]] * shares if self.layout == "alone" else self.devices[:shares]
 
     def _side_by_side(self, function: Callable[..., Any], *arguments: Sequence[Any]) -> list[Any]:
-        """Call the function for all shares, on as many threads as there are cores or devices; jax lets go of Python."""
+        """Call the function for all shares, on one thread per core or device; jax releases the interpreter lock."""
         threads = usable_cores() if self.layout == "alone" else len(self.devices)
         with ThreadPoolExecutor(threads) as pool:
             calls = [pool.submit(function, *each) for each in zip(*arguments, strict=True)]
             try:
                 return [call.result() for call in calls]
-            except BaseException:  # an interrupt must not wait for trials that have not begun
+            except BaseException:  # an interrupt must not wait for trials not yet begun
                 pool.shutdown(wait=False, cancel_futures=True)
                 raise
 
     @staticmethod
     @contextmanager
     def _settings() -> Iterator[None]:
-        """Set what the programs are traced and compiled under."""
+        """Set the context for tracing and compiling."""
         with jax.default_matmul_precision(MATMUL_PRECISION), warnings.catch_warnings():
-            # A kill can tear an entry of jax's cache: it is compiled anew, which must not become an error in pytest.
+            # A kill can damage an entry of jax's cache; jax recompiles it and warns, which must not fail in pytest.
             warnings.filterwarnings("ignore", "Error (reading|writing) persistent compilation cache")
             yield
 
@@ -206,7 +206,7 @@ class Lanes:
         return lowered.compile(options_for(self.condition, self.layout))
 
     def _compile(self, size: int, homes: Sequence[jax.Device]) -> dict[jax.Device, Compiled]:
-        """Compile what runs again and again, ahead of time, so that compile time and run time are told apart."""
+        """Compile the repeated programs ahead of time, to measure compile time and run time separately."""
         state, until = self.shapes(size), _seeds(size)[0]
         with self._settings():
             lowered = [
@@ -217,7 +217,7 @@ class Lanes:
                     self._lowered(self._program.score, home, (state,)),
                 )
             ]
-            # XLA compiles without holding the interpreter, so that two programs take the time of one.
+            # XLA compiles without the interpreter lock, so two programs take the time of one.
             with ThreadPoolExecutor() as pool:
                 made = list(pool.map(self._finished, lowered))
         return {home: Compiled(*made[2 * place : 2 * place + 2]) for place, home in enumerate(homes)}

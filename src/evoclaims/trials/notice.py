@@ -1,8 +1,8 @@
-"""Notices that a condition is being run, so that processes sharing a store do not run the same trials twice.
+"""Notices that a condition is running, so that processes that share a store do not run the same trials twice.
 
-A notice is a lease of filelock on a file in `running/`, which a thread refreshes for as long as the condition runs.
-Notices are hints and not locks: a missed or lost notice costs repeated work, never a wrong record, so that every
-failure to write one is passed over in silence.
+A notice is a filelock lease on a file in `running/`, which a thread refreshes while the condition runs. Notices are
+hints, not locks: a missed or lost notice costs repeated work, never a wrong record, so failures to write one are
+ignored.
 """
 
 from __future__ import annotations
@@ -21,18 +21,18 @@ from evoclaims.core.errors import UserError
 from evoclaims.trials.result_codec import is_hash
 
 FRESH_SECONDS: Final = 60.0
-"""A notice counts for this long after its last refresh, by the clock of whoever waits: its process may be on another
-machine, or stopped (SIGSTOP, Ctrl-Z). The notice of a process of this machine that has ended counts no longer."""
+"""A notice is valid for this long after its last refresh, by the clock of the waiting process: its own process may be
+on another machine, or stopped (SIGSTOP, Ctrl-Z). If that process was on this machine and has ended, it is invalid."""
 
 REFRESH_SECONDS: Final = 15.0
-"""Time between two refreshes: some may come late on a slow network folder before the notice looks stale."""
+"""Time between two refreshes: on a slow network folder, a few may be late before the notice looks stale."""
 
 _CONTAINER: Final = "?pidns-"
-"""What filelock adds to a host's name where processes are numbered anew, as in a container; a number follows."""
+"""What filelock adds to the host name in its own PID namespace, as in a container; a number follows."""
 
 
 def notice_path(store_root: Path, condition_id: str) -> Path:
-    """Return where the notice of a condition lies; a `UserError` for a text that is not an id."""
+    """Return the path of a condition's notice; raise a `UserError` for a text that is not an id."""
     if not is_hash(condition_id):
         raise UserError(f"{condition_id!r} is not a condition's id: an id is 64 lower-case hexadecimal digits.")
     return store_root / "running" / f"{condition_id}.lock"
@@ -46,14 +46,14 @@ def announced(
     poll: float = 0.2,
     sleep: Callable[[float], None] = time.sleep,
 ) -> Iterator[None]:
-    """Announce for as long as a `with` block lasts that this process runs a condition, once no other process does.
+    """Wait until no other process runs a condition; announce, during a `with` block, that this process does.
 
-    Another process that was waited for may have stored the trials: look into the store inside of the block.
+    The other process may have stored the trials: check the store inside the block.
 
     Args:
         store_root: the store's folder.
-        condition_id: the condition about to be run.
-        tell: receives a line of progress at every look at another's notice.
+        condition_id: the condition to run.
+        tell: receives a line of progress each time it looks at another process's notice.
         poll: seconds between two looks.
         sleep: how to wait.
     """
@@ -65,11 +65,11 @@ def announced(
     while not _is_ours(lease):
         owner, refreshed = lease.owner, _refreshed(path)
         if not refreshed:
-            continue  # it has gone meanwhile
+            continue  # it is gone by now
         if refreshed != seen:
             seen, since = refreshed, time.monotonic()
         if _has_ended(owner) or time.monotonic() - since > FRESH_SECONDS:
-            lease.force_break()  # filelock itself leaves zombies' alone, and on network folders all that are stale
+            lease.force_break()  # filelock keeps leases of zombies, and stale leases on network folders
             continue
         who = f"process {owner.pid} on {owner.hostname.partition(_CONTAINER)[0]}" if owner else "another process"
         tell(f"waiting for {who}, which runs the same trials")
@@ -83,7 +83,7 @@ def announced(
 
 
 def sweep(store_root: Path) -> None:
-    """Remove the notices of this machine's processes that have ended: nobody may ever look at them again."""
+    """Remove the notices of this machine's ended processes: no other process might ever look at them."""
     for path in sorted((store_root / "running").glob("*.lock")):
         lease = _lease(path)
         if _has_ended(lease.owner):
@@ -96,7 +96,7 @@ def _lease(path: Path) -> filelock.SoftFileLease:
 
 
 def _is_ours(lease: filelock.SoftFileLease) -> bool:
-    """Take a lease unless another process holds it; one that nobody can take holds nobody up."""
+    """Take a lease unless another process holds it; if no process can take it, do not wait for it."""
     try:
         lease.acquire(blocking=False)
     except (filelock.Timeout, filelock.LeaseSettingsMismatch):
@@ -107,7 +107,7 @@ def _is_ours(lease: filelock.SoftFileLease) -> bool:
 
 
 def _refreshed(path: Path) -> int:
-    """Return when a notice was last refreshed, by the clock of whoever did so; 0 where there is none."""
+    """Return when a notice was last refreshed, by the clock of its writer; 0 if there is none."""
     try:
         return path.lstat().st_mtime_ns
     except OSError:
@@ -115,9 +115,9 @@ def _refreshed(path: Path) -> int:
 
 
 def _has_ended(owner: filelock.OwnerRecord | None) -> bool:
-    """Whether a process of this machine has ended, as Linux tells it; also one that its parent has not collected."""
+    """Whether a process of this machine has ended, according to Linux; zombies count as ended."""
     try:
-        namespace = f"{os.stat('/proc/self/ns/pid').st_ino:x}"  # in another container, numbers mean other processes
+        namespace = f"{os.stat('/proc/self/ns/pid').st_ino:x}"  # in another container, PIDs mean other processes
     except OSError:
         return False
     if owner is None or owner.hostname not in (socket.gethostname(), f"{socket.gethostname()}{_CONTAINER}{namespace}"):

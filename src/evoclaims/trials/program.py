@@ -1,4 +1,4 @@
-"""The three programs of a condition (start, advance, score), written for one trial and laid out over many."""
+"""The three programs of a condition (start, advance, score), written for one trial and batched over many."""
 
 from __future__ import annotations
 
@@ -23,17 +23,17 @@ from evoclaims.trials.spec import Condition
 
 @pytree
 class TrialState:
-    """Everything a trial needs to go on; stacked over trials, this is what a checkpoint holds.
+    """Everything a trial needs to continue; a checkpoint holds it, stacked over trials.
 
     Attributes:
         seed: the trial's seed; all its keys derive from it.
         method: the method's own state.
-        ascent: where it stands in the levels.
+        ascent: its position in the levels.
         steps: steps of the method taken.
         last: what the last step reported.
-        diverged: whether a number has stopped being finite.
+        diverged: whether a number is no longer finite.
         idle: True for a lane that only fills the batch.
-        numbers: the task's, if it has any (`Numbered`).
+        numbers: the task's numbers, if it has any (`Numbered`).
     """
 
     seed: Int[Array, ""]
@@ -61,7 +61,7 @@ class Report:
 
 @pytree
 class Score:
-    """What the host reads of a trial that has ended.
+    """What the host reads from a trial that has ended.
 
     Attributes:
         final: the champion's episodes, leaves [levels].
@@ -146,11 +146,11 @@ class Program:
 
     @cached_property
     def _progress(self) -> Progress:
-        """The shapes of what a step reports; tracing one takes seconds, so that it is done once."""
+        """The shapes of what a step reports; cached, since tracing a step takes seconds."""
         return traced_progress(self.condition.method, self.condition.task)
 
     def _task(self, trial: TrialState) -> Task:
-        """Return the task, its numbers taken from the trial."""
+        """Return the task with the trial's numbers."""
         task = self.condition.task
         return task.with_numbers(trial.numbers) if isinstance(task, Numbered) else task
 
@@ -161,17 +161,17 @@ class Program:
 
 
 def over_trials(function: Callable[..., Any], layout: str) -> Callable[..., Any]:
-    """Lay a single-trial function out over a leading trial axis of all its arguments.
+    """Batch a single-trial function over a leading trial axis of all its arguments.
 
-    "alone" is for one trial at a time, an axis of length one: on a CPU, whose cores other trials fill, this costs
-    nothing, gives each trial the same bits whatever runs beside it, and a trial that has ended costs nothing.
-    "vector" runs them side by side: on an accelerator a step's time is mostly launches, which they share.
+    "alone" runs one trial at a time (an axis of length one): on a CPU, whose cores other trials fill, this costs
+    nothing, a trial's bits do not depend on other trials, and a trial that has ended costs nothing. "vector" runs
+    trials side by side: on an accelerator a step's time is mostly kernel launches, which they share.
     """
     layouts: dict[str, Callable[..., Any]] = {"alone": partial(_alone, function), "vector": jax.vmap(function)}
     return layouts[layout]
 
 
 def _alone(function: Callable[..., Any], *arguments: Any) -> Any:
-    """Call the function with the only trial along the arguments' leading axis, and give its results one."""
+    """Remove the arguments' leading axis of length one, call the function, and add the axis to its results."""
     trial = jax.tree.map(lambda leaf: jnp.squeeze(leaf, 0), arguments)
     return jax.tree.map(lambda leaf: leaf[None], function(*trial))

@@ -1,4 +1,4 @@
-"""What a run tells whoever watches it."""
+"""What a run reports to its watcher."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ class RunProgress:
         phase: "compiling", "resuming", "training" or "waiting …".
         trials: trials in the batch; `ended` of them have ended.
         steps: steps of the method taken by the furthest trial, of `total_steps`.
-        best: highest success on the level being trained; None before the first report.
-        level: highest level being trained, of `levels`.
+        best: highest success on `level`; None before the first report.
+        level: highest current level of any trial, of `levels`.
         seconds_left: estimate for the batch; None while unknown.
     """
 
@@ -37,4 +37,4 @@ Watcher = Callable[[RunProgress], None]
 
 
 def ignore(progress: RunProgress) -> None:
-    """Watch nothing."""
+    """Ignore progress."""

@@ -1,4 +1,4 @@
-"""What one trial leaves behind: a plain record that is stored as one JSON file."""
+"""The result of one trial: a plain record, stored as one JSON file."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from evoclaims.core.canonical import as_plain, content_hash
 
 Status = Literal["done", "diverged", "timeout", "crashed"]
 COMPLETE: tuple[str, ...] = ("done", "diverged")
-"""Statuses of trials that have come to their end, and whose metrics are all there."""
+"""Statuses of trials that ran to their end and have all their metrics."""
 SCHEMA = 1
 
 
@@ -23,15 +23,15 @@ class TrialResult:
         condition: hash of the specification without the seed.
         spec: the specification itself, as plain JSON.
         seed: the trial's seed.
-        status: "done" when it ran to its end, "diverged" when a number stopped being finite, "timeout" when its batch
-            took too long, "crashed" when it was ended from outside.
+        status: "done" when it ran to its end, "diverged" when a number was no longer finite, "timeout" when its batch
+            took too long, "crashed" when it was killed.
         metrics: final scalars of the champion and of the run, such as "mean_success" or "environment_steps".
         levels: per-level vectors of the champion, such as "success" with one value per level.
-        curves: training curves; equally long lists, one value per report.
+        curves: training curves; lists of equal length, one value per report.
         digest: hash of everything above that is deterministic, and of the champion's parameters: equal digests
-            mean the same trial to the bit.
-        timing: seconds ("run", "compile", both shared by `batch` trials) and "started", "ended" (UTC, ISO 8601); of a
-            trial that ran out of time also "limit", the seconds that its batch might take.
+            mean bit-identical trials.
+        timing: seconds ("run", "compile", both shared by `batch` trials) and "started", "ended" (UTC, ISO 8601); for
+            a timed-out trial also "limit", the seconds that its batch was allowed.
         provenance: versions, device, flags and git revision (see `core.provenance`).
         champion: SHA-256 of the stored champion's file, filled in by `Store.put`; empty while there is none.
     """
@@ -50,7 +50,7 @@ class TrialResult:
     champion: str = ""
 
     def to_json(self) -> dict[str, Any]:
-        """Return the record as plain JSON, sealed with a hash that a torn or edited file fails."""
+        """Return the record as plain JSON, sealed with a hash that detects torn or edited files."""
         plain: dict[str, Any] = {"schema": SCHEMA, **as_plain(self)}
         return {**plain, "seal": content_hash(plain)}
 

@@ -1,4 +1,4 @@
-"""A trial record as text: written sealed, read back with every field checked, since text is not to be trusted."""
+"""A trial record as text: written with a seal; reading checks every field, since text is not trusted."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ _FIELDS: Final = {field.name for field in dataclasses.fields(TrialResult)} | {"s
 
 
 class RecordError(UserError):
-    """A text is not a sound trial record; `reason` is a clause that says why."""
+    """A text is not a valid trial record; `reason` is a clause that says why."""
 
     def __init__(self, reason: str) -> None:
-        """Keep `reason` for a caller that knows the file's name."""
+        """Store `reason` for a caller that knows the file name."""
         super().__init__(f"This is not a sound trial record: {reason}.")
         self.reason = reason
 
@@ -90,7 +90,7 @@ def _fail(reason: str) -> NoReturn:
 
 
 def _is_sealed(data: bytes, plain: dict[str, Any]) -> bool:
-    """Whether the contents of a record match its seal, byte for byte as `dump` writes them or else in other words."""
+    """Whether a record matches its seal, in the exact bytes of `dump` or in equivalent JSON."""
     seal: object = plain["seal"]
     if not is_hash(seal):
         return False
@@ -101,7 +101,7 @@ def _is_sealed(data: bytes, plain: dict[str, Any]) -> bool:
 
 
 def _load(data: bytes) -> dict[str, Any]:
-    """Return the JSON object in `data`; refuse what JSON forbids but Python's reader lets through."""
+    """Return the JSON object in `data`; reject what JSON forbids but Python's reader accepts."""
     try:
         plain = json.loads(
             data.decode("utf-8"), parse_int=_whole, parse_constant=_no_constant, object_pairs_hook=_unique
@@ -114,19 +114,19 @@ def _load(data: bytes) -> dict[str, Any]:
 
 
 def _no_constant(word: str) -> NoReturn:
-    """Refuse the bare words NaN and Infinity, which are not JSON."""
+    """Reject the bare words NaN and Infinity, which are not JSON."""
     raise ValueError(word)
 
 
 def _whole(digits: str) -> int:
-    """Refuse whole numbers that no counter and no float can hold."""
+    """Reject integers that no counter and no float can hold."""
     if len(digits.lstrip("-")) > _MOST_DIGITS:
         raise ValueError("a whole number is too large")
     return int(digits)
 
 
 def _unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    """Refuse an object that names a key twice, of which Python would keep the last."""
+    """Reject an object with a repeated key; Python would keep only the last."""
     plain = dict(pairs)
     if len(plain) != len(pairs):
         raise ValueError("a key is named twice")
@@ -137,7 +137,7 @@ def _vectors(fields: Mapping[str, Vector]) -> dict[str, tuple[float, ...]]:
     """Return named vectors of floats."""
     vectors: dict[str, tuple[float, ...]] = {}
     for name, values in fields.items():
-        worded = str in set(map(type, values))  # hardly ever
+        worded = str in set(map(type, values))  # rarely
         vectors[name] = tuple(map(_number, values)) if worded else cast(tuple[float, ...], values)
     return vectors
 
@@ -148,10 +148,10 @@ def _number(value: Number) -> float:
 
 
 def _hash_of_json(plain: Any) -> str:
-    """Return `content_hash` of what was read from JSON, which has no need of `as_plain`."""
+    """Return `content_hash` of what was read from JSON, which does not need `as_plain`."""
     try:
         return hashlib.sha256(_ENCODER.encode(plain).encode("ascii")).hexdigest()
     except RecursionError:
         _fail("it is nested too deeply")
-    except ValueError:  # 1e999, which Python reads as infinite and which would pass for "inf" under the seal
+    except ValueError:  # 1e999, which Python reads as infinite and the seal would confuse with "inf"
         _fail("a number in it is too large")

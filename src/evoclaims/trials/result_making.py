@@ -1,4 +1,4 @@
-"""Making the record of a trial that has ended."""
+"""Making the record of an ended trial."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from evoclaims.trials.spec import Condition, TrialSpec
 
 
 def curve_point(spec_cost: int, report: Report, lane: int) -> dict[str, float]:
-    """Return one point of a lane's training curve; `spec_cost` is the environment steps of one step."""
+    """Return one point of a lane's training curve; `spec_cost` is the number of environment steps per step."""
     steps = int(report.steps[lane])
     return {
         "steps": steps,
@@ -48,11 +48,11 @@ def make_result(
     Metrics of every task with levels:
         mean_success, last_success: of the final policy, over all levels and on the last.
         last_fitness: of the final policy on the last level.
-        furthest_solved: highest level solved while training, -1 for none.
+        furthest_solved: highest level solved in training, -1 for none.
         furthest_reached: highest level trained on.
         steps, environment_steps: spent until the trial ended.
-    The task's own metrics of the final policy on the last level stand beside them. A trial whose last step was healthy
-    has still diverged when its final policy acts by numbers that are not finite, or scores one.
+    The task's own metrics of the final policy on the last level are added. Even if its last step was healthy, a trial
+    has diverged when its final policy uses parameters or gets scores that are not finite.
     """
     cost = spec.condition.method.cost(spec.condition.task)
     success, fitness = np.asarray(score.final.success)[lane], np.asarray(score.final.fitness)[lane]
@@ -84,7 +84,7 @@ def make_result(
 def make_timeout(
     spec: TrialSpec, curves: Mapping[str, Sequence[float]], timing: Mapping[str, Any], devices: Sequence[jax.Device]
 ) -> TrialResult:
-    """Return the record of a trial that ran out of time: its curves so far, and what they say; it has no champion.
+    """Return the record of a timed-out trial: its curves so far, and metrics from them; it has no champion.
 
     Metrics are "steps", "environment_steps" and "furthest_reached", at the curve's last point.
     """
@@ -123,17 +123,17 @@ def _record(
 
 
 def is_sound(method: Method[Any], parameters: Any) -> bool:
-    """Whether all numbers that a policy of `method` acts by are finite; `parameters` are on the host."""
+    """Whether all parameters that a policy of `method` uses are finite; `parameters` are on the host."""
     return are_finite(*jax.tree.leaves(method.used(parameters) if isinstance(method, PartlyUsed) else parameters))
 
 
 def are_finite(*arrays: NDArray[Any]) -> bool:
-    """Whether no array holds NaN or an infinity."""
+    """Whether no array contains NaN or infinity."""
     return all(bool(np.all(np.isfinite(array))) for array in arrays)
 
 
 def provenance(devices: Sequence[jax.Device], condition: Condition) -> dict[str, Any]:
-    """Return the process's provenance, with the devices, the precision and the packages that trials really use."""
+    """Return the process's provenance, with the devices, precision and packages that trials use."""
     found = collect()
     return {
         **found,

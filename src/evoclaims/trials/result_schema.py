@@ -1,7 +1,7 @@
-"""What the fields of a trial record are: the one schema that a record is checked against when it is read.
+"""The schema of a trial record; every record is checked against it when it is read.
 
-A seal says that a record is as its writer left it, and not that the writer was this program. What is declared here is
-what the rest of the code takes for granted of every record.
+A seal shows that a record was not changed, but not that this program wrote it. The rest of the code relies on
+everything that is declared here.
 """
 
 from __future__ import annotations
@@ -13,10 +13,10 @@ from msgspec import Meta, Struct, ValidationError, convert
 from evoclaims.trials.result import COMPLETE, Status
 
 DEEPEST: Final = 64
-"""Most levels of tables and lists in the parts of a record that are free JSON."""
+"""Maximum nesting of objects and lists in the free JSON parts of a record."""
 
 LONGEST_SECONDS: Final = 1e10
-"""Three hundred years: beyond it a time is a mistake, and sums of such times are still finite."""
+"""Three hundred years: a longer time is an error; sums of shorter times stay finite."""
 
 Hash = Annotated[str, Meta(pattern=r"\A[0-9a-f]{64}\Z")]
 Number = int | float | Literal["nan", "inf", "-inf"]
@@ -27,7 +27,7 @@ Table = dict[str, Any]
 
 
 class Record(Struct):
-    """All fields of a record; those of `TrialResult`, and what the file says of itself."""
+    """All fields of a record: those of `TrialResult`, and those about the file itself."""
 
     schema: int
     seal: Hash
@@ -46,7 +46,7 @@ class Record(Struct):
 
 
 class Metrics(Struct):
-    """What every trial has measured that has come to its end (see `outcome.make_result`); a task's own come on top."""
+    """The metrics of every trial that ran to its end (see `outcome.make_result`); tasks add their own."""
 
     mean_success: Number
     last_success: Number
@@ -58,7 +58,7 @@ class Metrics(Struct):
 
 
 class Levels(Struct):
-    """The vectors over levels of every trial that has come to its end."""
+    """The vectors over levels of every trial that ran to its end."""
 
     success: Annotated[Vector, Meta(min_length=1)]
     fitness: Annotated[Vector, Meta(min_length=1)]
@@ -83,7 +83,7 @@ class Device(Struct):
 
 
 class GitState(Struct):
-    """The code's state."""
+    """The state of the code."""
 
     sha: str | None = None
     dirty: bool | None = None
@@ -97,7 +97,7 @@ class Spec(Struct):
 
 
 class Provenance(Struct):
-    """Where a trial came from; records of earlier releases say less."""
+    """Where a trial came from; records of earlier releases have fewer fields."""
 
     git: GitState | None = None
     versions: dict[str, str | None] | None = None
@@ -118,10 +118,10 @@ def check(plain: dict[str, Any]) -> Record:
     """Return the fields of a record with their types checked.
 
     Args:
-        plain: the record as JSON says it, with whole numbers that a float can hold.
+        plain: the record as read from JSON; its integers must fit into a float.
 
     Raises:
-        SchemaError: naming the first field that is not as declared here.
+        SchemaError: naming the first field that does not fit the schema.
     """
     _check_depth([plain["spec"], plain["timing"], plain["provenance"]])
     record: Record = _fitted(plain, Record, "")
@@ -137,7 +137,7 @@ def check(plain: dict[str, Any]) -> Record:
 
 
 def _fitted(value: Any, kind: Any, name: str) -> Any:
-    """Return `value` as a `kind`; `name` is the field that it lies in, empty for the record itself."""
+    """Return `value` as a `kind`; `name` is the field that contains it, empty for the record itself."""
     try:
         return convert(value, kind)
     except ValidationError as error:
@@ -149,7 +149,7 @@ def _fitted(value: Any, kind: Any, name: str) -> Any:
 
 
 def _check_depth(level: list[Any]) -> None:
-    """Refuse values that are nested so deeply that walking through them would exhaust the interpreter's stack."""
+    """Reject values nested so deeply that walking through them would overflow the interpreter's stack."""
     for _ in range(DEEPEST):
         tables = [value.values() if isinstance(value, dict) else value for value in level if type(value) in _NESTING]
         if not tables:

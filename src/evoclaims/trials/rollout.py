@@ -1,4 +1,4 @@
-"""The one protocol by which every method's final policy is judged."""
+"""The evaluation of final policies, the same for every method."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from evoclaims.methods.base import Policy
 
 
 def score_every_level(task: Task, policy: Policy, key: PRNGKeyArray) -> Episode:
-    """Examine a policy on each level's own terms; the leaves of the result have shape [levels].
+    """Examine a policy on each level separately; the leaves of the result have shape [levels].
 
     The key must come from the trial's evaluation stream, which training never draws from.
     """

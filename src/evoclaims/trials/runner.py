@@ -1,4 +1,4 @@
-"""The one loop that runs trials: on the device for about a second at a time, reports and files in between."""
+"""The loop that runs trials: device calls of about a second, with reports and files in between."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ from evoclaims.trials.time_limit import is_final
 _log = logging.getLogger(__name__)
 
 CHECKPOINT_SECONDS: Final = 1.0
-"""Least time between two checkpoints: what a kill can cost."""
+"""Minimum time between two checkpoints: what a kill can cost."""
 
 
 def run(
@@ -46,17 +46,17 @@ def run(
     time_limit: float = math.inf,
     any_version: bool = False,
 ) -> list[TrialResult]:
-    """Return the trials of `condition` with these seeds, running those that the store lacks.
+    """Return the trials of `condition` with these seeds; run those that are not in the store.
 
-    A stored trial that was made with other versions than this environment's is run again, and both records stay; with
-    `any_version` it counts as it is.
+    A stored trial from other versions than this environment's is run again, and both records stay; with `any_version`
+    it is accepted.
 
-    Each trial is stored as soon as it has ended; a kill at any moment loses at most the time since the last
-    checkpoint, from which the same call goes on to the same bits (on the same kind of device and versions).
+    Each trial is stored as soon as it ends. A kill loses at most the time since the last checkpoint, from which the
+    same call resumes with the same bits (on the same kind of device and versions).
 
     A batch that takes longer than `time_limit` (seconds, on the device and compiling) ends there: its trials are stored
-    as "timeout" with their curves so far, and answer until a call allows more. With a limit the work is done on another
-    thread, since it may never return (see `allowance`).
+    as "timeout" with their curves so far, and run again only when a call allows more. With a limit the work is done on
+    another thread, since it may never return (see `allowance`).
 
     Raises:
         UserError: when the store is damaged or cannot be written, or the device's memory does not hold the batch.
@@ -77,7 +77,7 @@ def run(
 
 @contextmanager
 def _memory_told(condition: Condition, trials: int) -> Iterator[None]:
-    """Say in a sentence that the device has run out of memory."""
+    """Turn an out-of-memory error of the device into a `UserError`."""
     try:
         yield
     except jax.errors.JaxRuntimeError as error:
@@ -91,12 +91,12 @@ def _memory_told(condition: Condition, trials: int) -> Iterator[None]:
 
 
 def _finish(run: Run, header: Header, begin: Callable[[], Batch | None]) -> None:
-    """Run a batch until none of its trials is owed or its time is over."""
+    """Run a batch until all its trials are stored or its time is over."""
     allowance, strides = Allowance(run.time_limit), Strides()
     try:
         begun = allowance.spend(begin)
         if begun is None:
-            return  # another process has ended the batch; what it has not stored is begun anew
+            return  # another process finished the batch; `run` restarts what is not stored
         batch, header = begun, begun.header
         rhythm = Rhythm(run.checkpoint_seconds)
         while batch.owed:
@@ -117,14 +117,14 @@ def _finish(run: Run, header: Header, begin: Callable[[], Batch | None]) -> None
 
 
 def _go_on(run: Run, batch: Batch, allowance: Allowance, strides: Strides) -> tuple[Batch, RunProgress | None]:
-    """Call the device once; where that ends a chunk, store the trials that have ended and say how it stands."""
+    """Call the device once; at the end of a chunk, store the trials that have ended and report progress."""
     batch, report, whole = _advance(run, batch, allowance, strides)
     if not whole:
         return batch, None
     ended = [lane for lane in batch.running if report.ended[lane]]
     if ended:
         batch = _store_ended(run, batch, report, ended, allowance)
-    progress = _progress(run, batch, report, strides)  # the report speaks of the lanes as they are
+    progress = _progress(run, batch, report, strides)  # the report has the lanes before narrowing
     return _rearranged(run, batch) if ended else batch, progress
 
 
@@ -136,10 +136,10 @@ def _save(run: Run, batch: Batch) -> None:
 
 
 def _advance(run: Run, batch: Batch, allowance: Allowance, strides: Strides) -> tuple[Batch, Report, bool]:
-    """Call the device once; where that ends a chunk, note each running trial's point on its curve.
+    """Call the device once; at the end of a chunk, add a point to each running trial's curve.
 
     Returns:
-        The batch, what the device reports, and whether it has ended a chunk (or every running trial).
+        The batch, the device's report, and whether a chunk (or every running trial) has ended.
     """
     cost = run.condition.method.cost(run.condition.task)
     end = min((batch.header.chunks + 1) * run.condition.budget.chunk(cost), run.condition.steps)
@@ -161,7 +161,7 @@ def _advance(run: Run, batch: Batch, allowance: Allowance, strides: Strides) -> 
 
 
 def _store_ended(run: Run, batch: Batch, report: Report, ended: Sequence[int], allowance: Allowance) -> Batch:
-    """Judge the trials in the lanes that have ended, and store those that are owed."""
+    """Score the trials in the ended lanes, and store those without a record."""
     header, due = batch.header, [lane for lane in ended if lane in batch.owed]
     timing = _timing(run, header)
     score = allowance.spend(lambda: run.lanes.score(batch.state, len(header.lanes))) if due else None
@@ -179,7 +179,7 @@ def _store_ended(run: Run, batch: Batch, report: Report, ended: Sequence[int], a
 
 
 def _give_up(run: Run, header: Header) -> None:
-    """Store as timed out the trials of a batch that have not ended."""
+    """Store the unfinished trials of a batch as timed out."""
     timing = {**_timing(run, header), "limit": run.time_limit}
     owed = [
         TrialSpec(run.condition, seed)
@@ -192,7 +192,7 @@ def _give_up(run: Run, header: Header) -> None:
 
 
 def _timing(run: Run, header: Header) -> dict[str, Any]:
-    """Return what the records of a batch's trials say of its time."""
+    """Return the timing for the records of a batch's trials."""
     return {
         "run": header.run_seconds,
         "compile": header.compile_seconds + run.lanes.seconds,
@@ -202,14 +202,14 @@ def _timing(run: Run, header: Header) -> dict[str, Any]:
 
 
 def _tell_of_difference(run: Run, seed: int) -> None:
-    """Say that another process has stored the trial meanwhile, with other bits than it has here."""
+    """Report that another process has stored the trial meanwhile, with other bits than here."""
     text = f"seed {seed} is stored already and came out differently here: the first record stays"
     run.watch(RunProgress(run.condition.label, text, 1))
     _log.warning("%s: %s.", run.condition.label, text)
 
 
 def _rearranged(run: Run, batch: Batch) -> Batch:
-    """Narrow the batch where that makes the rest cheaper."""
+    """Narrow the batch if that makes the rest cheaper."""
     active, full = batch.running, len(batch.header.batch)
     width = run.lanes.width(len(active), full)
     if not batch.owed or width >= len(batch.header.lanes):
@@ -221,7 +221,7 @@ def _rearranged(run: Run, batch: Batch) -> Batch:
 
 
 def _progress(run: Run, batch: Batch, report: Report, strides: Strides) -> RunProgress:
-    """Say where the batch stands; `report` is about its lanes as they are."""
+    """Return the batch's progress; `report` must be about its current lanes."""
     shown = batch.owed if batch.owed else list(range(len(report.steps)))
     highest = max((int(report.level[lane]) for lane in shown), default=0)
     best = max((float(report.success[lane]) for lane in shown if report.level[lane] == highest), default=0.0)

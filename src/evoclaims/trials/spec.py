@@ -1,4 +1,4 @@
-"""What a trial is: a method on a task, under a curriculum or not, for a budget, from a seed."""
+"""The specification of a trial: method, task, progression, budget and seed."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ def _described(component: Any) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class Condition:
-    """Everything that a group of trials shares; the seed alone tells them apart.
+    """Everything that a group of trials shares; they differ only in the seed.
 
     Attributes:
         method: the algorithm with its frozen hyperparameters.
         task: the task with its frozen parameters.
-        progression: "curriculum" starts at level 0 and climbs; "direct" stays on the last level; both end when that is
-            solved. "whole_budget" stays on the last level to the end of the budget, whatever is solved.
+        progression: "curriculum" starts at level 0 and moves up; "direct" stays on the last level; both end when that
+            is solved. "whole_budget" stays on the last level to the end of the budget, even if solved.
         budget: training length and reports.
     """
 
@@ -66,13 +66,13 @@ class Condition:
     def packages(self) -> tuple[str, ...]:
         """The packages that compute the trials: those of every trial, and those that method and task declare.
 
-        They are no part of the id: their versions tell apart the records that one trial may have.
+        They are not part of the id: a trial may have several records, one per set of their versions.
         """
         return tuple(sorted({*ALWAYS, *packages_of(self.method), *packages_of(self.task)}))
 
     @property
     def versions(self) -> dict[str, str | None]:
-        """The versions of `packages` in this environment: a stored trial made with others does not answer for it."""
+        """The versions of `packages` in this environment: trials stored with others do not count for it."""
         return installed(self.packages)
 
     @property
@@ -94,7 +94,7 @@ class Condition:
 
 @dataclass(frozen=True)
 class TrialSpec:
-    """One trial: a condition and a seed (from 0 to 2³¹ − 1, as the device holds it)."""
+    """One trial: a condition and a seed (from 0 to 2³¹ − 1, a 32-bit integer on the device)."""
 
     condition: Condition
     seed: int

@@ -4,8 +4,8 @@ A trial has one record for each set of versions that it was run with: `trials/ab
 versions that its condition depends on. Records of older releases, which do not say what they depend on, are
 `trials/ab/<id>.json`.
 
-No locks and no server: files are whole or absent, and a file's name follows from its contents, so that several
-processes may share a store and a store copied over another merges with it.
+No locks and no server: files are complete or absent, and a file's name follows from its contents. So several processes
+may share a store, and copying a store over another merges them.
 """
 
 from __future__ import annotations
@@ -31,14 +31,14 @@ from evoclaims.trials.store_mark import ADVICE, check_store, mark
 from evoclaims.trials.time_limit import time_allowed
 
 Put = Literal["stored", "present", "differs"]
-"""What became of a trial handed to the store: written; there already, equal to the bit; there with another digest."""
+"""Result of storing a trial: written; already there, bit-identical; already there with another digest."""
 
 
 class DamagedFileError(UserError):
     """A file of the store is torn, edited or foreign; `path` is the file and `reason` a clause that says why."""
 
     def __init__(self, path: Path, reason: str) -> None:
-        """Build the sentence that names the file and the way out."""
+        """Build the message, which names the file and what to do."""
         super().__init__(
             f"Cannot use {path}: {reason}; run `evoclaims verify`, which moves the file aside so that "
             "the trial is run again."
@@ -49,20 +49,20 @@ class DamagedFileError(UserError):
 
 @dataclass(frozen=True)
 class Store(StoreFiles):
-    """Trials under one folder; making a `Store` touches no file, so that a read-only one can be read."""
+    """Trials in one folder; making a `Store` touches no file, so a read-only one can be read."""
 
     def champion_file(self, result: TrialResult) -> Path:
-        """Return the file that holds the champion which a record of this store names."""
+        """Return the file of the champion that a record of this store names."""
         spare = self.spare_champion_path(result.id, result.champion)
         return spare if os.path.exists(spare) else self.champion_path(result.id)
 
     def has_champion(self, result: TrialResult) -> bool:
-        """Whether a record of this store names the same champion, and its file is there; damaged or not."""
+        """Whether a record of this store names the same champion and its file exists, even if damaged."""
         named = any(record.champion == result.champion != "" for record in self.records(result.id))
         return named and self.champion_file(result).exists()
 
     def check(self) -> None:
-        """Refuse a folder that is there and is no store (see `store_mark.check_store`).
+        """Reject an existing folder that is not a store (see `store_mark.check_store`).
 
         Raises:
             UserError: when it is something else, cannot be read, or is of a later release.
@@ -70,10 +70,10 @@ class Store(StoreFiles):
         check_store(self.root)
 
     def check_writable(self) -> None:
-        """Mark the store and write and remove a small file, so that a bad folder is found before an hour of training.
+        """Mark the store, and write and remove a small file, to find a bad folder before an hour of training.
 
         Raises:
-            UserError: when the folder is no store, cannot be written, or the disk is full.
+            UserError: when the folder is not a store, cannot be written, or the disk is full.
         """
         self.check()
         mark(self.root)
@@ -84,7 +84,7 @@ class Store(StoreFiles):
     def made_with(self, trial_id: str, versions: Versions) -> TrialResult | None:
         """Return the record that was made with these versions, or None when there is none.
 
-        This is what answers for an environment: what is asked before a trial is run.
+        This decides whether a trial must be run in an environment.
 
         Args:
             trial_id: the trial.
@@ -98,15 +98,15 @@ class Store(StoreFiles):
             result = self.read(path)
             if result is not None and agree(result.provenance, versions):
                 return result
-        # A record made when its condition declared other packages is named by these.
+        # A record from when its condition declared other packages has their hash in its name.
         rest = (self._sound(path) for path in self.record_files(trial_id) if path not in usual)
         return next((result for result in rest if result is not None and agree(result.provenance, versions)), None)
 
     def get(self, trial_id: str, versions: Versions | None = None) -> TrialResult | None:
-        """Return the record of a trial, whatever versions it was made with, or None when there is none.
+        """Return the record of a trial, made with any versions, or None when there is none.
 
-        This is what is asked where trials at hand are judged, or looked at. Of several records the one made with
-        `versions` comes first, then the newest.
+        For judging or viewing stored trials. Of several records, the one made with `versions` comes first, then the
+        newest.
 
         Raises:
             DamagedFileError: when a file that may hold it is torn, edited, foreign or unreadable.
@@ -125,7 +125,7 @@ class Store(StoreFiles):
         return tuple(result for result in read if result is not None and not agree(result.provenance, versions))
 
     def _sound(self, path: Path) -> TrialResult | None:
-        """Read a record that is only one of several; `evoclaims verify` tells of a damaged one."""
+        """Read one of several records; a damaged one is None here, and `evoclaims verify` reports it."""
         try:
             return self.read(path)
         except DamagedFileError:
@@ -135,7 +135,7 @@ class Store(StoreFiles):
         """Return the trial in the record file `path` of this store, or None when the file is not there.
 
         Raises:
-            DamagedFileError: when it is torn, edited, foreign or unreadable, or not named and placed as a record is.
+            DamagedFileError: when it is torn, edited, foreign or unreadable, or has a wrong name or place.
         """
         trial_id = record_id(path)
         if trial_id is None or path.parent != self.record_path(trial_id).parent:
@@ -163,7 +163,7 @@ class Store(StoreFiles):
         return self.record_path(result.id, versions)
 
     def _present(self, result: TrialResult) -> TrialResult | None:
-        """Return the record that is there already for a trial and the versions that it was made with."""
+        """Return the stored record of the same trial and versions as `result`."""
         packages = depends_on(result.provenance)
         if packages is None:
             return self.read(self.record_path(result.id))
@@ -172,25 +172,24 @@ class Store(StoreFiles):
     def put(self, result: TrialResult, champion: Mapping[str, Any]) -> Put:
         """Store a trial and its champion's parameters (named arrays of any shape; empty for none).
 
-        The champion is written first, so that a record that exists is complete. A trial that is there already, made
-        with the same versions, stays as it is, whatever its digest, with one exception: neither a crash nor the end of
-        its time is an outcome of the trial, so a trial run again takes its place (see `_gives_way`). Of processes that
-        put the same trial at the same time, the first record stays and keeps its own champion: no champion is ever
-        written over another.
+        The champion is written first, so that every existing record is complete. A stored trial of the same versions is
+        not replaced, whatever its digest, with one exception: a crash or timeout is not an outcome, so a new run
+        replaces it (see `_gives_way`). If processes put the same trial at the same time, the first record stays and
+        keeps its own champion: a champion never overwrites another.
 
         Returns:
-            "stored", "present" (there already with an equal digest) or "differs" (there with another digest).
+            "stored", "present" (already there with an equal digest) or "differs" (there with another digest).
 
         Raises:
-            UserError: when the disk is full or read-only, or the record that is there is damaged.
-            ValueError: when `result` or `champion` has no sound record.
+            UserError: when the disk is full or read-only, or the stored record is damaged.
+            ValueError: when `result` or `champion` gives no valid record.
         """
         packed = pack(champion) if champion else b""
         sealed = dataclasses.replace(result, champion=hashlib.sha256(packed).hexdigest() if packed else "")
         record = dump(sealed)
         try:
             parse(record)
-        except RecordError as error:  # a mistake in the program: found here rather than by the next reader
+        except RecordError as error:  # a bug in the program: found here rather than by the next reader
             raise ValueError(str(error)) from error
         present = self._present(result)
         if present is not None and not _gives_way(present, result):
@@ -209,7 +208,7 @@ class Store(StoreFiles):
         return "stored"
 
     def forget_timeouts(self, trial_ids: Iterable[str], versions: Versions) -> None:
-        """Remove the records of these trials, made with these versions, that ran out of time: they are run again.
+        """Remove the "timeout" records of these trials and versions, so that the trials are run again.
 
         They have no champion.
 
@@ -226,13 +225,13 @@ class Store(StoreFiles):
                     raise UserError(f"Cannot remove {path}: {error.strerror or error}.") from error
 
     def _write_champion(self, sealed: TrialResult, packed: bytes) -> None:
-        """Write a champion to its usual place, or beside it where another one lies there."""
+        """Write a champion to its usual place, or beside it if another one is there."""
         usual = self.champion_path(sealed.id)
         if not write_once(usual, packed, ADVICE) and _sha256(usual) != sealed.champion:
             write_atomically(self.spare_champion_path(sealed.id, sealed.champion), packed, ADVICE)
 
     def _remove_champion_beside(self, first: TrialResult, sealed: TrialResult) -> None:
-        """Remove the champion of a trial that another process has stored first with another champion."""
+        """Remove our champion of a trial that another process stored first with a different champion."""
         if sealed.champion in {first.champion, *(record.champion for record in self.records(sealed.id))}:
             return
         for path in self.champion_files(sealed.id):
@@ -252,7 +251,7 @@ class Store(StoreFiles):
         return self.champion_of(result)
 
     def champion_of(self, result: TrialResult) -> dict[str, NDArray[Any]]:
-        """Return the champion's parameters of a trial read from this store; raises as `champion` does."""
+        """Return the champion's parameters for a record read from this store; raises as `champion` does."""
         if not result.champion:
             return {}
         path = self.champion_file(result)
@@ -268,12 +267,12 @@ class Store(StoreFiles):
             raise DamagedFileError(path, f"it is {error}") from error
 
     def ids(self) -> tuple[str, ...]:
-        """Return the sorted ids of the stored trials, by file name alone; the files are not opened."""
+        """Return the sorted ids of the stored trials, from file names only; the files are not opened."""
         named = ((record_id(path), path) for path in self.record_paths())
         return tuple(sorted({one for one, path in named if one and path.parent == self.record_path(one).parent}))
 
     def results(self, errors: list[DamagedFileError]) -> Iterator[TrialResult]:
-        """Iterate over every sound record in the order of ids; append one error to `errors` for each bad file.
+        """Iterate over every valid record in the order of ids; append an error to `errors` for each bad file.
 
         A trial that was run with several versions has several records.
         """
@@ -288,14 +287,14 @@ class Store(StoreFiles):
 
 
 def _gives_way(present: TrialResult, result: TrialResult) -> bool:
-    """Whether a stored trial without an outcome is replaced: by another end, or by one that had more time."""
+    """Whether `result` replaces a stored trial without an outcome: it ended otherwise, or had more time."""
     if present.status == "timeout":
         return result.status != "timeout" or time_allowed(result) > time_allowed(present)
     return present.status == "crashed" and present.digest != result.digest
 
 
 def newest(results: Iterable[TrialResult]) -> TrialResult | None:
-    """Return the record that was made last; None without any. One that does not say when is older than others."""
+    """Return the newest record; None if there is none. Records without a time count as oldest."""
     return max(results, key=lambda result: str(result.timing.get("ended", "")), default=None)
 
 

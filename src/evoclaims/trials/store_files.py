@@ -1,4 +1,4 @@
-"""Where the files of a trial store lie, and which of them belong to a trial."""
+"""Paths of the files in a trial store, and which of them belong to a trial."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _RECORD: Final = re.compile(rf"([0-9a-f]{{64}})(?:\.([0-9a-f]{{{SHORT_HASH}}}))?
 
 @dataclass(frozen=True)
 class StoreFiles:
-    """The names and places of a store's files; asking for them touches none.
+    """The names and paths of a store's files; this class opens none of them.
 
     Attributes:
         root: the folder; it need not exist yet.
@@ -33,62 +33,62 @@ class StoreFiles:
 
     @property
     def checkpoints(self) -> Path:
-        """The folder of interrupted conditions' checkpoints."""
+        """The folder of checkpoints of interrupted conditions."""
         return self.root / "checkpoints"
 
     def record_path(self, trial_id: str, versions: Versions | None = None) -> Path:
-        """Return where the record of `trial_id` belongs; a `UserError` for a text that is not an id.
+        """Return the path for the record of `trial_id`; raise a `UserError` for a text that is not an id.
 
         Args:
             trial_id: the trial.
-            versions: of the packages that it depends on; None for a record that does not say on which.
+            versions: of the packages that it depends on; None for a record that does not name them.
         """
         name = f"{_checked(trial_id)}.json" if versions is None else f"{trial_id}.{short_hash(versions)}.json"
         return self.root / "trials" / trial_id[:2] / name
 
     def record_files(self, trial_id: str) -> tuple[Path, ...]:
-        """Return the files that may hold a record of `trial_id`, whatever versions it was made with."""
+        """Return the files that may hold a record of `trial_id`, made with any versions."""
         usual = self.record_path(trial_id)
         return (usual, *(path for path in _entries(usual.parent) if path != usual and record_id(path) == trial_id))
 
     def champion_path(self, trial_id: str) -> Path:
-        """Return where the champion of `trial_id` belongs; a `UserError` for a text that is not an id."""
+        """Return the path for the champion of `trial_id`; raise a `UserError` for a text that is not an id."""
         return self.root / "champions" / _checked(trial_id)[:2] / f"{trial_id}.npz"
 
     def champion_files(self, trial_id: str) -> tuple[Path, ...]:
-        """Return the files that hold a champion of `trial_id`; more than one where processes have raced (see `put`)."""
+        """Return the files that hold a champion of `trial_id`; more than one if processes raced (see `put`)."""
         usual = self.champion_path(trial_id)
         found = (usual, *sorted(usual.parent.glob(f"{trial_id}.*.npz")))
         return tuple(path for path in found if os.path.exists(path))
 
     def spare_champion_path(self, trial_id: str, champion: str) -> Path:
-        """Return where a champion goes when the usual place holds another one."""
+        """Return the path for a champion when the usual place holds another one."""
         return self.champion_path(trial_id).with_suffix(f".{champion[:SPARE_DIGITS]}.npz")
 
     def record_paths(self) -> Iterator[Path]:
-        """Iterate over all that lies where records belong, strange entries included (hidden ones left out)."""
+        """Iterate over all entries in the record folders, including strange ones, without hidden ones."""
         return _walk(self.root / "trials")
 
     def champion_paths(self) -> Iterator[Path]:
-        """Iterate over all that lies where champions belong, strange entries included (hidden ones left out)."""
+        """Iterate over all entries in the champion folders, including strange ones, without hidden ones."""
         return _walk(self.root / "champions")
 
 
 def record_id(path: Path) -> str | None:
-    """Return the id of the trial that a file is named as a record of; None when its name is no record's."""
+    """Return the trial id in the name of a record file; None for any other name."""
     named = _RECORD.fullmatch(path.name)
     return named[1] if named else None
 
 
 def _checked(trial_id: str) -> str:
-    """Return `trial_id` when it is one; anything else might climb out of the store's folder."""
+    """Return `trial_id` if it is one; any other text might be a path outside of the store."""
     if not is_hash(trial_id):
         raise UserError(f"{trial_id!r} is not a trial's id: an id is 64 lower-case hexadecimal digits.")
     return trial_id
 
 
 def _walk(top: Path) -> Iterator[Path]:
-    """Iterate over `top/<two hex digits>/*`, sorted; an entry that is no such folder is given itself."""
+    """Iterate over `top/<two hex digits>/*`, sorted; any other entry of `top` is yielded itself."""
     for entry in _entries(top):
         if re.fullmatch(r"[0-9a-f]{2}", entry.name) and entry.is_dir():
             yield from _entries(entry)

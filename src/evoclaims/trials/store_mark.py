@@ -1,4 +1,4 @@
-"""What tells a store from any other folder: a small file in its root, or, of older stores, what lies in them."""
+"""How a store is recognized: by a small file in its root or, for older stores, by their contents."""
 
 from __future__ import annotations
 
@@ -23,20 +23,20 @@ _FOLDERS: Final = {
     "verdicts": r".+",
     "quarantine": r".+",
 }
-"""Folders of a store made before there was a mark, and what the names in them look like."""
+"""Folders of a store from before the mark existed, with the pattern of the names in them."""
 
 ELSEWHERE: Final = "name another folder with --claims-storage (pytest) or --storage (evoclaims)."
-"""The end of what a user is told whose store cannot be used."""
+"""End of the error message when a store cannot be used."""
 ADVICE: Final = f"Free some space or {ELSEWHERE}"
 
 _OTHER: Final = "Name the folder of a store with --storage (evoclaims) or --claims-storage (pytest)"
 
 
 def check_store(root: Path) -> None:
-    """Refuse a folder that is there and is no store: nothing may be read from it, written to it or moved in it.
+    """Reject an existing folder that is not a store: nothing may be read, written or moved in it.
 
-    A folder is a store when it has the mark, when it is empty, or when everything in it could have been put there by
-    a release that did not write the mark yet.
+    A folder is a store if it has the mark, is empty, or contains only what a release without the mark could have
+    written.
 
     Raises:
         UserError: when it is something else, cannot be read, or is of a later release.
@@ -46,7 +46,7 @@ def check_store(root: Path) -> None:
     except FileNotFoundError:
         return
     except NotADirectoryError as error:
-        if not os.path.exists(root):  # a folder on the way to it is a file: it is not there
+        if not os.path.exists(root):  # a parent is a file, so the folder does not exist
             return
         raise UserError(f"The trial store {root} is a file, not a folder: {ELSEWHERE}") from error
     except OSError as error:
@@ -63,9 +63,9 @@ def check_store(root: Path) -> None:
 
 
 def mark(root: Path) -> None:
-    """Mark a folder as a store, and tell git to ignore what is in it.
+    """Mark a folder as a store, and make git ignore its contents.
 
-    An older store that has no mark yet gets no `.gitignore`: somebody may have committed its files.
+    An older store without a mark gets no `.gitignore`: its files may have been committed.
 
     Raises:
         UserError: when the folder cannot be written or the disk is full.
@@ -80,7 +80,7 @@ def mark(root: Path) -> None:
 
 
 def _check_mark(path: Path) -> None:
-    """Refuse a mark of another program or a later release."""
+    """Reject a mark of another program or a later release."""
     try:
         plain: Any = json.loads(read_file(path))
     except (OSError, ValueError, RecursionError):
@@ -98,7 +98,7 @@ def _check_mark(path: Path) -> None:
 
 
 def _strange(root: Path, names: list[str]) -> str:
-    """Return the first name in an unmarked folder that no store has, a user's own before Python's; empty when none."""
+    """Return the first name in an unmarked folder that no store has, Python's own names last; empty if none."""
     for name in sorted(names, key=lambda name: (name == "__pycache__", name)):
         if name.startswith("."):
             continue
@@ -108,7 +108,7 @@ def _strange(root: Path, names: list[str]) -> str:
         try:
             inside = sorted(os.listdir(root / name))
         except OSError:
-            continue  # an unreadable part of a store is told of where it is read
+            continue  # an unreadable part of a store is reported where it is read
         for entry in inside:
             if not entry.startswith(".") and not re.fullmatch(pattern, entry):
                 return f"{name}/{entry}"

@@ -1,4 +1,4 @@
-"""The time that a batch of trials may take: how it is written, and which records it makes outdated."""
+"""The time limit of a batch of trials: how it is written, and which records it makes outdated."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ from evoclaims.core.errors import UserError
 from evoclaims.trials.result import TrialResult
 
 DEFAULT_LIMIT: Final = "24h"
-"""Long enough for every condition of the full tier on the hardware it is meant for."""
+"""Long enough for every condition of the full tier on its intended hardware."""
 
 _UNITS: Final = {"s": 1.0, "min": 60.0, "h": 3600.0}
 
 
 def seconds_of(text: str) -> float:
-    """Return a length of time such as "90s", "30min", "1.5h" in seconds; infinity for "none".
+    """Return a duration such as "90s", "30min", "1.5h" in seconds; infinity for "none".
 
     Raises:
-        UserError: for another text, or no time at all.
+        UserError: for any other text, or a duration of 0.
     """
     if text.strip() == "none":
         return math.inf
@@ -30,18 +30,18 @@ def seconds_of(text: str) -> float:
 
 
 def is_final(result: TrialResult | None) -> bool:
-    """Whether there is a trial that time has not ended."""
+    """Whether there is a trial, and it did not time out."""
     return result is not None and result.status != "timeout"
 
 
 def answers(result: TrialResult | None, limit: float) -> bool:
-    """Whether a trial need not be run under a limit of so many seconds.
+    """Whether a trial need not be run under a limit of `limit` seconds.
 
-    One that ran out of time answers as long as it would have no more of it now.
+    A timed-out trial is run again only under a larger limit.
     """
     return is_final(result) or (result is not None and limit <= time_allowed(result))
 
 
 def time_allowed(result: TrialResult) -> float:
-    """Return the seconds that a trial which ran out of time had with its batch; 0 where its record does not say."""
+    """Return the time limit of a timed-out trial's batch in seconds; 0 if its record does not say."""
     return float(result.timing.get("limit", 0.0))
