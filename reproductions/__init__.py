@@ -1,1 +1,1 @@
-"""Papers under test: what is run, and the committed reference trials."""
+"""Reproduced papers: their conditions and committed reference trials."""

@@ -1,6 +1,6 @@
-"""Figs. 5 to 10: what is run on ecorobot, at the paper's size ("full") and scaled down ("smoke").
+"""Figs. 5 to 10: conditions on ecorobot, at the paper's size ("full") and scaled down ("smoke").
 
-Hyperparameters are the paper's tables (appendix A); training lengths, which the paper omits, are the published code's.
+Hyperparameters are from the paper's tables (appendix A); training lengths, which it omits, are from the published code.
 """
 
 from __future__ import annotations
@@ -47,8 +47,8 @@ _QUARTER = math.pi / 2
 SIMPLE_ROB_SUBSTRATE = Substrate(
     (
         (
-            # x, y, heading, and the velocities along x and y: inside the body; then the rays where they leave it, from
-            # the right over the front to the left; the bias last.
+            # x, y, heading, and the velocities along x and y: inside the body. Then the rays, where they leave it, from
+            # right over front to left. The bias last.
             *((0.5, 0.0), (0.0, 0.5), (0.0, 0.0), (-0.5, 0.0), (0.0, -0.5)),
             *on_circle([-_QUARTER, -_QUARTER / 2, 0.0, _QUARTER / 2, _QUARTER]),
             (-0.25, -0.25),
@@ -57,22 +57,22 @@ SIMPLE_ROB_SUBSTRATE = Substrate(
         on_circle([_QUARTER, 0.0, math.pi, -_QUARTER]),
     )
 )
-"""Sensors and motors (north, east, west, south) where they sit on the robot (the paper's figure of the substrate)."""
+"""Positions of sensors and motors (north, east, west, south) on the robot (the paper's figure of the substrate)."""
 
 
 @dataclass(frozen=True)
 class Size:
-    """One size at which everything is run.
+    """The settings of one size.
 
     Attributes:
-        maze_steps, robot_steps: steps of an episode, in mazes with the simplest robot and of robots with limbs.
+        maze_steps, robot_steps: steps per episode, in mazes with the simplest robot and for robots with limbs.
         neat, limbed_neat: settings of NEAT with the simplest robot and with robots that have limbs.
-        cppn: of HyperNEAT's CPPNs.
+        cppn: settings of HyperNEAT's CPPNs.
         cma_es: population of CMA-ES.
         hidden: neurons of the network that CMA-ES trains.
         ppo: PPO.
         map_elites: MAP-Elites.
-        budgets: by task, of each method.
+        budgets: of each method, by task.
     """
 
     maze_steps: int
@@ -113,9 +113,9 @@ def _conditions(size: Size) -> Conditions:
         "ppo": dict.fromkeys(tasks, size.ppo),
         "goal_ppo": dict.fromkeys(tasks, size.ppo),
         "map_elites": dict.fromkeys(tasks, size.map_elites),
-        # Control C3: nothing is learnt.
+        # Control C3: no learning.
         "random_policy": dict.fromkeys(tasks, RandomPolicy()),
-        # Control C4: nothing to train.
+        # Control C4: no training.
         "waypoints": dict.fromkeys(tasks, Waypoints()),
     }
     goals = {STONES: replace(stones, shows_goal=True), STONES_ANT: replace(ant_stones, shows_goal=True)}

@@ -1,4 +1,4 @@
-"""Fig. 6: where MAP-Elites' elites end, in the deceptive maze and in the maze with stepping stones."""
+"""Fig. 6: end positions of MAP-Elites' elites, in the deceptive maze and in the maze with stepping stones."""
 
 from evoclaims.figures import ElitesMap, Figure, Ground
 

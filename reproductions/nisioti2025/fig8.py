@@ -1,4 +1,4 @@
-"""Fig. 8: obstacles of one height, without the curriculum of rising ones."""
+"""Fig. 8: obstacles of constant height, without the curriculum."""
 
 from evoclaims.figures import BarChart, Figure, compared
 from reproductions.nisioti2025.figures import NEAT, PPO, PUBLISHED

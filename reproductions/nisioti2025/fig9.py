@@ -1,4 +1,4 @@
-"""Fig. 9: the maze with stepping stones, the ant beside the simplest robot."""
+"""Fig. 9: the maze with stepping stones, for the ant and the simplest robot."""
 
 from evoclaims.figures import BarChart, Figure, compared
 from reproductions.nisioti2025.figures import CMA_ES, HYPERNEAT, NEAT, PPO, PUBLISHED

@@ -1,4 +1,4 @@
-"""What the figures share: the methods as they are shown, and what the paper has published."""
+"""Shared by the figures: how methods are shown, and the paper's published results."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the paper measures beyond success and reward: stones, obstacles, ways through mazes, and networks' sizes.
+"""The paper's measures besides success and reward: stones, obstacles, paths through mazes, and network sizes.
 
 The names in quotation marks are hashed into the claims' fingerprints.
 """
@@ -13,25 +13,25 @@ class PaperTrials(TrialGroup):
 
     @property
     def stones(self) -> Measure:
-        """Stones that the final policy crosses in their order, averaged over the examination's episodes."""
+        """Stones that the final policy crosses in order, averaged over the examination's episodes."""
         return self.measure("stones crossed", lambda t: t.metrics["stones"])
 
     def crosses(self, stones: float) -> Event:
-        """The final policy crosses exactly as many stones as this in every episode."""
+        """The final policy crosses exactly `stones` stones in every episode."""
         return self.event(f"crosses {stones:g} stones", lambda t: t.metrics["stones"] == stones)
 
     def crosses_at_most(self, stones: float) -> Event:
-        """The final policy crosses no more stones than this, averaged over the examination's episodes."""
+        """The final policy crosses at most `stones` stones, averaged over the examination's episodes."""
         return self.event(f"crosses at most {stones:g} stones", lambda t: t.metrics["stones"] <= stones)
 
     @property
     def path_coverage(self) -> Measure:
-        """Share of the reachable cells that the final policy's path leads through."""
+        """Share of the reachable cells on the final policy's path."""
         return self.measure("share of the maze covered", lambda t: t.metrics["coverage"])
 
     @property
     def archive_coverage(self) -> Measure:
-        """Share of the reachable cells that hold an elite; of methods with an archive."""
+        """Share of the reachable cells with an elite; for methods with an archive."""
         return self.measure("share of the maze covered", lambda t: t.curves["coverage"][-1])
 
     @property
@@ -46,7 +46,7 @@ class PaperTrials(TrialGroup):
 
     @property
     def has_found_the_target(self) -> Event:
-        """Some individual has reached the target; of methods with an archive."""
+        """Some individual has reached the target; for methods with an archive."""
         return self.event("has found the target", lambda t: t.curves["reached"][-1] == 1)
 
     def ends_within(self, distance: float) -> Event:
@@ -54,33 +54,33 @@ class PaperTrials(TrialGroup):
         return self.event(f"ends within {distance:g} m of the target", lambda t: t.metrics["distance"] <= distance)
 
     def passes_at_most(self, obstacles: float) -> Event:
-        """The final policy leaves no more obstacles behind than this, averaged over the examination's episodes."""
+        """The final policy passes at most `obstacles` obstacles, averaged over the examination's episodes."""
         return self.event(f"passes at most {obstacles:g} obstacles", lambda t: t.metrics["obstacles"] <= obstacles)
 
     @property
     def overturned(self) -> Measure:
-        """Share of the final policy's steps that the robot spends upside-down."""
+        """Share of the final policy's steps in which the robot is upside-down."""
         return self.measure("share of steps upside-down", lambda t: t.metrics["upside_down"])
 
     @property
     def control_cost(self) -> Measure:
-        """What the final policy's actions cost in an episode."""
+        """Cost of the final policy's actions per episode."""
         return self.measure("control cost", lambda t: t.metrics["control_cost"])
 
     @property
     def champion_is_mostly_hidden(self) -> Event:
-        """More than half of the final champion's neurons are hidden; of methods that grow networks."""
+        """More than half of the final champion's neurons are hidden; for methods that grow networks."""
         most = self._neurons_half_hidden
         return self.event("most neurons of the champion are hidden", lambda t: t.curves["champion_nodes"][-1] > most)
 
     @property
     def champion_is_mostly_input_and_output(self) -> Event:
-        """No more than half of the final champion's neurons are hidden; of methods that grow networks."""
+        """At most half of the final champion's neurons are hidden; for methods that grow networks."""
         most = self._neurons_half_hidden
         name = "at most half of the champion's neurons are hidden"
         return self.event(name, lambda t: t.curves["champion_nodes"][-1] <= most)
 
     @property
     def _neurons_half_hidden(self) -> int:
-        """Neurons of a network of which half are hidden."""
+        """Total neurons of a network in which half are hidden."""
         return 2 * (self.condition.task.observation_size + self.condition.task.action_size)

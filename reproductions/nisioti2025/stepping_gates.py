@@ -1,6 +1,6 @@
-"""Figs. 3 and 4: what is run on the stepping gates, at the paper's size ("full") and scaled down ("smoke").
+"""Figs. 3 and 4: conditions on the stepping gates, at the paper's size ("full") and scaled down ("smoke").
 
-Hyperparameters are the paper's tables (appendix A); training lengths, which the paper omits, are the published code's.
+Hyperparameters are from the paper's tables (appendix A); training lengths, which it omits, are from the published code.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ Conditions = dict[tuple[str, str], Condition]
 def _on_every_task(
     parity: Circuit, alu: Circuit, method: Method[Any], parity_budget: Budget, alu_budget: Budget
 ) -> Conditions:
-    """Put a method on N-parity and Simple ALU with the curriculum, and on N-parity's last level directly."""
+    """Return a method's conditions: N-parity and Simple ALU with the curriculum, and N-parity's last level alone."""
     on: list[tuple[str, Circuit, Progression, Budget]] = [
         ("n_parity", parity, "curriculum", parity_budget),
         ("simple_alu", alu, "curriculum", alu_budget),
@@ -41,19 +41,19 @@ def _on_every_task(
 
 
 def _sampled(circuit: Any) -> Any:
-    """Return the circuit as reinforcement learning meets it: episodes of one random row (§3.1)."""
+    """Return the circuit for reinforcement learning: episodes of one random row (§3.1)."""
     return replace(circuit, sampling="sampled")
 
 
 def _hand_built(parity: Circuit, alu: Circuit) -> Conditions:
-    """Put the hand-built networks (control C2) on every level of both tasks: there is nothing to train."""
+    """Return conditions of the hand-built networks (control C2) on every level of both tasks; no training."""
     look = Budget(generations=1, reports=1)
     built = [_on_every_task(parity, alu, HandBuilt(negated=negated), look, look) for negated in (False, True)]
     return {**built[0], **built[1]}
 
 
 def _tensorneat(parity: Circuit, alu: Circuit, neat: Settings, cppn: Settings, *budgets: Budget) -> Conditions:
-    """Put the library that the paper used beside our implementation of both its methods, for who has installed it."""
+    """Return conditions of both methods in the paper's library, to compare with ours; they need it installed."""
     on_parity, on_alu = budgets
     return {
         **_on_every_task(parity, alu, NeatTensorneat(neat), on_parity, on_alu),
@@ -64,7 +64,7 @@ def _tensorneat(parity: Circuit, alu: Circuit, neat: Settings, cppn: Settings, *
 def _full() -> Conditions:
     """Return the paper's own size."""
     parity, alu = NParity(bits=6), SimpleAlu()
-    neat = Settings()  # whose defaults are the paper's table
+    neat = Settings()  # the defaults are the paper's table
     cppn = replace(neat, activations=CPPN_FUNCTIONS)
     network = AllSkips(hidden=24)  # §A.3: "24 hidden neurons and all skip connections present"
     evolution = (Budget(generations=5_000), Budget(generations=10_000))
@@ -84,7 +84,7 @@ def _smoke() -> Conditions:
     """Return the scaled-down instances: 4-parity and the first three operations of the ALU.
 
     A whole budget takes seconds on one core; PPO takes larger steps on smaller batches, since it gets a few hundred
-    updates where the paper gives hundreds of thousands.
+    updates instead of the paper's hundreds of thousands.
     """
     parity, alu = NParity(bits=4), SimpleAlu(level_count=3)
     network = AllSkips(hidden=16)

@@ -1,4 +1,4 @@
-"""The tables of hyperparameters (appendix A), and what each tier is run with."""
+"""The tables of hyperparameters (appendix A), with the values of each tier."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ NEAT: Settings = {
     "mutation node": lambda c: c.method.settings.mutation.bias.mutate_rate,
     "node deletion probability": lambda c: c.method.settings.mutation.node_delete,
     "add node probability": lambda c: c.method.settings.mutation.node_add,
-    "architecture": lambda c: "feedforward",  # a genome here can be nothing else
+    "architecture": lambda c: "feedforward",  # genomes here are always feedforward
     "most nodes, connections": lambda c: f"{c.method.settings.nodes}, {c.method.settings.connections}",
     "training length": _length,
 }

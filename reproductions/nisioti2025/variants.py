@@ -1,4 +1,4 @@
-"""Details that the paper leaves open, or that its published code does otherwise: which conclusions hang on them?"""
+"""Details that the paper leaves open, or that its code does differently: which conclusions depend on them?"""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def _rows_so_far(method: str, task: str, condition: Condition) -> Condition | No
 
 
 def _published_alu(method: str, task: str, condition: Condition) -> Condition | None:
-    """Simple ALU, as the published code has it."""
+    """Simple ALU, as in the published code."""
     asked = condition.task
     if not isinstance(asked, SimpleAlu) or method.startswith("hand_built"):
         return None
@@ -30,7 +30,7 @@ def _published_alu(method: str, task: str, condition: Condition) -> Condition | 
 
 
 def _perceptron(method: str, task: str, condition: Condition) -> Condition | None:
-    """CMA-ES with the published script's network, or one as small as the smoke tier's others."""
+    """CMA-ES with the published script's network; in the smoke tier, with a small one."""
     trained: Any = condition.method
     if not isinstance(trained, CmaEs):
         return None
@@ -39,7 +39,7 @@ def _perceptron(method: str, task: str, condition: Condition) -> Condition | Non
 
 
 def _published_neat(method: str, task: str, condition: Condition) -> Condition | None:
-    """NEAT with the published code's rates and treatment of a new level; at full size its population too."""
+    """NEAT with the published code's rates and handling of new levels; at full size also its population."""
     evolved: Any = condition.method
     if not isinstance(evolved, Neat):
         return None
@@ -51,7 +51,7 @@ def _published_neat(method: str, task: str, condition: Condition) -> Condition |
 
 
 def _sigmoid(method: str, task: str, condition: Condition) -> Condition | None:
-    """HyperNEAT whose CPPNs have sigmoids only."""
+    """HyperNEAT with only sigmoids in its CPPNs."""
     evolved: Any = condition.method
     if not isinstance(evolved, HyperNeat):
         return None
@@ -60,7 +60,7 @@ def _sigmoid(method: str, task: str, condition: Condition) -> Condition | None:
 
 
 def _lucky_level_up(method: str, task: str, condition: Condition) -> Condition | None:
-    """PPO goes up a level when 128 rows drawn at random are answered right, tested 49 times in a whole budget."""
+    """PPO moves up a level when it answers 128 random rows correctly; tested 49 times in a whole budget."""
     learner: Any = condition.method
     if not isinstance(learner, Ppo) or isinstance(condition.task, RobotTask):
         return None
@@ -69,7 +69,7 @@ def _lucky_level_up(method: str, task: str, condition: Condition) -> Condition |
 
 
 def _published_ppo(method: str, task: str, condition: Condition) -> Condition | None:
-    """PPO among robots, with the published code's hyperparameters."""
+    """PPO on robots, with the published code's hyperparameters."""
     learner: Any = condition.method
     if not isinstance(learner, Ppo) or not isinstance(condition.task, RobotTask):
         return None

@@ -1,7 +1,7 @@
-"""A controller that knows the maze by heart: the positive control of the stepping stones (C4).
+"""A controller that knows the maze: the positive control of the stepping stones (C4).
 
-It learns nothing. Shortest paths to every stone are worked out beforehand; the robot follows the one to the stone that
-it is shown. A maze that it cannot cross within an episode would be one that no method can.
+It learns nothing. Shortest paths to every stone are computed beforehand; the robot follows the one to the stone that
+it observes. If it cannot cross a maze within an episode, no method can.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ from evoclaims.envs import ROBOT_PACKAGES, SIMPLE_ROB, STONES, Box, SteppingSton
 from evoclaims.methods import Policy, Progress
 
 GRID: Final = 0.1
-"""Distance of the points between which paths lead, m."""
+"""Distance between grid points of the paths, m."""
 AHEAD: Final = 4
 """How many points ahead the robot steers."""
 CLEARANCE: Final = 0.12
-"""How far from walls paths keep the robot's surface, m."""
+"""Distance that paths keep between the robot's surface and walls, m."""
 
 
 @dataclass(frozen=True)
@@ -34,8 +34,8 @@ class Waypoints:
     """Steers the simplest robot from stone to stone.
 
     Attributes:
-        speed: that it tries to keep, m/s.
-        gain: force for each m/s that it is too slow, N; the motors give no more than 2 N.
+        speed: target speed, m/s.
+        gain: force per m/s of speed error, N; the motors give at most 2 N.
     """
 
     name: ClassVar[str] = "waypoints"
@@ -82,19 +82,19 @@ class Waypoints:
         )
 
     def cost(self, task: Task) -> int:
-        """Return the environment steps of one step: none are made, but a trial's length is counted in them."""
+        """Return the environment steps of one step: none are made, but trial lengths are counted in them."""
         return task.horizon
 
 
 @lru_cache(maxsize=4)
 def _targets(boxes: tuple[Box, ...], area: tuple[tuple[float, float], ...], radius: float) -> NDArray[np.float32]:
-    """Return where to steer from each point of a grid, to each stone: shape [stones, points x, points y, 2], m."""
+    """Return where to steer from each grid point to reach each stone, shape [stones, points x, points y, 2], m."""
     axes = [np.arange(round((high - low) / GRID) + 1) * GRID + low for low, high in area]
     points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
     gap = np.full(points.shape[:2], np.inf)
     for box in boxes:
         gap = np.minimum(gap, box.distance(points))
-    # Points too near to walls are left by the cheapest way, but never passed.
+    # Points too near to walls are expensive: paths may start there, but never pass through.
     shape, flat = gap.shape, points.reshape(-1, 2)
     price = np.where(gap < radius + CLEARANCE, 1e3, 1.0).ravel()
     index = np.arange(price.size).reshape(shape)

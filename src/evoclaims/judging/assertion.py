@@ -1,4 +1,4 @@
-"""What a claim asserts about trials: the interface of every kind, and the compounds with "and" and "or"."""
+"""What a claim asserts about trials: the interface of all kinds, and compounds with "and" and "or"."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ class Finding:
 
     Attributes:
         p: for and against the assertion.
-        attainable: the smallest that n and the ties allow of each.
+        attainable: the smallest of each that n and the ties allow.
         evidence: one entry for each part.
-        deciding: for each direction, the index in `evidence` of the part that the p value rests on.
+        deciding: for each direction, the index in `evidence` of the part that gives the p value.
     """
 
     p: PValues
@@ -37,8 +37,8 @@ class Finding:
 class Assertion(ABC):
     """One checkable sentence about trials.
 
-    Each kind is a frozen dataclass that fills in the abstract methods. Its fields are readings of trials, and the
-    numbers and words that are fixed beforehand; all of them are in the claim's fingerprint.
+    Each kind is a frozen dataclass that implements the abstract methods. Its fields are readings of trials, and numbers
+    and words that are fixed beforehand; the claim's fingerprint includes all of them.
     """
 
     kind: ClassVar[str]
@@ -48,7 +48,7 @@ class Assertion(ABC):
         """Return the assertion in plain English."""
 
     def sources(self) -> tuple[Source, ...]:
-        """Return the conditions it needs, each once."""
+        """Return the conditions it needs, without duplicates."""
         values = (getattr(self, field.name) for field in fields(self))
         return _unique(value.source for value in values if isinstance(value, TrialReading))
 
@@ -58,25 +58,25 @@ class Assertion(ABC):
 
     @abstractmethod
     def attainable(self, n: int, protocol: Protocol) -> PValues:
-        """Return the smallest p, for and against, that `n` trials a side can give before any value is seen."""
+        """Return the smallest p, for and against, that `n` trials per side can give, without looking at values."""
 
     @abstractmethod
     def find(self, trials: Trials, protocol: Protocol, alpha: float) -> Finding:
         """Judge the trials at `alpha`.
 
         Raises:
-            UnreadableTrialError: when a finished trial holds no number that can be judged.
+            UnreadableTrialError: when a finished trial has no number that can be judged.
         """
 
     def looks(self, protocol: Protocol) -> tuple[Look, ...]:
-        """Return the looks that this kind takes: all of the protocol's unless it needs every trial at once."""
+        """Return this kind's looks: all of the protocol's, unless it needs every trial at once."""
         return protocol.looks
 
     def bounds(self, trials: Trials, n: int, protocol: Protocol) -> tuple[PValues, PValues]:
-        """Bound p over all completions of `trials` to `n` a side: the lowest and the highest, for and against.
+        """Bound p over all completions of `trials` to `n` per side: the lowest and the highest, for and against.
 
-        The bounds here hold for every kind. The rank tests keep them: with ties no single completion is extreme (a
-        tie among new values can lower p below that of distinct ones), so nothing tighter is safe for them.
+        The default bounds hold for every kind. The rank tests use them: with ties, no single completion is extreme (a
+        tie among new values can give a lower p than distinct ones), so nothing tighter is safe for them.
         """
         return self.attainable(n, protocol), PValues(1.0, 1.0)
 
@@ -98,15 +98,15 @@ class Assertion(ABC):
 
         Args:
             p: for and against the assertion.
-            attainable: the smallest that n and the ties allow of each.
+            attainable: the smallest of each that n and the ties allow.
             alpha: significance level of the look.
             samples: what was read from the trials.
-            detail: what else the reader should know.
+            detail: further information for the reader.
             bounds: what the trials are compared with.
             intervals: description only.
             events: whether values say that something held.
-            effect: whether to describe how far the two samples lie apart.
-            tested: whether p comes of a test; a fact's, 0 for what is so and 1 for what is not, is not reported.
+            effect: whether to report the effect size between the two samples.
+            tested: whether p comes from a test; the p of a fact (0 for true, 1 for false) is not reported.
         """
         first, last = samples[0].values, samples[-1].values
         evidence = Evidence(
@@ -130,7 +130,7 @@ class Assertion(ABC):
         return Finding(p, attainable, (evidence,), dict.fromkeys(Direction, 0))
 
     def fact(self, holds: bool, alpha: float, sample: Sample, detail: str, *, events: bool = False) -> Finding:
-        """Return the finding of an assertion that is so or not, without a test."""
+        """Return the finding of an assertion that is true or false without a test."""
         p = PValues(0.0, 1.0) if holds else PValues(1.0, 0.0)
         return self.found(p, PValues(0.0, 0.0), alpha, (sample,), detail=detail, events=events, tested=False)
 
@@ -143,7 +143,7 @@ class Assertion(ABC):
         return AnyOf((*_parts(self, AnyOf), *_parts(other, AnyOf)))
 
     def __bool__(self) -> NoReturn:
-        """Refuse to be true or false without a judge.
+        """Reject use as a bool: only the judge decides.
 
         Raises:
             TypeError: always.
@@ -152,7 +152,7 @@ class Assertion(ABC):
 
 
 def _parts(value: object, joined_by: type[Compound]) -> tuple[Assertion, ...]:
-    """Return the parts that `value` adds to a compound: flat, since nested corrections would multiply."""
+    """Return the parts that `value` adds to a compound; flattened, since nested corrections would multiply."""
     if not isinstance(value, Assertion):
         raise UserError(f"Only assertions are joined with & and |, not {value!r}: put each in parentheses.")
     return value.parts if isinstance(value, joined_by) else (value,)
@@ -164,7 +164,7 @@ def _unique(sources: Iterable[Source]) -> tuple[Source, ...]:
 
 
 def _plain(value: object) -> object:
-    """Return a kind's field as the fingerprint hashes it: 1 and 1.0 are the same number."""
+    """Return a kind's field as the fingerprint hashes it: 1 and 1.0 are equal."""
     if isinstance(value, TrialReading):
         return value.plain()
     return float(value) if isinstance(value, int) else value
@@ -172,11 +172,11 @@ def _plain(value: object) -> object:
 
 @dataclass(frozen=True)
 class Compound(Assertion):
-    """Several assertions that are judged as one; a subclass says how their p values combine.
+    """Several assertions that are judged as one; a subclass defines how their p values combine.
 
     Attributes:
         joint: the word between the parts.
-        weakest: the direction in which the part with the largest p decides; in the other it is the smallest.
+        weakest: the direction in which the part with the largest p decides; in the other, the smallest decides.
     """
 
     parts: tuple[Assertion, ...]
@@ -186,7 +186,7 @@ class Compound(Assertion):
     @staticmethod
     @abstractmethod
     def combine(parts: Sequence[PValues]) -> PValues:
-        """Return the compound's p from its parts'; must never fall as a part's p rises."""
+        """Combine the parts' p; the result must never fall when a part's p rises."""
 
     def describe(self) -> str:
         """Join the parts' sentences."""
@@ -224,7 +224,7 @@ class Compound(Assertion):
         )
 
     def _deciding(self, findings: Sequence[Finding], direction: Direction) -> int:
-        """Return the index, among all parts' evidence, of the one that the compound's p rests on."""
+        """Return the index, among all parts' evidence, of the entry that gives the compound's p."""
         choose = max if direction is self.weakest else min
         chosen = choose(range(len(findings)), key=lambda index: findings[index].p.toward(direction))
         before = sum(len(finding.evidence) for finding in findings[:chosen])

@@ -1,4 +1,4 @@
-"""Has anything drifted? New trials against committed reference trials of the same condition."""
+"""Drift: new trials compared with committed reference trials of the same condition."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ from evoclaims.trials.result import TrialResult
 ALPHA = 0.01
 MIN_REFERENCES = 10
 RESOLUTION = 1e-6
-"""Relative difference up to which two numbers of trials are the same: eight times what float32 resolves."""
+"""Relative difference up to which two trials' numbers count as equal: eight times the precision of float32."""
 
 DriftStatus = Literal["no drift", "drift", "underpowered", "no reference", "not run", "error"]
-"""Only "no drift" is a pass; "underpowered" means that no values could have shown drift after the correction."""
+"""Only "no drift" is a pass; "underpowered": no values could have shown drift after the correction."""
 
 
 @dataclass(frozen=True)
@@ -29,8 +29,8 @@ class DriftCase:
 
     Attributes:
         label: a short name, such as "cma_es on n_parity".
-        condition: the condition's id; references of another id are left out (their code or budget differs).
-        new: trials of now.
+        condition: the condition's id; references of another id are ignored (their code or budget differs).
+        new: new trials.
         reference: committed trials.
         metrics: names in `TrialResult.metrics`.
     """
@@ -49,14 +49,14 @@ class DriftRow:
     Attributes:
         label: names the condition.
         metric: what was compared.
-        n_new, n_ref: trials of now and reference trials.
-        status: what became of the comparison.
-        p: two-sided; None where nothing was tested.
+        n_new, n_ref: numbers of new trials and of reference trials.
+        status: result of the comparison.
+        p: two-sided; None if not tested.
         p_holm: the same, Holm-adjusted.
-        detail: why nothing was tested, or what the test could not have shown.
-        a12: Vargha and Delaney's effect: the chance that a trial of now is above a reference, ties counting half; None
-            where nothing was tested.
-        median_new, median_ref: of either side; None where nothing was tested.
+        detail: why there was no test, or what the test could not have shown.
+        a12: Vargha and Delaney's effect: the chance that a new trial is above a reference, ties counting half; None if
+            not tested.
+        median_new, median_ref: of each side; None if not tested.
     """
 
     label: str
@@ -78,7 +78,7 @@ class DriftRow:
 
     @property
     def in_words(self) -> str:
-        """A tested row in a line: which way, how far, how surely."""
+        """A tested row as one line: direction, effect and p."""
         if self.a12 is None or self.p_holm is None:
             return f"{self.label}: {self.metric}: {self.detail or self.status}"
         way = "higher" if self.a12 > 0.5 else "lower" if self.a12 < 0.5 else "spread otherwise"
@@ -102,7 +102,7 @@ class DriftReport:
 
     @property
     def tested(self) -> int:
-        """How many rows say something either way."""
+        """How many rows show drift or no drift."""
         return len(self.rows) - len(self.unchecked)
 
     @property
@@ -114,7 +114,7 @@ class DriftReport:
 
     @property
     def unchecked(self) -> tuple[DriftRow, ...]:
-        """Rows that say nothing either way, and so are no pass."""
+        """Rows that show neither drift nor no drift; they do not pass."""
         return tuple(row for row in self.rows if row.status not in ("no drift", "drift"))
 
     def to_json(self) -> dict[str, Any]:
@@ -126,8 +126,8 @@ class DriftReport:
 def check_drift(cases: Sequence[DriftCase], alpha: float = ALPHA) -> DriftReport:
     """Test every metric of every case: exact two-sided rank test, Holm over all rows that could be tested.
 
-    A failed trial ranks below all others on either side. New trials whose seeds are among the references repeat them
-    where the code is unchanged; such ties only make the test more cautious.
+    A failed trial ranks below all others. If the code is unchanged, new trials with seeds of references repeat them;
+    such ties only make the test more conservative.
 
     Args:
         cases: conditions to check.
@@ -141,7 +141,7 @@ def check_drift(cases: Sequence[DriftCase], alpha: float = ALPHA) -> DriftReport
 
 
 def _test(case: DriftCase, metric: str) -> DriftRow:
-    """Run the rank test of one metric, still without the correction for all; or say in a row why it cannot run."""
+    """Run the rank test of one metric, without Holm's correction, or return a row that says why it cannot run."""
     new = [trial for trial in case.new if trial.condition == case.condition]
     reference = [trial for trial in case.reference if trial.condition == case.condition]
 
@@ -177,9 +177,9 @@ def _test(case: DriftCase, metric: str) -> DriftRow:
 
 
 def _as_exact_as_float32(*sides: Sequence[float]) -> list[list[float]]:
-    """Return the values with those made equal that single precision, in which trials compute, hardly tells apart.
+    """Return the values, with those made equal that differ by no more than float32 rounding (see `RESOLUTION`).
 
-    Two releases may round the same mean to neighbouring numbers. Ranks would see ten trials that are all above.
+    Two releases may round the same mean to neighbouring numbers; in ranks, one side could then be above in all trials.
     """
     exact: dict[float, float] = {}
     last = -math.inf

@@ -1,4 +1,4 @@
-"""The paper's own statistics, for redrawing its figures; they never decide a claim."""
+"""The paper's own statistics, to redraw its figures; they never decide a claim."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def asterisks(p: float) -> str:
 def kruskal_wallis(groups: Sequence[Sequence[float]]) -> float:
     """Return the p of the Kruskal-Wallis test that all groups share a distribution (asymptotic, as in the paper)."""
     if len({value for group in groups for value in group}) == 1:
-        return 1.0  # scipy has no p for data without any variation
+        return 1.0  # scipy has no p for constant data
     return float(kruskal(*groups).pvalue)
 
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 
 BOOTSTRAP_SEED = 20250714
-"""Fixed, so that the same trials always print the same interval."""
+"""Fixed, so that the same trials always give the same interval."""
 
 
 def _dominance(a: Floats, b: Floats) -> Floats:
@@ -40,7 +40,7 @@ def median(values: Sequence[float]) -> float:
 
 
 def _percentiles(statistics: Floats, level: float) -> tuple[float, float]:
-    """Return the middle `level` of bootstrap statistics; picks actual values, since inf - inf has no midpoint."""
+    """Return the ends of the middle `level` of bootstrap statistics; no interpolation, since inf - inf is NaN."""
     low, high = np.quantile(statistics, [(1 - level) / 2, (1 + level) / 2], method="inverted_cdf")
     return float(low), float(high)
 

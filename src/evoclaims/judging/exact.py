@@ -32,9 +32,9 @@ class ExactTest:
 def rank_test(a: Sequence[float], b: Sequence[float]) -> ExactTest:
     """Test whether A lies above B: the one-sided exact permutation Mann-Whitney test on mid-ranks.
 
-    The null, that A is stochastically no larger than B, makes every split of the pooled values equally likely; the
-    splits are counted, ties included, by dynamic programming over the doubled U statistic (the doubled mid-rank sum
-    less a constant), never approximated. `attainable_p` is the p of the most extreme split of the pooled values.
+    Under the null (A is stochastically no larger than B) every split of the pooled values is equally likely. Splits
+    are counted exactly, ties included, by dynamic programming over the doubled U statistic (the doubled mid-rank sum
+    minus a constant). `attainable_p` is the p of the most extreme split of the pooled values.
 
     Args:
         a: values of A, shape [n]; infinities rank as such.
@@ -66,12 +66,12 @@ def _doubled_u_tails(n: int, ties: tuple[int, ...]) -> tuple[float, ...]:
     """Return P(2U >= u) for u = 0 .. the largest attainable 2U.
 
     Args:
-        n: values of A; the others are B's.
-        ties: sizes of the groups of equal pooled values, in rising order of the value.
+        n: number of values of A; the others belong to B.
+        ties: sizes of the groups of equal pooled values, in rising order of value.
     """
     m = sum(ties) - n
     width = digit_width(math.comb(n + m, n))
-    # ways[i] packs, digit u, the number of ways to hand i of the values so far to A with 2U = u.
+    # Digit u of ways[i]: the number of ways to give A i of the values so far, with 2U = u.
     ways = {0: 1}
     below = 0
     for size in ties:
@@ -119,10 +119,10 @@ def binomial_test(k: int, n: int, p0: float, alternative: Alternative = "greater
 
 
 def sign_test(k: int, n: int) -> ExactTest:
-    """Test whether a median lies on the side where `k` of `n` trials lie (the closed side counts its edge).
+    """Test whether a median is on the side where `k` of `n` trials are (including the edge itself).
 
-    If the median lay strictly beyond the edge, at most half of all trials would fall on the side: so the test is
-    binomial with p0 = 1/2.
+    If the median were strictly beyond the edge, a trial would be on the side with probability at most 1/2: so the test
+    is binomial with p0 = 1/2.
     """
     return binomial_test(k, n, 0.5, "greater")
 

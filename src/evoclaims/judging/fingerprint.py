@@ -1,4 +1,4 @@
-"""The hash of everything that is fixed before the trials: goalposts do not move silently."""
+"""The hash of everything that is fixed before the trials, so that no change goes unnoticed."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from evoclaims.judging.assertion import Assertion
 from evoclaims.judging.protocol import Protocol
 
 JUDGING_REVISION = 1
-"""Raised when a kind's tests change, so that old verdicts are not taken for new ones."""
+"""Raised when a kind's tests change, so that old verdicts do not count as new ones."""
 
 
 def fingerprint(assertion: Assertion, protocol: Protocol, *, claim: str = "", tier: str = "") -> str:

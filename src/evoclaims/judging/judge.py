@@ -1,4 +1,4 @@
-"""The judge: looks at the trials as the protocol says, attainability first, and ends with exactly one outcome."""
+"""The judge: follows the protocol's looks, checks attainable p first, and gives exactly one outcome."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from evoclaims.trials.result import TrialResult
 def judge(assertion: Assertion, protocol: Protocol, *, claim: str = "", tier: str = "") -> Verdict:
     """Judge an assertion.
 
-    At each look the smallest attainable p comes first: where neither direction can be decided, no trial is fetched.
-    The first decisive look ends it, and so does a look after which no outcome of the remaining trials could change
-    the verdict (curtailment).
+    Each look first checks the smallest attainable p: if neither direction can be decided, no trial is fetched.
+    Judging ends at the first decisive look, or when no outcome of the remaining trials could change the verdict
+    (curtailment).
 
     Args:
-        assertion: what is claimed.
+        assertion: the claim.
         protocol: looks, margins and seeds, fixed beforehand.
         claim: the claim's id, for the fingerprint.
         tier: the claim's tier, for the fingerprint.
@@ -73,9 +73,9 @@ def attainability(assertion: Assertion, protocol: Protocol) -> tuple[tuple[Look,
 
 
 def needed_trials(assertion: Assertion, protocol: Protocol) -> int | None:
-    """Return the fewest trials a side at which the last look could support the assertion; None if none can."""
+    """Return the fewest trials per side with which the last look could support the assertion, or None."""
     alpha = protocol.last.alpha
-    # No kind's attainable p rises with n, so the sizes that suffice form the upper part of the range.
+    # Attainable p never rises with n, so bisection finds the smallest n that suffices.
     below = bisect_left(
         range(1, MAX_TRIALS + 1), True, key=lambda n: assertion.attainable(n, protocol).supported <= alpha
     )
@@ -83,12 +83,12 @@ def needed_trials(assertion: Assertion, protocol: Protocol) -> int | None:
 
 
 def _decidable(attainable: PValues, alpha: float) -> bool:
-    """Whether at least one direction is available."""
+    """Whether at least one direction can be decided."""
     return attainable.supported <= alpha or attainable.refuted <= alpha
 
 
 def _fetch(source: Source, seeds: tuple[int, ...]) -> tuple[TrialResult, ...]:
-    """Return the trials of `seeds` in their order, whatever order the source gives them in."""
+    """Return the trials in the order of `seeds`; the source may return them in any order."""
     by_seed = {trial.seed: trial for trial in source.fetch(seeds)}
     if sorted(by_seed) != sorted(seeds):
         raise ValueError(f"{source.label} returned the seeds {sorted(by_seed)} when asked for {list(seeds)}.")
@@ -121,7 +121,7 @@ def _without_result(assertion: Assertion, trials: Trials) -> str:
 def _settled(
     assertion: Assertion, trials: Trials, later: tuple[Look, ...], protocol: Protocol
 ) -> tuple[Outcome, str] | None:
-    """Return the verdict that every completion of the trials would reach, or None while it is open."""
+    """Return the verdict that every completion of the trials would give, or None while it is open."""
     for look in later:
         low, high = assertion.bounds(trials, look.n, protocol)
         for_open, against_open = low.supported <= look.alpha, low.refuted <= look.alpha
@@ -172,7 +172,7 @@ def _needs(assertion: Assertion, protocol: Protocol) -> str:
 
 
 def _underpowered(assertion: Assertion, protocol: Protocol, mark: str) -> Verdict:
-    """Return the verdict of a protocol none of whose looks can decide."""
+    """Return the verdict of a protocol in which no look can decide."""
     look, attainable = attainability(assertion, protocol)[-1]
     return Verdict(
         outcome=Outcome.INCONCLUSIVE,

@@ -19,12 +19,12 @@ def trend_test(profiles: Sequence[Sequence[float]], direction: Slope) -> ExactTe
     """Test whether values fall (or rise) with the level, within trials.
 
     The statistic is the sum over trials of Kendall's S against the level index. Under the null a trial's values are
-    exchangeable over its levels, independently of the other trials. S is the number of untied pairs less twice the
+    exchangeable over its levels, independently of the other trials. S is the number of untied pairs minus twice the
     inversions, and the inversions of a random arrangement of a multiset follow the Gaussian multinomial coefficient
     (MacMahon 1913), so the null is exact, ties included, without enumeration.
 
     Args:
-        profiles: one row a trial, shape [n, levels]; infinities rank as such.
+        profiles: one row per trial, shape [n, levels]; infinities rank as such.
         direction: "falls" or "rises".
 
     Raises:
@@ -37,7 +37,7 @@ def trend_test(profiles: Sequence[Sequence[float]], direction: Slope) -> ExactTe
     if any(math.isnan(value) for row in profiles for value in row):
         raise ValueError("A trend test cannot rank NaN.")
     rows = [tuple(row) if direction == "falls" else tuple(reversed(row)) for row in profiles]
-    # The order of the tie groups does not change the coefficient: sort them, so that the cache meets them again.
+    # The order of the tie groups does not change the coefficient: sort them for more cache hits.
     patterns = tuple(sorted(tuple(sorted(Counter(row).values())) for row in rows))
     tails = _inversion_tails(patterns)
     observed = sum(earlier > later for row in rows for earlier, later in combinations(row, 2))

@@ -1,6 +1,6 @@
-"""The nouns of a claim: what is read from each trial, and the words that make an assertion of it.
+"""What a claim reads from each trial, with methods that make assertions about it.
 
-A kind of assertion needs no word here: `verdict(Kind(measure, ...))` asserts it as well.
+A kind of assertion needs no method here: `verdict(Kind(measure, ...))` also works.
 """
 
 from __future__ import annotations
@@ -21,22 +21,22 @@ from evoclaims.judging.reading import EventReading, LevelsReading, NumberReading
 
 
 class Measure(NumberReading):
-    """One number a trial, and what can be said of it."""
+    """One number per trial, and assertions about it."""
 
     def __gt__(self, other: Measure) -> Greater:
-        """Assert that this measure lies above `other`."""
+        """Assert that this measure is above `other`."""
         return Greater(self, self._comparable(other))
 
     def __lt__(self, other: Measure) -> Greater:
-        """Assert that this measure lies below `other`."""
+        """Assert that this measure is below `other`."""
         return Greater(self._comparable(other), self)
 
     def between(self, lo: float, hi: float) -> Band:
-        """Assert that the median lies in [lo, hi]."""
+        """Assert that the median is in [lo, hi]."""
         return Band(self, lo, hi)
 
     def equivalent_to(self, other: Measure, *, margin: float) -> Equivalent:
-        """Assert that this measure lies within `margin` of `other`."""
+        """Assert that this measure is within `margin` of `other`."""
         return Equivalent(self, self._comparable(other), margin)
 
     def never_above_itself(self) -> SelfComparison:
@@ -47,7 +47,7 @@ class Measure(NumberReading):
         """Return `other` if the two can be compared.
 
         Raises:
-            UserError: when it is no measure, or better means the other direction.
+            UserError: when it is not a measure, or its `better` differs.
         """
         if not isinstance(other, Measure):
             raise UserError(
@@ -63,14 +63,14 @@ class Measure(NumberReading):
 
 
 class Event(EventReading):
-    """Something that holds in a trial or does not, and what can be said of it."""
+    """Something that holds in a trial or does not, and assertions about it."""
 
     def in_most_trials(self, p0: float | None = None) -> Solves:
-        """Assert that it holds with a probability of at least p0 (default: the protocol's): "solves"."""
+        """Assert that it holds with probability at least p0 (default: the protocol's): "solves"."""
         return Solves(self, p0)
 
     def stays(self, p0: float | None = None) -> Stays:
-        """Assert that a bound is kept with a probability of at least p0 (default: the protocol's): "stays"."""
+        """Assert that a bound is kept with probability at least p0 (default: the protocol's): "stays"."""
         return Stays(self, p0)
 
     def in_every_trial(self) -> EveryTrial:
@@ -79,7 +79,7 @@ class Event(EventReading):
 
 
 class Profile(LevelsReading):
-    """One vector over levels a trial, and what can be said of it."""
+    """One vector over levels per trial, and assertions about it."""
 
     def at(self, level: int) -> Measure:
         """Return the measure at one level, counted from 0.
@@ -92,10 +92,10 @@ class Profile(LevelsReading):
         return Measure(self.source, f"{self.name} at level {level}", lambda t: self.row(t)[level], self.better)
 
     def above(self, other: Profile, *, beyond: int) -> Assertion:
-        """Assert that this profile lies above `other` at every level beyond a level, counted from 0.
+        """Assert that this profile is above `other` at every level beyond `beyond`, counted from 0.
 
         Raises:
-            UserError: when the two differ in their levels, or have none beyond `beyond`.
+            UserError: when the two differ in their number of levels, or have none beyond `beyond`.
         """
         if self.size != other.size or not 0 <= beyond < self.size - 1:
             raise UserError(

@@ -11,7 +11,7 @@ from evoclaims.judging.counting import MAX_TRIALS
 
 @dataclass(frozen=True)
 class Look:
-    """One look at the data: after `n` trials a side, decide at significance level `alpha`."""
+    """One look at the data: after `n` trials per side, decide at significance level `alpha`."""
 
     n: int
     alpha: float
@@ -29,10 +29,10 @@ class Protocol:
     """How a claim is judged.
 
     Attributes:
-        looks: in the order of rising n; their alphas add up to the false-positive rate (a union bound).
+        looks: sorted by rising n; their alphas add up to the false-positive rate (a union bound).
         p0: the probability of success that "solves" and "stays" must exceed.
         a12_margin: the effect that "greater" declares, as Vargha and Delaney's A12.
-        first_seed: trials take the seeds first_seed, first_seed + 1, ...
+        first_seed: trials use the seeds first_seed, first_seed + 1, ...
     """
 
     looks: tuple[Look, ...]
@@ -41,7 +41,7 @@ class Protocol:
     first_seed: int = 0
 
     def __post_init__(self) -> None:
-        """Reject protocols that cannot be carried out."""
+        """Reject impossible protocols."""
         if not self.looks:
             raise UserError("A protocol needs at least one look, such as Look(n=10, alpha=0.05).")
         if any(later.n <= earlier.n for earlier, later in pairwise(self.looks)):
@@ -77,7 +77,7 @@ class Protocol:
 
 
 FIXED_10 = Protocol.fixed(10)
-"""The paper's ten trials, looked at once."""
+"""The paper's ten trials in a single look."""
 
 SEQUENTIAL = Protocol(looks=(Look(5, 0.01), Look(10, 0.04)))
-"""Five trials, and five more where those leave the claim open."""
+"""Five trials, and five more if those leave the claim open."""

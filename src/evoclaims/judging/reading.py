@@ -30,8 +30,7 @@ class TrialReading:
 
     Attributes:
         source: the condition.
-        name: what is read, such as "mean success"; part of the claim's fingerprint, since a function has no canonical
-            form.
+        name: what is read, such as "mean success"; part of the claim's fingerprint, which cannot hash the function.
     """
 
     source: Source
@@ -48,11 +47,11 @@ class TrialReading:
 
 @dataclass(frozen=True, eq=False)
 class NumberReading(TrialReading):
-    """One number a trial.
+    """One number per trial.
 
     Attributes:
-        read: finds the number in a finished trial.
-        better: "higher" or "lower"; a failed trial takes the worst value, -inf or +inf.
+        read: reads the number from a finished trial.
+        better: "higher" or "lower"; a failed trial gets the worst value, -inf or +inf.
     """
 
     read: Callable[[TrialResult], float]
@@ -70,7 +69,7 @@ class NumberReading(TrialReading):
         """Read the number from every trial of the condition.
 
         Raises:
-            UnreadableTrialError: when a finished trial holds NaN.
+            UnreadableTrialError: when a NaN is read from a finished trial.
         """
         mine, worst = trials[self.source.fingerprint], _worst(self.better)
         return sample(self.describe(), mine, [read_number(t, self.describe(), self.read, worst) for t in mine])
@@ -78,10 +77,10 @@ class NumberReading(TrialReading):
 
 @dataclass(frozen=True, eq=False)
 class EventReading(TrialReading):
-    """Something that holds in a trial or does not; never in a failed trial, which supports nothing.
+    """Something that holds in a trial or does not; it never holds in a failed trial.
 
     Attributes:
-        holds: looks whether it holds in a finished trial.
+        holds: checks whether it holds in a finished trial.
     """
 
     holds: Callable[[TrialResult], bool]
@@ -90,7 +89,7 @@ class EventReading(TrialReading):
         """Return 1.0 for every trial in which the event holds, 0.0 for the others.
 
         Raises:
-            UnreadableTrialError: when the event looks at a NaN of a finished trial.
+            UnreadableTrialError: when a NaN is read from a finished trial.
         """
         mine = trials[self.source.fingerprint]
         return sample(self.describe(), mine, [float(not is_failed(t) and bool(self.holds(checked(t)))) for t in mine])
@@ -98,12 +97,12 @@ class EventReading(TrialReading):
 
 @dataclass(frozen=True, eq=False)
 class LevelsReading(TrialReading):
-    """One vector over levels a trial.
+    """One vector over levels per trial.
 
     Attributes:
-        read: finds the vector in a finished trial, shape [size].
+        read: reads the vector from a finished trial, shape [size].
         size: number of levels, at least 2; known beforehand, so that the attainable p is too.
-        better: "higher" or "lower"; a failed trial has the worst value at every level.
+        better: "higher" or "lower"; a failed trial gets the worst value at every level.
     """
 
     read: Callable[[TrialResult], tuple[float, ...]]
@@ -111,7 +110,7 @@ class LevelsReading(TrialReading):
     better: Better = "higher"
 
     def __post_init__(self) -> None:
-        """Reject an unknown direction and a vector without levels to compare."""
+        """Reject an unknown direction, and a vector with fewer than two levels."""
         _worst(self.better)
         if self.size < 2:
             raise UserError(f"A profile has at least 2 levels; {self.describe()!r} has {self.size}.")
@@ -124,17 +123,17 @@ class LevelsReading(TrialReading):
         """Read the vector from every trial of the condition, shape [n, size].
 
         Raises:
-            UnreadableTrialError: when a finished trial holds NaN, or a vector of another length.
+            UnreadableTrialError: when a finished trial's vector has NaN or another length.
         """
         return tuple(self.row(trial) for trial in trials[self.source.fingerprint])
 
     def samples(self, trials: Trials) -> tuple[Sample, ...]:
-        """Return one record a level."""
+        """Return one sample per level."""
         mine, columns = trials[self.source.fingerprint], zip(*self.rows(trials), strict=True)
         return tuple(sample(f"{self.describe()} at level {at}", mine, column) for at, column in enumerate(columns))
 
     def row(self, trial: TrialResult) -> tuple[float, ...]:
-        """Return the vector of one trial; a failed trial is worst everywhere."""
+        """Return the vector of one trial; the worst values for a failed trial."""
         if is_failed(trial):
             return (_worst(self.better),) * self.size
         row = tuple(ranked(float(value), trial, self.describe()) for value in self.read(checked(trial)))

@@ -1,4 +1,4 @@
-"""Where numbers come from: a source of trials, and what is read from each trial."""
+"""Sources of trials, and the numbers that are read from each trial."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from evoclaims.trials.result import TrialResult
 
 
 class Source(Protocol):
-    """A condition whose trials can be asked for by seed.
+    """A condition whose trials can be fetched by seed.
 
     Attributes:
         label: a short name, such as "cma_es on n_parity".
-        fingerprint: id of the condition: equal fingerprints mean the same trials.
+        fingerprint: id of the condition; equal fingerprints mean the same trials.
     """
 
     @property
@@ -28,31 +28,31 @@ class Source(Protocol):
         """Id of the condition."""
 
     def fetch(self, seeds: Sequence[int]) -> Sequence[TrialResult]:
-        """Return one trial per seed, in any order; runs what is missing, or raises where nothing may run."""
+        """Return one trial per seed, in any order; run missing ones, or raise if nothing may run."""
 
 
 Trials = Mapping[str, tuple[TrialResult, ...]]
-"""Fetched trials by the fingerprint of their source, in the order of their seeds."""
+"""Fetched trials by the fingerprint of their source, in order of their seeds."""
 
 
 class UnreadableTrialError(Exception):
-    """A finished trial whose number cannot be judged; its claim ends as an error, never as a zero."""
+    """A number of a finished trial cannot be judged; its claim ends as an error, never with a 0 instead."""
 
 
 class MissingNumberError(UnreadableTrialError, KeyError):
-    """A finished trial without the number; a `KeyError` too, so that a mapping keeps what it promises (`get`, `in`)."""
+    """A finished trial lacks the number; also a `KeyError`, so that `get` and `in` of a mapping work."""
 
-    __str__ = Exception.__str__  # a KeyError would show the sentence in quotation marks
+    __str__ = Exception.__str__  # a KeyError would print the message in quotation marks
 
 
 @dataclass(frozen=True)
 class Sample:
-    """What was read from every trial of one condition, for the record.
+    """What was read from every trial of one condition.
 
     Attributes:
         label: what was measured, such as "cma_es on n_parity: mean success".
         seeds: shape [n].
-        values: one number a trial, shape [n]; an event that held is 1.0. A failed trial has the worst value.
+        values: one number per trial, shape [n]; an event that held is 1.0. A failed trial has the worst value.
         median: median of `values`.
         failed: seeds of the diverged or timed-out trials.
         endings: how each of these ended, such as "diverged".
@@ -67,12 +67,12 @@ class Sample:
 
 
 def is_failed(trial: TrialResult) -> bool:
-    """Whether the trial ended without a result of its own (diverged or timed out)."""
+    """Whether the trial ended without a result (diverged or timed out)."""
     return trial.status != "done"
 
 
 class _Named(Mapping[str, Any]):
-    """What a trial has measured, by name; asking for what is not there is an error that names it."""
+    """What a trial has measured, by name; a missing name raises an error with that name."""
 
     def __init__(self, numbers: Mapping[str, Any], where: str) -> None:
         self._numbers = numbers
@@ -92,7 +92,7 @@ class _Named(Mapping[str, Any]):
 
 
 class _Numbers(_Named):
-    """A trial's numbers by name; meeting NaN is an error, since any comparison with it is silently false."""
+    """A trial's numbers by name; reading a NaN is an error, since any comparison with it is silently false."""
 
     def __getitem__(self, name: str) -> Any:
         value = super().__getitem__(name)
@@ -102,7 +102,7 @@ class _Numbers(_Named):
 
 
 def checked(trial: TrialResult) -> TrialResult:
-    """Return the trial with metrics and levels that raise `UnreadableTrialError` where NaN is read, or nothing is."""
+    """Return the trial with metrics and levels that raise `UnreadableTrialError` for NaN or missing names."""
     where = f"the finished trial of seed {trial.seed} (id {trial.id[:12]})"
     return replace(
         trial,
@@ -116,13 +116,13 @@ def read_number(trial: TrialResult, what: str, read: Callable[[TrialResult], flo
     """Return what `read` finds in a finished trial, or `worst` for a failed one.
 
     Raises:
-        UnreadableTrialError: when a finished trial holds NaN.
+        UnreadableTrialError: when a NaN is read from a finished trial.
     """
     return worst if is_failed(trial) else ranked(float(read(checked(trial))), trial, what)
 
 
 def ranked(value: float, trial: TrialResult, what: str) -> float:
-    """Return `value` if it has a rank.
+    """Return `value` if it can be ranked.
 
     Raises:
         UnreadableTrialError: when it is NaN.
@@ -133,7 +133,7 @@ def ranked(value: float, trial: TrialResult, what: str) -> float:
 
 
 def sample(label: str, trials: Sequence[TrialResult], values: Sequence[float]) -> Sample:
-    """Return the record of `values`, one for each of `trials`."""
+    """Return the sample of `values`, one for each of `trials`."""
     failed = [trial for trial in trials if is_failed(trial)]
     return Sample(
         label=label,

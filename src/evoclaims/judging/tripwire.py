@@ -1,4 +1,4 @@
-"""The digest tripwire: the same seed, machine class and versions should give the same trial to the bit."""
+"""The digest tripwire: the same seed, machine class and versions should give bit-identical trials."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from evoclaims.trials.result import TrialResult
 
 @dataclass(frozen=True)
 class DigestChange:
-    """A trial that is no longer what it was: changed, which need not mean wrong."""
+    """A trial whose digest has changed, which need not mean that it is wrong."""
 
     condition: str
     seed: int
@@ -24,7 +24,7 @@ class DigestCheck:
     """What the tripwire found.
 
     Attributes:
-        compared: new trials that had a comparable reference; with 0, the tripwire says nothing.
+        compared: new trials with a comparable reference; if 0, the check shows nothing.
         changed: those of them whose digest differs.
     """
 
@@ -35,8 +35,8 @@ class DigestCheck:
 def compare_digests(new: Sequence[TrialResult], reference: Sequence[TrialResult]) -> DigestCheck:
     """Compare digests of trials of the same condition, seed, machine class and versions.
 
-    Bit equality is promised on CPU only; a record whose provenance lacks the machine, the device's kind or the
-    versions is comparable with nothing.
+    Bit equality is guaranteed on CPU only; a record whose provenance lacks the machine, the device kind or the
+    versions cannot be compared.
     """
     stored = {key: trial for trial in reference if (key := _comparable_key(trial)) is not None}
     pairs = [(trial, stored[key]) for trial in new if (key := _comparable_key(trial)) in stored and key is not None]
@@ -49,7 +49,7 @@ def compare_digests(new: Sequence[TrialResult], reference: Sequence[TrialResult]
 
 
 def _comparable_key(trial: TrialResult) -> tuple[str, int, str] | None:
-    """Return what two records must share to be comparable, or None for a record that does not say."""
+    """Return what two records must share to be comparable, or None if the record does not have it."""
     device = trial.provenance.get("device") or {}
     made_by = [device.get("kind"), trial.provenance.get("machine"), trial.provenance.get("versions")]
     if not all(made_by):

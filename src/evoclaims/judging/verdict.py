@@ -1,4 +1,4 @@
-"""How a claim ends: exactly one outcome, the reason in a sentence, and the evidence."""
+"""The verdict on a claim: exactly one outcome, the reason in a sentence, and the evidence."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from evoclaims.judging.sample import Sample
 
 
 class Direction(StrEnum):
-    """What a p value speaks for: the claim, or its opposite."""
+    """What a p value is evidence for: the claim, or its opposite."""
 
     FOR = "for"
     AGAINST = "against"
 
 
 class Outcome(StrEnum):
-    """The five ways in which a claim can end."""
+    """The five possible outcomes of a claim."""
 
     SUPPORTED = "supported"
     REFUTED = "refuted"
@@ -31,7 +31,7 @@ class Outcome(StrEnum):
 
     @property
     def direction(self) -> Direction:
-        """Which p value a reader wants to see first: the one against what is refuted, else the one for the claim."""
+        """The p value to show first: against the claim if refuted, else for it."""
         return Direction.AGAINST if self is Outcome.REFUTED else Direction.FOR
 
 
@@ -52,7 +52,7 @@ class PValues:
     refuted: float
 
     def outcome(self, alpha: float) -> Outcome:
-        """Return what the pair says at `alpha`; evidence for both directions at once decides neither."""
+        """Return the outcome at `alpha`; if both directions are significant, neither is decided."""
         supported, refuted = self.supported <= alpha, self.refuted <= alpha
         if supported == refuted:
             return Outcome.INCONCLUSIVE
@@ -65,7 +65,7 @@ class PValues:
 
 @dataclass(frozen=True)
 class Interval:
-    """An interval that describes.
+    """A descriptive interval.
 
     Attributes:
         of: what it covers, and how it was made.
@@ -81,7 +81,7 @@ class Interval:
 
 @dataclass(frozen=True)
 class Bound:
-    """A number that was fixed beforehand for trials to be compared with, such as the highest value of a band.
+    """A number, fixed beforehand, that trials are compared with, such as the highest value of a band.
 
     Attributes:
         name: such as "highest".
@@ -96,10 +96,10 @@ class Bound:
 
 @dataclass(frozen=True)
 class Decision:
-    """The p value that a verdict rests on.
+    """The p value that decides a verdict.
 
     Attributes:
-        direction: whether it speaks for the claim or against it.
+        direction: whether it is for or against the claim.
         p: of the whole assertion.
         attainable_p: the smallest p that n and the ties allowed in this direction.
     """
@@ -116,18 +116,18 @@ class Evidence:
     Attributes:
         kind: "greater", "solves", ...
         describe: the assertion in plain English.
-        outcome: what this part says by itself at `alpha`.
+        outcome: the outcome of this part alone at `alpha`.
         samples: every trial's value.
-        n: trials a side.
+        n: trials per side.
         alpha: significance level of the look.
-        p: for the claim; None where the kind states a fact rather than a test.
+        p: for the claim; None if the kind states a fact without a test.
         attainable_p: the smallest p that n and the ties allowed.
         p_refuted: against the claim.
         attainable_p_refuted: the smallest p against it that n and the ties allowed.
         a12: Vargha and Delaney's effect size; None without two samples.
         cliffs_delta: Cliff's delta; None without two samples.
         intervals: description only.
-        detail: what else the reader should know.
+        detail: further information for the reader.
         bounds: what the trials are compared with.
         events: whether values say that something held (1) or did not (0).
     """
@@ -151,28 +151,28 @@ class Evidence:
 
     @property
     def direction(self) -> Direction:
-        """What this part speaks for by itself."""
+        """The direction of this part alone."""
         return self.outcome.direction
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """How one claim ended.
+    """The verdict on one claim.
 
     Attributes:
         outcome: exactly one of five.
         reason: why, in a sentence.
         describe: the assertion in plain English.
         fingerprint: hash of everything that was fixed beforehand.
-        n: trials a side that were looked at; 0 when none were.
-        alpha: significance level of the deciding look; None when no look was taken.
-        p: of the whole assertion, corrected where it is compound; None where nothing was tested.
+        n: trials per side that were looked at; 0 if none.
+        alpha: significance level of the deciding look; None if there was no look.
+        p: of the whole assertion, corrected if it is compound; None if nothing was tested.
         attainable_p: the smallest p that n and the ties allowed.
         p_refuted: against the whole assertion.
         attainable_p_refuted: the smallest p against it that n and the ties allowed.
         evidence: one entry for each part of the assertion.
-        without_result: which trials ended without a result of their own, and how; they took the worst rank.
-        deciding: index in `evidence` of the part whose p value the whole assertion's rests on; None without evidence.
+        without_result: which trials ended without a result, and how; they got the worst rank.
+        deciding: index in `evidence` of the part that gives the whole assertion's p value; None without evidence.
     """
 
     outcome: Outcome
@@ -191,7 +191,7 @@ class Verdict:
 
     @property
     def decision(self) -> Decision | None:
-        """The p value that the outcome rests on; None where nothing was tested."""
+        """The p value that decides the outcome; None if nothing was tested."""
         direction = self.outcome.direction
         against = direction is Direction.AGAINST
         p, attainable_p = (self.p_refuted, self.attainable_p_refuted) if against else (self.p, self.attainable_p)

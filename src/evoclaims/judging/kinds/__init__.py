@@ -1,1 +1,1 @@
-"""The kinds of assertion, one file each."""
+"""The kinds of assertions, one file each."""

@@ -1,4 +1,4 @@
-"""band(lo, hi): the median of a measure lies in a closed interval."""
+"""band(lo, hi): the median of a measure is in a closed interval."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ from evoclaims.judging.verdict import Bound, Interval, PValues
 
 @dataclass(frozen=True)
 class Band(Assertion):
-    """The median lies in [lo, hi], both ends finite (a failed trial, worst of all, must lie outside).
+    """The median is in [lo, hi], both finite (so that a failed trial, whose value is infinite, is outside).
 
     Supported when both one-sided sign tests reject (at n = 10 and alpha = 0.05: at least 9 trials >= lo and at least
-    9 <= hi). Refuted when a sign test puts the median below lo or above hi, each at alpha / 2.
+    9 <= hi). Refuted when a sign test finds the median below lo or above hi, each at alpha / 2.
     """
 
     measure: NumberReading
@@ -31,7 +31,7 @@ class Band(Assertion):
     kind: ClassVar[str] = "band"
 
     def __post_init__(self) -> None:
-        """Reject an empty or an open band."""
+        """Reject an empty or infinite band."""
         if not -math.inf < self.lo <= self.hi < math.inf:
             raise UserError(
                 f"A band runs from a finite lower end to a finite higher one, unlike [{self.lo}, {self.hi}]: "
@@ -47,7 +47,7 @@ class Band(Assertion):
         return PValues(_p(0, 0, n).supported, _p(n, 0, n).refuted)
 
     def bounds(self, trials: Trials, n: int, protocol: Protocol) -> tuple[PValues, PValues]:
-        """Bound p by new trials that all lie inside, all below or all above."""
+        """Bound p by new trials that are all inside, all below or all above."""
         values = self.measure.sample(trials).values
         below, above = self._outside(values)
         new = n - len(values)
@@ -74,7 +74,7 @@ class Band(Assertion):
         )
 
     def _outside(self, values: Sequence[float]) -> tuple[int, int]:
-        """Return how many values lie below and above the band."""
+        """Return how many values are below and above the band."""
         return sum(value < self.lo for value in values), sum(value > self.hi for value in values)
 
 

@@ -1,4 +1,4 @@
-"""equivalent(A, B, margin): two measures lie within a margin of each other."""
+"""equivalent(A, B, margin): two measures differ by less than a margin."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class Equivalent(Assertion):
     """`left` and `right` differ by less than `margin` (in the measure's unit).
 
     Supported when both one-sided rank tests reject (A + margin above B, and B above A - margin). Refuted when a rank
-    test finds one beyond the margin of the other; there are two such tests, so each is taken at alpha / 2.
+    test finds one beyond the margin of the other; these are two tests, so each is at alpha / 2.
     """
 
     left: NumberReading
@@ -30,7 +30,7 @@ class Equivalent(Assertion):
     kind: ClassVar[str] = "equivalent"
 
     def __post_init__(self) -> None:
-        """Reject a margin that no data could meet, and two measures of the same trials."""
+        """Reject an impossible margin, and two measures of the same trials."""
         if not (math.isfinite(self.margin) and self.margin > 0):
             raise UserError(f"The margin of an equivalence is a finite number above 0, unlike {self.margin}.")
         require_independent(self.left, self.right)
@@ -45,7 +45,7 @@ class Equivalent(Assertion):
         return PValues(separated, min(1.0, 2 * separated))
 
     def find(self, trials: Trials, protocol: Protocol, alpha: float) -> Finding:
-        """Run the two tests for and the two tests against."""
+        """Run the two tests for it and the two against it."""
         left, right = self.left.sample(trials), self.right.sample(trials)
         a, b = left.values, right.values
         raised = tuple(value + self.margin for value in a)

@@ -24,15 +24,15 @@ class EveryTrial(Assertion):
         return f"{self.event.describe()} in every trial"
 
     def looks(self, protocol: Protocol) -> tuple[Look, ...]:
-        """Return the last look alone: "every" needs every trial."""
+        """Return only the last look: "every" needs every trial."""
         return (protocol.last,)
 
     def attainable(self, n: int, protocol: Protocol) -> PValues:
-        """Return zeros: a fact can come out either way at any n."""
+        """Return zeros: a fact can be true or false at any n."""
         return PValues(0.0, 0.0)
 
     def find(self, trials: Trials, protocol: Protocol, alpha: float) -> Finding:
-        """Look whether it holds."""
+        """Check whether it holds."""
         sample = self.event.sample(trials)
         missed = [seed for seed, value in zip(sample.seeds, sample.values, strict=True) if not value]
         detail = f"does not hold for seeds {', '.join(map(str, missed))}" if missed else "holds in every trial"

@@ -1,4 +1,4 @@
-"""greater(A, B): a measure of A lies above the same measure of B."""
+"""greater(A, B): a measure of A is above the same measure of B."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from evoclaims.judging.verdict import Bound, PValues
 
 @dataclass(frozen=True)
 class GreaterTests:
-    """The three exact tests that decide whether A lies above B.
+    """The three exact tests that decide whether A is above B.
 
     Attributes:
         above: rank test, A above B.
@@ -36,7 +36,7 @@ class GreaterTests:
 
     @property
     def p(self) -> PValues:
-        """For: the rank. Against: the rank the other way, or the declared effect rejected."""
+        """For: the rank test. Against: the reverse rank test, or rejection of the declared effect."""
         return PValues(self.above.p, min(self.below.p, self.margin.p))
 
     @property
@@ -55,7 +55,7 @@ def compare(a: Sequence[float], b: Sequence[float], margin: float) -> GreaterTes
     """
     pairs = list(zip(a, b, strict=False))
     wins = sum(x >= y for x, y in pairs)
-    # However the pooled values were paired, a pair of equal values is a win: so ties bound the losses.
+    # In any pairing of the pooled values, equal values make a win: so ties bound the losses.
     commonest = Counter((*a, *b)).most_common(1)[0][1]
     most_losses = min(len(pairs), len(a) + len(b) - commonest)
     return GreaterTests(
@@ -71,7 +71,7 @@ def compare(a: Sequence[float], b: Sequence[float], margin: float) -> GreaterTes
 
 
 def require_independent(left: NumberReading, right: NumberReading) -> None:
-    """Reject two measures of the same trials: a rank test takes its two samples as independent.
+    """Reject two measures of the same trials: a rank test assumes independent samples.
 
     Raises:
         UserError: when both read the same condition.
@@ -85,10 +85,10 @@ def require_independent(left: NumberReading, right: NumberReading) -> None:
 
 @dataclass(frozen=True)
 class Greater(Assertion):
-    """`above` lies above `below`: supported by the rank test.
+    """`above` is above `below`: supported by the rank test.
 
-    Refuted by the rank test the other way, or when the declared effect (the protocol's A12 margin) is rejected by a
-    binomial test on disjoint seed pairs, ties counted as wins.
+    Refuted by the reverse rank test, or when a binomial test on disjoint seed pairs rejects the declared effect (the
+    protocol's A12 margin), ties counted as wins.
     """
 
     above: NumberReading
@@ -104,7 +104,7 @@ class Greater(Assertion):
         return f"{self.above.describe()} > {self.below.describe()}"
 
     def attainable(self, n: int, protocol: Protocol) -> PValues:
-        """Return the p of a complete separation; against, also of no win in any pair."""
+        """Return the p of complete separation; against, also of no win in any pair."""
         separated = rank_attainable(n, n)
         return PValues(separated, min(separated, binomial_test(0, n, protocol.a12_margin, "less").p))
 

@@ -1,4 +1,4 @@
-"""solves and stays: an event holds with a probability of at least p0."""
+"""solves and stays: an event holds with probability at least p0."""
 
 from __future__ import annotations
 
@@ -16,18 +16,18 @@ from evoclaims.judging.verdict import Bound, Interval, PValues
 
 @dataclass(frozen=True)
 class MostTrials(Assertion):
-    """The part that `Solves` and `Stays` share: P(event) is tested against p0 by the exact binomial test, both ways.
+    """Base of `Solves` and `Stays`: exact binomial tests of P(event) against p0, in both directions.
 
     Attributes:
         event: what must hold; it does not hold in a failed trial.
-        p0: overrides the protocol's p0 when it is not None.
+        p0: overrides the protocol's p0 unless it is None.
     """
 
     event: EventReading
     p0: float | None = None
 
     def __post_init__(self) -> None:
-        """Reject a probability that no test can use."""
+        """Reject a probability that cannot be tested."""
         if self.p0 is not None and not 0 < self.p0 < 1:
             raise UserError(f"p0 lies strictly between 0 and 1 (default 0.7), unlike {self.p0}.")
 
@@ -40,14 +40,14 @@ class MostTrials(Assertion):
         return PValues(self._p(n, n, protocol).supported, self._p(0, n, protocol).refuted)
 
     def bounds(self, trials: Trials, n: int, protocol: Protocol) -> tuple[PValues, PValues]:
-        """Bound p by new trials in which the event always, or never, holds."""
+        """Bound p by new trials in which the event always or never holds."""
         values = self.event.sample(trials).values
         fewest = round(sum(values))
         never, always = self._p(fewest, n, protocol), self._p(fewest + n - len(values), n, protocol)
         return PValues(always.supported, never.refuted), PValues(never.supported, always.refuted)
 
     def find(self, trials: Trials, protocol: Protocol, alpha: float) -> Finding:
-        """Run the binomial test both ways."""
+        """Run both binomial tests."""
         sample = self.event.sample(trials)
         n, k = len(sample.values), round(sum(sample.values))
         p, attainable = self._p(k, n, protocol), self.attainable(n, protocol)
@@ -63,7 +63,7 @@ class MostTrials(Assertion):
         )
 
     def _null(self, protocol: Protocol) -> float:
-        """Return the p0 in force."""
+        """Return the p0 to use."""
         return protocol.p0 if self.p0 is None else self.p0
 
     def _p(self, k: int, n: int, protocol: Protocol) -> PValues:
@@ -74,7 +74,7 @@ class MostTrials(Assertion):
 
 @dataclass(frozen=True)
 class Solves(MostTrials):
-    """A feat that most trials achieve."""
+    """A goal that most trials reach."""
 
     kind: ClassVar[str] = "solves"
 

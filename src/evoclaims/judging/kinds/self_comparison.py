@@ -1,4 +1,4 @@
-"""self-comparison: a control that compares a condition with itself, to see that the judge does not cry wolf."""
+"""self-comparison: a control that compares a condition with itself, to detect false positives of the judge."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ from evoclaims.judging.verdict import Outcome, PValues
 
 MOST_SPLITS = math.comb(10, 5)
 SPLIT_SEED = 20250714
-"""Fixed, so that the same trials always meet the same splits."""
+"""Fixed, so that the same trials always get the same splits."""
 
 
 @dataclass(frozen=True)
 class SelfComparison(Assertion):
-    """The measure is never above itself: splits of its trials into two halves go through the judge of `greater`.
+    """The measure is never above itself: splits of its trials into two halves are judged as in `greater`.
 
-    All splits of up to ten trials are judged, a fixed sample of splits beyond. Supported when the share that comes
-    out supported is at most alpha; where the splits are only a sample, refuted when an exact binomial test at alpha
-    says that the share of all splits exceeds alpha.
+    Up to ten trials, all splits are judged; for more, a fixed sample of splits. Supported when the share of supported
+    splits is at most alpha. For a sample of splits, refuted only when an exact binomial test at alpha says that the
+    share among all splits exceeds alpha.
     """
 
     measure: NumberReading
@@ -40,11 +40,11 @@ class SelfComparison(Assertion):
         return f"{self.measure.describe()} is never judged above itself"
 
     def looks(self, protocol: Protocol) -> tuple[Look, ...]:
-        """Return the last look alone: the control has no trial to save."""
+        """Return only the last look: stopping early would save nothing."""
         return (protocol.last,)
 
     def attainable(self, n: int, protocol: Protocol) -> PValues:
-        """Return the smallest p of one split, for both: a control whose splits cannot come out supported is empty."""
+        """Return the smallest p of one split, for both: if no split can be supported, the control shows nothing."""
         smallest = rank_attainable(n // 2, n - n // 2) if n > 1 else 1.0
         return PValues(smallest, smallest)
 

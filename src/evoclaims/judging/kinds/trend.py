@@ -20,7 +20,7 @@ _OPPOSITE: dict[Slope, Slope] = {"falls": "rises", "rises": "falls"}
 class Trend(Assertion):
     """The profile falls, or rises, with the level: exact permutation test of the rank correlation within trials.
 
-    Refuted by the same test the other way.
+    Refuted by the same test in the other direction.
     """
 
     profile: LevelsReading
@@ -37,15 +37,15 @@ class Trend(Assertion):
         return f"{self.profile.describe()} {self.direction} with the level"
 
     def attainable(self, n: int, protocol: Protocol) -> PValues:
-        """Return the p of a strict trend in every trial, either way."""
+        """Return the p of a strict trend in every trial, for and against."""
         strict = trend_attainable(n, self.profile.size)
         return PValues(strict, strict)
 
     def bounds(self, trials: Trials, n: int, protocol: Protocol) -> tuple[PValues, PValues]:
         """Bound p from below by new trials that follow the trend strictly.
 
-        Among new rows a strict one makes the most inversions, and ties would only remove chance inversions from the
-        null: so no other row lowers p further.
+        A strict row adds the most inversions; ties in a new row would only remove possible inversions from the null.
+        So no other row lowers p further.
         """
         rows = self.profile.rows(trials)
         falling = tuple(float(-level) for level in range(self.profile.size))
@@ -56,7 +56,7 @@ class Trend(Assertion):
         return PValues(*((fall, rise) if self.direction == "falls" else (rise, fall))), PValues(1.0, 1.0)
 
     def find(self, trials: Trials, protocol: Protocol, alpha: float) -> Finding:
-        """Run the trend test both ways."""
+        """Run the trend test in both directions."""
         rows = self.profile.rows(trials)
         test, reverse = trend_test(rows, self.direction), trend_test(rows, _OPPOSITE[self.direction])
         p, attainable = PValues(test.p, reverse.p), PValues(test.attainable_p, reverse.attainable_p)
