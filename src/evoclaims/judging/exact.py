@@ -30,7 +30,7 @@ class ExactTest:
 
 
 def rank_test(a: Sequence[float], b: Sequence[float]) -> ExactTest:
-    """Test whether A lies above B: the one-sided exact permutation Mann-Whitney test on mid-ranks.
+    """Test whether A is above B: the one-sided exact permutation Mann-Whitney test on mid-ranks.
 
     Under the null (A is stochastically no larger than B) every split of the pooled values is equally likely. Splits
     are counted exactly, ties included, by dynamic programming over the doubled U statistic (the doubled mid-rank sum
@@ -41,7 +41,7 @@ def rank_test(a: Sequence[float], b: Sequence[float]) -> ExactTest:
         b: values of B, shape [m].
 
     Raises:
-        ValueError: when a side is empty or a value is NaN, which has no rank.
+        ValueError: when a side is empty or a value is NaN, which cannot be ranked.
     """
     if not len(a) or not len(b):
         raise ValueError("A rank test needs at least one value on each side.")
