@@ -1,1 +1,1 @@
-"""Keys, trees, canonical JSON, files, errors and provenance: what every floor above needs."""
+"""Keys, trees, canonical JSON, files, errors and provenance: what every layer above needs."""

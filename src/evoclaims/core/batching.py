@@ -1,4 +1,4 @@
-"""A switch that still runs a single branch when it is batched by `jax.vmap`."""
+"""A switch that runs only one branch even when batched by `jax.vmap`."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from jaxtyping import Array, Int
 
 
 def switch_together(index: Int[Array, ""], branches: Sequence[Callable[..., Any]], *operands: Any) -> Any:
-    """Run `branches[index]` on the operands; a batch runs, as one, the branch of its largest index.
+    """Run `branches[index]` on the operands; a whole batch runs the branch of its largest index.
 
-    An ordinary switch under vmap runs every branch. This one is for branches that differ in what they can hold and not
-    in what they compute, in growing order. Of traced values they may close over floating-point ones.
+    An ordinary switch under vmap runs every branch. Here all branches must compute the same and differ only in
+    capacity, smallest first. The only traced values they may close over are floating-point.
     """
-    # A function with a rule of its own for batches sees as batched only what it takes as an argument.
+    # A function with its own batching rule sees only its arguments as batched.
     converted = [jax.closure_convert(branch, *operands) for branch in branches]
     closed = [partial(_apply, convert, place) for place, (convert, _) in enumerate(converted)]
     return _switch(index, closed, [values for _, values in converted], *operands)
@@ -30,7 +30,7 @@ def _apply(function: Callable[..., Any], place: int, closed_over: Sequence[Any],
 
 
 def _switch(index: Int[Array, ""], branches: Sequence[Callable[..., Any]], *operands: Any) -> Any:
-    """Run `branches[index]`, of branches that close over no traced values, with a rule for batches."""
+    """Run `branches[index]` with a batching rule; the branches close over no traced values."""
 
     @custom_vmap
     def choose(index: Array, *operands: Any) -> Any:

@@ -13,10 +13,10 @@ def as_plain(value: Any) -> Any:
     """Turn frozen dataclasses, tuples and scalars into plain JSON values.
 
     A dataclass becomes its fields; fields whose metadata holds `canonical=False` are left out. NaN and the
-    infinities become the strings "nan", "inf", "-inf", since JSON has no word for them.
+    infinities become the strings "nan", "inf", "-inf", since JSON cannot express them.
 
     Raises:
-        TypeError: for a value that has no canonical form (an array, a function, a set, a key that is no text).
+        TypeError: for a value without a canonical form (an array, a function, a set, a key that is not a string).
     """
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
         return {
@@ -26,7 +26,7 @@ def as_plain(value: Any) -> Any:
         }
     if isinstance(value, dict):
         for key in value:
-            if not isinstance(key, str):  # JSON would make one text of 1 and "1"
+            if not isinstance(key, str):  # JSON would write 1 and "1" alike
                 raise TypeError(f"a key of type {type(key).__name__} has no canonical JSON form: {key!r}")
         return {key: as_plain(item) for key, item in value.items()}
     if isinstance(value, list | tuple):

@@ -1,4 +1,4 @@
-"""Drawing with matplotlib, which is an extra: imported when asked for, in one style, and saved as the same bytes."""
+"""Drawing with matplotlib, an optional extra: imported on demand, in one style, saved as reproducible bytes."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ Format = Literal["svg", "png"]
 
 
 def optional(module: str) -> Any:
-    """Import a module of the extra `pictures`; a `UserError` tells how to install it."""
+    """Import a module of the extra `pictures`; if missing, a `UserError` says how to install it."""
     try:
         return importlib.import_module(module)
     except ImportError as error:
@@ -24,7 +24,7 @@ def optional(module: str) -> Any:
 
 
 def own_style(**settings: Any) -> AbstractContextManager[None]:
-    """Draw, or save, with matplotlib's defaults and these settings, whatever a user's own style is.
+    """Draw or save with matplotlib's defaults and these settings, ignoring the user's own style.
 
     Raises:
         UserError: when matplotlib is not installed.
@@ -35,10 +35,10 @@ def own_style(**settings: Any) -> AbstractContextManager[None]:
 
 
 def saved(figure: Any, file_format: str, title: str | None = None, **options: Any) -> bytes:
-    """Return the contents of a picture's file, without its date; `options` go to matplotlib's `savefig`.
+    """Return the contents of a picture's file, without a date; `options` go to matplotlib's `savefig`.
 
     Raises:
-        UnknownNameError: for a format that is no `Format`.
+        UnknownNameError: for a format not in `Format`.
     """
     if file_format not in get_args(Format):
         raise UnknownNameError("format of a picture", file_format, get_args(Format))

@@ -1,4 +1,4 @@
-"""Files that are whole or absent: written aside, flushed, then renamed into place; and read without ever waiting."""
+"""Files that are whole or absent: written to a temporary file, flushed, then renamed; reading never blocks."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ ADVICE: Final = "Free some space or name another folder."
 
 
 def read_file(path: Path) -> bytes:
-    """Return the bytes of a regular file (also by a link to one).
+    """Return the bytes of a regular file (or of a link to one).
 
     Raises:
-        OSError: when it is not there or cannot be read; when it is a folder, or a pipe or device, from which a reader
-            would wait for ever.
+        OSError: when it is missing or unreadable; when it is a folder, or a pipe or device, which could block the
+            reader forever.
     """
     descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
     mode = os.fstat(descriptor).st_mode
@@ -35,12 +35,12 @@ def read_file(path: Path) -> bytes:
 
 
 def write_atomically(path: Path, data: bytes, advice: str = ADVICE) -> None:
-    """Write `data` to `path` so that a reader, or a kill at any moment, sees the old file or the new one.
+    """Write `data` to `path`; a reader always sees the whole old file or the whole new one, even after a kill.
 
     Args:
-        path: of the file; folders on the way are made.
-        data: all that it will hold.
-        advice: a sentence for the user whose disk does not take it.
+        path: the file; missing parent folders are created.
+        data: its whole content.
+        advice: a sentence for the user if writing fails.
 
     Raises:
         UserError: when the folder cannot be written or the disk is full.
@@ -50,10 +50,10 @@ def write_atomically(path: Path, data: bytes, advice: str = ADVICE) -> None:
 
 
 def write_once(path: Path, data: bytes, advice: str = ADVICE) -> bool:
-    """Write `data` to `path` as `write_atomically` does, unless something is there; return whether this call wrote it.
+    """Write `data` to `path` as `write_atomically` does, unless the path exists; return whether this call wrote it.
 
-    Of processes that write at the same time exactly one does. On a file system without hard links the moment between
-    looking and writing stays open.
+    If several processes write at once, exactly one succeeds. Without hard links in the file system, a race between
+    the check and the write remains.
     """
     if os.path.lexists(path):
         return False
@@ -69,7 +69,7 @@ def write_once(path: Path, data: bytes, advice: str = ADVICE) -> bool:
 
 @contextlib.contextmanager
 def _aside(path: Path, data: bytes, advice: str) -> Iterator[Path]:
-    """Yield a temporary file beside `path` that holds `data` on disk; it is deleted after the block unless renamed."""
+    """Yield a temporary file beside `path` with `data` on disk; it is deleted after the block unless renamed."""
     aside = path.with_name(f".{path.name}.{os.getpid()}.{secrets.token_hex(4)}.tmp")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -81,5 +81,5 @@ def _aside(path: Path, data: bytes, advice: str) -> Iterator[Path]:
     except OSError as error:
         raise UserError(f"Cannot write {path}: {error.strerror or error}. {advice}") from error
     finally:
-        with contextlib.suppress(OSError):  # a read-only disk refuses this too
+        with contextlib.suppress(OSError):  # fails too on a read-only disk
             aside.unlink()

@@ -1,4 +1,4 @@
-"""Calling libraries that rely on jax's implicit promotions, which the project's own code does without."""
+"""Calling libraries that rely on jax's implicit promotions, which this project's own code does not use."""
 
 from __future__ import annotations
 
@@ -10,6 +10,6 @@ import jax
 
 @contextlib.contextmanager
 def implicit_promotions() -> Iterator[None]:
-    """Allow implicit promotions of dtype and rank while another library's functions are called or traced."""
+    """Allow implicit promotion of dtype and rank while another library's functions are called or traced."""
     with jax.numpy_dtype_promotion("standard"), jax.numpy_rank_promotion("allow"):
         yield

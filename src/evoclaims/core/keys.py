@@ -1,4 +1,4 @@
-"""Named streams of random keys: each use has a name, and a new name shifts no other stream."""
+"""Named streams of random keys: each use has a name, and a new name changes no other stream."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def _stable_int(name: str) -> int:
 
 
 def stream(key: jax.Array, name: str) -> jax.Array:
-    """Derive one key (typed, shape []) per use, told apart by `name`."""
+    """Derive the key (typed, shape []) for the use called `name`."""
     return jax.random.fold_in(key, _stable_int(name))
 
 
@@ -27,7 +27,7 @@ def streams(key: jax.Array, *names: str) -> tuple[jax.Array, ...]:
 
     `mutate_key, eval_key = streams(key, "mutate", "eval")`
     """
-    # The same keys as one after the other, but one call of the generator to compile instead of many.
+    # The same keys as separate calls of `stream`, but only one generator call to compile.
     return tuple(
         jax.vmap(jax.random.fold_in, (None, 0))(key, np.array([_stable_int(name) for name in names], np.uint32))
     )
@@ -36,7 +36,7 @@ def streams(key: jax.Array, *names: str) -> tuple[jax.Array, ...]:
 def trial_key(seed: int | jax.Array, purpose: str) -> jax.Array:
     """Return the root key of a trial for one purpose.
 
-    Training's and evaluation's keys come from different streams of the same seed, so that no evaluation can
-    meet a state that training has drawn.
+    Training and evaluation keys come from different streams of the same seed, so evaluation never reuses a state
+    drawn in training.
     """
     return stream(jax.random.key(seed), purpose)

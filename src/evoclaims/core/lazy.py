@@ -1,6 +1,6 @@
-"""Packages whose names are imported when they are first asked for, so that importing the package costs nothing.
+"""Packages whose names are imported on first use, so that importing the package itself is cheap.
 
-By hand and without `lazy_loader`, which does the same from the same stubs: it would be a dependency for these lines.
+`lazy_loader` does the same from the same stubs, but is not worth a dependency for these few lines.
 """
 
 from __future__ import annotations
@@ -13,9 +13,9 @@ from pathlib import Path
 
 
 def exported(package: str) -> tuple[list[str], Callable[[str], object], Callable[[], list[str]]]:
-    """Return `__all__`, `__getattr__` and `__dir__` of a package, as `__init__.pyi` beside its `__init__.py` says.
+    """Return `__all__`, `__getattr__` and `__dir__` of a package, read from the `__init__.pyi` beside `__init__.py`.
 
-    The stub, which is what type checkers and editors read, is a list of `from MODULE import NAME as NAME`.
+    The stub, which type checkers and editors also read, is a list of `from MODULE import NAME as NAME`.
     """
     module = sys.modules[package]
     stub = Path(str(module.__file__)).with_suffix(".pyi").read_text(encoding="utf-8")
@@ -25,6 +25,6 @@ def exported(package: str) -> tuple[list[str], Callable[[str], object], Callable
     def load(name: str) -> object:
         if name not in homes:
             raise AttributeError(f"module {package!r} has no attribute {name!r}", name=name, obj=module)
-        return getattr(importlib.import_module(homes[name]), name)  # not kept: what is imported anew is another class
+        return getattr(importlib.import_module(homes[name]), name)  # not cached: a re-import makes another class
 
     return sorted(homes), load, lambda: sorted({*vars(module), *homes})

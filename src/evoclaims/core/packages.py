@@ -1,4 +1,4 @@
-"""The packages that a computation depends on: what declares them, and in which versions they are here or were there."""
+"""The packages that a computation depends on: where they are declared, and their installed or recorded versions."""
 
 from __future__ import annotations
 
@@ -11,29 +11,29 @@ from evoclaims.core.errors import UserError
 from evoclaims.core.provenance import PACKAGES, version_of
 
 Versions = Mapping[str, str | None]
-"""Versions of packages by name; None where one is not installed."""
+"""Package versions by name; None if not installed."""
 
 ALWAYS: Final = ("jax", "jaxlib", "numpy")
-"""What computes every trial."""
+"""Used by every trial."""
 
 UNDECLARED: Final = tuple(name for name in PACKAGES if name not in ("evoclaims", *ALWAYS))
-"""What a component without a declaration may depend on; not evoclaims itself, whose revisions are in a trial's id."""
+"""Assumed for a component without a declaration; evoclaims is left out, as its revisions are in the trial's id."""
 
 DEPENDS_ON: Final = "depends_on"
-"""Name under which a trial's provenance lists the packages that its condition depends on."""
+"""Key under which a trial's provenance lists the packages that its condition depends on."""
 
 SHORT_HASH: Final = 16
-"""Digits of a hash of versions in a file's name."""
+"""Digits of the version hash in a file name."""
 
 
 def packages_of(component: Any) -> tuple[str, ...]:
-    """Return the packages beyond `ALWAYS` that a method or task depends on, by what it declares as its `packages`.
+    """Return the packages beyond `ALWAYS` that a method or task depends on, as declared in its `packages`.
 
-    One that declares nothing is taken to depend on every package whose version is recorded. What it holds in its fields
-    counts as well: another method or task that it wraps, and any part, such as a network, that declares something.
+    Without a declaration, it is assumed to depend on every package whose version is recorded. Its fields count too:
+    a wrapped method or task, and any part, such as a network, that declares `packages`.
 
     Raises:
-        UserError: when some `packages` are not a tuple of names.
+        UserError: when a `packages` is not a tuple of names.
     """
     declared = getattr(component, "packages", UNDECLARED)
     if not isinstance(declared, tuple) or not all(isinstance(name, str) for name in declared):
@@ -45,7 +45,7 @@ def packages_of(component: Any) -> tuple[str, ...]:
 
 
 def _parts(component: Any) -> Iterator[Any]:
-    """Give what a component holds in its fields that has packages of its own: wrapped components, declaring parts."""
+    """Yield the parts in a component's fields that have their own packages: wrapped components, declaring parts."""
     held: list[Any] = [component]
     while held:
         one = held.pop()
@@ -65,18 +65,18 @@ def _parts(component: Any) -> Iterator[Any]:
 
 
 def installed(packages: tuple[str, ...]) -> dict[str, str | None]:
-    """Return the versions of packages in this process's environment."""
+    """Return the package versions in this environment."""
     return {name: version_of(name) for name in packages}
 
 
 def recorded(provenance: Mapping[str, Any], packages: tuple[str, ...]) -> dict[str, str | None]:
-    """Return the versions of packages that a provenance records; None where it records none."""
+    """Return the package versions recorded in a provenance; None where none is recorded."""
     versions = provenance.get("versions")
     return {name: versions.get(name) if isinstance(versions, Mapping) else None for name in packages}
 
 
 def depends_on(provenance: Mapping[str, Any]) -> tuple[str, ...] | None:
-    """Return the packages that a provenance lists as its trial's dependencies; None for old ones, which list none."""
+    """Return the packages that a provenance lists as its trial's dependencies; None for old ones without a list."""
     names = provenance.get(DEPENDS_ON)
     if not isinstance(names, list | tuple) or not all(isinstance(name, str) for name in names):
         return None
@@ -84,16 +84,16 @@ def depends_on(provenance: Mapping[str, Any]) -> tuple[str, ...] | None:
 
 
 def agree(provenance: Mapping[str, Any], versions: Versions) -> bool:
-    """Whether a provenance records exactly these versions."""
+    """Whether a provenance has exactly these versions."""
     return recorded(provenance, tuple(versions)) == dict(versions)
 
 
 def short_hash(versions: Versions) -> str:
-    """Return the hash of versions that is part of a record's file name."""
+    """Return the hash of versions used in a record's file name."""
     return content_hash(dict(versions))[:SHORT_HASH]
 
 
 def differences(old: Versions, new: Versions) -> dict[str, tuple[str | None, str | None]]:
-    """Return the packages whose versions differ, with both."""
+    """Return packages with different versions, and both versions."""
     names = sorted(old.keys() | new.keys())
     return {name: (old.get(name), new.get(name)) for name in names if old.get(name) != new.get(name)}

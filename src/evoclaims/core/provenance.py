@@ -30,13 +30,13 @@ PACKAGES: Final = (
     "pandas",
 )
 CUDA: Final = re.compile(r"jax-cuda\d+-(plugin|pjrt)|nvidia-.+")
-"""Names of the packages that bring CUDA and its libraries; none of them is there on a machine without a GPU."""
+"""Names of packages that contain CUDA and its libraries; a machine without a GPU has none of them."""
 
 FIXES_BITS: Final = ("machine", "versions", "xla_flags", "matmul_precision", "x64", "prng")
-"""Parts of a provenance that a computation's bits depend on, besides the device."""
+"""Parts of a provenance that can change a result's bits, besides the device."""
 
 GIT_SECONDS: Final = 5.0
-"""How long git may take; on a slow network folder a missing revision is better than a stalled run."""
+"""Time limit for git; on a slow network folder, a missing revision is better than a stalled run."""
 
 
 def collect() -> dict[str, Any]:
@@ -44,8 +44,8 @@ def collect() -> dict[str, Any]:
 
     Returns:
         "git" ({"sha", "dirty"} of the repository around the current folder, or None), "versions" (by package
-        name, None where absent, and "python"), "cuda" (versions of the packages that bring CUDA, by name; empty
-        without any), "device" ({"platform", "kind", "count"}), "machine" (a string
+        name, None where absent, and "python"), "cuda" (versions of the CUDA packages by name; empty
+        if none), "device" ({"platform", "kind", "count"}), "machine" (a string
         such as "Linux x86_64 AMD EPYC 7B13"), "xla_flags" (string or None), "matmul_precision" (string or None),
         "x64" (bool) and "prng" ({"implementation", "partitionable"}: jax's generator of random bits).
     """
@@ -54,10 +54,10 @@ def collect() -> dict[str, Any]:
 
 @functools.cache
 def _collected() -> dict[str, Any]:
-    """Look everything up; cached because git and the device do not change under a running process."""
-    import jax  # here, so that reading records and `--help` need not wait for it
+    """Look everything up; cached because git and the device do not change while a process runs."""
+    import jax  # here, so that reading records and `--help` stay fast
 
-    config: Any = jax.config  # its options are attributes that the type stubs do not list
+    config: Any = jax.config  # the type stubs do not list its options
     precision = config.jax_default_matmul_precision
     return {
         "git": git_state(),
@@ -76,10 +76,10 @@ def _collected() -> dict[str, Any]:
 
 
 def what_fixes_bits(provenance: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the parts of a provenance that fix a computation's bits, as far as it has them.
+    """Return the parts of a provenance that determine a computation's bits, if present.
 
-    Two computations of the same program, whose provenances agree in these, should agree to the bit. CUDA's versions
-    count on a GPU alone.
+    Two runs of the same program with these parts equal should be bit-identical. CUDA's versions count only on a
+    GPU.
     """
     device = provenance.get("device") or {}
     names = (*FIXES_BITS, "cuda") if device.get("platform") == "gpu" else FIXES_BITS
@@ -90,7 +90,7 @@ def git_state() -> dict[str, Any] | None:
     """Return {"sha", "dirty"} of the repository around the current folder, or None when git cannot tell.
 
     "sha" is None before the first commit. "dirty" means that a tracked file differs from that commit; untracked
-    files do not count, as with `git describe --dirty`.
+    files do not count, as in `git describe --dirty`.
     """
     if _git("rev-parse", "--is-inside-work-tree") != "true":
         return None
@@ -103,7 +103,7 @@ def git_state() -> dict[str, Any] | None:
 
 
 def _git(*arguments: str) -> str | None:
-    """Return what a read-only git command prints, or None when it is absent, slow or fails."""
+    """Return what a read-only git command prints, or None when git is missing, slow or fails."""
     try:
         done = subprocess.run(
             ["git", "-c", "core.fsmonitor=false", *arguments],
@@ -124,7 +124,7 @@ def versions() -> dict[str, str | None]:
 
 
 def cuda_versions() -> dict[str, str]:
-    """Return the version of every installed package that brings CUDA, cuDNN and the like, by name."""
+    """Return the versions of installed packages that contain CUDA, cuDNN and so on, by name."""
     found = [
         (one.name.lower().replace("_", "-"), one.version) for one in importlib.metadata.distributions() if one.name
     ]
@@ -133,7 +133,7 @@ def cuda_versions() -> dict[str, str]:
 
 @functools.cache
 def version_of(package: str) -> str | None:
-    """Return a package's version, or None; cached because what is imported does not change under a running process."""
+    """Return a package's version, or None; cached because imported packages do not change while a process runs."""
     try:
         return importlib.metadata.version(package)
     except importlib.metadata.PackageNotFoundError:
@@ -141,17 +141,17 @@ def version_of(package: str) -> str | None:
 
 
 def device_of(devices: Sequence[Any]) -> dict[str, Any]:
-    """Return platform, kind and count of JAX's devices, which are alike."""
+    """Return platform, kind and count of JAX's devices, which are all alike."""
     return {"platform": devices[0].platform, "kind": devices[0].device_kind, "count": len(devices)}
 
 
 def machine_class() -> str:
-    """Return operating system, architecture and processor model: machines that should agree to the bit."""
+    """Return operating system, architecture and processor; equal machines should give equal bits."""
     return " ".join(f"{platform.system()} {platform.machine()} {_processor()}".split())
 
 
 def _processor() -> str:
-    """Return the processor's model name as the operating system words it (empty when it does not say)."""
+    """Return the processor's model name as the operating system reports it (empty if unknown)."""
     try:
         for line in Path("/proc/cpuinfo").read_text(errors="replace").splitlines():
             if line.startswith("model name"):

@@ -1,4 +1,4 @@
-"""Frozen dataclasses that jax sees as trees of arrays."""
+"""Frozen dataclasses that jax treats as trees of arrays."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ T = TypeVar("T")
 
 
 def static(**kwargs: Any) -> Any:
-    """Mark a field that is part of the tree's structure and not an array: hashable, compared by equality."""
+    """Mark a field as part of the tree's structure, not an array: hashable, compared by equality."""
     return dataclasses.field(metadata={"static": True}, **kwargs)
 
 
 @dataclass_transform(frozen_default=True, field_specifiers=(dataclasses.field, static))
 def pytree(cls: type[T]) -> type[T]:
     """Turn a class into a frozen dataclass registered as a jax pytree; fields made by `static()` are structure."""
-    return jax.tree_util.register_dataclass(dataclasses.dataclass(frozen=True)(cls))  # which reads the fields' metadata
+    return jax.tree_util.register_dataclass(dataclasses.dataclass(frozen=True)(cls))  # reads the fields' metadata
 
 
 def strong(tree: T) -> T:
-    """Give every leaf a strong dtype, so that a loop carries what it was given and nothing compiles twice."""
+    """Give every leaf a strong dtype, so that a loop's carry keeps its dtypes and nothing compiles twice."""
     made: T = jax.tree.map(lambda leaf: jnp.asarray(leaf, dtype=jnp.result_type(leaf)), tree)
     return made
 

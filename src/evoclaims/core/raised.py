@@ -1,4 +1,4 @@
-"""What was raised, and where in a user's own files, in one line: for errors of code that is not this project's."""
+"""One line that says what was raised, and where in the user's own files: for errors in code outside evoclaims."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ def in_one_line(error: BaseException, root: Path) -> str:
     """Return an exception with its place, such as "ValueError: no such level (my_paper/tasks.py, line 7)".
 
     Args:
-        error: whatever was raised; a `UserError` is shown as its sentence, and with a place in the project alone.
-        root: the user's project; the place is the innermost line of a file of it, else the innermost of all.
+        error: the exception; a `UserError` is shown as its message, with a place only if it is in the project.
+        root: the user's project; the place is the innermost frame in one of its files, else the innermost of all.
     """
     text = _text(error)
     told = text if isinstance(error, UserError) and text else f"{type(error).__name__}{': ' * bool(text)}{text}"
@@ -26,8 +26,8 @@ def in_one_line(error: BaseException, root: Path) -> str:
 
 
 def _place(error: BaseException, root: Path) -> str:
-    """Return where an exception was raised, such as "my_paper/tasks.py, line 7"; empty when that says nothing."""
-    if isinstance(error, SyntaxError):  # a module that does not compile has no frame of its own
+    """Return where an exception was raised, such as "my_paper/tasks.py, line 7"; empty if not known."""
+    if isinstance(error, SyntaxError):  # a module that does not compile has no frame
         if not error.filename:
             return ""
         if Path(error.filename).is_file():
@@ -35,7 +35,7 @@ def _place(error: BaseException, root: Path) -> str:
     frames = [
         (Path(frame.f_code.co_filename), line)
         for frame, line in traceback.walk_tb(error.__traceback__)
-        if not frame.f_code.co_filename.startswith("<")  # Python's own import machinery, and code made of text
+        if not frame.f_code.co_filename.startswith("<")  # Python's import machinery, and code compiled from strings
     ]
     theirs = [(file, line) for file, line in frames if _is_of(file, root)]
     shown = theirs if isinstance(error, UserError) else theirs or frames
@@ -43,22 +43,22 @@ def _place(error: BaseException, root: Path) -> str:
 
 
 def _text(error: BaseException) -> str:
-    """Return the first line of an exception's own words."""
+    """Return the first line of an exception's message."""
     try:
         words = error.msg if isinstance(error, SyntaxError) else str(error)
         return next(iter(words.strip().splitlines()), "")
-    except Exception:  # an exception that cannot even be shown must not hide that it was raised
+    except Exception:  # an exception that cannot be printed must still be reported
         return ""
 
 
 def _is_of(file: Path, root: Path) -> bool:
-    """Whether a file is a project's own: in its folder, and neither evoclaims' nor that of an installed package."""
+    """Whether a file is the project's own: in its folder, but not in evoclaims or an installed package."""
     file = file.resolve()
     return file.is_relative_to(root.resolve()) and not file.is_relative_to(_OWN) and _INSTALLED.isdisjoint(file.parts)
 
 
 def _line(file: Path, line: int | None, root: Path) -> str:
-    """Return a line of a file, named from the project's folder where it lies in it."""
+    """Return a file and line; the file relative to the project's folder if it is inside."""
     resolved, top = file.resolve(), root.resolve()
     name = resolved.relative_to(top) if resolved.is_relative_to(top) else file
     return f"{name}, line {line}" if line else str(name)

@@ -1,1 +1,1 @@
-"""A compiler of functions of small arrays to single GPU kernels; README.md beside this file explains the way."""
+"""Compiles functions of small arrays to single GPU kernels; README.md beside this file explains how."""

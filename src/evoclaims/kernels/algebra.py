@@ -1,4 +1,4 @@
-"""Making expressions: constants are folded, equal expressions are shared, and operations without effect left out."""
+"""Making expressions: constants are folded, equal expressions shared, and operations without effect dropped."""
 
 from __future__ import annotations
 
@@ -19,14 +19,13 @@ class Algebra:
     """Makes expressions, and remembers those it has made."""
 
     def __init__(self) -> None:
-        """Begin without any."""
+        """Start empty."""
         self._made: dict[tuple[Any, ...], ScalarOperation] = {}
 
     def apply(self, name: str, *operands: Number) -> Number:
-        """Return an operation on numbers of one dtype (but for the condition of "select").
+        """Return an operation on numbers of one dtype (except the condition of "select").
 
-        As in a compiler that may ignore NaN, infinity and the sign of 0: 0 times anything is 0, and so are 0 divided by
-        anything and anything less itself.
+        NaN, infinity and the sign of 0 may be ignored, as in some compilers: 0 * x, 0 / x and x - x are all 0.
         """
         if all(map(is_known, operands)):
             with np.errstate(all="ignore"):
@@ -52,7 +51,7 @@ class Algebra:
         """Return the one object for an operation on these operands."""
         keys = [(o.dtype.str, o.tobytes()) if is_known(o) else ("", id(o)) for o in operands]
         key = (name, dtype, *(sorted(keys, key=repr) if name in COMMUTATIVE else keys))
-        if key not in self._made:  # it keeps its operands alive, whose ids are in the key
+        if key not in self._made:  # the key has operands' ids; the object keeps them alive
             self._made[key] = ScalarOperation(dtype, name, operands)
         return self._made[key]
 
@@ -99,7 +98,7 @@ def _div(algebra: Algebra, a: Number, b: Number) -> Number | None:
     if _is(b, 1) or _is(a, 0):
         return a
     if b.dtype.kind == "f" and is_known(b) and abs(math.frexp(float(b))[0]) == 0.5 and abs(b) > 1e-30:
-        return algebra.apply("mul", a, b.dtype.type(1) / b)  # a power of two, whose reciprocal is exact
+        return algebra.apply("mul", a, b.dtype.type(1) / b)  # the reciprocal of a power of two is exact
     return None
 
 
@@ -111,7 +110,7 @@ def _rem(algebra: Algebra, a: Number, b: Number) -> Number | None:
 
 
 def _check_divisor(divisor: Number) -> None:
-    """Check that integers are divided by what is known not to be 0, where GPUs do as they please."""
+    """Check that an integer divisor is known not to be 0: GPUs leave that result undefined."""
     if not is_known(divisor) or divisor == 0:
         raise Unsupported("a division by an integer that may be 0")
 
@@ -147,7 +146,7 @@ def _select(algebra: Algebra, condition: Number, yes: Number, no: Number) -> Num
         return yes if condition else no
     if yes is no or (is_known(yes) and is_known(no) and yes.tobytes() == no.tobytes()):
         return yes
-    if yes.dtype == bool:  # no selecting among conditions: GPUs have no instruction for it
+    if yes.dtype == bool:  # GPUs have no instruction that selects between conditions
         other = algebra.apply("and", algebra.apply("not", condition), no)
         return algebra.apply("or", algebra.apply("and", condition, yes), other)
     return None
@@ -167,4 +166,4 @@ RULES: Final[dict[str, Rule]] = {
     "select": _select,
     "sub": _sub,
 }
-"""Simplifications by operation: each returns a simpler number, or None where there is none."""
+"""Simplifications by operation: each returns a simpler number, or None if there is none."""

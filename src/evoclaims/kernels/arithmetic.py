@@ -1,4 +1,4 @@
-"""Primitives that compute: sums, products of matrices, triangular systems, loops."""
+"""Primitives that compute: sums, matrix products, triangular systems, loops."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ IDENTITIES: Final[dict[str, Callable[[np.dtype[Any]], float]]] = {
     "mul": lambda dtype: 1,
     "or": lambda dtype: 0,
 }
-"""What operations make of no numbers."""
+"""Results of reductions over no numbers."""
 
 
 @primitive("round")
@@ -135,7 +135,7 @@ def _triangular_solve(s: Scalars, equation: Any, matrix: Numbers, right: Numbers
 
 @primitive("scan")
 def _scan(s: Scalars, equation: Any, *operands: Numbers) -> Sequence[Numbers]:
-    """A loop that only carries; one that also reads and writes arrays row by row is not supported."""
+    """A loop that only carries values; scanning over the rows of arrays is not supported."""
     inner, rounds = equation.params["jaxpr"], equation.params["length"]
     shapes = [v.aval.shape for v in inner.jaxpr.invars]
     fresh = len(equation.outvars)

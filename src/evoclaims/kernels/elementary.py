@@ -1,4 +1,4 @@
-"""Functions that are made of simple operations: sine, cosine, arc tangent, powers, signs."""
+"""Functions made of simple operations: sine, cosine, arc tangent, powers, signs."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from evoclaims.kernels.unsupported import Unsupported
 F = np.float32
 LARGEST_POWER: Final = 16
 WIDEST: Final = 50_000.0
-"""Angles, rad, for which the quadrant is found exactly enough."""
+"""Largest angle, rad, whose quadrant is found accurately."""
 PIO2: Final = (F(1.5703125), F(4.837512969970703125e-4), F(7.549789948768648e-8))
 """π/2 in three parts (Cody and Waite): a small multiple of the first two is exact."""
 SINE: Final = (-1.9515295891e-4, 8.3321608736e-3, -1.6666654611e-1)
-"""Coefficients of sinf, cosf and atanf in Moshier's Cephes library, the highest power first."""
+"""Coefficients of sinf, cosf and atanf in Moshier's Cephes library, highest power first."""
 COSINE: Final = (2.443315711809948e-5, -1.388731625493765e-3, 4.166664568298827e-2)
 ARC_TANGENT: Final = (8.05374449538e-2, -1.38776856032e-1, 1.99777106478e-1, -3.33329491539e-1)
 
@@ -35,7 +35,7 @@ def _polynomial(a: Algebra, z: Number, coefficients: Sequence[float]) -> Number:
 def _circular(quarters: int, a: Algebra, x: Number) -> Number:
     """Return the sine of x + `quarters` · π/2 (Cephes).
 
-    It is wrong by less than 1e-7 for |x| < 10,000, and than 6e-7 for |x| < `WIDEST`, beyond which it is NaN.
+    The error is below 1e-7 for |x| < 10,000, and below 6e-7 for |x| < `WIDEST`; beyond that it returns NaN.
     """
     near = a.apply("lt", a.apply("abs", x), F(WIDEST))
     turns = a.apply("rint", a.apply("mul", x, F(2 / np.pi)))
@@ -56,7 +56,7 @@ def _circular(quarters: int, a: Algebra, x: Number) -> Number:
 def _atan2(a: Algebra, y: Number, x: Number) -> Number:
     """Return the angle of (x, y), both finite; a zero has no sign here.
 
-    It is the arc tangent of the smaller coordinate over the larger, put into its octant.
+    It is the arc tangent of the smaller coordinate over the larger, moved to its octant.
     """
     wide, high = a.apply("abs", x), a.apply("abs", y)
     steep = a.apply("gt", high, wide)
@@ -107,4 +107,4 @@ ELEMENTARY: Final[dict[str, Callable[..., Number]]] = {
     "sin": partial(_circular, 0),
     "square": lambda a, x: a.apply("mul", x, x),
 }
-"""By jax's names; each takes the algebra and the operands."""
+"""By jax's names; each function takes the algebra and the operands."""

@@ -1,6 +1,6 @@
 """Scalar expressions: what a function computes, number by number.
 
-A number is known (a NumPy scalar) or an expression of inputs. The same operation on the same operands is one object.
+A number is known (a NumPy scalar) or an expression of inputs. Equal operations on the same operands are one object.
 """
 
 from __future__ import annotations
@@ -53,11 +53,11 @@ class Loop:
 
     Attributes:
         rounds: how many.
-        carried: what each round starts with.
-        start: what the first one starts with.
-        results: what each round hands on.
-        taken: what the rounds use of what is outside, so that it is computed once before them, and that a loop around
-            this one knows of it.
+        carried: the carry at the start of a round.
+        start: the first carry.
+        results: the next carry.
+        taken: outside expressions that the rounds use; computed once before the loop, and visible to a loop around
+            this one.
     """
 
     rounds: int
@@ -69,14 +69,14 @@ class Loop:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class LoopResult(Expression):
-    """A result of a loop: the value that its last round hands on at position `place` of what it carries."""
+    """A result of a loop: the value at position `place` of the carry after the last round."""
 
     loop: Loop
     place: int
 
 
 def is_known(number: Number) -> bool:
-    """Whether it is a number and not an expression."""
+    """Whether it is a number, not an expression."""
     return not isinstance(number, Expression)
 
 
@@ -93,7 +93,7 @@ def loop(rounds: int, carried: Sequence[Carried], start: Sequence[Number], resul
 
 
 def in_order(numbers: Iterable[Number]) -> list[Expression]:
-    """Return these and all that they are made of, each after what it is made of; not what loops make inside."""
+    """Return these and all expressions they use, operands first; without the bodies of loops."""
     made: set[int] = set()
     order: list[Expression] = []
     waiting = [n for n in numbers if not is_known(n)][::-1]
@@ -111,7 +111,7 @@ def in_order(numbers: Iterable[Number]) -> list[Expression]:
 
 
 def _parents(expression: Expression) -> list[Expression]:
-    """Return what it is made of."""
+    """Return its operands."""
     match expression:
         case ScalarOperation(operands=operands):
             return [o for o in operands if not is_known(o)]
@@ -121,14 +121,14 @@ def _parents(expression: Expression) -> list[Expression]:
 
 
 def _quotient(a: Any, b: Any) -> Any:
-    """Divide; integers towards zero, and by 0 as XLA does."""
+    """Divide; integers round towards zero, and division by 0 is as in XLA."""
     if a.dtype.kind == "f":
         return np.divide(a, b)
     return a.dtype.type(np.trunc(np.divide(a, b, dtype=np.float64))) if b else a.dtype.type(-1)
 
 
 def _remainder(a: Any, b: Any) -> Any:
-    """Return what is left of a, with its sign; of a division by 0, as in XLA, all."""
+    """Return the remainder, with a's sign; for b = 0 it is a, as in XLA."""
     return np.fmod(a, b) if a.dtype.kind == "f" or b else a
 
 
@@ -158,7 +158,7 @@ KNOWN: Final[dict[str, Callable[..., Any]]] = {
     "sub": np.subtract,
     "xor": np.bitwise_xor,
 }
-"""The simple operations, on numbers that are known. "select" chooses its second operand where the first is true; "rint"
-rounds halves to even; the others are jax's of the same name."""
+"""The simple operations, on known numbers. "select" returns its second operand where the first is true; "rint" rounds
+halves to even; the others are jax's of the same name."""
 COMPARISONS: Final = frozenset({"eq", "ge", "gt", "le", "lt", "ne"})
-"""Operations whose result is a bool."""
+"""Operations that return a bool."""

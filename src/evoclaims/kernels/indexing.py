@@ -1,4 +1,4 @@
-"""Primitives that index, reshape and sort; the positions that they read from may themselves be computed."""
+"""Primitives that index, reshape and sort; the positions they read may be computed."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from evoclaims.kernels.interpreter import Numbers, Scalars, filled, known, liste
 from evoclaims.kernels.unsupported import Unsupported
 
 Place = tuple[int, Number, int]
-"""A dimension, where a window begins along it, and the last position where it may begin."""
+"""A dimension, a window's start position along it, and the last possible start."""
 
 
 @primitive("copy", "stop_gradient", "optimization_barrier", "pvary")
@@ -138,9 +138,9 @@ def _sort(s: Scalars, equation: Any, *operands: Numbers) -> Sequence[Numbers]:
 
 
 def _sorted(s: Scalars, before: str, keys: Numbers, columns: Sequence[Numbers], count: int) -> list[Numbers]:
-    """Return each column's first `count` numbers in the order of keys ("le": the smallest first; "ge": the largest).
+    """Return each column's first `count` numbers, ordered by keys ("le": smallest first; "ge": largest first).
 
-    Equal ones keep their order. There is no order with NaN among the keys.
+    Equal keys keep their order. With NaN among the keys the order is undefined.
     """
     size = keys.shape[-1]
     results = [np.empty((*keys.shape[:-1], count), object) for _ in columns]
@@ -197,9 +197,9 @@ def _gather(s: Scalars, equation: Any, x: Numbers, indices: Numbers) -> Sequence
 
 
 def _read(s: Scalars, x: Numbers, at: list[int], places: Sequence[Place], fill: Number | None = None) -> Number:
-    """Return a number of a window: known places are looked up, others are selected among all that are possible.
+    """Return a number of a window: known positions are looked up, others selected among all possible ones.
 
-    A window out of bounds gives `fill` if there is one, and else is moved to the nearest place where it is not.
+    A window out of bounds gives `fill` if there is one; otherwise it moves to the nearest position in bounds.
     """
     if not places:
         return x[tuple(at)]
@@ -226,7 +226,7 @@ def _read(s: Scalars, x: Numbers, at: list[int], places: Sequence[Place], fill: 
 
 @primitive("scatter", "scatter-add", "scatter-mul")
 def _scatter(s: Scalars, equation: Any, x: Numbers, indices: Numbers, updates: Numbers) -> Sequence[Numbers]:
-    """Write windows at known places; one that is out of bounds is left out, or moved if the mode says so."""
+    """Write windows at known positions; one out of bounds is dropped, or moved if the mode says so."""
     combine = equation.primitive.name.removeprefix("scatter").removeprefix("-")
     p = equation.params
     numbers = p["dimension_numbers"]

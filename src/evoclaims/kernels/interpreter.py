@@ -1,4 +1,4 @@
-"""Interpreting jaxprs with numbers that are expressions; what each primitive does is in `arithmetic` and `indexing`."""
+"""Interprets jaxprs with expressions as numbers; the rules for primitives are in `arithmetic` and `indexing`."""
 
 from __future__ import annotations
 
@@ -29,13 +29,13 @@ CALLS: Final = {
     "custom_vmap_call": "call",
     "jit": "jaxpr",
 }
-"""Primitives that call a function, and the parameter that holds it."""
+"""Primitives that call a function, and the parameter with that function."""
 COMPOUND: Final = "call_hi_primitive"
 """What jax 0.12 stages for some functions, such as `jax.numpy.nonzero`; it can be lowered to simpler primitives."""
 
 
 def primitive(*names: str) -> Callable[[Any], Any]:
-    """Register what primitives do: a function of the interpreter, the equation and its operands."""
+    """Register the rule for primitives: a function of interpreter, equation and operands."""
 
     def register(rule: Any) -> Any:
         PRIMITIVES.update(dict.fromkeys(names, rule))
@@ -45,13 +45,13 @@ def primitive(*names: str) -> Callable[[Any], Any]:
 
 
 def known(array: Any) -> Numbers:
-    """Return an array's numbers."""
+    """Return an array as numbers."""
     array = np.asarray(array)
     return listed(list(array.reshape(-1)), array.shape)
 
 
 def filled(shape: Sequence[int], number: Number) -> Numbers:
-    """Return an array of one number."""
+    """Return an array of copies of a number."""
     return listed([number] * int(np.prod(shape)), shape)
 
 
@@ -66,7 +66,7 @@ def check(dtype: Any) -> np.dtype[Any]:
     """Return a dtype as NumPy has it.
 
     Raises:
-        Unsupported: when it is not one that expressions may have.
+        Unsupported: when expressions cannot have it.
     """
     for known_dtype in DTYPES:
         if dtype == known_dtype:
@@ -78,7 +78,7 @@ class Scalars:
     """Interprets jaxprs."""
 
     def __init__(self) -> None:
-        """Begin without expressions."""
+        """Start without expressions."""
         self.algebra = Algebra()
 
     def run(self, closed: Any, operands: Sequence[Numbers]) -> list[Numbers]:
@@ -86,7 +86,7 @@ class Scalars:
         jaxpr = closed.jaxpr
         try:
             constants = [known(c) for c in closed.consts]
-        except TypeError as error:  # a random key, or a value that is being traced
+        except TypeError as error:  # a random key, or a traced value
             raise Unsupported("a constant that is not known") from error
         values: dict[Any, Numbers] = dict(zip(jaxpr.constvars, constants, strict=True))
         values.update(zip(jaxpr.invars, operands, strict=True))
@@ -125,16 +125,16 @@ class Scalars:
         return PRIMITIVES[name](self, equation, *operands)
 
     def each(self, function: Callable[..., Number], *operands: Numbers) -> Numbers:
-        """Apply a function to numbers at the same place."""
+        """Apply a function to the numbers at each position."""
         arrays = np.broadcast_arrays(*operands)
         return listed([function(*n) for n in zip(*(a.reshape(-1) for a in arrays), strict=True)], arrays[0].shape)
 
     def elementwise(self, name: str, *operands: Numbers) -> Numbers:
-        """Apply a simple operation to numbers at the same place."""
+        """Apply a simple operation to the numbers at each position."""
         return self.each(lambda *numbers: self.algebra.apply(name, *numbers), *operands)
 
     def fold(self, name: str, numbers: Sequence[Number]) -> Number:
-        """Apply a simple operation from the first number to the last."""
+        """Combine numbers by an operation, from first to last."""
         result = numbers[0]
         for number in numbers[1:]:
             result = self.algebra.apply(name, result, number)

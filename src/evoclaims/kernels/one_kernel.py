@@ -1,6 +1,6 @@
-"""Running a function as one GPU kernel, a thread for each element of a batch.
+"""Running a function as one GPU kernel, with one thread per element of a batch.
 
-XLA makes some hundred kernels of a robot's time step, each of which costs at least a microsecond however few robots
+XLA splits a robot's time step into some hundred kernels, and each costs at least a microsecond however few robots
 there are. Here one thread computes a robot's whole step in registers.
 """
 
@@ -24,20 +24,20 @@ from evoclaims.kernels.scalarize import scalarize
 from evoclaims.kernels.unsupported import Unsupported
 
 BLOCK: Final = 32
-"""Threads in a block: one warp, so that few robots are spread over many processors."""
+"""Threads in a block: one warp, so that even few robots use many processors."""
 TARGET: Final = "__gpu$xla.gpu.ptx"
-"""XLA's call of a kernel that is given as PTX."""
+"""XLA's call target for a kernel given as PTX."""
 Shapes = tuple[jax.ShapeDtypeStruct, ...]
 
 
 def one_kernel(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Return `function`, which on an NVIDIA GPU runs as one kernel, and elsewhere as it is.
+    """Return `function`, run as one kernel on an NVIDIA GPU, and unchanged elsewhere.
 
-    It may be batched, any number of times (under `jax.shard_map` with `check_vma=False`). Where it cannot be one kernel
-    (`Unsupported`) it runs as it is, and a warning says why.
+    It may be batched, any number of times (under `jax.shard_map` with `check_vma=False`). If it cannot be one kernel
+    (`Unsupported`), it runs unchanged, and a warning says why.
 
     Args:
-        function: of trees of small arrays (float32, int32, bool); pure, and not differentiated.
+        function: takes trees of small arrays (float32, int32, bool); pure, and not differentiated.
     """
 
     @cache
@@ -77,14 +77,14 @@ def has_gpu() -> bool:
     device = jax.devices()[0]
     try:
         return device.platform == "gpu" and float(device.compute_capability) >= ptx.CAPABILITY
-    except (AttributeError, ValueError):  # another maker's
+    except (AttributeError, ValueError):  # not NVIDIA's
         return False
 
 
 def _batched(alone: Callable[..., list[Array]], results: list[Numbers], shapes: Shapes, outputs: Shapes) -> Any:
-    """Return a function of the leaves, each with any number of batch dimensions in front.
+    """Return a function of the leaves, each with any number of leading batch dimensions.
 
-    An array with fewer of them than others lacks the innermost.
+    An array with fewer of them lacks the innermost.
     """
 
     @custom_vmap
@@ -125,7 +125,7 @@ def _launch(
     shapes: Shapes,
     outputs: Shapes,
 ) -> list[Array]:
-    """Call the kernel, with as many threads as the batch has elements."""
+    """Call the kernel with one thread per element of the batch."""
     threads = math.prod(batch)
     some = [i for i, result in enumerate(results) if result.size and threads]
     if not some:

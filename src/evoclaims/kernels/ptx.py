@@ -1,4 +1,4 @@
-"""Scalar expressions as PTX, the assembly language of NVIDIA GPUs (PTX ISA 7.1): a thread computes all results once."""
+"""Scalar expressions as PTX, the assembly language of NVIDIA GPUs (PTX ISA 7.1); a thread computes all results once."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ from evoclaims.kernels.unsupported import Unsupported
 ENTRY: Final = "kernel"
 HEAD: Final = ".version 7.1\n.target sm_80\n.address_size 64\n"
 LARGEST: Final = 200_000
-"""Expressions of a kernel at most: the driver assembles 50,000 in about 10 s."""
+"""Most expressions in a kernel: the driver assembles 50,000 in about 10 s."""
 CAPABILITY: Final = 8.0
-"""The compute capability that the target needs: `max.NaN` and `min.NaN`."""
+"""The compute capability needed, for `max.NaN` and `min.NaN`."""
 COMPARED: Final = {name: f"setp.{name}" for name in ("eq", "ge", "gt", "le", "lt")}
-# The assembler may fuse a product with the sum that it goes into, which is faster and more exact.
+# The assembler may fuse a product and a following sum, which is faster and more exact.
 FLOATS: Final = {name: f"{code}.f32" for name, code in COMPARED.items()} | {
     "abs": "abs.f32",
     "add": "add.f32",
@@ -40,7 +40,7 @@ FLOATS: Final = {name: f"{code}.f32" for name, code in COMPARED.items()} | {
     "max": "max.NaN.f32",
     "min": "min.NaN.f32",
     "mul": "mul.f32",
-    "ne": "setp.neu.f32",  # true of NaN, of which the other comparisons are false
+    "ne": "setp.neu.f32",  # true for NaN; the other comparisons are false
     "neg": "neg.f32",
     "rint": "cvt.rni.f32.f32",
     "select": "selp.f32",
@@ -66,7 +66,7 @@ INTEGERS: Final = {name: f"{code}.s32" for name, code in COMPARED.items()} | {
 }
 CONDITIONS: Final = {"and": "and.pred", "ne": "xor.pred", "not": "not.pred", "or": "or.pred", "xor": "xor.pred"}
 INSTRUCTIONS: Final = {"f": FLOATS, "i": INTEGERS, "b": CONDITIONS}
-"""The instruction for an operation, by the kind of its last operand's dtype."""
+"""Instructions by the kind of the last operand's dtype, then by operation."""
 CASTS: Final = {"if": "cvt.rn.f32.s32", "fi": "cvt.rzi.s32.f32"}
 TYPES: Final = {"f": "f32", "i": "s32", "b": "pred"}
 NAMES: Final = {"f": "%f", "i": "%r", "b": "%p"}
@@ -75,12 +75,12 @@ BYTES: Final = {"f": 4, "i": 4, "b": 1}
 
 @dataclass(frozen=True)
 class Array:
-    """How an array that a kernel takes lies in memory, row by row.
+    """The memory layout of a kernel's input array, row by row.
 
     Attributes:
         size: numbers in a row.
         dtype: float32, int32 or bool.
-        shared_by: how many threads, one after the other, read the same row.
+        shared_by: how many consecutive threads read the same row.
     """
 
     size: int
@@ -89,15 +89,15 @@ class Array:
 
 
 def arrays_read(results: Sequence[Numbers]) -> list[int]:
-    """Return which of a function's arrays its results depend on."""
+    """Return which input arrays the results depend on."""
     return sorted({e.array for e in _everything(_numbers(results)) if isinstance(e, Input)})
 
 
 def check_results(results: Sequence[Numbers]) -> None:
-    """Check that there is an instruction for every operation, and that assembling takes less than a minute or so.
+    """Check that every operation has an instruction, and that assembling takes at most about a minute.
 
     Raises:
-        Unsupported: when there is none, or there are more than `LARGEST` operations.
+        Unsupported: when one has none, or there are more than `LARGEST` operations.
     """
     everything = _everything(_numbers(results))
     if len(everything) > LARGEST:
@@ -114,8 +114,8 @@ def kernel(results: Sequence[Numbers], arrays: dict[int, Array], threads: int, b
 
     Args:
         results: what a thread writes into its row of each result, none of them empty.
-        arrays: those that are read (`arrays_read`); the kernel's parameters are their addresses, then those of results.
-        threads: how many rows there are.
+        arrays: the inputs read (`arrays_read`); the kernel's parameters are their addresses, then the results'.
+        threads: number of rows.
         block: threads in a block.
     """
     page = _Assembly()
@@ -145,17 +145,17 @@ def _numbers(results: Sequence[Numbers]) -> list[Number]:
 
 
 def _everything(numbers: Iterable[Number]) -> list[Expression]:
-    """Return these and all that they are made of, what loops make inside too."""
+    """Return these and all expressions they use, including loop bodies."""
     order = in_order(numbers)
     loops = {id(e.loop): e.loop for e in order if isinstance(e, LoopResult)}
     return order + [inner for loop in loops.values() for inner in _everything(loop.results)]
 
 
 class _Assembly:
-    """Instructions, as they are written down. Every register is written once, but for those that loops carry."""
+    """The instructions written so far. Every register is written once, except those that loops carry."""
 
     def __init__(self) -> None:
-        """Begin without any."""
+        """Start empty."""
         self.lines: list[str] = []
         self.count = dict.fromkeys(TYPES, 0)
         self.labels = 0
@@ -165,7 +165,7 @@ class _Assembly:
         self.lines += lines
 
     def register(self, dtype: Any) -> str:
-        """Return a new one."""
+        """Return a new register."""
         kind = np.dtype(dtype).kind
         self.count[kind] += 1
         return f"{NAMES[kind]}{self.count[kind] - 1}"
@@ -180,7 +180,7 @@ class _Assembly:
         self.write(f"mad.wide.u32 {address}, {row}, {array.size * BYTES[array.dtype.kind]}, {address}")
 
     def compute(self, expressions: Sequence[Expression], registers: dict[int, Any]) -> None:
-        """Compute expressions in their order; `registers` holds where each is, by its id."""
+        """Compute expressions in order; `registers` has each one's register by its id."""
         for expression in expressions:
             if id(expression) in registers:
                 continue
@@ -201,7 +201,7 @@ class _Assembly:
             registers[id(expression)] = place
 
     def operand(self, number: Number, registers: dict[int, Any]) -> str:
-        """Return a number's register, or what stands for it if it is known."""
+        """Return a number's register, or its literal if it is known."""
         if not is_known(number):
             return str(registers[id(number)])
         if number.dtype.kind == "f":
@@ -253,7 +253,7 @@ class _Assembly:
             self.write(f"{INSTRUCTIONS[kind][operation.name]} {place}, {', '.join(operands)}")
 
     def _repeat(self, loop: Loop, registers: dict[int, Any]) -> list[str]:
-        """Write a loop; return where its outcomes are."""
+        """Write a loop; return its results' registers."""
 
         def move(numbers: Iterable[tuple[str, str, Carried]]) -> None:
             self.write(*(f"mov.{TYPES[c.dtype.kind]} {to}, {source}" for to, source, c in numbers))
@@ -265,7 +265,7 @@ class _Assembly:
         self.write(f"mov.s32 {rounds}, 0", f"{again}:")
         inside = {**registers, **{id(c): register for c, register in zip(loop.carried, carried, strict=True)}}
         self.compute(in_order(loop.results), inside)
-        # A result may be another carried number: all are set aside before one is overwritten.
+        # A result may be another carried number: copy all before overwriting any.
         aside = [self.register(c.dtype) for c in loop.carried]
         move(zip(aside, [self.operand(r, inside) for r in loop.results], loop.carried, strict=True))
         move(zip(carried, aside, loop.carried, strict=True))

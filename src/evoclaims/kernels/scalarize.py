@@ -1,6 +1,6 @@
-"""A function's jaxpr as scalar expressions: one for every number of every array it makes.
+"""A function's jaxpr as scalar expressions: one for every number in every array.
 
-Moving numbers about (slices, transpositions, indexing) costs nothing, and what is known while tracing is worked out.
+Moving numbers (slices, transpositions, indexing) costs nothing, and known values are computed while tracing.
 """
 
 from __future__ import annotations
@@ -20,14 +20,14 @@ from evoclaims.kernels.interpreter import Numbers, Scalars, check, listed
 
 
 def scalarize(function: Callable[..., Any], *arguments: Any) -> tuple[list[Numbers], Any]:
-    """Return expressions for every result of `function`, and the results' shapes as `jax.eval_shape` gives them.
+    """Return expressions for every result of `function`, and the results' shapes as from `jax.eval_shape`.
 
     Args:
-        function: of trees of small arrays.
-        arguments: shapes (`jax.ShapeDtypeStruct`); the i-th array of them is array i of `Input`.
+        function: takes trees of small arrays.
+        arguments: shapes (`jax.ShapeDtypeStruct`); their i-th array is array i of `Input`.
 
     Raises:
-        Unsupported: for a primitive, a use of one, or a dtype that has no scalar expression here.
+        Unsupported: for a primitive, a use of one, or a dtype without a scalar expression here.
     """
     jaxpr, shape = jax.make_jaxpr(function, return_shape=True)(*arguments)
     for aval in jaxpr.out_avals:

@@ -3,5 +3,5 @@
 from __future__ import annotations
 
 
-class Unsupported(Exception):  # noqa: N818  (nothing has gone wrong: the function runs as any other)
+class Unsupported(Exception):  # noqa: N818  (not an error: the function runs without a kernel)
     """A function uses something that kernels do not support; the message says what."""
