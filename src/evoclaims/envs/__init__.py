@@ -1,4 +1,4 @@
-"""Tasks: what a method is tried on."""
+"""Tasks: what methods are run on."""
 
 from evoclaims.core.lazy import exported
 

@@ -1,4 +1,4 @@
-"""What a task is: a list of levels, an environment to act in, and an examination that says how well a policy does."""
+"""What a task is: a list of levels, an environment to act in, and an examination that scores a policy."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ class TaskState:
 
     Attributes:
         observation: what the policy sees, shape [observation_size].
-        reward: reward of the step just made.
+        reward: reward of the last step.
         terminated: the task itself ended the episode.
         truncated: the horizon ended it.
-        inner: whatever the task needs to go on.
+        inner: the task's own state.
     """
 
     observation: Float[Array, " observation"]
@@ -37,12 +37,12 @@ class TaskState:
 
 @pytree
 class Episode:
-    """What a policy got out of a task.
+    """The result of a policy on a task.
 
     Attributes:
         fitness: the episode's reward as evolution maximizes it.
-        success: share of the level that is right, in [0, 1]; the level is solved at exactly 1.
-        metrics: further scalars that the task measures; the same names in all its episodes.
+        success: share of the level solved, in [0, 1]; the level is solved at exactly 1.
+        metrics: other scalars measured by the task; the same names in all its episodes.
     """
 
     fitness: Float[Array, ""]
@@ -51,24 +51,24 @@ class Episode:
 
     @property
     def score(self) -> Episode:
-        """The episode without the task's own metrics: what a method's state remembers of it."""
+        """The episode without the task's own metrics, as kept in a method's state."""
         return Episode(fitness=self.fitness, success=self.success)
 
 
 def share(part: Int[Array, ""], whole: Int[Array, ""]) -> Float[Array, ""]:
-    """Return part / whole of two counts: exactly 1 when they are equal, and only then.
+    """Return part / whole of two counts: exactly 1 if and only if they are equal.
 
-    XLA turns a division by what it knows to be constant into a product with the rounded reciprocal, by which 41 of 41
-    would be 0.99999994: a solved level that nobody ever leaves.
+    XLA turns division by a constant into multiplication by the rounded reciprocal. 41 of 41 would then be 0.99999994,
+    and a solved level would never count as solved.
     """
     return jnp.where(part == whole, 1.0, part.astype(jnp.float32) / whole.astype(jnp.float32))
 
 
 class MisfitError(UserError):
-    """What a policy, a method or a task gives is not what the other side takes; `clause` says what, and where."""
+    """The output of a policy, method or task does not fit what receives it; `clause` says what, and where."""
 
     def __init__(self, clause: str) -> None:
-        """Make a sentence of the clause."""
+        """Make the clause a sentence."""
         super().__init__(f"{clause[0].upper()}{clause[1:]}.")
         self.clause = clause
 
@@ -85,7 +85,7 @@ class Task(Protocol):
 
     @property
     def revision(self) -> int:
-        """Raised whenever the task computes something else."""
+        """Increased whenever the task's results change."""
 
     @property
     def levels(self) -> int:
@@ -107,22 +107,22 @@ class Task(Protocol):
         """Start an episode at `level`."""
 
     def step(self, state: TaskState, action: Float[Array, " action"]) -> TaskState:
-        """Act once. The caller resets a state that is terminated or truncated."""
+        """Act once. The caller resets a terminated or truncated state."""
 
     def episode(self, policy: PolicyFn, key: PRNGKeyArray, level: Int[Array, ""]) -> Episode:
-        """Run one whole training episode of `policy`: one evaluation of an individual in evolution."""
+        """Run one whole training episode of `policy`: one evaluation of an individual."""
 
     def examine(self, policy: PolicyFn, key: PRNGKeyArray, level: Int[Array, ""]) -> Episode:
         """Score `policy` on `level`: the test that decides level-ups and final results, the same for every method."""
 
 
 def fitting(task: Task, action: Float[Array, " action"]) -> Float[Array, " action"]:
-    """Return an action as it is; every task asks this of every action, while its program is traced.
+    """Return an action unchanged, after checking it; every task checks every action during tracing.
 
-    jax would broadcast one of another shape: a policy whose only fault is an action of shape [] scores nothing.
+    jax would broadcast an action of another shape: a good policy with actions of shape [] would score nothing.
 
     Raises:
-        MisfitError: when its shape or type is not that of the task's actions.
+        MisfitError: when its shape or dtype is not that of the task's actions.
     """
     found, wanted = jnp.asarray(action), (task.action_size,)
     if found.shape != wanted or found.dtype != jnp.float32:
@@ -135,9 +135,9 @@ def fitting(task: Task, action: Float[Array, " action"]) -> Float[Array, " actio
 
 @runtime_checkable
 class Numbered(Protocol):
-    """A task with numbers that programs take as data, and do not embed.
+    """A task with numbers that programs take as data instead of constants.
 
-    Conditions that differ in nothing else share their compiled programs: obstacles of three heights compile once.
+    Conditions that differ only in these share their compiled programs: obstacles of three heights compile once.
     """
 
     @property
@@ -145,4 +145,4 @@ class Numbered(Protocol):
         """The numbers: a tree of arrays."""
 
     def with_numbers(self, numbers: Any) -> Task:
-        """Return the task with these numbers, which may be traced, in the place of its own."""
+        """Return the task with these numbers, which may be traced, instead of its own."""

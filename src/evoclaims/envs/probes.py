@@ -1,6 +1,6 @@
 """Probe tasks: tiny, with known answers, each harder than the last; a method that fails one is broken.
 
-The idea is rejax's: when the first probe that fails is the one with a delayed reward, look at credit assignment.
+The idea is from rejax: if the first failing probe is the one with a delayed reward, check credit assignment.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from evoclaims.core.pytree import pytree
 from evoclaims.envs.base import Episode, PolicyFn, TaskState, fitting, share
 
 Question = tuple[tuple[float, ...], int | None]
-"""An observation and the bit wanted as its answer; None where any answer will do."""
+"""An observation and the right answer bit; None where any answer is accepted."""
 Case = tuple[Question, ...]
 """The questions of one episode, in order."""
 
@@ -31,7 +31,7 @@ class Asked:
     Attributes:
         case: which case is being asked.
         time: how many questions have been answered.
-        owed: what the answers so far have earned and the rewards have not yet paid.
+        owed: reward earned by the answers so far but not yet paid.
     """
 
     case: Int[Array, ""]
@@ -41,15 +41,15 @@ class Asked:
 
 @dataclass(frozen=True)
 class Probe:
-    """Questions to be answered by one action, read as the bit action > 0; a right answer earns 1, a wrong one -1.
+    """Questions answered by one action, read as the bit action > 0; a right answer earns 1, a wrong one -1.
 
     Attributes:
         name: the registered name.
-        cases: the episodes there are, all of the same length; level k asks for the first `cases_at_level[k]` of them.
+        cases: the possible episodes, all of the same length; level k asks for the first `cases_at_level[k]` of them.
         cases_at_level: ascending, one entry per level.
-        paid_late: whether all is paid by the last reward.
-        error_ends: whether a wrong answer terminates the episode; one without errors is then truncated at the horizon,
-            as a task that could go on for ever. Otherwise the last answer terminates it.
+        paid_late: whether the last reward pays everything.
+        error_ends: whether a wrong answer terminates the episode; an episode without errors is then truncated at the
+            horizon, like an endless task. Otherwise the last answer terminates it.
     """
 
     revision: ClassVar[int] = 1
@@ -79,12 +79,12 @@ class Probe:
 
     @property
     def best_fitness(self) -> float:
-        """The fitness of a policy that is always right: the questions of an episode that matter."""
+        """The fitness of a policy that is always right: the number of questions that matter."""
         return float(self.matters[0].sum())
 
     @cached_property
     def observations(self) -> NDArray[np.float32]:
-        """What is shown, shape [cases, horizon, observation_size]."""
+        """The observations, shape [cases, horizon, observation_size]."""
         return np.array([[shown for shown, _ in case] for case in self.cases], np.float32)
 
     @cached_property
@@ -94,7 +94,7 @@ class Probe:
 
     @cached_property
     def matters(self) -> NDArray[np.bool_]:
-        """Whether the answer matters, shape [cases, horizon]; every case has as many that do."""
+        """Whether the answer matters, shape [cases, horizon]; the same count in every case."""
         return np.array([[answer is not None for _, answer in case] for case in self.cases])
 
     def reset(self, key: PRNGKeyArray, level: Int[Array, ""]) -> TaskState:
@@ -127,8 +127,8 @@ class Probe:
         """Ask every case of `level`; the key is not used.
 
         Returns:
-            Fitness is the mean over cases of an episode's rewards, success the share of questions answered rightly; a
-            question that an ended episode has not reached is not.
+            Fitness is the mean over cases of an episode's total reward; success is the share of questions answered
+            right. Questions after an early end count as wrong.
         """
         rewards, right = jax.vmap(lambda case: self._play(policy, case))(jnp.arange(len(self.cases), dtype=jnp.int32))
         cases = self._cases(level)
@@ -162,34 +162,34 @@ class Probe:
         return jnp.asarray(self.cases_at_level, jnp.int32)[level]
 
     def _shown(self, asked: Asked) -> Float[Array, " observation"]:
-        """Return the observation; past the last question it is the last one's."""
+        """Return the observation; after the last question, the last one again."""
         return jnp.asarray(self.observations)[asked.case, jnp.minimum(asked.time, self.horizon - 1)]
 
 
 CONSTANT: Final = Probe("probe_constant", cases=((((0.0,), 1),), (((1.0,), 1),)), cases_at_level=(2,))
-"""Say yes, whatever is shown: does anything that is rewarded get done?"""
-# From here on bits are shown as -1 and 1: an untrained network without biases answers 0, a no, to an observation of 0.
+"""Always answer yes: does the method learn anything rewarded?"""
+# From here on bits are shown as -1 and 1: to an observation of 0, an untrained network without biases answers 0, a no.
 COPY: Final = Probe("probe_copy", cases=((((-1.0,), 0),), (((1.0,), 1),)), cases_at_level=(2,))
-"""Repeat the bit: does the policy look at what it is shown?"""
+"""Repeat the bit: does the policy use its observation?"""
 DELAYED: Final = Probe(
     "probe_delayed",
     cases=((((-1.0, 0.0), 0), ((0.0, 1.0), None)), (((1.0, 0.0), 1), ((0.0, 1.0), None))),
     cases_at_level=(2,),
     paid_late=True,
 )
-"""Repeat the bit and be paid one step later, when nothing shown tells which bit it was: is credit carried back?"""
+"""Repeat the bit; the reward comes one step later, when the bit is not visible: does credit reach the answer?"""
 SURVIVAL: Final = Probe(
     "probe_survival",
     cases=((((-1.0,), 0), ((1.0,), 1)), (((1.0,), 1), ((-1.0,), 0))),
     cases_at_level=(2,),
     error_ends=True,
 )
-"""Repeat two bits, of which a wrong answer to the first forfeits the second: is a policy trained through early ends?"""
+"""Repeat two bits; a wrong first answer ends the episode: does the method learn despite early ends?"""
 CURRICULUM: Final = Probe(
     "probe_curriculum",
     cases=((((-1.0, -1.0), 0),), (((-1.0, 1.0), 1),), (((1.0, -1.0), 1),), (((1.0, 1.0), 0),)),
     cases_at_level=(2, 4),
 )
-"""Repeat the second bit (level 0), and negate it where the first is set (level 1): is a level left when solved?"""
+"""Repeat the second bit (level 0); negate it where the first is set (level 1): does the level go up when solved?"""
 
 PROBES: Final = {probe.name: probe for probe in (CONSTANT, COPY, DELAYED, SURVIVAL, CURRICULUM)}

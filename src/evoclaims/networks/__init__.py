@@ -1,4 +1,4 @@
-"""Networks: what a policy is made of."""
+"""Networks: the building blocks of policies."""
 
 from evoclaims.core.lazy import exported
 

@@ -35,7 +35,7 @@ def apply_activation(
 ) -> Float[Array, "*shape"]:
     """Apply function `names[index]` to each element of `z`; `index` broadcasts against `z`.
 
-    All functions of the set are computed and one is kept: sets have a handful of members.
+    All functions of the set are computed and one is kept, as sets are small.
     """
     value = ACTIVATIONS[names[0]](z)
     for i, name in enumerate(names[1:], start=1):

@@ -1,4 +1,4 @@
-"""What a network with a fixed shape is: a flat vector of parameters and a function."""
+"""A network of fixed shape: a flat vector of parameters and a function."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Genomes for other programs: as a directed graph of networkx, and as plain JSON in which no bit is lost."""
+"""Genomes for other programs: as a directed graph of networkx, and as plain JSON that loses no bit."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def to_networkx(genome: Genome, network: GraphNetwork) -> Any:
 
     Nodes, in topological order, are historical markings. Their attributes are `kind` ("input", "output", "hidden"),
     `bias`, `response` and `activation`, the name of the function applied: for an input "identity", for an output the
-    network's output function, of which other nodes see the argument (see `networks.graph`). Edges have a `weight`.
+    network's output function, whose argument other nodes see (see `networks.graph`). Edges have a `weight`.
 
     Raises:
         UserError: when networkx is not installed.
@@ -45,11 +45,10 @@ def to_networkx(genome: Genome, network: GraphNetwork) -> Any:
 
 
 def to_json(genome: Genome, network: GraphNetwork) -> str:
-    """Return one genome as JSON, a gene a line.
+    """Return one genome as JSON, one gene per line.
 
-    Genes lie in the order of their places. A node's `activation` indexes `activations`; connections name the keys of
-    both ends; numbers are written so that their float32 reads back, and those that are not finite as "nan", "inf",
-    "-inf".
+    Genes are in slot order. A node's `activation` indexes `activations`; connections name the keys of both ends;
+    numbers are written so that the same float32 is read back, and non-finite ones as "nan", "inf", "-inf".
     """
     nodes, connections = _genes(genome)
     head = {

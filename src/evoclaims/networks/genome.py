@@ -1,7 +1,7 @@
 """NEAT's genome (Stanley and Miikkulainen 2002, §3.1) as arrays of fixed size.
 
-The order of the node slots is a topological order of the network, always: every connection leads from a lower slot to
-a higher one. Whatever changes a genome keeps it so, and nothing ever sorts.
+The node slots are always in a topological order of the network: every connection leads from a lower slot to a higher
+one. Every change of a genome keeps this order, and nothing ever sorts.
 """
 
 from __future__ import annotations
@@ -54,9 +54,9 @@ class Genome:
     """One genome; a population is the same with a leading axis on every leaf.
 
     Attributes:
-        nodes: leaves [nodes], the most it may have.
-        connections: leaves [connections], the most it may have.
-        node_count, connection_count: how many there are.
+        nodes: leaves [nodes], the maximum number.
+        connections: leaves [connections], the maximum number.
+        node_count, connection_count: the current numbers.
     """
 
     nodes: Nodes

@@ -1,9 +1,9 @@
 """The network that a genome describes, and its forward pass.
 
 Node i computes z = bias + response · Σ w x over its connections (TensorNEAT, Wang et al. 2024). A hidden node emits
-its activation function of z. An output emits z to other nodes, and its reading is the output function of z. A node
-with no connection from a node that emits something emits nothing, nor does an input that is not finite; an output that
-emits nothing is read as 0. A value that overflows is passed on as 0.
+its activation function of z. An output emits z to other nodes, and its result is the output function of z. A node
+without a connection from an emitting node emits nothing, nor does an input that is not finite; the result of an
+output that emits nothing is 0. A value that overflows is passed on as 0.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ class Graph:
         weights: weights[i, j] of the connection from j to i; 0 where there is none.
         linked: whether there is a connection from j to i; strictly lower triangular.
         bias, response: of each node.
-        activation: of each node, index into the network's activation functions, identity for outputs.
+        activation: of each node, index into the network's activation functions; identity for outputs.
         outputs: the slots of the outputs.
     """
 
@@ -47,7 +47,7 @@ class Graph:
 
 @dataclass(frozen=True)
 class GraphNetwork:
-    """Genomes' networks with these many inputs and outputs.
+    """Networks of genomes, with fixed numbers of inputs and outputs.
 
     Attributes:
         activations: names of the functions that node genes index.
@@ -67,7 +67,7 @@ class GraphNetwork:
         """Write a genome's genes into matrices."""
         size = genome.nodes.key.shape[0]
         genes = genome.connections
-        # Places without a connection write outside the matrix, where nothing is kept.
+        # Empty slots write outside the matrix, where writes are dropped.
         target = jnp.where(genome.has_connection, genes.target, size)
         linked = jnp.zeros((size, size), bool).at[target, genes.source].set(True, mode="drop")
         weights = jnp.zeros((size, size)).at[target, genes.source].set(genes.weight, mode="drop")
@@ -82,7 +82,7 @@ class GraphNetwork:
         )
 
     def apply(self, graph: Graph, observation: Float[Array, " inputs"]) -> Float[Array, " outputs"]:
-        """Map one observation to one output; a vmap over observations alone runs them through the graph together."""
+        """Map one observation to one output; a vmap over only observations runs them through the graph together."""
         result: Array = _one_or_many(self)(graph, observation)
         return result
 
@@ -91,7 +91,7 @@ class GraphNetwork:
         present = jnp.isfinite(rows).T
         if rows.shape[0] == 1:
             return self._propagate(graph, rows, present)
-        # Who emits is the same for all rows, unless an input is missing in some.
+        # All rows have the same emitting nodes, unless some lack an input.
         return jax.lax.cond(
             jnp.all(present),
             lambda: self._propagate(graph, rows, jnp.ones((self.inputs, 1), bool)),
@@ -101,7 +101,7 @@ class GraphNetwork:
     def _propagate(
         self, graph: Graph, rows: Float[Array, "rows inputs"], present: Bool[Array, "inputs rows_or_1"]
     ) -> Float[Array, "rows outputs"]:
-        """Compute node after node; slots are in topological order, so that once is enough."""
+        """Compute node after node; slots are in topological order, so one pass is enough."""
         rest = ((0, graph.bias.shape[0] - self.inputs), (0, 0))
         given = jnp.pad(jnp.where(present, rows.T, 0.0), rest), jnp.pad(present, rest)
         # A CPU's cache holds a genome's values. A GPU would read all of them from memory again for every node.
@@ -121,7 +121,7 @@ class GraphNetwork:
         return jax.lax.fori_loop(self.inputs, graph.bias.shape[0], fire, state)
 
     def _in_blocks(self, graph: Graph, state: tuple[Array, Array]) -> tuple[Array, Array]:
-        """Do the same in blocks of nodes: what comes from earlier blocks is one matrix product."""
+        """Do the same in blocks of nodes: input from earlier blocks is one matrix product."""
         size = graph.bias.shape[0]
         values, emits = state
         done = values[: self.inputs]
@@ -158,9 +158,9 @@ def _fire_block(
     earlier: Float[Array, "block rows"],
     emits: Bool[Array, "nodes rows_or_1"],
 ) -> tuple[Array, Array]:
-    """Return a block's values, given what it receives from earlier blocks, and who emits.
+    """Return a block's values and emitting nodes, given the input from earlier blocks.
 
-    `part` holds the block's rows of the graph, and of the weights the columns of the block alone.
+    `part` holds the block's rows of the graph; its weights have only the block's columns.
     """
 
     def fire(place: Array, state: tuple[Array, Array]) -> tuple[Array, Array]:

@@ -1,7 +1,7 @@
-"""Where the nodes of a network lie in a picture, and which of them are at work.
+"""Where the nodes of a network lie in a picture, and which of them are active.
 
-Graphs are `networkx.DiGraph`s without cycles, whose nodes have a `kind` ("input", "output", "hidden"). Of networkx's
-own layouts, those in columns hide nodes behind connections that pass by, and its springs keep to no columns.
+Graphs are `networkx.DiGraph`s without cycles, whose nodes have a `kind` ("input", "output", "hidden"). networkx's own
+column layouts hide nodes behind passing connections, and its spring layouts have no columns.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from evoclaims.networks.substrate import Point, Substrate
 
 ROUNDS: Final = 300
 NEAR: Final = 1.0
-"""How far nodes keep from each other and from connections that pass them, in units of a column's width."""
+"""Distance of nodes from each other and from passing connections, in column widths."""
 
 
 def at_work(graph: Any) -> set[Hashable]:
@@ -34,7 +34,7 @@ def at_work(graph: Any) -> set[Hashable]:
 
 
 def columns(graph: Any) -> dict[Hashable, int]:
-    """Return each node's depth, the length of the longest path to it; outputs all lie beyond the deepest other node."""
+    """Return each node's depth, the length of the longest path to it; all outputs lie beyond the deepest other node."""
     networkx = optional("networkx")
     depth: dict[Hashable, int] = {}
     for node in networkx.topological_sort(graph):
@@ -46,10 +46,10 @@ def columns(graph: Any) -> dict[Hashable, int]:
 
 
 def positions(graph: Any) -> dict[Hashable, Point]:
-    """Return a place for each node: its column as x, and a y by which connected nodes lie at about the same height.
+    """Return a place for each node: its column as x, and a y that puts connected nodes at about the same height.
 
-    Inputs and outputs are spread evenly from top to bottom in the order of their keys. The others are drawn to their
-    neighbours' mean height and pushed off other nodes, and off connections that pass by.
+    Inputs and outputs are spread evenly from top to bottom in key order. The others are pulled to their neighbours'
+    mean height and pushed away from other nodes and from passing connections.
     """
     depth = columns(graph)
     nodes = sorted(graph, key=lambda node: (depth[node], node))
@@ -65,9 +65,9 @@ def positions(graph: Any) -> dict[Hashable, Point]:
     hidden = np.array([kind == "hidden" for kind in kinds])
     ends = np.array([(index[source], index[target]) for source, target in graph.edges], int).reshape(-1, 2)
     linked = optional("networkx").to_numpy_array(graph.to_undirected(as_view=True), nodes, weight=None)
-    # How far apart nodes would lie if they shared the area evenly.
+    # The distance between nodes if they shared the area evenly.
     apart = max(1.2 * math.sqrt(x.max() * height / len(nodes)), 1.5 * NEAR)
-    # A golden ratio's multiples start nodes of one column apart, wherever there are how many.
+    # Multiples of the golden ratio: any number of nodes in a column start apart.
     y[hidden] = height * (np.arange(hidden.sum()) * 0.618034 % 1.0 - 0.5)
     for i in range(ROUNDS):
         pull = linked @ y / np.maximum(linked.sum(axis=1), 1) - y
@@ -78,7 +78,7 @@ def positions(graph: Any) -> dict[Hashable, Point]:
 
 
 def substrate_graph(substrate: Substrate, weights: Sequence[NDArray[Any]]) -> tuple[Any, dict[Hashable, Point]]:
-    """Return the network drawn on a substrate, and its neurons' places; weights of 0 are no connections.
+    """Return a substrate's network and its neurons' places; a weight of 0 means no connection.
 
     Nodes are (layer, place in the layer), with their `kind`.
 
@@ -101,7 +101,7 @@ def substrate_graph(substrate: Substrate, weights: Sequence[NDArray[Any]]) -> tu
 
 
 def _off_nodes(x: NDArray[Any], y: NDArray[Any], apart: float) -> NDArray[Any]:
-    """Return the push of other nodes, in proportion to how much nearer than `apart` they are."""
+    """Return the push from other nodes, proportional to how much nearer than `apart` they are."""
     dx, dy = np.abs(x[:, None] - x[None, :]), y[:, None] - y[None, :]
     near = np.clip(apart - np.hypot(dx, dy), 0, None)
     np.fill_diagonal(near, 0)
@@ -112,7 +112,7 @@ def _off_nodes(x: NDArray[Any], y: NDArray[Any], apart: float) -> NDArray[Any]:
 
 
 def _off_connections(x: NDArray[Any], y: NDArray[Any], ends: NDArray[Any]) -> NDArray[Any]:
-    """Return the push of connections that pass a node's column near its height."""
+    """Return the push from connections that pass a node's column near its height."""
     source, target = ends[:, 0], ends[:, 1]
     span = np.where(x[target] == x[source], 1.0, x[target] - x[source])
     share = (x[:, None] - x[source]) / span

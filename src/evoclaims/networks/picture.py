@@ -1,4 +1,4 @@
-"""Pictures of networks, drawn by matplotlib without a screen; the same network gives the same bytes."""
+"""Pictures of networks, drawn by matplotlib without a display; the same network gives the same bytes."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from evoclaims.networks.substrate import Point, Substrate
 
 KINDS: Final = {"input": "#7fb3d5", "hidden": "#ffffff", "output": "#f5b041"}
 POSITIVE, NEGATIVE, INK, PALE = "#2166ac", "#b2182b", "#333333", 0.22
-"""Colours that those who cannot tell red from green can tell apart; `PALE` is the opacity of what is not at work."""
+"""Colours safe for red-green colour blindness; `PALE` is the opacity of inactive nodes and connections."""
 
 
 @dataclass(frozen=True)
@@ -26,7 +26,7 @@ class Panel:
 
     Attributes:
         graph: a `networkx.DiGraph` with `kind` on nodes and `weight` on edges.
-        places: of every node.
+        places: of all nodes.
         title: above the panel.
         inside: a word inside each node, such as its activation function.
         beside: names beside inputs and outputs.
@@ -50,7 +50,7 @@ def network_panel(
 
     Args:
         graph: what `export.to_networkx` returns.
-        network: what it is made of; hidden nodes are labelled where several functions are possible.
+        network: its description; hidden nodes are labelled if several functions are possible.
         title: what to write above it, before the counts.
         inputs: their names; "x0", "x1", … by default.
         outputs: their names; "y0", "y1", … by default.
@@ -60,7 +60,7 @@ def network_panel(
     several = len(set(network.activations)) > 1
     places = positions(graph)
     across, down = np.ptp(np.array(list(places.values())), axis=0).tolist()
-    # Inches of a column: wide ones for few, narrow ones where a long chain would fill a wall.
+    # Inches per column: wide if there are few, narrow for long chains.
     unit = min(max(15.0 / across, 0.36), 0.9)
     width = max(1.5 + unit * across, 5.0)
     return Panel(
@@ -74,11 +74,11 @@ def network_panel(
 
 
 def substrate_panel(substrate: Substrate, weights: Sequence[NDArray[Any]], title: str) -> Panel:
-    """Show the network that a CPPN has drawn: neurons at their coordinates, and the connections that it drew.
+    """Show the network that a CPPN made: neurons at their coordinates, and its connections.
 
     Args:
         substrate: where the neurons lie.
-        weights: into each layer but the first, shapes [to, from]; 0 for a connection that was not drawn.
+        weights: into each layer but the first, shapes [to, from]; 0 for no connection.
         title: what to write above it, before the counts.
     """
     graph, places = substrate_graph(substrate, weights)
@@ -94,7 +94,7 @@ def substrate_panel(substrate: Substrate, weights: Sequence[NDArray[Any]], title
 def draw(panels: Sequence[Panel], title: str, file_format: Format) -> bytes:
     """Draw panels side by side, with one legend; return the file's contents.
 
-    Colour tells a weight's sign and width its size, relative to the panel's largest.
+    Colour shows a weight's sign, and width its size relative to the panel's largest.
 
     Raises:
         UserError: for another format, or when matplotlib is not installed.
@@ -116,7 +116,7 @@ def _numbered(letter: str, count: int) -> list[str]:
 
 
 def _counts(graph: Any) -> str:
-    """Say how large a network is, and how much of it is at work."""
+    """Say how large a network is, and how much of it is active."""
     working = at_work(graph)
     used = sum(source in working and target in working for source, target in graph.edges)
     hidden = [node for node, kind in graph.nodes(data="kind") if kind == "hidden"]
@@ -136,7 +136,7 @@ def _paint(axis: Any, panel: Panel) -> None:
             nodes = [n for n, k in panel.graph.nodes(data="kind") if k == kind and (n in working) == is_working]
             if nodes:
                 across, up = zip(*(panel.places[node] for node in nodes), strict=True)
-                # An opaque disc keeps connections from shining through a pale node.
+                # An opaque disc hides the connections behind a pale node.
                 axis.scatter(across, up, s=area, c="white", edgecolors="none", zorder=2)
                 axis.scatter(across, up, s=area, c=colour, edgecolors=INK, linewidths=0.9, alpha=opacity, zorder=3)
     kinds = dict(panel.graph.nodes(data="kind"))
@@ -159,7 +159,7 @@ def _paint(axis: Any, panel: Panel) -> None:
 
 
 def _beside(kind: str, flowing: bool) -> tuple[float, float]:
-    """Return where a node's name lies, in points from its centre: outside of the network."""
+    """Return a name's offset from its node's centre, in points, out of the network."""
     sign = -1.0 if kind == "input" else 1.0
     return (17.0 * sign, 0.0) if flowing else (0.0, 15.0 * sign)
 
@@ -190,7 +190,7 @@ def _bend(source: Point, target: Point, flowing: bool) -> NDArray[np.float64]:
     start, end = np.array(source), np.array(target)
     reach = (end - start) / 3
     if flowing:
-        # Back from an output the curve still leaves to the right, so that its direction shows.
+        # A curve going back still leaves to the right, to show its direction.
         forward = end[0] - start[0]
         reach = np.array([0.4 * forward if forward > 0 else 1.0, 0.0])
     return np.array([start, start + reach, end - reach, end])

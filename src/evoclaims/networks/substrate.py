@@ -22,13 +22,13 @@ class Substrate:
     """Layers of neurons in the plane, each fed by the whole layer before.
 
     Attributes:
-        layers: the (x, y) of every neuron: inputs and, last among them, the bias; hidden layers; outputs.
+        layers: the (x, y) of every neuron: inputs, with the bias last; hidden layers; outputs.
     """
 
     layers: tuple[tuple[Point, ...], ...]
 
     def __post_init__(self) -> None:
-        """Check that there are inputs and outputs, and neurons in every layer, each at a point."""
+        """Check that inputs and outputs exist and every layer has neurons, each at a point."""
         if len(self.layers) < 2 or not all(self.layers):
             raise UserError("A substrate has a layer of inputs, one of outputs, and at least one neuron in each layer.")
         for point in (point for layer in self.layers for point in layer):
@@ -37,14 +37,14 @@ class Substrate:
 
     @property
     def shapes(self) -> list[tuple[int, int]]:
-        """The shapes [to, from] of the weights into each layer but the first."""
+        """The weight shapes [to, from] into each layer but the first."""
         return [(len(after), len(before)) for before, after in pairwise(self.layers)]
 
     @property
     def queries(self) -> NDArray[np.float32]:
         """The coordinates (x₁, y₁, x₂, y₂) of both ends of every connection, shape [connections, 4].
 
-        Layer by layer; within a layer in the order of its weights, row by row.
+        Layer by layer; within a layer in weight order, row by row.
         """
         ends = [(*source, *target) for before, after in pairwise(self.layers) for target in after for source in before]
         return np.array(ends, np.float32)
@@ -55,8 +55,8 @@ def layered(widths: Sequence[int], extent: Extent = "largest_layer") -> Substrat
 
     Args:
         widths: neurons per layer, the bias among the inputs.
-        extent: both coordinates run from -1 to 1 ("unit"), or to ± the width of the largest layer ("largest_layer", the
-            published code's, by which most weights of a first population are near their largest).
+        extent: both coordinates run from -1 to 1 ("unit"), or to ± the width of the largest layer ("largest_layer", as
+            in the published code: most weights of a first population are then near their largest).
 
     Raises:
         UserError: for fewer than two layers, or an empty one.

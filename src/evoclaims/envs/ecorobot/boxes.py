@@ -1,4 +1,4 @@
-"""Boxes: the walls and obstacles of which worlds are built."""
+"""Boxes: the walls and obstacles of the tasks' worlds."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from evoclaims.core.errors import UserError
 
 @dataclass(frozen=True)
 class Box:
-    """A box that stands in the world: a wall, or an obstacle.
+    """A fixed box in the world: a wall, or an obstacle.
 
     Attributes:
         centre: x and y, m.
         half_size: along its axis and across, m.
-        angle: of its axis, counterclockwise from +x, degrees.
+        angle: its axis, counterclockwise from +x, degrees.
         bottom, top: z, m.
     """
 
@@ -59,7 +59,7 @@ class Box:
         return np.array(self.centre) + (signs * self.half_size) @ self.rotation[:2, :2].T
 
     def distance(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return how far points on the ground, shape [..., 2], are from it, seen from above, m; 0 inside."""
+        """Return the distance of ground points, shape [..., 2], from it, seen from above, m; 0 inside."""
         local = (points - np.array(self.centre)) @ self.rotation[:2, :2]
         outside = np.maximum(np.abs(local) - np.array(self.half_size), 0.0)
         return np.hypot(outside[..., 0], outside[..., 1])

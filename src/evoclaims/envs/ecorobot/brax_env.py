@@ -1,4 +1,4 @@
-"""Ecorobot's tasks as environments of Brax, for code that expects those: Brax's agents, QDax's scoring functions."""
+"""Ecorobot's tasks as Brax environments, for code that expects those: Brax's agents, QDax's scoring functions."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ with contextlib.redirect_stdout(io.StringIO()):
 class BraxEnv(Env):  # type: ignore[misc]
     """A task in Brax's API: pure `reset` and `step`, one environment; vmap it, or use Brax's wrappers.
 
-    `State.pipeline_state` is the task's own state. `done` says that the task has ended; episodes are truncated by
-    Brax's `EpisodeWrapper`, whose `episode_length` is `task.horizon`. On an NVIDIA GPU a step is one kernel,
-    which cannot be differentiated; `task.plain_step` can.
+    `State.pipeline_state` is the task's own state. `done` says that the task has ended; Brax's `EpisodeWrapper`, with
+    `episode_length` set to `task.horizon`, truncates episodes. On an NVIDIA GPU a step is one kernel, which cannot be
+    differentiated; `task.plain_step` can.
     """
 
     def __init__(self, task: RobotTask) -> None:
@@ -30,7 +30,7 @@ class BraxEnv(Env):  # type: ignore[misc]
         self.task = task
 
     def reset(self, rng: jax.Array) -> State:
-        """Start an episode; `rng` is a key, typed or of the old kind, as Brax's are."""
+        """Start an episode; `rng` is a key, typed or old-style, as in Brax."""
         key = rng if jnp.issubdtype(rng.dtype, jax.dtypes.prng_key) else jax.random.wrap_key_data(rng)
         return self._state(self.task.reset(key, jnp.zeros((), jnp.int32)), {})
 
@@ -54,7 +54,7 @@ class BraxEnv(Env):  # type: ignore[misc]
         return "mjx"
 
     def _state(self, reached: TaskState, info: Any) -> State:
-        """Return a state of the task as one of Brax's; `metrics` holds where the torso is."""
+        """Return a task's state as Brax's; `metrics` holds the torso's position."""
         place = reached.inner.pose.place
         return State(
             pipeline_state=reached,

@@ -1,8 +1,8 @@
 """MuJoCo's constrained dynamics for few constraints: one Newton step with an exact line search.
 
 The accelerations a minimize ½ (a - a₀)ᵀ M (a - a₀) + ½ Σᵢ Dᵢ min(0, (J a - r)ᵢ)² (MuJoCo's documentation,
-"Computation", primal problem, pyramidal friction cones). MJX's solver searches its line by bracketing, in a loop of
-several hundred operations; the slope along a line is piecewise linear, so that its root can be had at once.
+"Computation", primal problem, pyramidal friction cones). MJX's line search brackets the root, in a loop of several
+hundred operations; the slope along a line is piecewise linear, so its root can be computed directly.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 SMALL = 3
-"""Up to this size a system is solved by formulas without loops, which a compiler fuses with what is around them."""
+"""Systems up to this size are solved by formulas without loops, which a compiler fuses with the code around them."""
 
 
 def cholesky_solve(matrix: Float[Array, "n n"], right: Float[Array, " n"]) -> Float[Array, " n"]:
@@ -50,8 +50,8 @@ def constrained_acceleration(
     Args:
         mass: M.
         force: all smooth forces, M a₀.
-        warm: the last step's acceleration; the start, if it costs less than a₀.
-        jacobian: J, of constraints that push and never pull.
+        warm: the last step's acceleration; the starting point, if it costs less than a₀.
+        jacobian: J, of constraints that only push.
         reference: r.
         stiffness: D.
     """
@@ -87,8 +87,8 @@ def _root(
 ) -> Float[Array, ""]:
     """Return where slope + t curvature + Σᵢ Dᵢ vᵢ min(0, oᵢ + t vᵢ) is 0.
 
-    It rises in t and bends only where a row turns on or off: between the last bend at which it is negative and the
-    first at which it is not, it is a straight line.
+    It rises in t and bends only where a row turns on or off. It is a straight line between its last negative bend and
+    the next bend.
     """
 
     def value(t: Array) -> Array:
@@ -97,7 +97,7 @@ def _root(
     bends = -off / jnp.where(along == 0, 1.0, along)
     ahead = jnp.where((along == 0) | (bends < 0), 0.0, bends)
     low = jnp.max(jnp.where(jax.vmap(value)(ahead) < 0, ahead, 0.0))
-    # Which rows push just beyond `low`: by comparing bends, since rounding decides whether a row is 0 at its own bend.
+    # Rows that push just beyond `low`: compare bends, since rounding decides whether a row is 0 at its own bend.
     pushing = jnp.where(along > 0, bends > low, jnp.where(along < 0, bends <= low, off < 0))
     weight = jnp.where(pushing, stiffness * along, 0.0)
     return (-slope - weight @ off) / jnp.maximum(curvature + weight @ along, 1e-12)

@@ -1,4 +1,4 @@
-"""How many boxes a robot can touch at a time: of many boxes, only as many need be simulated."""
+"""How many boxes a robot can touch at a time: only that many need to be simulated."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ import numpy as np
 from evoclaims.envs.ecorobot.boxes import Box
 
 SPACING: Final = 0.05
-"""Of the grid over which boxes within reach are counted, m; a world of more than `LINES` of them has a coarser one."""
+"""Spacing of the grid on which boxes within reach are counted, m; coarser if it would need more than `LINES` lines."""
 LINES: Final = 500
 
 
 def reach(model: mujoco.MjModel) -> float:
-    """Return a bound on how far from the torso's centre a robot can touch a box, m, whatever its posture.
+    """Return an upper bound on the distance from the torso's centre at which a robot can touch a box, m.
 
-    Limbs are taken as stretched out straight. A limb on a slide has no bound, nor has a body apart: infinity.
+    Limbs are assumed stretched out straight. With a limb on a slide, or a separate body, it is infinity.
 
     Args:
         model: the robot alone; its first body is the torso.
     """
-    # Of each body: a point of it about which it turns, and how far from the torso's centre that can come.
+    # For each body: a point about which it turns, and that point's largest distance from the torso's centre.
     pivots, furthest = np.zeros((model.nbody, 3)), np.zeros(model.nbody)
     for body in range(2, model.nbody):
         first, parent = model.body_jntadr[body], model.body_parentid[body]
@@ -45,7 +45,7 @@ def reach(model: mujoco.MjModel) -> float:
 
 
 def touched_at_once(model: mujoco.MjModel, boxes: Sequence[Box]) -> int:
-    """Return a bound on how many boxes a robot (`model`: alone) can touch at a time, wherever it is.
+    """Return an upper bound on the boxes a robot (`model`: alone) can touch at a time, anywhere.
 
     It is the most boxes within its reach, seen from above.
     """
@@ -55,7 +55,7 @@ def touched_at_once(model: mujoco.MjModel, boxes: Sequence[Box]) -> int:
     corners = np.concatenate([box.corners for box in boxes])
     low, high = corners.min(axis=0) - arm, corners.max(axis=0) + arm
     spacing = max(SPACING, float(np.max(high - low)) / LINES)
-    within = arm + spacing / np.sqrt(2)  # no place is further than this from a point of the grid
+    within = arm + spacing / np.sqrt(2)  # adds the largest distance to a grid point
     axes = [np.arange(start, end + spacing, spacing) for start, end in zip(low, high, strict=True)]
     points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
     return int(np.max(np.sum([box.distance(points) <= within for box in boxes], axis=0)))

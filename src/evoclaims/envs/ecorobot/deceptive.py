@@ -1,4 +1,4 @@
-"""Deceptive mazes, easy and difficult (§3.2 of the paper): the straight way to the target ends at a wall."""
+"""Deceptive mazes, easy and difficult (§3.2 of the paper): the straight path to the target ends at a wall."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ Difficulty = Literal["easy", "difficult"]
 
 
 class Plan(NamedTuple):
-    """A maze: its walls, the ground between them, start and target, and how near the target counts, m."""
+    """A maze: walls, the ground between them, start, target, and the distance that counts as reached, m."""
 
     walls: tuple[Box, ...]
     area: Area
@@ -48,10 +48,10 @@ PLANS: Final = {"easy": EASY, "difficult": DIFFICULT}
 
 @pytree
 class Approach:
-    """How the robot stands to the target.
+    """Progress towards the target.
 
     Attributes:
-        first: distance to where the target counts as reached, at the start, m.
+        first: at the start, the distance to where the target counts as reached, m.
         done: whether it was reached.
     """
 
@@ -61,9 +61,9 @@ class Approach:
 
 @dataclass(frozen=True)
 class DeceptiveMaze(Maze):
-    """Reach the target: a step pays the decrease of the distance to it, as a share of the first distance.
+    """Reach the target: a step's reward is the decrease in distance, as a share of the first distance.
 
-    The distance is to where the target counts as reached, so that rewards sum to 1 on the way there, whichever it is.
+    The distance is to where the target counts as reached, so rewards sum to 1 along any path there.
 
     Attributes:
         difficulty: "easy" (a bar across the way) or "difficult" (the walls of the stepping stones' maze).
@@ -103,15 +103,15 @@ class DeceptiveMaze(Maze):
 
     @property
     def target(self) -> tuple[float, float]:
-        """What is to be reached."""
+        """The target's place."""
         return self.plan.target
 
     def memory(self, pose: Pose) -> Approach:
-        """Note how far the target is."""
+        """Store the target's distance."""
         return Approach(first=self._distance(pose), done=jnp.zeros((), bool))
 
     def rule(self, memory: Approach, before: Pose, after: Pose, action: Float[Array, " action"]) -> Ruling:
-        """Pay for the way gained; end at the target."""
+        """Reward progress; end at the target."""
         distance = self._distance(after)
         reached = distance <= 0.0
         gained = self._distance(before) - jnp.maximum(distance, 0.0)
@@ -127,9 +127,9 @@ class DeceptiveMaze(Maze):
         return done
 
     def measures(self, outing: Outing) -> dict[str, Array]:
-        """Return how far the target still is, m."""
+        """Return the distance left to the target, m."""
         return {"distance": jnp.maximum(self._distance(outing.pose), 0.0)}
 
     def _distance(self, pose: Pose) -> Float[Array, ""]:
-        """Return how far it is to where the target counts as reached, m."""
+        """Return the distance to where the target counts as reached, m."""
         return jnp.linalg.norm(pose.place[:2] - jnp.asarray(self.target, jnp.float32)) - self.plan.within

@@ -17,9 +17,9 @@ from evoclaims.envs.ecorobot.robots import HALF_CHEETAH, Robot
 def forward(
     robot: Robot, seconds: float, before: Pose, after: Pose, action: Float[Array, " action"]
 ) -> tuple[Float[Array, ""], Bool[Array, ""]]:
-    """Return Brax's reward of a step (forward velocity, health, minus the control cost), and whether health is lost.
+    """Return Brax's reward of a step (forward velocity, health, minus control cost), and whether health is lost.
 
-    Brax measures the humanoid's velocity at its centre of mass; here it is the torso's, as for all others.
+    Brax measures the humanoid's velocity at its centre of mass; here it is the torso's, as for the other robots.
     """
     velocity = (after.place[0] - before.place[0]) / seconds
     low, high = robot.healthy_height
@@ -46,10 +46,10 @@ class Locomotion(RobotTask):
 
     @property
     def shows_place(self) -> bool:
-        """Free ground is the same everywhere."""
+        """False: free ground is the same everywhere."""
         return False
 
     def rule(self, memory: Any, before: Pose, after: Pose, action: Float[Array, " action"]) -> Ruling:
-        """Pay for the way made; end when the robot is no longer healthy."""
+        """Reward forward motion; end when the robot is no longer healthy."""
         reward, lost = forward(self.robot, self.scene.seconds, before, after, action)
         return Ruling(memory=memory, reward=reward, ended=lost)

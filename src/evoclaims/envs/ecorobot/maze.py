@@ -1,4 +1,4 @@
-"""What mazes share: the ground a robot can reach, and how much of it a path has covered."""
+"""The base of all mazes: the ground a robot can reach, and how much of it a path has covered."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ Area = tuple[tuple[float, float], tuple[float, float]]
 CELLS: Final = (50, 50)
 """The grid over which coverage is counted (§4 of the paper)."""
 FINE: Final = 4
-"""Points to each side of a cell on which reachability is worked out."""
+"""Points along each side of a cell for computing reachability."""
 
 
 @dataclass(frozen=True)
@@ -40,17 +40,17 @@ class Maze(RobotTask):
     @property
     @abstractmethod
     def target(self) -> tuple[float, float]:
-        """What is to be reached, m."""
+        """The target's place, m."""
 
     def reachable(self, cells: tuple[int, int] = CELLS) -> NDArray[np.bool_]:
-        """Return which cells of a grid over the area the torso's centre can get to, shape [cells along x, along y]."""
+        """Return which cells of a grid over the area the torso's centre can reach, shape [cells along x, along y]."""
         assert self.start is not None
         return _reachable(self.boxes, self.area, self.start, self.robot.torso_radius, cells)
 
     def path_measures(
         self, path: Float[Array, "steps 2"], alive: Bool[Array, " steps"]
     ) -> Mapping[str, Float[Array, ""]]:
-        """Return the share of the reachable cells that the path has been in."""
+        """Return the share of the reachable cells that the path visited."""
         ground = self.reachable()
         low = jnp.asarray([bounds[0] for bounds in self.area], jnp.float32)
         high = jnp.asarray([bounds[1] for bounds in self.area], jnp.float32)

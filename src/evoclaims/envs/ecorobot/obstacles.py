@@ -1,4 +1,4 @@
-"""Locomotion over obstacles, of rising height or all of one (§3.2 of the paper)."""
+"""Locomotion over obstacles, of rising or equal height (§3.2 of the paper)."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ PLACES: Final = (9.0, 11.0, 13.0, 15.0, 17.0, 23.0, 25.0, 27.0, 29.0, 31.0, 43.0
 """x of the obstacles, m."""
 HALF_THICKNESS: Final = 0.2
 DEPTH: Final = 1.0
-"""How far obstacles reach below their top, m: one size for all, so that they differ in their places alone."""
+"""How far obstacles reach below their top, m: one size for all, so that they differ only in place."""
 
 
 @pytree
 class FurthestRun:
-    """The furthest x that the torso has come to, m."""
+    """The furthest x that the torso has reached, m."""
 
     furthest: Float[Array, ""]
 
@@ -41,7 +41,7 @@ class Obstacles(RobotTask):
         heights: of their tops: "hierarchical" (five of 0.1 m, five of 0.2 m, five of 0.3 m), "medium" (all 0.2 m) or
             "high" (all 0.3 m).
 
-    The corridor's walls at y = ±3 are not built: the half-cheetah moves in the plane y = 0.
+    The corridor's walls at y = ±3 are left out: the half-cheetah moves in the plane y = 0.
     """
 
     name: ClassVar[str] = "obstacles"  # type: ignore[misc]
@@ -76,14 +76,14 @@ class Obstacles(RobotTask):
         return FurthestRun(furthest=pose.place[0])
 
     def rule(self, memory: FurthestRun, before: Pose, after: Pose, action: Float[Array, " action"]) -> Ruling:
-        """Pay as in plain locomotion."""
+        """Reward as in plain locomotion."""
         reward, lost = forward(self.robot, self.scene.seconds, before, after, action)
         return Ruling(
             memory=FurthestRun(furthest=jnp.maximum(memory.furthest, after.place[0])), reward=reward, ended=lost
         )
 
     def measures(self, outing: Outing) -> dict[str, Array]:
-        """Return how many obstacles were left behind, and the furthest x, m."""
+        """Return the number of obstacles passed, and the furthest x, m."""
         furthest = outing.memory.furthest
         behind = jnp.asarray(np.array(PLACES) + HALF_THICKNESS, jnp.float32)
         return {"obstacles": jnp.sum(furthest > behind).astype(jnp.float32), "furthest": furthest}

@@ -1,4 +1,4 @@
-"""Simulating a scene: MJX's functions, carrying from step to step only what a step cannot work out again."""
+"""Simulating a scene with MJX's functions, carrying between steps only what a step cannot recompute."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ from evoclaims.envs.ecorobot.pose import torso
 from evoclaims.envs.ecorobot.scene import GEOMS, Places, Scene, box_geoms, mjx, on_device
 
 LARGEST: Final = 1e10
-"""What MuJoCo takes for a number beyond reason (mjMAXVAL)."""
+"""MuJoCo's limit for valid numbers (mjMAXVAL)."""
 
 
 @pytree
 class Body:
-    """What moves.
+    """The moving state.
 
     Attributes:
         position: generalized positions, MuJoCo's qpos; lengths in m, angles in rad, orientations as quaternions.
         velocity: MuJoCo's qvel, per s.
-        acceleration: of the last step, per s², where the next one's solver starts.
+        acceleration: of the last step, per s², where the next step's solver starts.
     """
 
     position: Float[Array, " nq"]
@@ -40,7 +40,7 @@ def resting(position: Float[Array, " nq"], velocity: Float[Array, " nv"]) -> Bod
 
 
 def act(scene: Scene, body: Body, control: Float[Array, " nu"], places: Places) -> Body:
-    """Hold the motors at `control` for one environment step; `places` as of `Scene.turns`."""
+    """Hold the motors at `control` for one environment step; `places` as in `Scene.turns`."""
 
     def frame(body: Body, _: None) -> tuple[Body, None]:
         return _frame(scene, body, control, places), None
@@ -51,14 +51,14 @@ def act(scene: Scene, body: Body, control: Float[Array, " nu"], places: Places) 
 def is_stable(body: Body) -> Bool[Array, ""]:
     """Whether the simulation has not diverged, by MuJoCo's own test of positions, velocities and accelerations.
 
-    Large steps let a fast ant gain speed without end. C MuJoCo warns and puts such a robot back at the start; MJX goes
-    on to numbers that are none.
+    With large steps, a fast ant can gain speed without limit. C MuJoCo then warns and resets the robot; MJX goes on
+    to NaN.
     """
     numbers = jnp.concatenate([body.position, body.velocity, body.acceleration])
-    return jnp.all(jnp.abs(numbers) <= LARGEST)  # False of NaN
+    return jnp.all(jnp.abs(numbers) <= LARGEST)  # NaN: False
 
 
-# MJX takes a second to trace; with a jit of its own this is traced once for each scene, and not for each use.
+# MJX takes a second to trace; with its own jit this is traced once per scene, not once per use.
 @partial(jax.jit, static_argnums=0)
 def _frame(scene: Scene, body: Body, control: Float[Array, " nu"], places: Places) -> Body:
     """Simulate one time step, as `mjx.step` does with semi-implicit Euler integration."""
@@ -91,7 +91,7 @@ def _nearest(scene: Scene, model: Any, body: Body, places: Places) -> Int[Array,
     """Return which boxes are nearest to the torso's centre, seen from above."""
     alike = {name: getattr(model, name)[box_geoms(scene.model)[:1]] for name in GEOMS if name not in places}
     centre, size, quaternion = (jnp.asarray({**alike, **places}[name]) for name in GEOMS)
-    w, z = quaternion[:, 0], quaternion[:, 3]  # boxes are turned about the vertical alone
+    w, z = quaternion[:, 0], quaternion[:, 3]  # boxes turn only about the vertical
     cosine, sine = 1.0 - 2.0 * z * z, 2.0 * w * z
     x, y = (torso(scene, body.position).place[:2][None] - centre[:, :2]).T
     local = jnp.stack([cosine * x + sine * y, cosine * y - sine * x], axis=1)

@@ -1,4 +1,4 @@
-"""Where a robot's torso is, worked out from its generalized positions alone."""
+"""The torso's pose, computed only from a robot's generalized positions."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ class Pose:
     """The torso in the world.
 
     Attributes:
-        place: of its centre, m.
+        place: its centre, m.
         rotation: its axes as columns.
     """
 
@@ -39,7 +39,7 @@ class Pose:
 
 
 def torso(scene: Scene, position: Float[Array, " nq"]) -> Pose:
-    """Return the pose of the first body: its joints (free, slides, hinges) one after the other."""
+    """Return the pose of the first body: its joints (free, slides, hinges) applied in order."""
     model = scene.model
     place = jnp.asarray(model.body_pos[1], position.dtype)
     rotation = _of_quaternion(jnp.asarray(model.body_quat[1], position.dtype))

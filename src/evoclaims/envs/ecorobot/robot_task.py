@@ -1,4 +1,4 @@
-"""What all of ecorobot's tasks share: a robot in a scene, episodes of it, and an examination over several starts."""
+"""The base of all ecorobot tasks: a robot in a scene, its episodes, and an examination over several starts."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from evoclaims.envs.ecorobot.sensors import Sensor
 from evoclaims.kernels.one_kernel import has_gpu, one_kernel
 
 ROBOT_PACKAGES: Final = ("mujoco", "mujoco-mjx")
-"""What every robot's task depends on; a task of this kind declares it, and whatever else it needs."""
+"""Packages that every robot task depends on; a task declares these and any others it needs."""
 
 
 @pytree
@@ -35,10 +35,10 @@ class Outing:
     """The inner state of an episode.
 
     Attributes:
-        body: what moves.
+        body: the moving state.
         pose: the torso's.
         time: environment steps made.
-        memory: what the task's rules remember.
+        memory: the rule's memory.
         effort: sum of the squared actions so far.
         overturned: steps spent upside-down.
     """
@@ -53,10 +53,10 @@ class Outing:
 
 @pytree
 class Ruling:
-    """What the rules say of one step.
+    """The rule's result for one step.
 
     Attributes:
-        memory: what they remember from now on.
+        memory: the rule's new memory.
         reward: of the step.
         ended: whether the task is over.
     """
@@ -68,16 +68,16 @@ class Ruling:
 
 @dataclass(frozen=True)
 class RobotTask(ABC):
-    """A task of one level. A new one gives its name, its boxes and its `rule`; and `memory`, `measures` where needed.
+    """A task with one level. A subclass defines name, boxes and `rule`, and if needed `memory` and `measures`.
 
-    Its fields are hashable, and what `rule` reads of them is compared: equal tasks have one kernel.
+    Fields must be hashable, and the fields that `rule` reads must be compared: equal tasks share one kernel.
 
     Attributes:
         robot: who acts.
-        sensor: what it perceives of the boxes; None for nothing.
+        sensor: how it senses the boxes; None for not at all.
         episode_steps: environment steps after which an episode is truncated.
         examined_episodes: episodes, from different starts, over which an examination averages.
-        places: where the boxes stand, if a program takes it as data; None for where the task puts them.
+        places: the boxes' places, if a program takes them as data; None for the task's own.
     """
 
     robot: Robot = SIMPLE_ROB
@@ -102,7 +102,7 @@ class RobotTask(ABC):
     @property
     @abstractmethod
     def boxes(self) -> tuple[Box, ...]:
-        """What stands in the world."""
+        """The boxes in the world."""
 
     @abstractmethod
     def rule(self, memory: Any, before: Pose, after: Pose, action: Float[Array, " action"]) -> Ruling:
@@ -110,32 +110,32 @@ class RobotTask(ABC):
 
     @property
     def start(self) -> tuple[float, float] | None:
-        """Where the torso starts, exactly; None for where the robot's own noise puts it."""
+        """The torso's exact start; None for the robot's own start with noise."""
         return None
 
     def memory(self, pose: Pose) -> Any:
-        """Return what the rules remember at the start."""
+        """Return the rule's memory at the start."""
         return ()
 
     def shown(self, outing: Outing) -> Float[Array, " more"]:
-        """Return what the policy sees beside positions, velocities and sensors."""
+        """Return what the policy sees besides positions, velocities and sensors."""
         return jnp.zeros(0)
 
     def measures(self, outing: Outing) -> Mapping[str, Float[Array, ""]]:
-        """Return the task's own metrics of an episode that has ended."""
+        """Return the task's own metrics of a finished episode."""
         return {}
 
     def reached(self, outing: Outing) -> Bool[Array, ""]:
-        """Whether the task's goal is reached; never, for tasks without one."""
+        """Whether the task's goal is reached; False for tasks without one."""
         return jnp.zeros((), bool)
 
     def path_measures(self, path: Float[Array, "steps 2"], alive: Bool[Array, " steps"]) -> Mapping[str, Array]:
-        """Return metrics of the way that an examined robot took; `alive` marks the steps before the episode's end."""
+        """Return metrics of an examined robot's path; `alive` marks the steps before the episode's end."""
         return {}
 
     @property
     def shows_place(self) -> bool:
-        """Whether the policy sees where in the world the robot is."""
+        """Whether the policy sees the robot's place in the world."""
         return True
 
     @property
@@ -155,7 +155,7 @@ class RobotTask(ABC):
 
     @cached_property
     def observation_size(self) -> int:
-        """Positions, velocities, readings, and what else is shown."""
+        """Positions, velocities, readings, and whatever `shown` adds."""
         key = jax.eval_shape(lambda: jax.random.key(0))
         return int(jax.eval_shape(lambda k: self.reset(k, jnp.zeros((), jnp.int32)), key).observation.shape[0])
 
@@ -166,12 +166,12 @@ class RobotTask(ABC):
 
     @property
     def numbers(self) -> Places:
-        """Where the boxes stand: what programs take as data."""
+        """The boxes' places: what programs take as data."""
         return self.scene.turns if self.places is None else self.places
 
     def with_numbers(self, numbers: Places | None) -> RobotTask:
-        """Return the task with its boxes elsewhere, or where it puts them."""
-        moved = copy(self)  # unlike `replace`, it keeps what has been worked out (`observation_size`)
+        """Return the task with its boxes moved; None for its own places."""
+        moved = copy(self)  # unlike `replace`, it keeps cached values (`observation_size`)
         object.__setattr__(moved, "places", numbers)
         return moved
 
@@ -203,16 +203,16 @@ class RobotTask(ABC):
         )
 
     def step(self, state: TaskState, action: Float[Array, " action"]) -> TaskState:
-        """Act for `robot.frames` simulation steps: `plain_step`, on an NVIDIA GPU in one kernel (`one_kernel`)."""
+        """Act for `robot.frames` simulation steps: `plain_step`, on an NVIDIA GPU as one kernel (`one_kernel`)."""
         action = fitting(self, action)
-        if not has_gpu():  # and no task needs to be hashed for its kernel
+        if not has_gpu():  # so the task need not be hashed
             return self.plain_step(state, action)
         return _kernel(self.with_numbers(None))(state, action, self.numbers)
 
     def plain_step(self, state: TaskState, action: Float[Array, " action"]) -> TaskState:
         """Act for `robot.frames` simulation steps.
 
-        A step in which the simulation diverges (`physics.is_stable`) is undone: it pays nothing, and the episode ends.
+        A step in which the simulation diverges (`physics.is_stable`) is undone: no reward, and the episode ends.
         """
         outing: Outing = state.inner
         control = action
@@ -254,7 +254,7 @@ class RobotTask(ABC):
         return jax.tree.map(jnp.mean, episodes)
 
     def trajectory(self, policy: PolicyFn, key: PRNGKeyArray) -> tuple[Outing, Bool[Array, " steps"]]:
-        """Return every state of one episode, leaves [steps, …], and which belong to it: for pictures."""
+        """Return all states of one episode, leaves [steps, …], and which belong to it, for pictures."""
         level = jnp.zeros((), jnp.int32)
 
         def step(carry: tuple[TaskState, Array], _: None) -> tuple[tuple[TaskState, Array], tuple[Outing, Array]]:
@@ -267,7 +267,7 @@ class RobotTask(ABC):
         return jax.lax.scan(step, start, None, length=self.episode_steps)[1]
 
     def _play(self, policy: PolicyFn, key: PRNGKeyArray, level: Int[Array, ""], follow: bool) -> Episode:
-        """Play to the end; with `follow`, note the way taken for `path_measures`."""
+        """Play to the end; with `follow`, record the path for `path_measures`."""
 
         def step(carry: tuple[TaskState, Array, Array], _: None) -> tuple[tuple[TaskState, Array, Array], Any]:
             state, total, alive = carry
@@ -295,7 +295,7 @@ class RobotTask(ABC):
         return Episode(fitness=total, success=metrics["reached"], metrics=metrics)
 
     def _observe(self, outing: Outing) -> Float[Array, " observation"]:
-        """Return positions, velocities, readings, and what else is shown."""
+        """Return positions, velocities, readings, and whatever `shown` adds."""
         robot, body = self.robot, outing.body
         limit = robot.velocity_limit
         parts = [
@@ -310,7 +310,7 @@ class RobotTask(ABC):
 
 @lru_cache(maxsize=64)
 def _kernel(task: RobotTask) -> Callable[[TaskState, Array, Places], TaskState]:
-    """Return a task's step, its boxes' places as an argument."""
+    """Return a task's step, with its boxes' places as an argument."""
     return one_kernel(lambda state, action, places: task.with_numbers(places).plain_step(state, action))
 
 

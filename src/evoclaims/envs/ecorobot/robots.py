@@ -1,4 +1,4 @@
-"""Robots: a MuJoCo model and what a task must know of it. A new robot is an XML file and one entry below."""
+"""Robots: a MuJoCo model and what a task must know about it. A new robot is an XML file and one entry below."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ class Robot:
 
     Attributes:
         name: the registered name.
-        xml: the model, "package:path". Its first body is the torso, on whose joints the robot moves through the world.
+        xml: the model, "package:path". Its first body is the torso, whose joints move the robot through the world.
         frames: simulation steps in one environment step.
         torso_radius: where range sensors sit, m from the torso's centre.
         forward_reward: for each m/s of forward velocity, in every step.
@@ -25,16 +25,16 @@ class Robot:
         healthy_reward: earned in every step in which the robot is healthy.
         healthy_height: lowest and highest z of a healthy torso, m.
         healthy_pitch: largest pitch of a healthy torso to either side, rad; only for planar robots.
-        start: the configuration at the start, where it is not the model's own.
-        position_noise, velocity_noise: of starts: half-width of a uniform distribution, scale of a normal one (uniform
+        start: the start configuration, if not the model's own.
+        position_noise, velocity_noise: at starts: half-width of a uniform distribution, scale of a normal one (uniform
             for robots that Brax starts so).
-        normal_velocity: whether velocities start normally distributed, and not uniformly.
-        scales_actions: whether an action in [-1, 1] spans the motors' whole range, as Brax's humanoid does it;
-            otherwise motors take it as it is, clipped to their range.
-        free_coordinates: leading positions that say where in the world it is; plain locomotion does not show them.
+        normal_velocity: whether start velocities are normally, not uniformly, distributed.
+        scales_actions: whether an action in [-1, 1] spans the motors' whole range, as for Brax's humanoid; otherwise
+            motors take it unscaled, clipped to their range.
+        free_coordinates: leading positions that give its place in the world; plain locomotion does not show them.
         seen_velocities: how many velocities a policy sees, from the first; None for all.
-        velocity_limit: velocities are shown clipped to it.
-        contacts: most contacts that are kept, the nearest ones.
+        velocity_limit: shown velocities are clipped to it.
+        contacts: most contacts kept, the nearest ones.
     """
 
     name: str

@@ -26,9 +26,9 @@ with contextlib.redirect_stdout(io.StringIO()):
     from mujoco import mjx
 
 WORLD_GROUP: Final = 1
-"""The geom group of what the scene adds; sensors look at it."""
+"""The geom group of the scene's own geoms; sensors see it."""
 Places = Mapping[str, Any]
-"""What tells boxes apart: arrays of MuJoCo's model by their names, each [boxes, …]."""
+"""What differs between boxes: arrays of MuJoCo's model by name, each [boxes, …]."""
 GEOMS: Final = ("geom_pos", "geom_size", "geom_quat")
 """MuJoCo's arrays in which boxes may differ."""
 
@@ -39,10 +39,10 @@ class Scene:
 
     Attributes:
         robot: who acts.
-        boxes: what stands in the world.
+        boxes: the boxes in the world.
 
-    Only as many boxes are simulated as the robot can touch at a time: before every step those nearest to the torso take
-    their place (`physics`). A row of fifteen obstacles costs no more than two of them.
+    Only as many boxes are simulated as the robot can touch at a time: before every step, these are moved to the places
+    of the boxes nearest to the torso (`physics`). A row of fifteen obstacles costs no more than two.
     """
 
     robot: Robot
@@ -50,7 +50,7 @@ class Scene:
 
     @cached_property
     def whole(self) -> mujoco.MjModel:
-        """The model with all boxes, for plain MuJoCo: pictures, and comparison."""
+        """The model with all boxes, for plain MuJoCo: pictures and comparisons."""
         return _compiled(self.robot, self.boxes)
 
     @cached_property
@@ -65,10 +65,10 @@ class Scene:
 
     @cached_property
     def mjx(self) -> Any:
-        """The model that is simulated, as MJX takes it; its arrays are on the host, so that programs embed them."""
+        """The model that is simulated, in MJX's form; its arrays are on the host, so that programs embed them."""
         with jax.ensure_compile_time_eval():
             model = jax.device_get(mjx.put_model(self.model, impl="jax"))
-        # Nothing is left of the boxes that happen to stand first, or programs would differ by them.
+        # Erase the boxes that happen to come first, or programs would depend on them.
         geoms = box_geoms(self.model)
         blank = {name: np.array(getattr(model, name)) for name in self.turns}
         for array in blank.values():
@@ -94,7 +94,7 @@ class Scene:
 
     @cached_property
     def turns(self) -> Places:
-        """What tells boxes that take turns apart: MuJoCo's arrays of their geoms, shape [boxes, …]; else nothing."""
+        """MuJoCo's arrays that differ between boxes that take turns, shape [boxes, …]; else empty."""
         if self.near == len(self.boxes):
             return {}
         arrays = {name: getattr(self.whole, name)[box_geoms(self.whole)] for name in GEOMS}
@@ -108,18 +108,18 @@ class Scene:
 
 @lru_cache(maxsize=64)
 def scene(robot: Robot, boxes: tuple[Box, ...] = ()) -> Scene:
-    """Return the scene, compiled at most once in a process."""
+    """Return the scene, compiled at most once per process."""
     return Scene(robot, boxes)
 
 
 def box_geoms(model: mujoco.MjModel) -> NDArray[np.int64]:
-    """Return the indices of the geoms that are boxes of the scene, in their order."""
+    """Return the indices of the geoms that are the scene's boxes, in order."""
     return np.flatnonzero((model.geom_bodyid == 0) & (model.geom_group == WORLD_GROUP))
 
 
 @lru_cache(maxsize=64)
 def _compiled(robot: Robot, boxes: tuple[Box, ...]) -> mujoco.MjModel:
-    """Build the model from the robot's own file, so that its defaults and its total mass stay as they are."""
+    """Build the model from the robot's own file, so that its defaults and total mass are unchanged."""
     try:
         spec = mujoco.MjSpec.from_file(robot.file)
     except (ValueError, FileNotFoundError) as error:
@@ -127,8 +127,8 @@ def _compiled(robot: Robot, boxes: tuple[Box, ...]) -> mujoco.MjModel:
     option = spec.option
     option.solver, option.iterations, option.ls_iterations = mujoco.mjtSolver.mjSOL_NEWTON, 1, 4
     option.disableflags |= mujoco.mjtDisableBit.mjDSBL_EULERDAMP
-    # Brax's own numbers go: MJX (3.17) looks its setting up at the place of its name, not of its data, and would read
-    # one of theirs (the ant lost all contacts).
+    # Remove Brax's own numbers: MJX (3.17) looks up its setting by the index of its name, not of its data, and would
+    # read one of Brax's (the ant lost all contacts).
     for numeric in list(spec.numerics):
         spec.delete(numeric)
     spec.add_numeric(name="max_contact_points", data=[robot.contacts])
@@ -148,7 +148,7 @@ def _compiled(robot: Robot, boxes: tuple[Box, ...]) -> mujoco.MjModel:
             group=WORLD_GROUP,
             rgba=[0.55, 0.5, 0.45, 1.0],
         )
-    # What MuJoCo (3.17) advises in place of the deprecated attribute `settotalmass`, which the half-cheetah has.
+    # As MuJoCo (3.17) advises instead of the deprecated attribute `settotalmass`, which the half-cheetah has.
     total, spec.compiler.settotalmass = spec.compiler.settotalmass, -1.0
     model = spec.compile()
     if total > 0:

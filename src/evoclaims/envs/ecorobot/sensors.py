@@ -1,4 +1,4 @@
-"""Sensors: rays that a robot sends out and that end at the boxes of the scene, or at the floor."""
+"""Sensors: rays from a robot that end at the scene's boxes or at the floor."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ ARENA: Final = math.hypot(8.0, 8.0)
 
 
 class Sensor(Protocol):
-    """What a robot perceives of the world, as part of its observation."""
+    """How a robot senses the world, as part of its observation."""
 
     @property
     def size(self) -> int:
@@ -35,7 +35,7 @@ class Rangefinders:
 
     Attributes:
         count: rays, spread evenly from the right (-90°) over the front, the torso's x axis, to the left (90°).
-        reach: distance that reads 1, m; nothing within reach reads 1 too, and nothing else does.
+        reach: the distance that reads 1, m; a ray reads 1 if and only if it meets nothing nearer.
     """
 
     count: int = 5
@@ -47,7 +47,7 @@ class Rangefinders:
 
     @property
     def size(self) -> int:
-        """One reading a ray."""
+        """One reading per ray."""
         return self.count
 
     def read(self, scene: Scene, pose: Pose) -> Float[Array, " size"]:
@@ -58,7 +58,7 @@ class Rangefinders:
 
 @dataclass(frozen=True)
 class PieSlices:
-    """Whether anything is to be seen in each sector around the robot.
+    """Whether there is anything in each sector around the robot.
 
     Attributes:
         count: sectors, the first one centred on the front, the others counterclockwise.
@@ -74,7 +74,7 @@ class PieSlices:
 
     @property
     def size(self) -> int:
-        """One reading a sector."""
+        """One reading per sector."""
         return self.count
 
     def read(self, scene: Scene, pose: Pose) -> Float[Array, " size"]:
@@ -97,7 +97,7 @@ def distances(scene: Scene, pose: Pose, angles: np.ndarray) -> Float[Array, " ra
     ahead = np.stack([np.cos(turned), np.sin(turned), np.zeros_like(turned)], axis=1)
     directions = jnp.asarray(ahead, jnp.float32) @ pose.rotation.T
     origins = pose.place[None] + scene.robot.torso_radius * directions
-    # The floor: met from above, by rays that lead down.
+    # The floor: hit from above, by rays that point down.
     down = jnp.minimum(directions[:, 2], 0.0)
     nearest = jnp.where(down < 0, jnp.maximum(origins[:, 2], 0.0) / jnp.maximum(-down, 1e-9), jnp.inf)
     if not scene.boxes:

@@ -30,7 +30,7 @@ AREA: Final[Area] = ((-4.0, 4.0), (0.0, 7.0))
 START: Final = (-3.0, 1.0)
 TARGET: Final = (-3.0, 6.0)
 STONES: Final = ((-1.0, 2.5), (3.2, 1.0), (3.2, 2.5), (0.0, 4.5), (1.0, 6.0), (-2.0, 6.0), TARGET)
-"""In their order; the target is the last."""
+"""In order; the target is the last."""
 BONUS: Final = 1000.0
 
 
@@ -43,14 +43,14 @@ class StonesCrossed:
 
 @dataclass(frozen=True)
 class SteppingStones(Maze):
-    """Cross seven stones in their order; they are marks, which touch nothing and which no sensor sees.
+    """Cross seven stones in order; stones are marks that touch nothing and that no sensor sees.
 
-    A step pays the stones crossed so far, plus 1 - (distance to the next) / (the arena's diagonal); crossing the last,
-    the target, pays 1,000 and ends the episode.
+    A step's reward is the number of stones crossed so far, plus 1 - (distance to the next) / (the arena's diagonal);
+    crossing the last, the target, pays 1,000 and ends the episode.
 
     Attributes:
         within: how near the torso's centre must come, m.
-        shows_goal: whether the policy sees where the next stone lies: goal-conditioned learning.
+        shows_goal: whether the policy sees the next stone's place: goal-conditioned learning.
     """
 
     name: ClassVar[str] = "stepping_stones"  # type: ignore[misc]
@@ -85,7 +85,7 @@ class SteppingStones(Maze):
         return StonesCrossed(crossed=jnp.zeros((), jnp.int32))
 
     def rule(self, memory: StonesCrossed, before: Pose, after: Pose, action: Float[Array, " action"]) -> Ruling:
-        """Count a stone when the robot is at the one that is next."""
+        """Count a stone when the robot is at the next one."""
         crossed = memory.crossed + (self._distance(memory, after) <= self.within).astype(jnp.int32)
         now = StonesCrossed(crossed=crossed)
         done = crossed == len(STONES)
@@ -93,7 +93,7 @@ class SteppingStones(Maze):
         return Ruling(memory=now, reward=reward + jnp.where(done, BONUS, 0.0), ended=done)
 
     def shown(self, outing: Outing) -> Float[Array, " more"]:
-        """Return the next stone's x and y, where the policy is told its goal."""
+        """Return the next stone's x and y, if the policy sees its goal."""
         return self._next(outing.memory) if self.shows_goal else jnp.zeros(0)
 
     def reached(self, outing: Outing) -> Bool[Array, ""]:
@@ -101,13 +101,13 @@ class SteppingStones(Maze):
         return outing.memory.crossed == len(STONES)
 
     def measures(self, outing: Outing) -> dict[str, Array]:
-        """Return how many stones were crossed."""
+        """Return the number of stones crossed."""
         return {"stones": outing.memory.crossed.astype(jnp.float32)}
 
     def _next(self, memory: StonesCrossed) -> Float[Array, 2]:
-        """Return where the next stone lies; after the last, the last."""
+        """Return the next stone's place; after the last, the last one's."""
         return jnp.asarray(STONES, jnp.float32)[jnp.minimum(memory.crossed, len(STONES) - 1)]
 
     def _distance(self, memory: StonesCrossed, pose: Pose) -> Float[Array, ""]:
-        """Return how far the next stone is, m."""
+        """Return the distance to the next stone, m."""
         return jnp.linalg.norm(pose.place[:2] - self._next(memory))

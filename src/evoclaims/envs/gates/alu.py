@@ -13,7 +13,7 @@ from evoclaims.envs.gates.circuit import Circuit, Sampling
 from evoclaims.envs.gates.truth_table import Operation, TruthTable, bits_of, number_of
 
 WIDTH = 4
-"""Bits of data in, of data out, and of control."""
+"""Number of data input, data output and control bits."""
 
 OperationList = Literal["paper", "published_code"]
 MultiplexerReading = Literal["paper", "published_code"]
@@ -30,8 +30,8 @@ def _add(amount: int) -> Operation:
 
 
 MULTIPLEXER = Operation("multiplexer", 3, 1, lambda x: (x[1] if x[0] else x[2],))
-# The published code reads the select bit from the inactive fourth bit, which is always 0: the output is the middle
-# active bit, whatever the other two say.
+# The published code reads the select bit from the inactive fourth bit, which is always 0: the output is always the
+# middle active bit.
 MULTIPLEXER_AS_PUBLISHED = Operation("multiplexer", 3, 1, lambda x: (x[1],))
 NAND = Operation("nand", 2, 1, lambda x: (1 - (x[0] & x[1]),))
 NOT = Operation("not", 1, 1, lambda x: (1 - x[0],))
@@ -53,12 +53,12 @@ OPERATIONS: dict[OperationList, tuple[Operation, ...]] = {
 class SimpleAlu(Circuit):
     """Level k asks for operations 0 … k together.
 
-    An observation is the operation's index in 4 bits, most significant first, then 4 data bits of which an operation
-    with i inputs uses the last i (the others are 0). An operation with o outputs is scored on the first o of 4.
+    An observation is the operation's index in 4 bits, most significant first, then 4 data bits. An operation with i
+    inputs uses the last i of them (the others are 0); one with o outputs is scored on the first o of 4.
 
     Attributes:
         level_count: how many of the nine operations to ask for, from 1.
-        operations: the paper's list, or the published code's, which has XAX and no shift right.
+        operations: the paper's list, or the published code's, with XAX and without shift right.
         multiplexer: the paper's, or the published code's, whose select bit is always 0.
         sampling: see `Circuit`.
     """
@@ -84,7 +84,7 @@ class SimpleAlu(Circuit):
 
     @cached_property
     def operation_list(self) -> tuple[Operation, ...]:
-        """The operations asked for, in the order of the levels."""
+        """The operations asked for, in level order."""
         operations = OPERATIONS[self.operations][: self.level_count]
         if self.multiplexer == "published_code":
             return (MULTIPLEXER_AS_PUBLISHED, *operations[1:])
@@ -92,7 +92,7 @@ class SimpleAlu(Circuit):
 
     @cached_property
     def table(self) -> TruthTable:
-        """The operations' tables one after the other, so that a level is a prefix."""
+        """The operations' tables in order, so that a level is a prefix."""
         inputs, targets, active, rows_at_level = [], [], [], []
         for index, operation in enumerate(self.operation_list):
             for number in range(2**operation.inputs):

@@ -1,4 +1,4 @@
-"""What all stepping gates share: a truth table made into a task (§3.1 of the paper)."""
+"""The base of all stepping gates: a truth table made into a task (§3.1 of the paper)."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class Row:
 
 
 class Circuit(ABC):
-    """A gate task; a subclass gives `name`, `revision`, `table` and a field `sampling`.
+    """A gate task; a subclass defines `name`, `revision`, `table` and a field `sampling`.
 
     Attributes:
         sampling: "exhaustive": an episode asks every row of the level in order, and its fitness is minus the mean
@@ -84,7 +84,7 @@ class Circuit(ABC):
         return self._asking(following, -wrong[0], ended)
 
     def episode(self, policy: PolicyFn, key: PRNGKeyArray, level: Int[Array, ""]) -> Episode:
-        """Return the fitness under this task's sampling; success is the whole level's, so that no luck moves it up."""
+        """Return the fitness under this task's sampling; success is the whole level's, to exclude lucky level-ups."""
         if self.sampling == "exhaustive":
             return self.examine(policy, key, level)
         index = jax.random.randint(key, (1,), 0, self._rows(level), jnp.int32)
@@ -93,7 +93,7 @@ class Circuit(ABC):
         return Episode(fitness=-wrong[0], success=self.examine(policy, key, level).success)
 
     def examine(self, policy: PolicyFn, key: PRNGKeyArray, level: Int[Array, ""]) -> Episode:
-        """Ask every row of `level`: fitness is minus the mean error, success the share of rows wholly right.
+        """Ask every row of `level`: fitness is minus the mean error, success the share of fully correct rows.
 
         The key is not used: the examination is exhaustive.
         """
@@ -120,7 +120,7 @@ class Circuit(ABC):
         return share.astype(jnp.float32), ~jnp.any(wrong, axis=-1)
 
     def _asking(self, row: Row, reward: Float[Array, ""], ended: Bool[Array, ""]) -> TaskState:
-        """Build the state that shows `row`; past the last row the observation is the last row's."""
+        """Build the state that shows `row`; past the last row it shows the last row."""
         shown = jnp.minimum(row.index, self.table.rows - 1)
         return TaskState(
             observation=jnp.asarray(self.table.inputs)[shown],

@@ -1,4 +1,4 @@
-"""N-parity that goes on asking what it asked before: a reading of the paper's curriculum, as a named variant."""
+"""N-parity that keeps asking the rows of earlier levels: a reading of the paper's curriculum, a named variant."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from evoclaims.envs.gates.truth_table import TruthTable
 class CumulativeParity(Circuit):
     """Level k asks the tables of levels 0 … k of N-parity, one after the other.
 
-    One of the published environments does so with its curriculum switched on. The rows of early levels are asked once
-    for every level so far, so that forgetting them costs more than in `NParity`, and success weighs them alike.
+    One of the published environments does so with its curriculum switched on. Rows of early levels are asked once for
+    every level so far, so forgetting them costs more than in `NParity`, and success weighs them the same way.
 
     Attributes:
         bits: N, from 2 to 12.
@@ -39,7 +39,7 @@ class CumulativeParity(Circuit):
 
     @cached_property
     def table(self) -> TruthTable:
-        """Levels one after the other, so that level k is a prefix: the first 4 + 8 + … + 2^(k + 2) rows."""
+        """The levels in order, so that level k is a prefix: the first 4 + 8 + … + 2^(k + 2) rows."""
         plain = NParity(self.bits).table
         rows = np.concatenate([np.arange(count) for count in plain.rows_at_level])
         return TruthTable(

@@ -17,11 +17,11 @@ Bits = tuple[int, ...]
 
 @dataclass(frozen=True, eq=False)
 class TruthTable:
-    """A circuit's wanted behaviour.
+    """A circuit's target behaviour.
 
     Attributes:
         inputs: bits 0/1, shape [rows, inputs].
-        targets: wanted bits 0/1, shape [rows, outputs]; meaningless where not active.
+        targets: target bits 0/1, shape [rows, outputs]; meaningless where not active.
         active: which outputs are scored, shape [rows, outputs].
         rows_at_level: how many leading rows each level asks for, ascending, one entry per level.
     """
@@ -32,10 +32,10 @@ class TruthTable:
     rows_at_level: tuple[int, ...]
 
     def __post_init__(self) -> None:
-        """Check that the parts belong together; jax would broadcast what does not, and read past the last row.
+        """Check that the parts fit together; jax would broadcast wrong shapes, and read past the last row.
 
         Raises:
-            MisfitError: when shapes or types are others, an output is never asked, or levels have no ascending rows.
+            MisfitError: when shapes or types are wrong, an output is never asked, or level rows do not ascend.
         """
         rows = len(self.inputs)
         wanted: tuple[tuple[str, NDArray[Any], type], ...] = (
@@ -69,7 +69,7 @@ def bits_of(number: int, width: int) -> Bits:
 
 
 def number_of(bits: Sequence[int]) -> int:
-    """Return the number that `bits` spell, most significant first."""
+    """Return the number with these `bits`, most significant first."""
     return sum(bit << shift for shift, bit in enumerate(reversed(bits)))
 
 

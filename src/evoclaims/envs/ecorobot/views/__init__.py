@@ -1,1 +1,1 @@
-"""What robots do, to look at: pictures, animations, and a page in three dimensions."""
+"""Views of what robots do: pictures, animations, and a page in three dimensions."""

@@ -25,21 +25,21 @@ from evoclaims.envs.ecorobot.views.painting import (
 )
 
 MOST_FRAMES: Final = 160
-"""Of longer episodes, frames are left out: a file must stay small."""
+"""Longer episodes drop frames, to keep the file small."""
 FRAME: Final = 50
 """How long a frame is shown, ms."""
 COLOURS: Final = 128
-"""Of a frame; a GIF has at most 256."""
+"""Per frame; a GIF has at most 256."""
 WINDOW: Final = 6.0
-"""Ground that the camera beside the robot shows, m."""
+"""Width of ground shown by the camera beside the robot, m."""
 SIZES: Final = {FROM_ABOVE: (5.2, 5.6), FROM_THE_SIDE: (7.0, 2.8)}
 """Inches."""
 LETTERS: Final = 11
-"""Of a title, for each inch."""
+"""In a title, per inch."""
 
 
 def film(task: RobotTask, motion: Motion, title: str) -> bytes:
-    """Return an episode as an animated GIF that repeats for ever.
+    """Return an episode as an animated GIF that repeats forever.
 
     Raises:
         UserError: when matplotlib is not installed.
@@ -52,7 +52,7 @@ def film(task: RobotTask, motion: Motion, title: str) -> bytes:
         (path,) = axis.plot([], [], color=PATHS[0], linewidth=1.2, zorder=3)
         time = axis.set_title("0.0 s", fontsize=9)
         figure.draw_without_rendering()
-        figure.set_layout_engine("none")  # what the frames share must not move between them
+        figure.set_layout_engine("none")  # shared elements must not move between frames
         pictures = []
         for frame in range(shown.frames):
             if plane == FROM_THE_SIDE:
@@ -71,7 +71,7 @@ def film(task: RobotTask, motion: Motion, title: str) -> bytes:
 
 
 def _stage(task: RobotTask, motion: Motion, plane: Plane) -> tuple[Any, Any]:
-    """Build what stands still; return figure and axis."""
+    """Build the static parts; return figure and axis."""
     figure = optional("matplotlib.figure").Figure(figsize=SIZES[plane], dpi=90, layout="constrained")
     optional("matplotlib.backends.backend_agg").FigureCanvasAgg(figure)
     axis = figure.add_subplot()

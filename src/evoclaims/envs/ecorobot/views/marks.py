@@ -1,4 +1,4 @@
-"""Marks: places on the ground that a task's rules speak of, and that a picture shows."""
+"""Marks: places on the ground that a task's rule uses, and that a picture shows."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from evoclaims.envs.ecorobot.stones import STONES, SteppingStones
 
 @dataclass(frozen=True)
 class Mark:
-    """A place to come to.
+    """A place to reach.
 
     Attributes:
         place: x and y, m.
         within: how near the torso's centre must come, m.
-        label: its number; empty where there is but one.
+        label: its number; empty if there is only one.
         target: whether the task ends there.
     """
 
@@ -29,7 +29,7 @@ class Mark:
 
 @singledispatch
 def marks(task: RobotTask) -> tuple[Mark, ...]:
-    """Return the marks of a task, the target last; a kind of task that has some registers here."""
+    """Return the marks of a task, the target last; task classes with marks register here."""
     return ()
 
 

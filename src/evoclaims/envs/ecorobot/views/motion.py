@@ -1,4 +1,4 @@
-"""Bodies in space over time: every geom's pose, worked out by plain MuJoCo from generalized positions."""
+"""Bodies in space over time: every geom's pose, computed by plain MuJoCo from generalized positions."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ KINDS: Final[dict[int, Kind]] = {
     int(mujoco.mjtGeom.mjGEOM_CYLINDER): "cylinder",
     int(mujoco.mjtGeom.mjGEOM_BOX): "box",
 }
-"""What is shown, by MuJoCo's number; the floor, a plane, is left to whoever draws."""
+"""The shapes shown, by MuJoCo's number; each drawer draws the floor, a plane, itself."""
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,7 @@ class Shape:
 
     Attributes:
         kind: its form.
-        radii: along its x, y and z axis, m; of a box and of a cylinder's z the half-sizes.
+        radii: along its x, y and z axis, m; half-sizes for a box, and for z of a cylinder.
         reach: half the length of a capsule's cylinder, along z, m; 0 for all others.
         moves: whether it is part of the robot.
     """
@@ -45,7 +45,7 @@ class Shape:
 
 @dataclass(frozen=True)
 class Motion:
-    """Shapes and where they are in each frame.
+    """Shapes and their poses in each frame.
 
     Attributes:
         shapes: the geoms, in the order of the model.
@@ -63,11 +63,11 @@ class Motion:
 
     @property
     def frames(self) -> int:
-        """How many there are."""
+        """Number of frames."""
         return len(self.places)
 
     def outline(self, shape: int, frame: int, axes: tuple[int, int]) -> NDArray[np.float64]:
-        """Return the convex polygon, shape [corners, 2], that a shape covers when seen along the third axis."""
+        """Return the convex polygon, shape [corners, 2], that a shape covers, seen along the third axis."""
         matrix = np.empty(9)
         mujoco.mju_quat2Mat(matrix, self.turns[frame, shape].astype(np.float64))
         points = _surface(self.shapes[shape]) @ matrix.reshape(3, 3).T + self.places[frame, shape]
@@ -76,19 +76,19 @@ class Motion:
         return polygon
 
     def every(self, stride: int) -> Motion:
-        """Return each `stride`-th frame, from the first on."""
+        """Return every `stride`-th frame, from the first."""
         return Motion(
             self.shapes, self.places[::stride], self.turns[::stride], self.torso[::stride], self.seconds * stride
         )
 
 
 def motion(scene: Scene, positions: NDArray[np.floating]) -> Motion:
-    """Return where every geom is.
+    """Return the pose of every geom.
 
     Args:
-        scene: whose geoms; with all boxes, also those that take turns in the simulation.
-        positions: generalized positions, shape [frames, nq]; from the first frame on that is not finite, all are left
-            out.
+        scene: whose geoms; with all boxes, even those that take turns in the simulation.
+        positions: generalized positions, shape [frames, nq]; the first frame that is not finite, and all later ones,
+            are dropped.
 
     Raises:
         UserError: when no frame is finite.
@@ -122,14 +122,14 @@ def at_start(task: RobotTask) -> Motion:
 
 
 def _shape(model: mujoco.MjModel, geom: int) -> Shape:
-    """Return a geom's shape: MuJoCo leaves sizes at 0 that a kind does not need."""
+    """Return a geom's shape; MuJoCo leaves unused sizes at 0."""
     kind, (a, b, c) = KINDS[int(model.geom_type[geom])], map(float, model.geom_size[geom])
     radii = {"sphere": (a, a, a), "capsule": (a, a, a), "cylinder": (a, a, b)}.get(kind, (a, b, c))
     return Shape(kind, radii, b if kind == "capsule" else 0.0, bool(model.geom_bodyid[geom] != 0))
 
 
 def _surface(shape: Shape) -> NDArray[np.float64]:
-    """Return points of a shape's surface, in its own axes, shape [points, 3], whose hull is the shape."""
+    """Return surface points of a shape, in its own axes, shape [points, 3]; their hull is the shape."""
     if shape.kind == "box":
         corners = np.stack(np.meshgrid([-1.0, 1.0], [-1.0, 1.0], [-1.0, 1.0]), axis=-1).reshape(-1, 3)
         return np.asarray(corners * np.array(shape.radii), np.float64)

@@ -1,4 +1,4 @@
-"""An episode as a page that turns under the mouse: one HTML file that asks for nothing else, drawn by WebGL."""
+"""An episode as a page that the mouse can rotate: one self-contained HTML file, drawn by WebGL."""
 
 from __future__ import annotations
 
@@ -20,21 +20,21 @@ from evoclaims.envs.ecorobot.views.motion import Motion, Shape
 
 ASSETS: Final = resources.files("evoclaims.envs.ecorobot.views") / "assets"
 DIGITS: Final = 6
-"""Of what stands still; what moves keeps every bit."""
+"""For static shapes; moving ones keep every bit."""
 
 
 def page(task: RobotTask, motion: Motion, title: str) -> bytes:
     """Return the page of an episode.
 
-    It holds the viewer (`assets/viewer.html`, `assets/viewer.js`) and, as JSON, what `scenery` returns. It needs no
-    network, and its policy forbids the browser any.
+    It contains the viewer (`assets/viewer.html`, `assets/viewer.js`) and, as JSON, what `scenery` returns. It needs
+    no network, and its policy forbids network access.
 
     Args:
-        task: whose marks are shown, and whose robot tells from where to look.
+        task: whose marks are shown, and whose robot sets the first view.
         motion: of the episode.
         title: plain text.
     """
-    # "<" could end the element that the text lies in; the escape means the same to JSON.
+    # "<" could end the element around the text; the escape means the same in JSON.
     data = json.dumps(scenery(task, motion), allow_nan=False).replace("<", "\\u003c")
     template = Template((ASSETS / "viewer.html").read_text("utf-8"))
     script = (ASSETS / "viewer.js").read_text("utf-8")
@@ -44,8 +44,8 @@ def page(task: RobotTask, motion: Motion, title: str) -> bytes:
 def scenery(task: RobotTask, motion: Motion) -> dict[str, Any]:
     """Return what the viewer shows, as plain JSON.
 
-    Floats of whole arrays are little-endian float32 in base64: "poses" [frames, moving shapes, 7] (place, m, and
-    quaternion w, x, y, z) and "torso" [frames, 3].
+    Whole arrays are little-endian float32 in base64: "poses" [frames, moving shapes, 7] (place, m, and quaternion
+    w, x, y, z) and "torso" [frames, 3].
     """
     moves = np.array([shape.moves for shape in motion.shapes], bool)
     poses = np.concatenate([motion.places, motion.turns], axis=-1)
@@ -69,13 +69,13 @@ def scenery(task: RobotTask, motion: Motion) -> dict[str, Any]:
 
 
 def _shape(shape: Shape, pose: NDArray[np.float32]) -> dict[str, Any]:
-    """Return a shape; with its pose, where it stands still."""
+    """Return a shape; with its pose if it is static."""
     plain = {"kind": shape.kind, "radii": list(shape.radii), "reach": shape.reach, "moves": shape.moves}
     return plain if shape.moves else {**plain, "pose": [round(float(value), DIGITS) for value in pose]}
 
 
 def _view(task: RobotTask, motion: Motion) -> dict[str, Any]:
-    """Return from where to look at first: a maze as a whole from above, everything else beside the robot."""
+    """Return the first view: a whole maze from above, anything else beside the robot."""
     if isinstance(task, Maze):
         (low_x, high_x), (low_y, high_y) = task.area
         return {

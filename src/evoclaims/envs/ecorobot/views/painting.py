@@ -1,4 +1,4 @@
-"""What is painted on matplotlib's axes: bodies, the ground with its marks, and paths."""
+"""Paints on matplotlib's axes: bodies, the ground with its marks, and paths."""
 
 from __future__ import annotations
 
@@ -17,24 +17,24 @@ from evoclaims.envs.ecorobot.views.motion import Motion, at_start
 TorsoPath = NDArray[np.floating]
 """Centres of the torso in an episode, shape [steps, 3], m; finite."""
 Plane = tuple[int, int]
-"""Which coordinates a picture shows, across and up."""
+"""The coordinates a picture shows, across and up."""
 
 FROM_ABOVE: Final[Plane] = (0, 1)
 FROM_THE_SIDE: Final[Plane] = (0, 2)
 
 WALL, ROBOT, STONE, TARGET, GROUND, INK = "#9a938a", "#2f6fb5", "#f5c04a", "#d1495b", "#e6e4df", "#333333"
 PATHS: Final = ("#1b9e77", "#7570b3", "#e7298a", "#66a61e", "#a6761d", "#0072b2", "#8c2d04", "#4d4d4d")
-"""Colours of paths; of more than eight, they come again."""
+"""Colours of paths; they repeat after eight."""
 MARGIN: Final = 0.5
 """Ground shown around everything, m."""
 OPEN: Final = 2.0
-"""Ground shown around a robot that has no walls around it, m."""
+"""Ground shown around a robot without walls, m."""
 BELOW: Final = 0.3
 """How far below the ground a view from the side reaches, m."""
 
 
 def plane_of(task: RobotTask) -> Plane:
-    """Return from where a task is looked at: from above where its robot moves over the ground, else from the side."""
+    """Return a task's view: from above if its robot moves over the ground, else from the side."""
     return FROM_ABOVE if task.robot.free_coordinates > 1 else FROM_THE_SIDE
 
 
@@ -45,24 +45,24 @@ def paint_robot(axis: Any, motion: Motion, frame: int, plane: Plane, zorder: flo
 
 
 def paint_boxes(axis: Any, motion: Motion, plane: Plane) -> None:
-    """Paint what stands still."""
+    """Paint the static shapes."""
     _paint_shapes(axis, motion, 0, plane, False, {"facecolor": WALL, "linewidth": 0.0, "zorder": 2})
 
 
 def _paint_shapes(
     axis: Any, motion: Motion, frame: int, plane: Plane, moving: bool, style: Mapping[str, Any]
 ) -> list[Any]:
-    """Paint the shapes that move, or those that stand still; return what was added."""
+    """Paint the moving or the static shapes; return what was added."""
     patches = optional("matplotlib.patches")
     (depth,) = {0, 1, 2} - set(plane)
-    # What is nearer to the eye comes last: eyes look down, and along +y.
+    # What is nearer to the viewer comes last: views look down, and along +y.
     order = np.argsort(motion.places[frame, :, depth] * (1.0 if depth == 2 else -1.0), kind="stable")
     outlines = [motion.outline(i, frame, plane) for i in map(int, order) if motion.shapes[i].moves == moving]
     return [axis.add_patch(patches.Polygon(outline, **style)) for outline in outlines]
 
 
 def paint_ground(axis: Any, task: RobotTask, paths: Sequence[TorsoPath]) -> None:
-    """Paint walls and marks from above, and set the axes: metres, equal on both."""
+    """Paint walls and marks from above, and set the axes: metres, equal scales."""
     paint_boxes(axis, at_start(task), FROM_ABOVE)
     patches = optional("matplotlib.patches")
     for mark in marks(task):
@@ -83,7 +83,7 @@ def paint_elites(axis: Any, task: Maze, fitnesses: NDArray[np.floating]) -> Any:
 
 
 def ground_shown(task: RobotTask, paths: Sequence[TorsoPath]) -> NDArray[np.float64]:
-    """Return the lowest and the highest x and y, shape [2, 2], m, between which lies all that is seen from above."""
+    """Return the lowest and highest x and y, shape [2, 2], m, of everything seen from above."""
     start = at_start(task)
     walls = [start.outline(i, 0, FROM_ABOVE) for i, shape in enumerate(start.shapes) if not shape.moves]
     around = [] if isinstance(task, Maze) else [start.torso[:, :2] - OPEN, start.torso[:, :2] + OPEN]
@@ -92,14 +92,14 @@ def ground_shown(task: RobotTask, paths: Sequence[TorsoPath]) -> NDArray[np.floa
 
 
 def paint_earth(axis: Any, motion: Motion) -> None:
-    """Paint what stands still from the side, and the ground over the part that is below it."""
+    """Paint the static shapes from the side, and the ground over the parts below it."""
     paint_boxes(axis, motion, FROM_THE_SIDE)
     axis.axhspan(-BELOW, 0.0, color=GROUND, zorder=2.2)
     axis.set(aspect="equal", ylabel="z, m")
 
 
 def paint_paths(axis: Any, paths: Sequence[TorsoPath], plane: Plane) -> None:
-    """Paint paths as lines, and where they end."""
+    """Paint paths as lines, and their ends."""
     for i, path in enumerate(paths):
         across, up = path[:, plane[0]], path[:, plane[1]]
         colour = PATHS[i % len(PATHS)]
@@ -108,7 +108,7 @@ def paint_paths(axis: Any, paths: Sequence[TorsoPath], plane: Plane) -> None:
 
 
 def mark_sign(mark: Mark, zorder: float = 0.0) -> Any:
-    """Return the sign of a mark: a disc for its number, or a cross."""
+    """Return a mark's symbol: a disc for its number, or a cross."""
     colour = TARGET if mark.target else STONE
     style = {"marker": "o", "mec": INK} if mark.label else {"marker": "X", "mec": "white"}
     across, up = mark.place

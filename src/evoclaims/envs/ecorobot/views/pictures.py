@@ -1,4 +1,4 @@
-"""Pictures of ecorobot, drawn by matplotlib without a screen; the same input gives the same bytes."""
+"""Pictures of ecorobot, drawn by matplotlib without a display; the same input gives the same bytes."""
 
 from __future__ import annotations
 
@@ -34,11 +34,11 @@ from evoclaims.envs.ecorobot.views.painting import (
 )
 
 ROW: Final = 15.0
-"""About how much of a course one row shows, m."""
+"""Approximate length of a course in one row, m."""
 ROWS: Final = 5
 """Most rows of a course: longer ones are drawn smaller."""
 WIDTH: Final = {FROM_ABOVE: 7.5, FROM_THE_SIDE: 11.0}
-"""Of what is drawn, inches."""
+"""Of the drawing, inches."""
 
 
 def draw(task: RobotTask, paths: Sequence[NDArray[np.floating]], title: str, file_format: str) -> bytes:
@@ -46,8 +46,7 @@ def draw(task: RobotTask, paths: Sequence[NDArray[np.floating]], title: str, fil
 
     Args:
         task: whose robot is shown to scale where it starts.
-        paths: of the torso's centre, shapes [steps, 3], m; none for the task alone. Places that are not finite are
-            left out.
+        paths: of the torso's centre, shapes [steps, 3], m; none for the task alone. Non-finite places are left out.
         title: what to write above.
         file_format: "svg" or "png".
 
@@ -99,7 +98,7 @@ def _ground(task: RobotTask, paths: Sequence[TorsoPath], title: str) -> tuple[An
 
 
 def _course(task: RobotTask, paths: Sequence[TorsoPath], title: str) -> Any:
-    """Build the picture from the side, in rows one below the other."""
+    """Build the picture from the side, in rows below each other."""
     start = at_start(task)
     covered = np.concatenate([start.torso, *paths])
     low = float(covered[:, 0].min()) - 1.5
@@ -132,7 +131,7 @@ def _figure(size: Any) -> Any:
 
 
 def _legend(figure: Any, task: RobotTask, paths: int, columns: int) -> None:
-    """Explain below the picture what is shown in it."""
+    """Add a legend below the picture."""
     lines, patches = optional("matplotlib.lines"), optional("matplotlib.patches")
     handles = [patches.Patch(facecolor=ROBOT, label=f"{task.robot.name} at the start, to scale")]
     if task.boxes:
