@@ -1,4 +1,4 @@
-"""Networks: the building blocks of policies."""
+"""Networks that policies are made of."""
 
 from evoclaims.core.lazy import exported
 

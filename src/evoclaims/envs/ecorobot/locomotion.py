@@ -19,7 +19,7 @@ def forward(
 ) -> tuple[Float[Array, ""], Bool[Array, ""]]:
     """Return Brax's reward of a step (forward velocity, health, minus control cost), and whether health is lost.
 
-    Brax measures the humanoid's velocity at its centre of mass; here it is the torso's, as for the other robots.
+    Brax measures the humanoid's velocity at its centre of mass; here it is the torso's, as for all others.
     """
     velocity = (after.place[0] - before.place[0]) / seconds
     low, high = robot.healthy_height
@@ -46,7 +46,7 @@ class Locomotion(RobotTask):
 
     @property
     def shows_place(self) -> bool:
-        """False: free ground is the same everywhere."""
+        """No: free ground looks the same."""
         return False
 
     def rule(self, memory: Any, before: Pose, after: Pose, action: Float[Array, " action"]) -> Ruling:
