@@ -46,7 +46,7 @@ class Locomotion(RobotTask):
 
     @property
     def shows_place(self) -> bool:
-        """No: free ground looks the same."""
+        """False: the place does not matter."""
         return False
 
     def rule(self, memory: Any, before: Pose, after: Pose, action: Float[Array, " action"]) -> Ruling:
