@@ -9,7 +9,6 @@ import jax
 import jax.numpy as jnp
 import pytest
 from small_methods import METHODS, Entry
-from workbench import AS_SHIPPED
 
 from evoclaims.envs.probes import PROBES, Probe
 from evoclaims.trials import lanes
@@ -29,7 +28,7 @@ AT_ONCE = 10
 @pytest.fixture
 def _as_shipped(monkeypatch: pytest.MonkeyPatch) -> None:
     """Compile every trial as a user's short ones are: what takes thousands of steps is worth that."""
-    monkeypatch.setattr(lanes, "options_for", lambda condition, layout: {**lanes.FAST_TO_COMPILE, **AS_SHIPPED})
+    monkeypatch.setattr(lanes, "options_for", lambda condition, layout: lanes.FAST_TO_COMPILE)
 
 
 @pytest.mark.usefixtures("_as_shipped")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
 from typing import Any
 
@@ -11,12 +10,6 @@ import jax.numpy as jnp
 import numpy as np
 
 from evoclaims.methods.base import Progress
-
-AS_SHIPPED = {"xla_cpu_use_fusion_emitters": True} if "fusion_emitters" in os.environ["XLA_FLAGS"] else {}
-"""Options of a program in which the tests do not do without emitters (tests/conftest.py).
-
-Without them roundings depend on the size of arrays, and differ more between the programs that train and that judge.
-"""
 
 
 class Workbench:

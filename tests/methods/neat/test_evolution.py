@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 import reference
 from genomes import at, read, read_all, same
-from workbench import AS_SHIPPED
 
 from evoclaims.envs.gates.parity import NParity
 from evoclaims.methods.neat import capacity
@@ -53,7 +52,7 @@ def _bench(settings: Settings) -> Bench:
     with jax.numpy_dtype_promotion("strict"), jax.numpy_rank_promotion("raise"), jax.debug_key_reuse(True):
         state = jax.jit(lambda key: begin(key, settings, NETWORK))(jax.random.key(2))
         level = jnp.zeros((), jnp.int32)
-        step = jax.jit(generation).lower(keys[0], level, state).compile(AS_SHIPPED)
+        step = jax.jit(generation).lower(keys[0], level, state).compile()
     states, reports = [state], []
     for key in keys:
         state, progress = step(key, level, state)
