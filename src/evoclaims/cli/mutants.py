@@ -40,7 +40,7 @@ def main(options: argparse.Namespace) -> int:
         for names, condition in one.conditions.items()
     ]
     seeds = tier.protocol.seeds(tier.protocol.last.n)
-    failed = [name for name, results in run_each(faulty, seeds, fetch, line, project.config.root) if results is None]
+    failed = [name for name, _, results in run_each(faulty, seeds, fetch, line, project.config.root) if results is None]
     mutated = replace(project, reproduction=under_faults(project.reproduction, options.tier, planted))
     reports = mutated.judge_variants([(options.tier, one.name) for one in planted])
     comparison = Comparison(project.archive, project.reproduction, options.tier, used)

@@ -55,12 +55,12 @@ def main(options: argparse.Namespace) -> int:
             store.forget_timeouts((TrialSpec(condition, seed).id for seed in seeds), condition.versions)
     named = [(f"{' on '.join(names)} ({options.tier})", tier.condition(*names)) for names in chosen]
     failed = 0
-    for name, results in run_each(named, seeds, fetch, line, project.config.root):
+    for name, condition, results in run_each(named, seeds, fetch, line, project.config.root):
         if results is None:
             failed += 1
             continue
         print(name)
-        again = len(fetch.again.get(results[0].condition, ()))
+        again = len(fetch.again.get(condition.id, ()))
         if again:
             print(f"  {again} of these were run again, since the stored ones were made with other versions")
         for result in results:
@@ -74,11 +74,11 @@ def main(options: argparse.Namespace) -> int:
 
 def run_each(
     conditions: Iterable[tuple[str, Condition]], seeds: Sequence[int], fetch: RunMissing, line: LiveLine, root: Path
-) -> Iterator[tuple[str, Sequence[TrialResult] | None]]:
+) -> Iterator[tuple[str, Condition, Sequence[TrialResult] | None]]:
     """Run conditions one after the other; an error in one is printed in a line and does not stop the others.
 
     Yields:
-        Each condition's name and its trials, or None for one that failed.
+        Each condition's name, the condition, and its trials, or None for one that failed.
     """
     for name, condition in conditions:
         try:
@@ -88,9 +88,9 @@ def run_each(
             raise
         except BaseException as error:  # an error in a method or a task must not stop the other conditions
             print(f"evoclaims: {name} failed: {printable(in_one_line(error, root))}.", file=sys.stderr)
-            yield name, None
+            yield name, condition, None
             continue
-        yield name, results
+        yield name, condition, results
 
 
 def _print_matrix(project: Project, tier: str, variant: str) -> None:
