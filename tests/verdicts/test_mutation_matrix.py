@@ -61,7 +61,8 @@ def test_the_score_counts_each_mutant_once_by_the_best_that_notices_it() -> None
     assert (found.mutants, found.by_verdict, found.by_drift, found.claims) == (3, 1, 1, 2)
     assert found.insensitive == ("B[x]",)
     assert str(found) == (
-        "1 of 3 mutants change a verdict, 1 more are told by the drift check; 1 of 2 claims are insensitive"
+        "1 of 3 mutants change a verdict, 1 more are told by the drift check; 1 of 2 claims are changed by none of "
+        "those tried"
     )
 
 

@@ -72,4 +72,4 @@ def _planted(options: argparse.Namespace, sound: Conditions) -> tuple[Planted, .
 def _told(row: Sensitivity) -> str:
     """Return a line on what a claim notices."""
     found = [f"{len(row.named(one))} {one} ({', '.join(row.named(one))})" for one in Fate if row.named(one)]
-    return f"{'INSENSITIVE; ' * row.insensitive}{'; '.join(found)}"
+    return f"{'changed by none of those tried; ' * row.insensitive}{'; '.join(found)}"

@@ -129,7 +129,7 @@ class MutationScore:
         """Return one line for a table's foot."""
         return (
             f"{self.by_verdict} of {self.mutants} mutants change a verdict, {self.by_drift} more are told by the drift "
-            f"check; {len(self.insensitive)} of {self.claims} claims are insensitive"
+            f"check; {len(self.insensitive)} of {self.claims} claims are changed by none of those tried"
         )
 
 
