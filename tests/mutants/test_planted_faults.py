@@ -35,8 +35,7 @@ def condition(method: Any = CMA_ES, task: Any = PARITY) -> Condition:
     return Condition(method, task, "curriculum", Budget(generations=3))
 
 
-def right(task: Any) -> PolicyFn:
-    return HandBuilt().best(PARITY, jnp.int32(0))
+RIGHT: PolicyFn = HandBuilt().best(PARITY, jnp.int32(0))
 
 
 def examined(fault: type[Any], policy: PolicyFn, level: int = 1) -> Episode:
@@ -91,7 +90,7 @@ def test_two_faults_in_one_component_are_one_sentence() -> None:
     ],
 )
 def test_what_a_right_circuit_gets_from_faulty_parity(fault: type[Any], success: float, fitness: float) -> None:
-    episode = examined(fault, right(PARITY))
+    episode = examined(fault, RIGHT)
     assert (float(episode.success), float(episode.fitness)) == (success, fitness)
 
 
@@ -103,32 +102,35 @@ def test_a_reversed_reward_is_the_negative_of_the_right_one() -> None:
 
 def test_a_random_payment_depends_on_the_key_alone() -> None:
     task: Any = plant(of_tasks.PaysAtRandom, PARITY)
-    paid = [float(task.episode(right(PARITY), jax.random.key(seed), LEVEL).fitness) for seed in (0, 0, 1)]
+    paid = [float(task.episode(RIGHT, jax.random.key(seed), LEVEL).fitness) for seed in (0, 0, 1)]
     assert paid[0] == paid[1] != paid[2]
     assert 0 <= min(paid) <= max(paid) < 1
 
 
 def test_the_level_is_the_first_one_whatever_is_asked() -> None:
-    first_level_alone: Any = lambda bits: jnp.where(bits[:1] > 0, -1.0, right(PARITY)(bits))  # noqa: E731
+    first_level_alone: Any = lambda bits: jnp.where(bits[:1] > 0, -1.0, RIGHT(bits))  # noqa: E731
     assert float(PARITY.examine(first_level_alone, KEY, LEVEL).success) < 1
     assert float(examined(of_tasks.StaysAtFirstLevel, first_level_alone).success) == 1
 
 
 @pytest.mark.parametrize(
-    "fault", [of_tasks.Blind, of_tasks.PaysNothing, of_tasks.ReversesReward, of_tasks.PaysAtRandom]
+    ("fault", "paid"),
+    [
+        (of_tasks.Blind, -1.0),
+        (of_tasks.PaysNothing, 0.0),
+        (of_tasks.ReversesReward, 1.0),
+        (of_tasks.PaysAtRandom, None),
+    ],
 )
-def test_steps_are_faulty_like_episodes(fault: type[Any]) -> None:
+def test_steps_are_faulty_like_episodes(fault: type[Any], paid: float | None) -> None:
     task: Any = plant(fault, NParity(3, "sampled"))
+    sound = task.sound.reset(KEY, LEVEL)
+    assert bool(jnp.any(sound.observation != 0))
     state = task.reset(KEY, LEVEL)
-    following = task.step(state, -right(PARITY)(PARITY.reset(KEY, LEVEL).observation))
-    sound = task.sound.step(state, -right(PARITY)(PARITY.reset(KEY, LEVEL).observation))
-    assert bool(jnp.any(state.observation != 0)) == (fault is not of_tasks.Blind) or not bool(
-        jnp.any(task.sound.reset(KEY, LEVEL).observation)
-    )
-    changed = {of_tasks.PaysNothing: 0.0, of_tasks.ReversesReward: -float(sound.reward)}
-    if fault in changed:
-        assert float(following.reward) == changed[fault]
-    assert bool(following.terminated) == bool(sound.terminated)
+    assert bool(jnp.any(state.observation != 0)) == (fault is not of_tasks.Blind)
+    following = task.step(state, -RIGHT(sound.observation))  # a wrong answer, which costs 1
+    assert float(following.reward) == paid if paid is not None else 0 <= float(following.reward) < 1
+    assert bool(following.terminated)
 
 
 def test_an_alu_that_ignores_an_input_differs_from_the_right_one_in_targets_alone() -> None:
