@@ -110,6 +110,13 @@ def in_order(numbers: Iterable[Number]) -> list[Expression]:
     return order
 
 
+def everything(numbers: Iterable[Number]) -> list[Expression]:
+    """Return these and all expressions they use, operands first, with the bodies of loops at the end."""
+    order = in_order(numbers)
+    loops = {id(e.loop): e.loop for e in order if isinstance(e, LoopResult)}
+    return order + [inner for loop in loops.values() for inner in everything(loop.results)]
+
+
 def _parents(expression: Expression) -> list[Expression]:
     """Return its operands."""
     match expression:

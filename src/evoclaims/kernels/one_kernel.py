@@ -1,157 +1,109 @@
-"""Running a function as one GPU kernel, with one thread per element of a batch.
+"""Running a function as one kernel over a batch: a lane of a processor's vectors, or a GPU's thread, per element.
 
-XLA splits a robot's time step into some hundred kernels, and each costs at least a microsecond however few robots
-there are. Here one thread computes a robot's whole step in registers.
+XLA splits a robot's time step into some hundred kernels. Here the whole step is computed in registers.
 """
 
 from __future__ import annotations
 
-import math
-import warnings
 from collections.abc import Callable, Sequence
-from functools import cache
+from functools import cache, partial
 from typing import Any, Final
 
 import jax
 import jax.numpy as jnp
-import numpy as np
-from jax.custom_batching import custom_vmap
+from jax.core import ShapedArray
+from jax.extend.core import Primitive
+from jax.interpreters import ad, batching, mlir
 from jaxtyping import Array
 
-from evoclaims.kernels import ptx
-from evoclaims.kernels.interpreter import Numbers
-from evoclaims.kernels.scalarize import scalarize
-from evoclaims.kernels.unsupported import Unsupported
-
-BLOCK: Final = 32
-"""Threads in a block: one warp, so that even few robots use many processors."""
-TARGET: Final = "__gpu$xla.gpu.ptx"
-"""XLA's call target for a kernel given as PTX."""
-Shapes = tuple[jax.ShapeDtypeStruct, ...]
+from evoclaims.kernels import gpu_kernel
+from evoclaims.kernels.kernel import Kernel, Shapes
 
 
 def one_kernel(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Return `function`, run as one kernel on an NVIDIA GPU, and unchanged elsewhere.
+    """Return `function`, run as one kernel on processors and NVIDIA's GPUs.
 
-    It may be batched, any number of times (under `jax.shard_map` with `check_vma=False`). If it cannot be one kernel
+    It may be batched, any number of times; derivatives are those of the function itself. If it cannot be one kernel
     (`Unsupported`), it runs unchanged, and a warning says why.
 
     Args:
-        function: takes trees of small arrays (float32, int32, bool); pure, and not differentiated.
+        function: takes trees of small arrays (float32, int32, bool); pure.
     """
 
     @cache
-    def program(treedef: Any, shapes: Shapes) -> tuple[list[Numbers], Any] | None:
-        """Return the results' expressions and shapes."""
-        try:
-            results, shape = scalarize(function, *jax.tree.unflatten(treedef, shapes))
-            ptx.check_results(results)
-        except Unsupported as reason:
-            warnings.warn(f"What could be one GPU kernel is many, and slower, because of {reason}.", stacklevel=3)
-            return None
-        return results, shape
+    def kernel(treedef: Any, shapes: Shapes) -> Kernel:
+        return Kernel(function, treedef, shapes)
 
     def run(*arguments: Any) -> Any:
         leaves, treedef = jax.tree.flatten(arguments)
-        if not leaves or not has_gpu():
-            return function(*arguments)
         leaves = [jnp.asarray(leaf) for leaf in leaves]
-        shapes = tuple(jax.ShapeDtypeStruct(leaf.shape, leaf.dtype) for leaf in leaves)
-        made = program(treedef, shapes)
-        if made is None:
+        made = kernel(treedef, tuple(jax.ShapeDtypeStruct(leaf.shape, leaf.dtype) for leaf in leaves))
+        if not leaves or not made.supported:
             return function(*arguments)
-        results, shape = made
-
-        def alone(*leaves: Array) -> list[Array]:
-            return jax.tree.leaves(function(*jax.tree.unflatten(treedef, leaves)))
-
-        outputs = tuple(jax.ShapeDtypeStruct(x.shape, x.dtype) for x in jax.tree.leaves(shape))
-        return jax.tree.unflatten(jax.tree.structure(shape), _batched(alone, results, shapes, outputs)(*leaves))
+        return jax.tree.unflatten(made.structure, CALL.bind(*leaves, kernel=made))
 
     return run
 
 
-@cache
-def has_gpu() -> bool:
-    """Whether programs may run on an NVIDIA GPU that is new enough."""
-    device = jax.devices()[0]
-    try:
-        return device.platform == "gpu" and float(device.compute_capability) >= ptx.CAPABILITY
-    except (AttributeError, ValueError):  # not NVIDIA's
-        return False
+CALL: Final = Primitive("one_kernel")
+"""A kernel's call: the arguments' batch dimensions are in front of the kernel's own."""
+CALL.multiple_results = True
 
 
-def _batched(alone: Callable[..., list[Array]], results: list[Numbers], shapes: Shapes, outputs: Shapes) -> Any:
-    """Return a function of the leaves, each with any number of leading batch dimensions.
-
-    An array with fewer of them lacks the innermost.
-    """
-
-    @custom_vmap
-    def call(*leaves: Array) -> list[Array]:
-        depths = [leaf.ndim - len(shape.shape) for leaf, shape in zip(leaves, shapes, strict=True)]
-        deepest = max(range(len(leaves)), key=depths.__getitem__)
-        batch = leaves[deepest].shape[: depths[deepest]]
-
-        def as_one_kernel(*leaves: Array) -> list[Array]:
-            return _launch(results, leaves, depths, batch, shapes, outputs)
-
-        def as_it_is(*leaves: Array) -> list[Array]:
-            repeated = alone
-            for level in reversed(range(len(batch))):
-                repeated = jax.vmap(repeated, [0 if depth > level else None for depth in depths])
-            return repeated(*leaves)
-
-        made: list[Array] = jax.lax.platform_dependent(*leaves, cuda=as_one_kernel, default=as_it_is)
-        return made
-
-    @call.def_vmap
-    def batch(size: int, batched: Sequence[bool], *leaves: Array) -> tuple[list[Array], list[bool]]:
-        whole = [
-            leaf if of_batch or leaf.ndim == len(shape.shape) else jnp.broadcast_to(leaf, (size, *leaf.shape))
-            for leaf, shape, of_batch in zip(leaves, shapes, batched, strict=True)
-        ]
-        results = call(*whole)
-        return results, [True] * len(results)
-
-    return call
+@CALL.def_abstract_eval
+def _shapes(*leaves: ShapedArray, kernel: Kernel) -> list[ShapedArray]:
+    """Return the results' shapes."""
+    return [ShapedArray((*kernel.batch(leaves), *out.shape), out.dtype) for out in kernel.outputs]
 
 
-def _launch(
-    results: list[Numbers],
-    leaves: Sequence[Array],
-    depths: Sequence[int],
-    batch: tuple[int, ...],
-    shapes: Shapes,
-    outputs: Shapes,
-) -> list[Array]:
-    """Call the kernel with one thread per element of the batch."""
-    threads = math.prod(batch)
-    some = [i for i, result in enumerate(results) if result.size and threads]
-    if not some:
-        return [jnp.zeros((*batch, *out.shape), out.dtype) for out in outputs]
-    written = [results[i] for i in some]
-    arrays = {
-        i: ptx.Array(math.prod(shapes[i].shape), np.dtype(shapes[i].dtype), math.prod(batch[depths[i] :]))
-        for i in ptx.arrays_read(written)
-    }
-    call = jax.ffi.ffi_call(TARGET, [jax.ShapeDtypeStruct((threads, results[i].size), outputs[i].dtype) for i in some])
-    one, none = np.int32(1), np.int32(0)
-    rows = call(
-        *(leaves[i] for i in arrays),
-        name=ptx.ENTRY,
-        kernel_type="ptx",
-        kernel_data=ptx.kernel(written, arrays, threads, BLOCK),
-        grid_x=np.int32(-(-threads // BLOCK)),
-        grid_y=one,
-        grid_z=one,
-        block_x=np.int32(BLOCK),
-        block_y=one,
-        block_z=one,
-        shared_mem_bytes=none,
-    )
-    made = dict(zip(some, rows, strict=True))
-    return [
-        made[i].reshape(*batch, *out.shape) if i in made else jnp.zeros((*batch, *out.shape), out.dtype)
-        for i, out in enumerate(outputs)
-    ]
+@CALL.def_impl
+def _alone(*leaves: Array, kernel: Kernel) -> list[Array]:
+    """Run outside of compiled programs."""
+    made: list[Array] = jax.jit(partial(CALL.bind, kernel=kernel))(*leaves)
+    return made
+
+
+def _batched(leaves: Sequence[Array], axes: Sequence[int | None], kernel: Kernel) -> tuple[list[Array], list[int]]:
+    """Add a batch dimension in front of the others; arguments that are the same in the whole batch stay as they are."""
+    size = next(leaf.shape[axis] for leaf, axis in zip(leaves, axes, strict=True) if axis is not None)
+
+    def in_front(leaf: Array, axis: int | None, alone: jax.ShapeDtypeStruct) -> Array:
+        if axis is not None:
+            return jnp.moveaxis(leaf, axis, 0)
+        return leaf if leaf.ndim == len(alone.shape) else jnp.broadcast_to(leaf, (size, *leaf.shape))
+
+    results = CALL.bind(*map(in_front, leaves, axes, kernel.shapes), kernel=kernel)
+    return results, [0] * len(results)
+
+
+def _derivative(values: Sequence[Any], tangents: Sequence[Any], kernel: Kernel) -> Any:
+    """Return the results and their derivatives, both of the function itself."""
+    return jax.jvp(kernel.as_it_is, tuple(values), tuple(map(ad.instantiate_zeros, tangents)))
+
+
+def _lowered_for_gpu(context: Any, *operands: Any, kernel: Kernel) -> Any:
+    """Lower for NVIDIA's GPUs; those that are too old get the function itself."""
+    call = kernel.on_gpu if _is_new_enough() else kernel.as_it_is
+    return mlir.lower_fun(call, multiple_results=True)(context, *operands)
+
+
+def _is_new_enough() -> bool:
+    """Whether this machine's GPU runs kernels; a program may be lowered without one."""
+    capability = getattr(jax.devices()[0], "compute_capability", None)
+    return capability is None or float(capability) >= gpu_kernel.CAPABILITY
+
+
+def _lowered(call: Callable[..., list[Array]]) -> Any:
+    """Return a lowering rule: a method of the kernel."""
+
+    def rule(context: Any, *operands: Any, kernel: Kernel) -> Any:
+        return mlir.lower_fun(partial(call, kernel), multiple_results=True)(context, *operands)
+
+    return rule
+
+
+batching.primitive_batchers[CALL] = _batched
+ad.primitive_jvps[CALL] = _derivative
+mlir.register_lowering(CALL, _lowered(Kernel.as_it_is))
+mlir.register_lowering(CALL, _lowered(Kernel.on_host), platform="cpu")
+mlir.register_lowering(CALL, _lowered_for_gpu, platform="cuda")

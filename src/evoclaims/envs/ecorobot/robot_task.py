@@ -24,7 +24,7 @@ from evoclaims.envs.ecorobot.pose import Pose, torso
 from evoclaims.envs.ecorobot.robots import SIMPLE_ROB, Robot
 from evoclaims.envs.ecorobot.scene import Places, Scene, scene
 from evoclaims.envs.ecorobot.sensors import Sensor
-from evoclaims.kernels.one_kernel import has_gpu, one_kernel
+from evoclaims.kernels.one_kernel import one_kernel
 
 ROBOT_PACKAGES: Final = ("mujoco", "mujoco-mjx")
 """Packages that every robot task depends on; a task declares these and any others it needs."""
@@ -203,10 +203,8 @@ class RobotTask(ABC):
         )
 
     def step(self, state: TaskState, action: Float[Array, " action"]) -> TaskState:
-        """Act for `robot.frames` simulation steps: `plain_step`, on an NVIDIA GPU as one kernel (`one_kernel`)."""
+        """Act for `robot.frames` simulation steps: `plain_step` as one kernel (`one_kernel`)."""
         action = fitting(self, action)
-        if not has_gpu():  # so the task need not be hashed
-            return self.plain_step(state, action)
         return _kernel(self.with_numbers(None))(state, action, self.numbers)
 
     def plain_step(self, state: TaskState, action: Float[Array, " action"]) -> TaskState:

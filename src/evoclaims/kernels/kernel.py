@@ -1,0 +1,151 @@
+"""A function as a kernel: what it computes, and how a batch of it is called on processors and GPUs."""
+
+from __future__ import annotations
+
+import ctypes
+import math
+import warnings
+from collections.abc import Callable, Sequence
+from functools import cached_property
+from typing import Any, Final
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax.extend.core import jaxpr_as_fun
+from jaxtyping import Array
+
+from evoclaims.kernels import gpu_kernel, host_kernel, llvm_ir, machine_code
+from evoclaims.kernels.expressions import Input, everything
+from evoclaims.kernels.interpreter import Numbers
+from evoclaims.kernels.scalarize import scalarize
+from evoclaims.kernels.unsupported import Unsupported
+
+GPU_TARGET: Final = "__gpu$xla.gpu.ptx"
+"""XLA's name for a kernel given as PTX."""
+Shapes = tuple[jax.ShapeDtypeStruct, ...]
+
+
+class Kernel:
+    """A function of arrays of given shapes.
+
+    Attributes:
+        shapes: its arguments' leaves, without batch dimensions.
+        outputs: its results' leaves.
+        structure: its results' tree.
+    """
+
+    def __init__(self, function: Callable[..., Any], treedef: Any, shapes: Shapes) -> None:
+        """Trace the function once."""
+        self.shapes = shapes
+        self._traced, shape = jax.make_jaxpr(function, return_shape=True)(*jax.tree.unflatten(treedef, shapes))
+        self.outputs: Shapes = tuple(jax.ShapeDtypeStruct(x.shape, x.dtype) for x in jax.tree.leaves(shape))
+        self.structure = jax.tree.structure(shape)
+
+    @cached_property
+    def supported(self) -> bool:
+        """Whether it can be a kernel; a warning says once why not."""
+        try:
+            machine_code.lanes()
+            llvm_ir.check([number for result in self.results for number in result.flat])
+        except Unsupported as reason:
+            warnings.warn(f"What could be one kernel is many, and slower, because of {reason}.", stacklevel=5)
+            return False
+        return True
+
+    @cached_property
+    def results(self) -> list[Numbers]:
+        """The expressions of the numbers of each result."""
+        return scalarize(self._traced)
+
+    @cached_property
+    def written(self) -> list[int]:
+        """The results that are not empty."""
+        return [place for place, result in enumerate(self.results) if result.size]
+
+    @cached_property
+    def read(self) -> dict[int, llvm_ir.Row]:
+        """The rows of the arguments that the results depend on."""
+        used = {e.array for e in everything(n for r in self.results for n in r.flat) if isinstance(e, Input)}
+        return {i: llvm_ir.Row(math.prod(self.shapes[i].shape), self.shapes[i].dtype.kind) for i in sorted(used)}
+
+    @cached_property
+    def host_target(self) -> str:
+        """The name under which XLA knows the kernel for this machine's processor."""
+        text = host_kernel.text([self.results[i] for i in self.written], self.read, machine_code.lanes())
+        name = f"evoclaims_{machine_code.key_of(text)}"
+        handler = ctypes.CFUNCTYPE(ctypes.c_void_p)(machine_code.address(text, host_kernel.ENTRY))
+        jax.ffi.register_ffi_target(name, jax.ffi.pycapsule(handler), platform="cpu")
+        return name
+
+    def as_it_is(self, *leaves: Array) -> list[Array]:
+        """Call the function itself, for every element of a batch."""
+        depths = self.depths(leaves)
+        repeated: Any = jaxpr_as_fun(self._traced)
+        for level in reversed(range(max(depths))):
+            repeated = jax.vmap(repeated, [0 if depth > level else None for depth in depths])
+        made: list[Array] = repeated(*leaves)
+        return made
+
+    def depths(self, leaves: Sequence[Any]) -> list[int]:
+        """Return how many batch dimensions each argument has; one with fewer than others lacks the innermost."""
+        return [len(leaf.shape) - len(shape.shape) for leaf, shape in zip(leaves, self.shapes, strict=True)]
+
+    def batch(self, leaves: Sequence[Any]) -> tuple[int, ...]:
+        """Return the batch dimensions."""
+        depths = self.depths(leaves)
+        deepest = max(range(len(leaves)), key=depths.__getitem__)
+        shape: tuple[int, ...] = leaves[deepest].shape[: depths[deepest]]
+        return shape
+
+    def on_host(self, *leaves: Array) -> list[Array]:
+        """Call the kernel for this machine's processor, for every element of a batch."""
+
+        def call(rows: int, shared: list[int], shapes: Shapes) -> Any:
+            layout = np.array([rows, *(shared[i] for i in self.read)], np.int32)
+            return jax.ffi.ffi_call(self.host_target, shapes)(layout, *(leaves[i] for i in self.read))
+
+        return self._call(leaves, call)
+
+    def on_gpu(self, *leaves: Array) -> list[Array]:
+        """Call the kernel for NVIDIA's GPUs, for every element of a batch."""
+
+        def call(rows: int, shared: list[int], shapes: Shapes) -> Any:
+            given = {i: shared[i] for i in self.read}
+            text = gpu_kernel.text([self.results[i] for i in self.written], self.read, given, rows)
+            one, none = np.int32(1), np.int32(0)
+            return jax.ffi.ffi_call(GPU_TARGET, shapes)(
+                *(leaves[i] for i in self.read),
+                name=gpu_kernel.ENTRY,
+                kernel_type="ptx",
+                kernel_data=gpu_kernel.ptx(text),
+                grid_x=np.int32(-(-rows // gpu_kernel.BLOCK)),
+                grid_y=one,
+                grid_z=one,
+                block_x=np.int32(gpu_kernel.BLOCK),
+                block_y=one,
+                block_z=one,
+                shared_mem_bytes=none,
+            )
+
+        return self._call(leaves, call)
+
+    def _call(self, leaves: Sequence[Array], call: Callable[..., Any]) -> list[Array]:
+        """Return the results of a kernel for every element of a batch.
+
+        Args:
+            leaves: the arguments.
+            call: gets the number of elements, how many of them share a row of each argument, and the shapes of the
+                results that are not empty, each [elements, numbers]; returns these results.
+        """
+        depths, batch = self.depths(leaves), self.batch(leaves)
+        rows = math.prod(batch)
+        results = [jnp.zeros((*batch, *out.shape), out.dtype) for out in self.outputs]
+        if not rows or not self.written:
+            return results
+        shared = [math.prod(batch[depth:]) for depth in depths]
+        wanted = [self.outputs[i] for i in self.written]
+        shapes = [jax.ShapeDtypeStruct((rows, math.prod(out.shape)), out.dtype) for out in wanted]
+        for place, made in zip(self.written, call(rows, shared, shapes), strict=True):
+            results[place] = made.reshape(results[place].shape)
+        return results
