@@ -10,7 +10,7 @@ from typing import Final
 import pytest
 from hypothesis import settings
 
-pytest_plugins = ["hand_made_paper", "ptx_machine", "pytester", "tiny_project"]
+pytest_plugins = ["hand_made_paper", "pytester", "tiny_project"]
 
 # No test fails on a slow machine for being slow.
 settings.register_profile("untimed", deadline=None)

@@ -30,13 +30,15 @@ class Kernel:
     """A function of arrays of given shapes.
 
     Attributes:
+        name: what it computes, for the warning.
         shapes: its arguments' leaves, without batch dimensions.
         outputs: its results' leaves.
         structure: its results' tree.
     """
 
-    def __init__(self, function: Callable[..., Any], treedef: Any, shapes: Shapes) -> None:
+    def __init__(self, function: Callable[..., Any], name: str, treedef: Any, shapes: Shapes) -> None:
         """Trace the function once."""
+        self.name = name
         self.shapes = shapes
         self._traced, shape = jax.make_jaxpr(function, return_shape=True)(*jax.tree.unflatten(treedef, shapes))
         self.outputs: Shapes = tuple(jax.ShapeDtypeStruct(x.shape, x.dtype) for x in jax.tree.leaves(shape))
@@ -49,7 +51,7 @@ class Kernel:
             machine_code.lanes()
             llvm_ir.check([number for result in self.results for number in result.flat])
         except Unsupported as reason:
-            warnings.warn(f"What could be one kernel is many, and slower, because of {reason}.", stacklevel=5)
+            warnings.warn(f"{self.name} is not one kernel, and slower, because of {reason}.", stacklevel=5)
             return False
         return True
 

@@ -20,7 +20,7 @@ from evoclaims.kernels import gpu_kernel
 from evoclaims.kernels.kernel import Kernel, Shapes
 
 
-def one_kernel(function: Callable[..., Any]) -> Callable[..., Any]:
+def one_kernel(function: Callable[..., Any], name: str) -> Callable[..., Any]:
     """Return `function`, run as one kernel on processors and NVIDIA's GPUs.
 
     It may be batched, any number of times; derivatives are those of the function itself. If it cannot be one kernel
@@ -28,11 +28,12 @@ def one_kernel(function: Callable[..., Any]) -> Callable[..., Any]:
 
     Args:
         function: takes trees of small arrays (float32, int32, bool); pure.
+        name: what it computes, for the warning.
     """
 
     @cache
     def kernel(treedef: Any, shapes: Shapes) -> Kernel:
-        return Kernel(function, treedef, shapes)
+        return Kernel(function, name, treedef, shapes)
 
     def run(*arguments: Any) -> Any:
         leaves, treedef = jax.tree.flatten(arguments)

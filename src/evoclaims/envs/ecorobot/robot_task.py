@@ -309,7 +309,9 @@ class RobotTask(ABC):
 @lru_cache(maxsize=64)
 def _kernel(task: RobotTask) -> Callable[[TaskState, Array, Places], TaskState]:
     """Return a task's step, with its boxes' places as an argument."""
-    return one_kernel(lambda state, action, places: task.with_numbers(places).plain_step(state, action))
+    return one_kernel(
+        lambda state, action, places: task.with_numbers(places).plain_step(state, action), f"A step of {task.name}"
+    )
 
 
 def _uniform(key: PRNGKeyArray, shape: tuple[int, ...]) -> Array:
