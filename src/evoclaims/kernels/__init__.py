@@ -1,1 +1,1 @@
-"""Compiles functions of small arrays to single GPU kernels; README.md beside this file explains how."""
+"""Compiles functions of small arrays to single kernels; README.md beside this file explains how."""
