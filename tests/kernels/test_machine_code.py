@@ -20,6 +20,7 @@ from evoclaims.kernels import machine_code
 from evoclaims.kernels.one_kernel import one_kernel
 
 TEXT = "define i32 @seven(i32 %x) {\n%y = mul i32 %x, 7\nret i32 %y\n}\n"
+NEW_LINKER = machine_code._linker.__wrapped__
 PROCESS = """
 import sys, time, jax
 from evoclaims.kernels import machine_code
@@ -56,7 +57,7 @@ def _forget(monkeypatch: pytest.MonkeyPatch) -> None:
     """Forget the machine code in memory, as another process would."""
     machine_code.lanes()
     monkeypatch.setattr(machine_code, "_libraries", {})
-    monkeypatch.setattr(machine_code, "_linker", cache(machine_code.llvm.create_lljit_compiler))
+    monkeypatch.setattr(machine_code, "_linker", cache(NEW_LINKER))
 
 
 def _seven_times(number: int) -> int:

@@ -37,7 +37,9 @@ def test_a_kernel_computes_what_jax_does(case: str) -> None:
 @pytest.mark.parametrize("case", FUNCTIONS)
 def test_nvidias_assembler_takes_every_kernel(case: str, tmp_path: Path) -> None:
     function, arguments = FUNCTIONS[case]
-    lowered = jax.jit(jax.vmap(one_kernel(function, "This"))).trace(*arguments).lower(lowering_platforms=("cuda",)).as_text()
+    lowered = (
+        jax.jit(jax.vmap(one_kernel(function, "This"))).trace(*arguments).lower(lowering_platforms=("cuda",)).as_text()
+    )
     (ptx,) = re.findall(r'kernel_data = "([^"]*)"', lowered)
     ptx = re.sub(r"\\([0-9A-F]{2})", lambda code: chr(int(code[1], 16)), ptx)
     assert ".visible .entry kernel(" in ptx
@@ -58,7 +60,9 @@ def test_sine_and_cosine_are_wrong_by_little(widest: float, error: float) -> Non
 
 
 def test_sine_and_cosine_of_wider_angles_are_not_a_number() -> None:
-    assert np.isnan(jax.vmap(one_kernel(lambda x: jnp.sin(x) + jnp.cos(x), "This"))(jnp.array([2 * WIDEST, -2 * WIDEST]))).all()
+    assert np.isnan(
+        jax.vmap(one_kernel(lambda x: jnp.sin(x) + jnp.cos(x), "This"))(jnp.array([2 * WIDEST, -2 * WIDEST]))
+    ).all()
 
 
 @pytest.mark.parametrize("value", [3e9, -3e9, np.inf, np.nan, -1.9])
@@ -188,7 +192,9 @@ def test_derivatives_are_the_functions_own() -> None:
     def total(f: Any) -> Any:
         return lambda x: jnp.sum(jax.vmap(lambda row: f(row, jnp.int32(1))[0])(x))
 
-    np.testing.assert_allclose(jax.grad(total(one_kernel(function, "This")))(X), jax.grad(total(function))(X), rtol=1e-5)
+    np.testing.assert_allclose(
+        jax.grad(total(one_kernel(function, "This")))(X), jax.grad(total(function))(X), rtol=1e-5
+    )
 
 
 @given(st.lists(st.floats(-4, 4, width=32), min_size=6, max_size=6))

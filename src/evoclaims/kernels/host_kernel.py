@@ -171,9 +171,15 @@ def _loaded(register: str, type_: str, address: str, offset: int) -> list[str]:
 
 def _count(register: str, place: int) -> list[str]:
     """Return instructions that read a number of the first argument."""
-    return [*_loaded(f"{register}.short", "i32", "%layout", 4 * place), f"{register} = zext i32 {register}.short to i64"]
+    return [
+        *_loaded(f"{register}.short", "i32", "%layout", 4 * place),
+        f"{register} = zext i32 {register}.short to i64",
+    ]
 
 
 def _buffer(register: str, buffers: str, place: int) -> list[str]:
     """Return instructions that read the address of the data of a buffer."""
-    return [*_loaded(f"{register}.buffer", "ptr", buffers, 8 * place), *_loaded(register, "ptr", f"{register}.buffer", DATA)]
+    return [
+        *_loaded(f"{register}.buffer", "ptr", buffers, 8 * place),
+        *_loaded(register, "ptr", f"{register}.buffer", DATA),
+    ]

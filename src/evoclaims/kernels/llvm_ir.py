@@ -13,8 +13,6 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
-import numpy as np
-
 from evoclaims.kernels.expressions import (
     Expression,
     Input,
@@ -39,12 +37,22 @@ SUFFIXES: Final = {"f": "f32", "i": "i32", "b": "i8"}
 """Of intrinsic functions, as types are in memory."""
 BINARY: Final = {
     "f": {"add": "fadd", "div": "fdiv", "mul": "fmul", "sub": "fsub"},
-    "i": {"add": "add", "and": "and", "div": "sdiv", "mul": "mul", "or": "or", "rem": "srem", "sub": "sub", "xor": "xor"},
+    "i": {
+        "add": "add",
+        "and": "and",
+        "div": "sdiv",
+        "mul": "mul",
+        "or": "or",
+        "rem": "srem",
+        "sub": "sub",
+        "xor": "xor",
+    },
     "b": {"and": "and", "or": "or", "xor": "xor"},
 }
+_ORDERS: Final = ("ge", "gt", "le", "lt")
 COMPARED: Final = {
-    "f": {name: f"fcmp {'une' if name == 'ne' else 'o' + name}" for name in ("eq", "ge", "gt", "le", "lt", "ne")},
-    "i": {name: f"icmp {name if name in ('eq', 'ne') else 's' + name}" for name in ("eq", "ge", "gt", "le", "lt", "ne")},
+    "f": {"eq": "fcmp oeq", "ne": "fcmp une"} | {name: f"fcmp o{name}" for name in _ORDERS},
+    "i": {"eq": "icmp eq", "ne": "icmp ne"} | {name: f"icmp s{name}" for name in _ORDERS},
     "b": {"eq": "icmp eq", "ne": "icmp ne"},
 }
 """NaN is unequal to everything; the other comparisons with it are false."""

@@ -79,7 +79,8 @@ def _target() -> Any:
 def _linker() -> Any:
     """Return what puts machine code into memory."""
     _target()
-    return llvm.create_lljit_compiler()
+    # It puts code and constants side by side; the older linker may put them farther apart than code can reach.
+    return llvm.create_lljit_compiler(use_jit_link=True)
 
 
 def _machine_code(key: str, text: str) -> bytes:

@@ -1,8 +1,6 @@
-"""A robot's step as one kernel, executed by a machine for tests, against the same step as XLA compiles it."""
+"""A robot's step as one kernel against the same step as XLA compiles it, along whole episodes."""
 
 from __future__ import annotations
-
-from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -17,40 +15,38 @@ from evoclaims.envs.ecorobot.stones import SteppingStones
 
 pytestmark = pytest.mark.slow
 
-ROBOTS = 40
+ROBOTS, STEPS = 6, 400
 TASKS: dict[str, RobotTask] = {
     "stones": SteppingStones(),
     "obstacles": Obstacles(),
     "ant": SteppingStones(robot=ANT),
 }
-# In float32 a foot's contact may begin a rounding error earlier: of legged robots most agree, and the others nearly.
-EXACT = {"stones": 1e-5, "obstacles": 2e-3, "ant": 2e-3}
+# Largest difference of an observation: of nearly all steps, and of any. In float32 a foot's contact may begin a
+# rounding error earlier or later, and velocities are up to 10.
+NEARLY_ALL = {"stones": 1e-5, "obstacles": 1e-3, "ant": 1e-3}
+ANY = {"stones": 1e-4, "obstacles": 1.0, "ant": 1.0}
 
 
-@pytest.mark.usefixtures("gpu")
 @pytest.mark.parametrize("name", TASKS)
 def test_a_step_in_one_kernel_is_the_step(name: str) -> None:
     task = TASKS[name]
+    state = jax.vmap(task.reset, (0, None))(jax.random.split(jax.random.key(0), ROBOTS), jnp.int32(0))
+    held = jax.random.uniform(jax.random.key(1), (STEPS // 10, ROBOTS, task.action_size), minval=-1.0, maxval=1.0)
+    actions = jnp.repeat(held, 10, axis=0)
     plain = quickly_compiled(jax.vmap(task.plain_step))
-    keys = jax.random.split(jax.random.key(0), ROBOTS)
-    state = jax.vmap(task.reset, (0, None))(keys, jnp.int32(0))
-    actions = jax.random.uniform(jax.random.key(1), (3, ROBOTS, task.action_size), minval=-1.0, maxval=1.0)
-    for number in range(45):  # 15 steps under each action: they fall, and meet walls
-        following = plain(state, actions[number // 15])
-        if number in (20, 44):
-            made = jax.vmap(task.step)(state, actions[number // 15])
-            _compare(made, following, EXACT[name])
-        state = following
-
-
-def _compare(made: Any, expected: Any, exact: float) -> None:
-    """Compare states."""
+    states = [state]
+    for action in actions:
+        states.append(plain(states[-1], action))
+    before, expected = (jax.tree.map(lambda *leaves: jnp.stack(leaves), *part) for part in (states[:-1], states[1:]))
+    made = jax.vmap(jax.vmap(task.step))(before, actions)
     assert jax.tree.structure(made) == jax.tree.structure(expected)
-    np.testing.assert_allclose(made.inner.body.position, expected.inner.body.position, atol=exact / 10)
-    np.testing.assert_allclose(made.observation, expected.observation, atol=exact)
-    np.testing.assert_allclose(made.reward, expected.reward, atol=exact)
-    np.testing.assert_allclose(np.median(np.abs(made.observation - expected.observation)), 0.0, atol=1e-6)
     for a, b in zip(jax.tree.leaves(made), jax.tree.leaves(expected), strict=True):
         assert (a.shape, a.dtype) == (b.shape, b.dtype)
-        if a.dtype != jnp.float32:
-            np.testing.assert_array_equal(a, b)
+    differences = np.abs(made.observation - expected.observation).max(axis=-1)
+    assert np.median(differences) < 1e-5
+    assert np.quantile(differences, 0.99) < NEARLY_ALL[name]
+    assert differences.max() < ANY[name]
+    assert np.quantile(np.abs(made.reward - expected.reward), 0.99) < NEARLY_ALL[name]
+    for marks in ("terminated", "truncated"):
+        assert np.mean(np.asarray(getattr(made, marks)) != np.asarray(getattr(expected, marks))) < 0.01
+    np.testing.assert_array_equal(made.inner.time, expected.inner.time)
