@@ -24,7 +24,7 @@ FIGURE = """
 from evoclaims.figures.bar_panel import Series
 from evoclaims.figures.bars import BarChart, compared
 from evoclaims.figures.figure import Figure
-from evoclaims.figures.reported import Published
+from evoclaims.paper.reported import Published
 
 METHODS = tuple(Series(name, name, "#0072b2") for name in {methods})
 PANEL = compared(

@@ -15,7 +15,7 @@ from evoclaims.figures.bar_panel import Series
 from evoclaims.figures.bars import BarChart, by_level, compared
 from evoclaims.figures.figure import Drawing
 from evoclaims.figures.files import contents, csv
-from evoclaims.figures.reported import Published
+from evoclaims.paper.reported import Published
 from evoclaims.trials.spec import TrialSpec
 
 SILENT = Published({}, {})

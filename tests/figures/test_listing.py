@@ -9,7 +9,7 @@ from small_paper import collisions, told, words
 
 from evoclaims.core.errors import UserError
 from evoclaims.figures.listing import Block, Listing
-from evoclaims.figures.reported import Published
+from evoclaims.paper.reported import Published
 
 PUBLISHED = Published({}, {"one": {"place": "Table 1", "values": {"bits": 3, "generations": 5000, "kind": "parity"}}})
 SETTINGS = {

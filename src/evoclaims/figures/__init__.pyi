@@ -13,7 +13,6 @@ from evoclaims.figures.histogram import HistogramPanel as HistogramPanel
 from evoclaims.figures.histogram import Threshold as Threshold
 from evoclaims.figures.listing import Block as Block
 from evoclaims.figures.listing import Listing as Listing
-from evoclaims.figures.reported import load_published as load_published
 from evoclaims.figures.style import BLUE as BLUE
 from evoclaims.figures.style import GREEN as GREEN
 from evoclaims.figures.style import ORANGE as ORANGE
@@ -21,3 +20,4 @@ from evoclaims.figures.style import PURPLE as PURPLE
 from evoclaims.figures.style import SKY as SKY
 from evoclaims.figures.style import VERMILION as VERMILION
 from evoclaims.figures.style import YELLOW as YELLOW
+from evoclaims.paper.reported import load_published as load_published

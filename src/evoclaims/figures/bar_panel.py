@@ -10,9 +10,9 @@ from evoclaims.core.drawing import optional
 from evoclaims.figures import brackets
 from evoclaims.figures.brackets import PairTest
 from evoclaims.figures.readings import NOT_RUN, MeasureOf, Readings
-from evoclaims.figures.reported import Reported
 from evoclaims.figures.sheet import PanelRow, measured
 from evoclaims.figures.style import FAINT, INK, SMALL, TEXT, lighter
+from evoclaims.paper.reported import Reported
 
 GAP: Final = 0.7
 """Room between groups of bars, in slots."""

@@ -12,8 +12,8 @@ from evoclaims.figures import bar_panel, brackets, sheet
 from evoclaims.figures.bar_panel import Bar, BarPanel, Filled, Measured, Series
 from evoclaims.figures.figure import Drawing, Heading, Scope
 from evoclaims.figures.readings import MeasureOf, absences, frame, read
-from evoclaims.figures.reported import Published
 from evoclaims.figures.style import COLUMN, plain
+from evoclaims.paper.reported import Published
 
 PanelOf = Callable[[Scope], BarPanel]
 

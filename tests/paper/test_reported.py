@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from evoclaims.core.errors import UnknownNameError, UserError
-from evoclaims.figures.reported import Reported, load_published
+from evoclaims.paper.reported import Reported, load_published
 
 SOUND = """
 [plots.maze.reward]
@@ -34,6 +34,12 @@ def test_a_number_has_its_error_bar_and_its_place(tmp_path: Path) -> None:
     assert published.table("neat") == {"place": "Table 1", "values": {"population size": 5000}}
 
 
+def test_a_number_knows_its_trials_and_its_scale_where_the_file_says_them(tmp_path: Path) -> None:
+    text = "trials = 10\n" + SOUND.replace('"Fig. 5"', '"Fig. 5"\nscale = [0, 7]\nprecision = 0.5')
+    found = load_published(_write(tmp_path, text)).value("maze", "reward", "neat", 1)
+    assert found == Reported(6.5, 0.5, "Fig. 5", trials=10, scale=(0.0, 7.0), precision=0.5)
+
+
 def test_what_is_not_published_is_nothing(tmp_path: Path) -> None:
     published = load_published(_write(tmp_path, SOUND))
     for task, quantity, method, at in (
@@ -54,6 +60,9 @@ def test_what_is_not_published_is_nothing(tmp_path: Path) -> None:
         ('[plots.maze.reward]\nplace = "Fig. 5"\n', "maze.reward"),
         ('[plots.maze.reward]\nplace = "Fig. 5"\nmethods.neat = { mean = [1, 2], error = [1] }\n', "maze.reward"),
         ('[plots.maze.reward]\nplace = "Fig. 5"\nmethods.neat.error = [1]\n', "maze.reward"),
+        ('[plots.maze.reward]\nplace = "Fig. 5"\nscale = [0, 1]\nmethods.neat.mean = [2]\n', "maze.reward"),
+        ('[plots.maze.reward]\nplace = "Fig. 5"\nscale = [0]\nmethods.neat.mean = [0]\n', "maze.reward"),
+        ("trials = 1\n", "trials"),
         ("[tables.neat]\nvalues = { a = 1 }\n", "neat"),
         ('[tabels.neat]\nplace = "x"\nvalues = { a = 1 }\n', "tabels"),
     ],

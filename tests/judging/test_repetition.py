@@ -1,0 +1,135 @@
+"""Prediction intervals for a published mean: coverage, scale, exact arguments, and when nothing can be said."""
+
+from __future__ import annotations
+
+import math
+import statistics
+from math import comb
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from evoclaims.judging.repetition import (
+    DEVIATION,
+    FEWEST,
+    STANDARD_ERROR,
+    Answer,
+    Prediction,
+    PublishedMean,
+    Repetition,
+    repetition,
+)
+
+DRAWN = 2_000
+BAR_IS = {name: f"the bar is a {name}" for name in (DEVIATION, STANDARD_ERROR)}
+UNIT = (0.0, 1.0)
+
+values = st.floats(-100, 100)
+spreads = st.floats(0.01, 100)
+several = st.lists(values, min_size=FEWEST, max_size=12)
+
+
+def _of(found: Repetition, reading: str) -> Prediction:
+    (prediction,) = [one for one in found.predictions if one.assumption == BAR_IS[reading]]
+    return prediction
+
+
+@pytest.mark.parametrize("reading", [DEVIATION, STANDARD_ERROR])
+@pytest.mark.parametrize("n", [5, 10])
+def test_a_repetition_of_normal_trials_is_inside_in_95_of_100_draws(reading: str, n: int) -> None:
+    rng = np.random.default_rng(20261122)
+    inside = 0
+    for theirs, ours in zip(rng.normal(3.0, 2.0, (DRAWN, 10)), rng.normal(3.0, 2.0, (DRAWN, n)), strict=True):
+        bar = statistics.stdev(theirs) / (1.0 if reading == DEVIATION else math.sqrt(10))
+        found = repetition(PublishedMean(float(theirs.mean()), bar, 10), [*map(float, ours)], 10)
+        inside += _of(found, reading).answer is Answer.INSIDE
+    assert inside / DRAWN == pytest.approx(0.95, abs=3 * math.sqrt(0.95 * 0.05 / DRAWN))
+
+
+@pytest.mark.parametrize("probability", [0.5, 0.9, 0.99])
+def test_a_repetition_of_trials_all_at_the_end_of_the_scale_is_seldom_outside(probability: float) -> None:
+    """Exactly: all ten published trials are at the end, and too few of ours; for any probability at most 5%."""
+    (prediction,) = repetition(PublishedMean(1.0, 0.0, 10, UNIT), [], 10).predictions
+    too_few = sum(comb(10, k) * probability**k * (1 - probability) ** (10 - k) for k in range(int(prediction.low)))
+    assert probability**10 * too_few <= 0.05
+    assert (prediction.of, prediction.low, prediction.high) == ("trials at 1", 7.0, 10.0)
+
+
+@given(mean=values, error=spreads, ours=several, factor=st.sampled_from([0.25, 2.0, 1024.0]))
+def test_another_unit_changes_no_answer(mean: float, error: float, ours: list[float], factor: float) -> None:
+    here = repetition(PublishedMean(mean, error, 10), ours, 10)
+    there = repetition(PublishedMean(mean * factor, error * factor, 10), [x * factor for x in ours], 10)
+    ends = [(prediction.low * factor, prediction.high * factor) for prediction in here.predictions]
+    assert ends == [(prediction.low, prediction.high) for prediction in there.predictions]
+    assert here.answer == there.answer
+
+
+@given(mean=values, error=spreads, ours=several)
+def test_an_interval_has_the_mean_in_its_middle_and_is_wider_for_a_standard_error(
+    mean: float, error: float, ours: list[float]
+) -> None:
+    found = repetition(PublishedMean(mean, error, 10), ours, 10)
+    narrow, wide = _of(found, DEVIATION), _of(found, STANDARD_ERROR)
+    assert (narrow.low + narrow.high) / 2 == pytest.approx(mean, abs=1e-9)
+    assert wide.high - wide.low == pytest.approx(math.sqrt(10) * (narrow.high - narrow.low))
+
+
+@given(mean=values, error=spreads, ours=several)
+def test_a_planted_shift_is_outside(mean: float, error: float, ours: list[float]) -> None:
+    """By the bar's width times ten, under both readings; unshifted, the same spread of values is inside."""
+    centred = [x / 200 * error / 10 for x in ours]
+    centred = [mean + x - statistics.fmean(centred) for x in centred]
+    published = PublishedMean(mean, error, 10)
+    assert repetition(published, centred, 10).answer is Answer.INSIDE
+    for shift in (10 * error, -10 * error):
+        assert repetition(published, [x + shift for x in centred], 10).answer is Answer.OUTSIDE
+
+
+def test_where_the_readings_of_a_bar_disagree_nothing_can_be_said() -> None:
+    found = repetition(PublishedMean(0.0, 1.0, 10), [1.0, 2.0] * 5, 10)
+    assert found.answer is Answer.UNKNOWN
+    assert found.reason == "outside if the bar is a standard deviation; inside if the bar is a standard error"
+
+
+def test_a_bar_too_long_for_a_standard_error_on_its_scale_is_read_as_a_deviation() -> None:
+    """0.82 ± 0.21 on [0, 1]: 0.21 √10 is 0.66, and no ten such numbers deviate by more than 0.41."""
+    found = repetition(PublishedMean(0.82, 0.21, 10, UNIT), [1.0] * 10, 10)
+    assert [prediction.assumption for prediction in found.predictions] == [BAR_IS[DEVIATION]]
+    assert (found.answer, found.predictions[0].high) == (Answer.INSIDE, 1.0)
+    assert found.reason == "on this scale the bar cannot be a standard error"
+    extremes = [0.0, 1.0] * 5
+    assert PublishedMean(0.5, None, 10, UNIT).allows(statistics.stdev(extremes))
+    assert not PublishedMean(0.5, None, 10, UNIT).allows(statistics.stdev(extremes) * 1.001)
+
+
+@pytest.mark.parametrize(("solved", "answer"), [(10, "inside"), (7, "inside"), (6, "outside"), (0, "outside")])
+def test_at_the_end_of_a_scale_the_trials_there_are_counted(solved: int, answer: str) -> None:
+    ours = [1.0] * solved + [0.999] * (10 - solved)
+    assert repetition(PublishedMean(1.0, None, 10, UNIT), ours, 10).answer == answer
+
+
+def test_a_number_without_a_spread_is_compared_by_ours() -> None:
+    published = PublishedMean(3.0, None, 10, (0.0, 7.0), precision=0.5)
+    assert repetition(published, [1.5, 1.7] * 5, 10).answer is Answer.OUTSIDE
+    assert repetition(published, [2.4, 2.6] * 5, 10).answer is Answer.INSIDE
+    nothing = repetition(published, [3.0] * 10, 10)
+    assert (nothing.answer, nothing.reason) == (Answer.UNKNOWN, "no spread is published, and ours is 0")
+    assert repetition(PublishedMean(0.4, 0.0, 10, UNIT), [0.4] * 10, 10).answer is Answer.UNKNOWN
+
+
+@pytest.mark.parametrize(
+    ("ours", "broken", "reason"),
+    [
+        ([], 0, "not run"),
+        ([3.0] * 4, 0, "4 of our trials, at least 5 are needed"),
+        ([3.0] * 8, 2, "2 of our 10 trials gave no number"),
+    ],
+)
+def test_without_enough_trials_the_interval_is_for_as_many_as_planned(
+    ours: list[float], broken: int, reason: str
+) -> None:
+    found = repetition(PublishedMean(3.0, 1.0, 10), ours, 10, broken)
+    assert (found.answer, found.reason) == (Answer.UNKNOWN, reason)
+    assert _of(found, DEVIATION).high == pytest.approx(3.0 + 2.262157 * math.sqrt(0.2), abs=1e-6)
