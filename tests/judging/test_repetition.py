@@ -12,18 +12,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from evoclaims.judging.repetition import (
-    DEVIATION,
     FEWEST,
-    STANDARD_ERROR,
     Answer,
     Prediction,
     PublishedMean,
     Repetition,
+    Spread,
     repetition,
 )
 
 DRAWN = 2_000
-BAR_IS = {name: f"the bar is a {name}" for name in (DEVIATION, STANDARD_ERROR)}
 UNIT = (0.0, 1.0)
 
 values = st.floats(-100, 100)
@@ -31,18 +29,18 @@ spreads = st.floats(0.01, 100)
 several = st.lists(values, min_size=FEWEST, max_size=12)
 
 
-def _of(found: Repetition, reading: str) -> Prediction:
-    (prediction,) = [one for one in found.predictions if one.assumption == BAR_IS[reading]]
+def _of(found: Repetition, reading: Spread) -> Prediction:
+    (prediction,) = [one for one in found.predictions if one.spread is reading]
     return prediction
 
 
-@pytest.mark.parametrize("reading", [DEVIATION, STANDARD_ERROR])
+@pytest.mark.parametrize("reading", [Spread.DEVIATION, Spread.STANDARD_ERROR])
 @pytest.mark.parametrize("n", [5, 10])
-def test_a_repetition_of_normal_trials_is_inside_in_95_of_100_draws(reading: str, n: int) -> None:
+def test_a_repetition_of_normal_trials_is_inside_in_95_of_100_draws(reading: Spread, n: int) -> None:
     rng = np.random.default_rng(20261122)
     inside = 0
     for theirs, ours in zip(rng.normal(3.0, 2.0, (DRAWN, 10)), rng.normal(3.0, 2.0, (DRAWN, n)), strict=True):
-        bar = statistics.stdev(theirs) / (1.0 if reading == DEVIATION else math.sqrt(10))
+        bar = statistics.stdev(theirs) / (1.0 if reading == Spread.DEVIATION else math.sqrt(10))
         found = repetition(PublishedMean(float(theirs.mean()), bar, 10), [*map(float, ours)], 10)
         inside += _of(found, reading).answer is Answer.INSIDE
     assert inside / DRAWN == pytest.approx(0.95, abs=3 * math.sqrt(0.95 * 0.05 / DRAWN))
@@ -71,7 +69,7 @@ def test_an_interval_has_the_mean_in_its_middle_and_is_wider_for_a_standard_erro
     mean: float, error: float, ours: list[float]
 ) -> None:
     found = repetition(PublishedMean(mean, error, 10), ours, 10)
-    narrow, wide = _of(found, DEVIATION), _of(found, STANDARD_ERROR)
+    narrow, wide = _of(found, Spread.DEVIATION), _of(found, Spread.STANDARD_ERROR)
     assert (narrow.low + narrow.high) / 2 == pytest.approx(mean, abs=1e-9)
     assert wide.high - wide.low == pytest.approx(math.sqrt(10) * (narrow.high - narrow.low))
 
@@ -96,9 +94,9 @@ def test_where_the_readings_of_a_bar_disagree_nothing_can_be_said() -> None:
 def test_a_bar_too_long_for_a_standard_error_on_its_scale_is_read_as_a_deviation() -> None:
     """0.82 ± 0.21 on [0, 1]: 0.21 √10 is 0.66, and no ten such numbers deviate by more than 0.41."""
     found = repetition(PublishedMean(0.82, 0.21, 10, UNIT), [1.0] * 10, 10)
-    assert [prediction.assumption for prediction in found.predictions] == [BAR_IS[DEVIATION]]
+    assert [prediction.spread for prediction in found.predictions] == [Spread.DEVIATION]
     assert (found.answer, found.predictions[0].high) == (Answer.INSIDE, 1.0)
-    assert found.reason == "on this scale the bar cannot be a standard error"
+    assert found.reason == "on its scale it cannot be that the bar is a standard error"
     extremes = [0.0, 1.0] * 5
     assert PublishedMean(0.5, None, 10, UNIT).allows(statistics.stdev(extremes))
     assert not PublishedMean(0.5, None, 10, UNIT).allows(statistics.stdev(extremes) * 1.001)
@@ -132,4 +130,4 @@ def test_without_enough_trials_the_interval_is_for_as_many_as_planned(
 ) -> None:
     found = repetition(PublishedMean(3.0, 1.0, 10), ours, 10, broken)
     assert (found.answer, found.reason) == (Answer.UNKNOWN, reason)
-    assert _of(found, DEVIATION).high == pytest.approx(3.0 + 2.262157 * math.sqrt(0.2), abs=1e-6)
+    assert _of(found, Spread.DEVIATION).high == pytest.approx(3.0 + 2.262157 * math.sqrt(0.2), abs=1e-6)

@@ -150,6 +150,14 @@ def _parser() -> argparse.ArgumentParser:
     tier(reproduce)
     reproduce.add_argument("--out", metavar="DIR", help="folder for PNG, SVG and CSV (figures/TIER)")
 
+    replicate = add("replicate", "put the numbers that the paper has published beside those of the trials at hand")
+    replicate.add_argument("--tier", default="full", help="full (default: the paper's size) or smoke")
+    replicate.add_argument(
+        "--variant", metavar="NAME", default="", help="under this variant of the protocol; all: under each, too"
+    )
+    replicate.add_argument("--as", dest="form", metavar="FORM", help="write a file instead: csv, json or markdown")
+    replicate.add_argument("--out", metavar="FILE", help="where to (replication.FORM)")
+
     verify = add(
         "verify",
         "read every stored trial, champion and checkpoint back, and move bad ones aside so that their trials run again "

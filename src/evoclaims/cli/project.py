@@ -8,6 +8,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Final
 
+from evoclaims.claims.as_published import AsPublished
 from evoclaims.claims.fetching import StoredOnly
 from evoclaims.claims.session import Session
 from evoclaims.cli.judging import judge
@@ -73,7 +74,15 @@ class Project:
         Raises:
             UserError: when the claims cannot be collected, or not all of them are judged.
         """
-        return judge(self.config, [(self.session(variant), tier) for tier, variant in asked])
+        return self.judge_sessions([(self.session(variant), tier) for tier, variant in asked])
+
+    def judge_sessions(self, asked: Sequence[tuple[Session, str]]) -> list[list[ClaimReport]]:
+        """Judge all claims of a tier in each session; raises as `judge_variants` does."""
+        return judge(self.config, asked)
+
+    def as_published(self, tier: str) -> Session:
+        """Return a session in which the paper's own numbers stand for trials."""
+        return Session(self.reproduction, self.store, AsPublished(self.reproduction, tier))
 
     def session(self, variant: str = "") -> Session:
         """Return what claims are judged with: the trials at hand, under the protocol or a variant of it."""

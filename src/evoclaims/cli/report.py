@@ -13,6 +13,7 @@ from evoclaims.cli.project import ALL_TIERS, Project, open_project
 from evoclaims.cli.stored import Stored, write
 from evoclaims.envs.ecorobot.robot_task import RobotTask
 from evoclaims.envs.ecorobot.views import pictures
+from evoclaims.figures.replication import replications
 from evoclaims.report import table_cells
 from evoclaims.report.build import gather
 from evoclaims.report.champion import network
@@ -35,7 +36,9 @@ def main(options: argparse.Namespace) -> int:
     # The paper's sentence is the statement of the largest tier, so that is judged in any case.
     asked = [(tier, "") for tier in tiers if tier in (tiers[0], *shown)]
     asked += [(tier, variant) for tier in shown for variant in _tried(project, tier)]
-    judged = dict(zip(asked, project.judge_variants(asked), strict=True))
+    sessions = [(project.session(variant), tier) for tier, variant in asked]
+    *found, by_the_paper = project.judge_sessions([*sessions, (project.as_published(tiers[0]), tiers[0])])
+    judged = dict(zip(asked, found, strict=True))
     verdicts = {tier: reports for (tier, variant), reports in judged.items() if not variant}
     robustness = [
         row
@@ -53,6 +56,8 @@ def main(options: argparse.Namespace) -> int:
         figures=drawn,
         missing=missing,
         robustness=robustness,
+        numbers=replications(archive, reproduction, tiers[0], ("", *reproduction.variants)),
+        put_to_the_paper=by_the_paper,
         generated=f"Written on {datetime.now(UTC):%Y-%m-%d %H:%M} UTC by evoclaims {metadata.version('evoclaims')}.",
     )
     folder = Path(options.out)

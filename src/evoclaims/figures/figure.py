@@ -27,16 +27,18 @@ class Scope:
         archive: the trials.
         reproduction: whose conditions are drawn.
         tier_name: at which tier.
+        variant: of the protocol; empty for the protocol itself.
     """
 
     archive: Archive
     reproduction: Reproduction
     tier_name: str
+    variant: str = ""
 
     @property
     def tier(self) -> Tier:
-        """The tier; an `UnknownNameError` lists the known ones."""
-        return self.reproduction.tier(self.tier_name)
+        """The tier under the variant; an `UnknownNameError` lists the known ones."""
+        return self.reproduction.tier(self.tier_name, self.variant)
 
     @property
     def seeds(self) -> tuple[int, ...]:

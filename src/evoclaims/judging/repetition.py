@@ -21,8 +21,19 @@ LEVEL: Final = 0.95
 FEWEST: Final = 5
 """Fewest trials of ours that are compared with a published mean: those of the first look."""
 
-DEVIATION, STANDARD_ERROR = "standard deviation", "standard error"
-"""What an error bar may be that its source does not explain."""
+
+class Spread(StrEnum):
+    """What is taken for the spread of the published trials."""
+
+    DEVIATION = "the bar is a standard deviation"
+    STANDARD_ERROR = "the bar is a standard error"
+    OURS = "no spread is published: that of our trials"
+    NONE = "none: the mean is at the end of the scale, and so is every trial"
+
+    @property
+    def short(self) -> str:
+        """A few letters for tables."""
+        return {"DEVIATION": "SD", "STANDARD_ERROR": "SE", "OURS": "our SD", "NONE": "exact"}[self.name]
 
 
 class Answer(StrEnum):
@@ -66,20 +77,27 @@ class PublishedMean:
 
 @dataclass(frozen=True)
 class Prediction:
-    """What a repetition would give if an assumption about the published spread holds.
+    """What a repetition would give, by one reading of the published spread.
 
     Attributes:
-        assumption: what is taken for the published spread.
+        spread: the reading.
         of: what is predicted: "mean", or "trials at 1".
         low, high: the interval.
-        answer: whether our trials are inside.
+        ours: our mean, or our number of trials at 1; None while our trials are too few.
     """
 
-    assumption: str
+    spread: Spread
     of: str
     low: float
     high: float
-    answer: Answer
+    ours: float | None
+
+    @property
+    def answer(self) -> Answer:
+        """Whether our trials are inside."""
+        if self.ours is None:
+            return Answer.UNKNOWN
+        return Answer.INSIDE if self.low <= self.ours <= self.high else Answer.OUTSIDE
 
 
 @dataclass(frozen=True)
@@ -113,7 +131,7 @@ def repetition(published: PublishedMean, ours: Sequence[float], planned: int, br
     answers = {prediction.answer for prediction in predictions}
     if len(answers) == 1:
         return Repetition(predictions, answers.pop(), reason)
-    split = "; ".join(f"{prediction.answer} if {prediction.assumption}" for prediction in predictions)
+    split = "; ".join(f"{prediction.answer} if {prediction.spread}" for prediction in predictions)
     return Repetition(predictions, Answer.UNKNOWN, split or reason)
 
 
@@ -132,27 +150,25 @@ def _predictions(published: PublishedMean, ours: Sequence[float], planned: int) 
     if published.at_an_end:
         return (_count(published.mean, trials, n, ours),), ""
     if published.error:
-        bars = {DEVIATION: published.error, STANDARD_ERROR: published.error * math.sqrt(trials)}
-        allowed = {name: spread for name, spread in bars.items() if published.allows(spread)}
-        found = [_mean(published, f"the bar is a {name}", s, trials, n, ours) for name, s in allowed.items()]
-        excluded = [name for name in bars if name not in allowed]
-        return tuple(found), "; ".join(f"on this scale the bar cannot be a {name}" for name in excluded)
-    spread = statistics.stdev(ours) if ours else 0.0
-    if not spread:
+        bars = {Spread.DEVIATION: published.error, Spread.STANDARD_ERROR: published.error * math.sqrt(trials)}
+        found = [_mean(published, name, s, trials, n, ours) for name, s in bars.items() if published.allows(s)]
+        excluded = [f"on its scale it cannot be that {name}" for name, s in bars.items() if not published.allows(s)]
+        return tuple(found), "; ".join(excluded)
+    deviation = statistics.stdev(ours) if ours else 0.0
+    if not deviation:
         return (), "no spread is published" + (", and ours is 0" if ours else "")
-    assumption = "the spread, not published, is that of our trials"
-    return (_mean(published, assumption, spread, n, n, ours),), ""
+    return (_mean(published, Spread.OURS, deviation, n, n, ours),), ""
 
 
 def _mean(
-    published: PublishedMean, assumption: str, spread: float, known_from: int, n: int, ours: Sequence[float]
+    published: PublishedMean, spread: Spread, deviation: float, known_from: int, n: int, ours: Sequence[float]
 ) -> Prediction:
-    """Predict the mean of `n` trials by Student's t: `spread` is a standard deviation of `known_from` trials."""
+    """Predict the mean of `n` trials by Student's t, from the standard deviation of `known_from` trials."""
     factor = float(student.ppf((1 + LEVEL) / 2, known_from - 1))
-    half = factor * spread * math.sqrt(1 / published.trials + 1 / n) + published.precision
+    half = factor * deviation * math.sqrt(1 / published.trials + 1 / n) + published.precision
     least, most = published.scale or (-math.inf, math.inf)
     low, high = max(published.mean - half, least), min(published.mean + half, most)
-    return Prediction(assumption, "mean", low, high, _answer(statistics.fmean(ours) if ours else None, low, high))
+    return Prediction(spread, "mean", low, high, statistics.fmean(ours) if ours else None)
 
 
 def _count(end: float, trials: int, n: int, ours: Sequence[float]) -> Prediction:
@@ -164,14 +180,5 @@ def _count(end: float, trials: int, n: int, ours: Sequence[float]) -> Prediction
     failures = 0
     while failures < n and math.comb(n, failures + 1) / math.comb(trials + n, failures + 1) > 1 - LEVEL:
         failures += 1
-    at_the_end = sum(value == end for value in ours) if ours else None
-    assumption = "all published trials are at the end of the scale, as their mean"
-    answer = _answer(at_the_end, n - failures, n)
-    return Prediction(assumption, f"trials at {end:g}", float(n - failures), float(n), answer)
-
-
-def _answer(value: float | None, low: float, high: float) -> Answer:
-    """Return whether a value is inside; unknown without one."""
-    if value is None:
-        return Answer.UNKNOWN
-    return Answer.INSIDE if low <= value <= high else Answer.OUTSIDE
+    at_the_end = float(sum(value == end for value in ours)) if ours else None
+    return Prediction(Spread.NONE, f"trials at {end:g}", float(n - failures), float(n), at_the_end)

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from evoclaims.core.errors import UnknownNameError, UserError
 from evoclaims.judging.protocol import Protocol
+from evoclaims.paper.reported import FILE, Published, load_published
 from evoclaims.paper.trial_group import TrialGroup
 from evoclaims.paper.variant import Variant
 from evoclaims.trials.spec import Condition
@@ -43,7 +44,8 @@ class Reproduction:
     Attributes:
         name: a short name, such as "nisioti2025".
         title: the paper's title.
-        folder: of the reproduction; its reference trials are in folder/reference.
+        folder: of the reproduction; its reference trials are in folder/reference, the paper's numbers in
+            folder/reported.toml.
         tiers: by name; "smoke" and "full".
         variants: of the protocol, by name; claims are judged again under them.
         figures: modules that redraw the paper's figures and tables, in paper order; each holds FIGURE, an
@@ -80,6 +82,16 @@ class Reproduction:
             raise UnknownNameError("variant", variant, self.variants or {"(none)"})
         tier, changes = self.tiers[name], self.variants[variant].conditions.get(name, {})
         return replace(tier, conditions={**tier.conditions, **changes})
+
+    @property
+    def published(self) -> Published:
+        """The numbers that the paper has published; none without a file of them.
+
+        Raises:
+            UserError: when that file cannot be read.
+        """
+        path = self.folder / FILE
+        return load_published(path) if path.exists() else Published({}, {})
 
     @property
     def references(self) -> Path:

@@ -7,11 +7,12 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from evoclaims.core.errors import UserError
+from evoclaims.figures.replication import Replication
 from evoclaims.judging.protocol import Protocol
 from evoclaims.judging.verdict import Outcome
 from evoclaims.paper.archive import Archive
 from evoclaims.paper.reproduction import Reproduction
-from evoclaims.report import origin, training_curves
+from evoclaims.report import origin, replication_cells, training_curves
 from evoclaims.report.champion import Draw, champion_of, network
 from evoclaims.report.evidence import Part, judged_parts, unjudged_part
 from evoclaims.report.formatting import Anchors, clean, counted, listed, place_key, places, plural
@@ -38,6 +39,8 @@ def gather(
     figures: Sequence[PaperFigure] = (),
     missing: Sequence[str] = (),
     robustness: Sequence[Robustness] = (),
+    numbers: Sequence[Replication] = (),
+    put_to_the_paper: Sequence[ClaimReport] = (),
     generated: str = "",
 ) -> Page:
     """Return the data of a whole report.
@@ -52,9 +55,11 @@ def gather(
         figures: of the paper.
         missing: sentences about missing figures.
         robustness: how claims end under variants of the protocol.
+        numbers: published ones beside ours.
+        put_to_the_paper: reports of claims that were judged from the paper's own numbers.
         generated: when, and by which version.
     """
-    gathered = _Gathering(reproduction, archive, history, sentences, draws)
+    gathered = _Gathering(reproduction, archive, history, sentences, draws, put_to_the_paper)
     boards = tuple(
         Board(tier, tuple(gathered.section(report) for report in sorted(reports, key=_order)))
         for tier, reports in verdicts.items()
@@ -69,6 +74,8 @@ def gather(
         missing=tuple(missing),
         variants={name: variant.says for name, variant in reproduction.variants.items()},
         robustness=tuple(robustness),
+        numbers=tuple(numbers),
+        put_to_the_paper=tuple(replication_cells.put_to_the_paper(put_to_the_paper)),
         generated=generated,
     )
 
@@ -107,9 +114,15 @@ class _Gathering:
         history: History,
         sentences: Mapping[str, str],
         draws: Sequence[Draw],
+        put_to_the_paper: Sequence[ClaimReport],
     ) -> None:
         self._reproduction, self._archive, self._history = reproduction, archive, history
         self._sentences, self._draws, self._anchors = sentences, draws, Anchors()
+        self._failing = {
+            (report.tier, report.name): replication_cells.would_not_pass(report)
+            for report in put_to_the_paper
+            if replication_cells.is_decided(report) and report.outcome is not Outcome.SUPPORTED
+        }
         self.reader = Reader(archive)
         self.conditions: dict[str, ConditionTrials] = {}
 
@@ -131,10 +144,15 @@ class _Gathering:
             parts=_parts(report, read),
             conditions=tuple(self._condition(report.tier, source) for source in report.sources if source.trials),
             made=made,
-            warnings=(*_broken(every), *origin.warnings(made)),
+            warnings=(*_broken(every), *origin.warnings(made), *self._of_the_paper(report)),
             history=eras(entries),
             change=_change(entries, report),
         )
+
+    def _of_the_paper(self, report: ClaimReport) -> tuple[str, ...]:
+        """Say that the paper's own numbers would not pass a claim's assertion, where it is so."""
+        found = self._failing.get((report.tier, report.name))
+        return (found,) if found else ()
 
     def _condition(self, tier: str, source: SourceTrials) -> str:
         """Return the key of a condition with this number of trials, after gathering its data."""

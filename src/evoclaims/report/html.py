@@ -16,7 +16,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from evoclaims.judging.verdict import Outcome
-from evoclaims.report import charts, formatting
+from evoclaims.report import charts, formatting, replication_cells
 from evoclaims.report.model import Page
 
 _VIEW_BOX: Final = re.compile(rb'viewBox="[-\d.]+ [-\d.]+ ([\d.]+) ([\d.]+)"')
@@ -78,6 +78,7 @@ def _environment() -> Environment:
         "data_uri": data_uri,
     }
     environment.globals |= {"strip_svg": charts.strip_svg, "axis_svg": charts.axis_svg, "plural": formatting.plural}
+    environment.globals |= {"replication": replication_cells}
     return environment
 
 

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
+from evoclaims.figures.replication import Replication
 from evoclaims.judging.verdict import Outcome
-from evoclaims.report import table_cells
+from evoclaims.report import replication_cells, table_cells
 from evoclaims.report.formatting import p_value, plural
 from evoclaims.report.markdown_text import literal, table
 from evoclaims.report.model import Board, Page, Section
@@ -22,6 +23,9 @@ def markdown(page: Page) -> str:
             blocks += [block for section in board.sections for block in _section(section, page)]
     if page.robustness:
         blocks += ["## Which conclusions hang on a detail?", _details(page), _robustness(page)]
+    if page.numbers:
+        blocks += ["## Do the numbers replicate?", literal(replication_cells.HOW), numbers(page.numbers)]
+        blocks += [literal(line) for line in (*replication_cells.totals(page.numbers), *page.put_to_the_paper)]
     return "\n\n".join(block for block in blocks if block) + "\n"
 
 
@@ -58,6 +62,11 @@ def _robustness(page: Page) -> str:
             for row in page.robustness
         ),
     )
+
+
+def numbers(found: Sequence[Replication]) -> str:
+    """Return the published numbers beside ours, as a table."""
+    return table(replication_cells.HEADINGS, (map(literal, replication_cells.cells(one)) for one in found))
 
 
 def _overview(board: Board) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
+from evoclaims.figures.replication import Replication
 from evoclaims.judging.verdict import Outcome
 from evoclaims.report.evidence import Part
 from evoclaims.report.formatting import counted, place_key
@@ -142,6 +143,8 @@ class Page:
         missing: sentences about missing figures.
         variants: of the protocol, by name: what differs.
         robustness: claims that were judged under a variant too.
+        numbers: published ones beside ours.
+        put_to_the_paper: what the claims' assertions make of the published numbers, in sentences.
         generated: when, and by which version; free text.
     """
 
@@ -154,6 +157,8 @@ class Page:
     missing: tuple[str, ...] = ()
     variants: Mapping[str, str] = field(default_factory=dict)
     robustness: tuple[Robustness, ...] = ()
+    numbers: tuple[Replication, ...] = ()
+    put_to_the_paper: tuple[str, ...] = ()
     generated: str = ""
 
     @property

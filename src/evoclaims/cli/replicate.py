@@ -1,0 +1,85 @@
+"""`evoclaims replicate`: the paper's numbers beside those of the trials at hand; nothing is run."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Final
+
+from rich.markup import escape
+from rich.table import Table
+
+from evoclaims.cli.project import Project, open_project
+from evoclaims.cli.stored import write
+from evoclaims.cli.terminal import styled
+from evoclaims.core.errors import UnknownNameError, UserError
+from evoclaims.figures.figure import SIZES
+from evoclaims.figures.replication import Replication, replications
+from evoclaims.report import replication_cells
+from evoclaims.report.console import PlainSpokenConsole
+from evoclaims.report.markdown import numbers
+from evoclaims.verdicts import export
+
+ALL: Final = "all"
+
+_FORMS: Final[Mapping[str, Callable[[Sequence[Replication]], bytes]]] = {
+    "csv": lambda found: export.as_csv([one.row() for one in found]),
+    "json": lambda found: export.as_json([one.row() for one in found]),
+    "markdown": lambda found: (numbers(found) + "\n").encode(),
+}
+"""Writers by the names of their forms."""
+
+
+def main(options: argparse.Namespace) -> int:
+    """Print the table, and what the claims' assertions make of the published numbers; or write the table to a file."""
+    if options.form not in (None, *_FORMS):
+        raise UnknownNameError("form", options.form, _FORMS)
+    project = open_project(options.storage)
+    found = _found(project, options.tier, options.variant)
+    if options.form:
+        out = Path(options.out or f"replication.{options.form}")
+        write(out, _FORMS[options.form](found))
+        print(f"wrote {out}: {len(found)} numbers")
+        return 0
+    console = PlainSpokenConsole(file=styled())
+    size = SIZES.get(options.tier, f"{options.tier} tier")
+    console.print(escape(f"Published numbers and ours ({size})"))
+    console.print(_table(found))
+    console.print(escape(replication_cells.HOW))
+    (reports,) = project.judge_sessions([(project.as_published(options.tier), options.tier)])
+    for line in (*replication_cells.totals(found), *replication_cells.put_to_the_paper(reports)):
+        console.print(escape(line), highlight=False)
+    return 0
+
+
+def _found(project: Project, tier: str, variant: str) -> tuple[Replication, ...]:
+    """Return the published numbers beside ours, under the variants that are asked for.
+
+    Raises:
+        UserError: when there are none.
+    """
+    reproduction = project.reproduction
+    variants = ("", *reproduction.variants) if variant == ALL else (variant,)
+    found = replications(project.archive, reproduction, tier, variants)
+    if not reproduction.published.plots:
+        raise UserError(f"The paper's numbers are read from {reproduction.folder / 'reported.toml'}, which has none.")
+    if not found:
+        raise UserError(
+            f"No trial of the {tier} tier under {variant} is at hand whose numbers are published. "
+            f"`evoclaims run --tier {tier} --variant {variant}` runs them."
+        )
+    return found
+
+
+def _table(found: Sequence[Replication]) -> Table:
+    """Build the table; a number's name is written once for all variants."""
+    table = Table(box=None, pad_edge=False)
+    for heading in replication_cells.HEADINGS:
+        table.add_column(heading)
+    before = ""
+    for one in found:
+        name, *rest = replication_cells.cells(one)
+        table.add_row("" if name == before else escape(name), *map(escape, rest))
+        before = name
+    return table

@@ -1,0 +1,162 @@
+"""Do the published numbers replicate? Each beside ours, under the protocol and under its variants."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from evoclaims.core.errors import UnknownNameError
+from evoclaims.figures.figure import Scope
+from evoclaims.figures.readings import Readings, read
+from evoclaims.judging.measure import Measure, Profile
+from evoclaims.judging.repetition import Answer, PublishedMean, Repetition, repetition
+from evoclaims.paper.archive import Archive
+from evoclaims.paper.reported import Published, Reported
+from evoclaims.paper.reproduction import Reproduction
+
+
+@dataclass(frozen=True)
+class Replication:
+    """A published number and ours.
+
+    Attributes:
+        tier: at which ours were made.
+        variant: of the protocol; empty for the protocol itself.
+        reported: the published number.
+        readings: ours, from each trial.
+        repetition: whether ours are what a repetition of the published trials would give.
+    """
+
+    tier: str
+    variant: str
+    reported: Reported
+    readings: Readings
+    repetition: Repetition
+
+    @property
+    def name(self) -> str:
+        """What is measured, such as "neat on n_parity: success at level 4"."""
+        return f"{self.readings.method} on {self.readings.task}: {self.readings.name}"
+
+    @property
+    def answer(self) -> Answer:
+        """Whether the number replicates."""
+        return self.repetition.answer
+
+    def row(self) -> dict[str, Any]:
+        """Return it as one row of a table for other programs."""
+        common = {
+            "method": self.readings.method,
+            "task": self.readings.task,
+            "measure": self.readings.name,
+            "tier": self.tier,
+            "variant": self.variant,
+            "published.mean": self.reported.value,
+            "published.error": self.reported.error,
+            "published.trials": self.reported.trials,
+            "published.place": self.reported.place,
+            "ours.mean": self.readings.mean if self.readings.values else None,
+            "ours.deviation": self.readings.deviation if len(self.readings.values) > 1 else None,
+            "ours.trials": len(self.readings.values),
+            "ours.values": list(self.readings.values),
+            "answer": self.answer,
+            "reason": self.repetition.reason,
+        }
+        predictions = [
+            {"spread": p.spread, "of": p.of, "low": p.low, "high": p.high, "ours": p.ours, "answer": p.answer}
+            for p in self.repetition.predictions
+        ]
+        return {**common, "predictions": predictions}
+
+
+def replications(
+    archive: Archive, reproduction: Reproduction, tier: str, variants: Sequence[str] = ("",)
+) -> tuple[Replication, ...]:
+    """Return every published number beside ours; number by number, each under the variants in their order.
+
+    A variant has a row only where it changes the trials behind a number, and some of these are at hand.
+
+    Args:
+        archive: our trials.
+        reproduction: whose published numbers are asked for.
+        tier: at which ours were made.
+        variants: names of variants; "" for the protocol itself.
+
+    Raises:
+        UnknownNameError: for an unknown tier or variant.
+        UserError: when the published numbers or a trial cannot be read.
+    """
+    published = reproduction.published
+    scopes = [Scope(archive, reproduction, tier, variant) for variant in variants]
+    plain, changed = reproduction.tier(tier), {scope.variant: scope.tier for scope in scopes}
+    found = []
+    for quantity, method, task, at, reported in _numbers(published):
+        for scope in scopes:
+            names = method, task
+            if scope.variant and plain.conditions.get(names) == changed[scope.variant].conditions.get(names):
+                continue
+            readings = _ours(scope, quantity, method, task, at)
+            if not scope.variant or readings.values:
+                judged = _judged(reported, readings, len(scope.seeds))
+                found.append(Replication(tier, scope.variant, reported, readings, judged))
+    return tuple(found)
+
+
+def counts(found: Sequence[Replication]) -> Mapping[str, Mapping[Answer, int]]:
+    """Return, by variant, how many numbers have each answer."""
+    variants = dict.fromkeys(one.variant for one in found)
+    return {
+        name: {answer: sum(one.answer is answer for one in found if one.variant == name) for answer in Answer}
+        for name in variants
+    }
+
+
+def _numbers(published: Published) -> Iterator[tuple[str, str, str, int, Reported]]:
+    """Yield each number of the plots, in the order of the file: quantity, method, task, place on the axis, number.
+
+    A number that the file has under two quantities (the last level's, and its own) is yielded once.
+    """
+    for task, quantities in published.plots.items():
+        seen: dict[tuple[str, Reported], str] = {}
+        for quantity, plot in quantities.items():
+            for method, numbers in plot["methods"].items():
+                for at in range(len(numbers["mean"])):
+                    reported = published.value(task, quantity, method, at)
+                    if reported is not None and seen.setdefault((method, reported), quantity) == quantity:
+                        yield quantity, method, task, at, reported
+
+
+def _ours(scope: Scope, quantity: str, method: str, task: str, at: int) -> Readings:
+    """Read our trials; without any where the tier has no such condition, or its task no such level."""
+    try:
+        return read(scope, method, task, lambda group: _measure(group, quantity, at))
+    except _AbsentError as absent:
+        return Readings(method, task, str(absent), ())
+    except UnknownNameError:
+        if (method, task) in scope.tier.conditions:
+            raise
+        return Readings(method, task, quantity, ())
+
+
+class _AbsentError(Exception):
+    """A level that a task does not have; its name."""
+
+
+def _measure(group: Any, quantity: str, at: int) -> Measure:
+    """Return the measure of a published quantity: a group's own, or one level of it."""
+    found = getattr(group, quantity)
+    if not isinstance(found, Profile):
+        measure: Measure = found
+        return measure
+    if at >= found.size:
+        raise _AbsentError(f"{found.name} at level {at}")
+    return found.at(at)
+
+
+def _judged(reported: Reported, readings: Readings, planned: int) -> Repetition:
+    """Put our readings to the published number."""
+    if reported.trials is None:
+        return Repetition((), Answer.UNKNOWN, "reported.toml does not say of how many trials the number is the mean")
+    mean = PublishedMean(reported.value, reported.error, reported.trials, reported.scale, reported.precision)
+    return repetition(mean, readings.values, planned, readings.broken)
