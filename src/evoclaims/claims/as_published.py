@@ -36,15 +36,14 @@ class AsPublished:
         Raises:
             NotStoredError: when the paper has published no number of the condition.
         """
-        metrics: dict[str, float] = {}
-        levels: dict[str, tuple[float, ...]] = {}
-        for (method, task), known in self.reproduction.tier(self.tier).conditions.items():
-            if known.id == condition.id:
-                metrics, levels = self._numbers(method, task, condition)
-                break
-        if not metrics and not levels:
-            raise NotStoredError(f"no number of {condition.label} is published")
-        return [_record(TrialSpec(condition, seed), metrics, levels) for seed in seeds]
+        conditions = self.reproduction.tier(self.tier).conditions
+        names = [name for name, known in conditions.items() if known.id == condition.id]
+        for method, task in names:
+            metrics, levels = self._numbers(method, task, condition)
+            if metrics or levels:
+                return [_record(TrialSpec(condition, seed), metrics, levels) for seed in seeds]
+        label = " on ".join(names[0]) if names else condition.label
+        raise NotStoredError(f"no number of {label} is published")
 
     def _numbers(
         self, method: str, task: str, condition: Condition

@@ -190,6 +190,9 @@ def _parser() -> argparse.ArgumentParser:
     export.add_argument("--as", dest="form", metavar="FORM", default="json", help="json (default), csv or parquet")
     export.add_argument("--out", metavar="FILE", help="where to (trials.FORM, verdicts.FORM)")
 
+    tables = add("tables", "write the tables in Markdown files anew from the reference trials; 1 when one changed")
+    tables.add_argument("files", nargs="+", metavar="FILE", help="such as README.md")
+
     badge = add("badge", "draw how many claims ended how, as a small SVG picture")
     tier(badge)
     badge.add_argument("--out", metavar="FILE", help="where to (claims-TIER.svg)")

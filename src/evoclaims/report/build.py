@@ -12,15 +12,15 @@ from evoclaims.judging.protocol import Protocol
 from evoclaims.judging.verdict import Outcome
 from evoclaims.paper.archive import Archive
 from evoclaims.paper.reproduction import Reproduction
-from evoclaims.report import origin, replication_cells, training_curves
+from evoclaims.report import origin, replication_cells, table_cells, training_curves
 from evoclaims.report.champion import Draw, champion_of, network
 from evoclaims.report.evidence import Part, judged_parts, unjudged_part
-from evoclaims.report.formatting import Anchors, clean, counted, listed, place_key, places, plural
+from evoclaims.report.formatting import Anchors, clean, counted, listed, places, plural
 from evoclaims.report.model import Board, ConditionTrials, Page, PaperFigure, Section, ShownChampion
 from evoclaims.report.trial_summary import Reader, TrialSummary
 from evoclaims.verdicts.acceptance import UNDECIDED
 from evoclaims.verdicts.claim_report import ClaimReport
-from evoclaims.verdicts.history import Entry, History, eras, in_order, key_of
+from evoclaims.verdicts.history import Entry, History, eras, key_of
 from evoclaims.verdicts.robustness import Robustness
 from evoclaims.verdicts.source_trials import SourceTrials
 
@@ -61,7 +61,7 @@ def gather(
     """
     gathered = _Gathering(reproduction, archive, history, sentences, draws, put_to_the_paper)
     boards = tuple(
-        Board(tier, tuple(gathered.section(report) for report in sorted(reports, key=_order)))
+        Board(tier, tuple(gathered.section(report) for report in table_cells.in_the_papers_order(reports)))
         for tier, reports in verdicts.items()
     )
     return Page(
@@ -78,11 +78,6 @@ def gather(
         put_to_the_paper=tuple(replication_cells.put_to_the_paper(put_to_the_paper)),
         generated=generated,
     )
-
-
-def _order(report: ClaimReport) -> tuple[Any, ...]:
-    """Order claims as the paper does, within a section as the terminal's table does: G2 before G10."""
-    return place_key(places(report.where)[0]), in_order(key_of(report))
 
 
 def _notices(boards: Sequence[Board], reader: Reader) -> list[str]:

@@ -12,7 +12,7 @@ from evoclaims.report.formatting import listed, number, plural
 from evoclaims.report.table_cells import NONE
 from evoclaims.verdicts.claim_report import ClaimReport
 
-HEADINGS: Final = ("number", "protocol", "published", "ours", "95% of repetitions", "replicates")
+HEADINGS: Final = ("number", "protocol", "published", "ours", "replicates", "95% of repetitions")
 
 PROTOCOL: Final = "the protocol"
 """The protocol itself, without a variant."""
@@ -35,7 +35,7 @@ HOW: Final = (
 
 def cells(one: Replication) -> tuple[str, ...]:
     """Return a row, a cell per heading."""
-    return (one.name, one.variant or PROTOCOL, published(one), ours(one), predicted(one), answer(one))
+    return (one.name, one.variant or PROTOCOL, published(one), ours(one), answer(one), predicted(one))
 
 
 def published(one: Replication) -> str:
@@ -49,7 +49,7 @@ def ours(one: Replication) -> str:
     readings = one.readings
     if not readings.values:
         return NONE
-    spread = f" ± {readings.deviation:.2g}" if len(readings.values) > 1 else ""
+    spread = f" ± {number(float(f'{readings.deviation:.2g}'))}" if len(readings.values) > 1 else ""
     return f"{number(readings.mean)}{spread} ({len(readings.values)})"
 
 
@@ -103,8 +103,8 @@ def would_not_pass(report: ClaimReport) -> str:
     part = verdict.deciding_part if verdict else None
     why = part.detail if part and part.detail else report.reason
     return (
-        f"{report.name}: the paper's own numbers would not pass this assertion{asserted}: by trials that all are at the "
-        f"published means it is {report.outcome} ({why})."
+        f"{report.name}: the paper's own numbers would not pass this assertion{asserted}: by trials that all are at "
+        f"the published means it is {report.outcome} ({why})."
     )
 
 

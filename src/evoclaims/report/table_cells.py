@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Iterable, Sequence
 
 from evoclaims.judging.verdict import Direction, Outcome
-from evoclaims.report.formatting import p_value
+from evoclaims.report.formatting import p_value, place_key, places
 from evoclaims.verdicts import mixed_versions
 from evoclaims.verdicts.claim_report import ClaimReport
 from evoclaims.verdicts.history import in_order, key_of
@@ -18,6 +18,11 @@ NONE = "–"
 def ordered(reports: Iterable[ClaimReport]) -> list[ClaimReport]:
     """Return reports by tier, G9 before G10."""
     return sorted(reports, key=lambda report: in_order(key_of(report)))
+
+
+def in_the_papers_order(reports: Iterable[ClaimReport]) -> list[ClaimReport]:
+    """Return reports in the order of the paper's sections, within one as `ordered` has them."""
+    return sorted(ordered(reports), key=lambda report: place_key(places(report.where)[0]))
 
 
 def verdict(report: ClaimReport) -> str:

@@ -1,0 +1,98 @@
+"""`evoclaims tables`: tables in Markdown files, written anew from the committed reference trials alone.
+
+A table is between two comments, the first of which says what it shows:
+
+    <!-- evoclaims: verdicts full full:published smoke -->    verdicts by tier, or by tier and variant of the protocol
+    <!-- evoclaims: numbers full all -->                      published numbers and ours, under all variants
+    <!-- evoclaims: end -->
+"""
+
+from __future__ import annotations
+
+import argparse
+import re
+import tempfile
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Final
+
+from evoclaims.cli.project import Project, open_project
+from evoclaims.cli.stored import write
+from evoclaims.core.errors import UnknownNameError, UserError
+from evoclaims.figures.replication import replications
+from evoclaims.report import replication_cells
+from evoclaims.report.markdown import numbers
+from evoclaims.report.markdown_text import literal
+from evoclaims.report.trial_summary import Reader
+from evoclaims.report.verdict_overview import overview
+
+_TABLE: Final = re.compile(
+    r"(?P<begin>^<!-- evoclaims: (?P<kind>\w+) (?P<words>[^>]*?) ?-->\n).*?(?P<end>^<!-- evoclaims: end -->$)",
+    re.MULTILINE | re.DOTALL,
+)
+
+
+def main(options: argparse.Namespace) -> int:
+    """Write the tables of each file anew; 1 when that changed one."""
+    changed = 0
+    with tempfile.TemporaryDirectory() as folder:
+        project = open_project(str(Path(folder) / "no-store"))
+        for name in options.files:
+            path = Path(name)
+            try:
+                before = path.read_text(encoding="utf-8")
+            except (OSError, UnicodeError) as error:
+                raise UserError(f"Cannot read {path}: {error}.") from error
+            after = filled(before, project)
+            print(f"{path}: {'changed' if after != before else 'as it was'}")
+            if after != before:
+                write(path, after.encode())
+                changed = 1
+    return changed
+
+
+def filled(text: str, project: Project) -> str:
+    """Return a Markdown text with its tables written anew.
+
+    Raises:
+        UserError: when it has none, or one of an unknown kind.
+    """
+    if not _TABLE.search(text):
+        raise UserError(
+            "There is no table to write: put <!-- evoclaims: verdicts full --> and <!-- evoclaims: end -->."
+        )
+    return _TABLE.sub(lambda found: f"{found['begin']}\n{_made(found, project)}\n\n{found['end']}", text)
+
+
+def _made(found: re.Match[str], project: Project) -> str:
+    """Return one table."""
+    kind, words = found["kind"], found["words"].split()
+    if kind not in _KINDS:
+        raise UnknownNameError("kind of table", kind, _KINDS)
+    return _KINDS[kind](project, words)
+
+
+def _verdicts(project: Project, words: list[str]) -> str:
+    """Return the verdicts; each word is a tier, or a tier and a variant: full:published."""
+    tiers = list(project.reproduction.tiers)[::-1]  # the paper's own sentences come first
+    asked = [(tier, variant) for tier, _, variant in (word.partition(":") for word in words or tiers)]
+    for column in asked:
+        project.reproduction.tier(*column)
+    *columns, papers = project.judge_variants([*asked, (tiers[0], "")])
+    headings = [f"{tier}, {variant}" if variant else tier for tier, variant in asked]
+    sentences = {report.name: report.statement for report in papers}
+    return overview(dict(zip(headings, columns, strict=True)), sentences, Reader(project.archive))
+
+
+def _numbers(project: Project, words: list[str]) -> str:
+    """Return the published numbers beside ours; the words are a tier and, for the variants too, "all"."""
+    tier, *rest = words or list(project.reproduction.tiers)[-1:]
+    variants = ("", *project.reproduction.variants) if rest else ("",)
+    found = replications(project.archive, project.reproduction, tier, variants)
+    (papers,) = project.judge_sessions([(project.as_published(tier), tier)])
+    said = [*replication_cells.totals(found), *replication_cells.put_to_the_paper(papers)]
+    return "\n\n".join((numbers(found), "\n".join(f"* {literal(line)}" for line in said)))
+
+
+_KINDS: Final[Mapping[str, Callable[[Project, list[str]], str]]] = {"verdicts": _verdicts, "numbers": _numbers}
+"""What makes each kind of table."""

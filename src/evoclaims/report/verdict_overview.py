@@ -1,0 +1,110 @@
+"""All verdicts as one Markdown table: a line per sentence of the paper, a column per tier or variant."""
+
+from __future__ import annotations
+
+import string
+from collections import defaultdict
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Final
+
+from evoclaims.report.formatting import plural
+from evoclaims.report.markdown_text import literal, table
+from evoclaims.report.table_cells import NONE, in_the_papers_order
+from evoclaims.report.trial_summary import Reader
+from evoclaims.verdicts.claim_report import ClaimReport
+
+Versions = dict[str, str]
+
+_SHOWN: Final = ("python", "jax", "jaxlib")
+"""Packages whose versions are shown for every trial; others only where a trial depends on them."""
+
+
+def overview(columns: Mapping[str, Sequence[ClaimReport]], sentences: Mapping[str, str], reader: Reader) -> str:
+    """Return the table, and a list of the devices and versions that its letters stand for.
+
+    Args:
+        columns: reports by heading.
+        sentences: the paper's own by claim, such as "G1[n_parity]".
+        reader: reads the trials behind the reports.
+    """
+    made = Environments(reader)
+    rows: dict[tuple[str, str], dict[str, list[ClaimReport]]] = {}
+    for heading, reports in columns.items():
+        for report in in_the_papers_order(reports):
+            line = rows.setdefault((report.claim, sentences[report.name]), defaultdict(list))
+            line[heading].append(report)
+    lines = [
+        (literal(claim), literal(sentence), *(_cell(found[heading], made) for heading in columns))
+        for (claim, sentence), found in rows.items()
+    ]
+    return "\n\n".join((table(("claim", "the paper says", *map(literal, columns)), lines), made.legend()))
+
+
+class Environments:
+    """Letters for what trials were made on and with, given in the order of appearance."""
+
+    def __init__(self, reader: Reader) -> None:
+        """Start without any."""
+        self._reader = reader
+        self._known: list[tuple[str, Versions]] = []
+
+    def letters(self, report: ClaimReport) -> str:
+        """Return the letters of a report's trials, such as "A" or "A, C"."""
+        found = {
+            self._letter(trial.origin.device, _shown(trial.origin.versions, source.versions))
+            for source in report.sources
+            for trial in self._reader.read(source.trials, source.installed)
+        }
+        return ", ".join(sorted(found))
+
+    def legend(self) -> str:
+        """Return a line for each letter."""
+        return "\n".join(
+            f"* {letter}: {literal(device)}; {literal(', '.join(map(' '.join, sorted(versions.items()))))}"
+            for letter, (device, versions) in zip(string.ascii_uppercase, self._known, strict=False)
+        )
+
+    def _letter(self, device: str, versions: Versions) -> str:
+        """Return the letter of the first environment that differs in nothing, after adding what it did not know."""
+        for letter, (known, together) in zip(string.ascii_uppercase, self._known, strict=False):
+            if known == device and all(together.get(name, version) == version for name, version in versions.items()):
+                together.update(versions)
+                return letter
+        self._known.append((device, dict(versions)))
+        return string.ascii_uppercase[len(self._known) - 1]
+
+
+def _shown(versions: Iterable[tuple[str, str]], needed: Iterable[str]) -> Versions:
+    """Return the versions of Python and of what a trial depends on."""
+    names = {*_SHOWN, *needed}
+    return {name: version for name, version in versions if name in names}
+
+
+def _cell(reports: Sequence[ClaimReport], made: Environments) -> str:
+    """Return the verdicts of a claim's cases, one line for all that are alike."""
+    alike: dict[str, list[str]] = defaultdict(list)
+    for report in reports:
+        alike[_verdict(report, made)].append(literal(report.case))
+    if len(alike) == 1:
+        return next(iter(alike))
+    return "<br>".join(f"{', '.join(cases)}: {verdict}" for verdict, cases in alike.items()) or NONE
+
+
+def _verdict(report: ClaimReport, made: Environments) -> str:
+    """Return a verdict with its evidence in short, such as "**refuted** (2 of 10 trials; A)"."""
+    if not report.n:
+        return literal(report.outcome)
+    return f"**{literal(report.outcome)}** ({literal(_evidence(report))}; {made.letters(report)})"
+
+
+def _evidence(report: ClaimReport) -> str:
+    """Return what the part that decided has found."""
+    part = report.verdict.deciding_part if report.verdict else None
+    trials = plural(report.n, "trial")
+    if part is None:
+        return trials
+    if part.events:
+        return f"{sum(part.samples[0].values):g} of {trials}"
+    if part.a12 is not None:
+        return f"A12 {part.a12:.2f}, {trials} a side"
+    return f"{part.detail}; {trials}" if part.detail else trials

@@ -1,0 +1,103 @@
+"""`evoclaims replicate`: what it prints and writes."""
+
+from __future__ import annotations
+
+import csv
+import json
+from pathlib import Path
+
+import pytest
+from tiny_project import Evoclaims, Project
+
+from evoclaims.trials.store import Store
+
+REPORTED = """
+trials = 10
+
+[plots.parity.mean_success]
+place = "Fig. 1"
+scale = [0, 1]
+methods.right.mean = [1]
+methods.wrong = { mean = [0.6], error = [0.05] }
+methods.coin = { mean = [0.5], error = [0.2] }
+"""
+
+
+@pytest.fixture(autouse=True)
+def _published(project: Project, stored: Store) -> None:
+    """The paper has published three numbers; two of them have trials."""
+    Path("reported.toml").write_text(REPORTED)
+
+
+def test_each_number_has_a_line_with_ours_and_the_interval(evoclaims: Evoclaims) -> None:
+    status, out, err = evoclaims("replicate", "--tier=smoke")
+    assert (status, err) == (0, "")
+    right, wrong, coin = (" ".join(line.split()) for line in out.splitlines() if " on parity: mean success" in line)
+    assert right.endswith("the protocol 1 1 ± 0 (10) ✓ inside 7 to 10 trials at 1, ours 10 (exact: inside)")
+    assert "0.6 ± 0.05 0 ± 0 (10) ✗ outside 0.5494 to 0.6506 (SD: outside);" in wrong
+    assert "0.5 ± 0.2 – ? cannot be said 0.2977 to 0.7023 (SD)" in coin  # a standard error would be too large
+    assert "the protocol: 1 inside, 1 outside, 1 cannot be said" in out
+
+
+def test_assertions_are_put_to_the_published_numbers(evoclaims: Evoclaims, project: Project) -> None:
+    solid = "verdict(trials('right', on='parity').mean_success.between(0.9, 1.0))"
+    short = "verdict(trials('wrong', on='parity').mean_success.between(0.9, 1.0))"
+    project.write(a=solid, b=short, c="refuted")
+    out = " ".join(evoclaims("replicate", "--tier=smoke")[1].split())
+    assert (
+        "suffice for 2 assertions of the claims. Trials that all are at the published means would pass 1 of them (a)."
+        in out
+    )
+    asserted = "the median of wrong on parity: mean success over levels lies in [0.9, 1]"
+    assert f"b: the paper's own numbers would not pass this assertion ({asserted})" in out
+    assert "c:" not in out
+
+
+def test_a_variant_shows_the_numbers_that_it_changes(evoclaims: Evoclaims) -> None:
+    """Under `traded` the right network is what the wrong one is."""
+    out = evoclaims("replicate", "--tier=smoke", "--variant=traded")[1]
+    assert "the protocol" not in out
+    assert "traded: 1 outside" in out
+    both = evoclaims("replicate", "--tier=smoke", "--variant=all")[1]
+    assert "the protocol: 1 inside" in both
+    assert "traded: 1 outside" in both
+
+
+def test_files_have_the_same_numbers(evoclaims: Evoclaims) -> None:
+    for form in ("csv", "json", "markdown"):
+        assert evoclaims("replicate", "--tier=smoke", f"--as={form}") == (
+            0,
+            f"wrote replication.{form}: 3 numbers\n",
+            "",
+        )
+    rows = json.loads(Path("replication.json").read_text())["rows"]
+    assert [(row["method"], row["ours.mean"], row["answer"]) for row in rows] == [
+        ("right", 1.0, "inside"),
+        ("wrong", 0.0, "outside"),
+        ("coin", None, "cannot be said"),
+    ]
+    with Path("replication.csv").open() as file:
+        assert [row["answer"] for row in csv.DictReader(file)] == [row["answer"] for row in rows]
+    table = Path("replication.markdown").read_text().splitlines()
+    assert table[0] == "| number | protocol | published | ours | replicates | 95% of repetitions |"
+    assert len(table) == 5
+
+
+@pytest.mark.parametrize(
+    ("arguments", "text"),
+    [
+        (("--tier=ful",), "There is no tier named 'ful'."),
+        (("--variant=trade",), "There is no variant named 'trade'. Did you mean 'traded'?"),
+        (("--as=xml",), "There is no form named 'xml'."),
+        (("--variant=traded",), "No trial of the full tier under traded is at hand whose numbers are published."),
+    ],
+)
+def test_a_mistake_is_a_sentence(evoclaims: Evoclaims, arguments: tuple[str, ...], text: str) -> None:
+    status, _, err = evoclaims("replicate", *arguments)
+    assert (status, text in " ".join(err.split())) == (2, True)
+
+
+def test_a_paper_without_numbers_says_where_they_are_read_from(evoclaims: Evoclaims) -> None:
+    Path("reported.toml").unlink()
+    status, _, err = evoclaims("replicate")
+    assert (status, "reported.toml, which has none" in " ".join(err.split())) == (2, True)

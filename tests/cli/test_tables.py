@@ -1,0 +1,101 @@
+"""`evoclaims tables`: tables in Markdown files, from the reference trials alone."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import pytest
+from tiny_project import Evoclaims, Project
+
+from evoclaims.trials.store import Store
+
+PAGE = """# Title
+
+<!-- evoclaims: verdicts full smoke smoke:traded -->
+An old table.
+<!-- evoclaims: end -->
+
+The rest.
+"""
+
+
+@pytest.fixture
+def committed(evoclaims: Evoclaims, stored: Store) -> Evoclaims:
+    """The trials of the right and the wrong network are reference trials, and no store is left."""
+    assert evoclaims("reference")[0] == 0
+    shutil.rmtree(".evoclaims")
+    Path("page.md").write_text(PAGE)
+    return evoclaims
+
+
+def test_a_table_is_written_between_its_marks_once(committed: Evoclaims, project: Project) -> None:
+    assert committed("tables", "page.md") == (1, "page.md: changed\n", "")
+    text = Path("page.md").read_text()
+    assert text.startswith(PAGE.partition("An old")[0])
+    assert text.endswith("<!-- evoclaims: end -->\n\nThe rest.\n")
+    lines = text.splitlines()
+    assert "| claim | the paper says | full | smoke | smoke, traded |" in lines
+    assert (
+        "| a | a at full size | not run | **supported** (10 of 10 trials; A) | **refuted** (0 of 10 trials; A) |"
+        in lines
+    )
+    assert "| b | b at full size | not run | **refuted** (0 of 10 trials; A) | not run |" in lines
+    (legend,) = [line for line in lines if line.startswith("* A: cpu; ")]
+    assert "jax " in legend
+    assert "python " in legend
+    assert committed("tables", "page.md") == (0, "page.md: as it was\n", "")
+    assert "An old table" not in text
+
+
+def test_a_store_changes_no_table(committed: Evoclaims, trials_of_both: Path) -> None:
+    committed("tables", "page.md")
+    shutil.rmtree("reference")
+    shutil.copytree(trials_of_both, ".evoclaims")
+    assert committed("tables", "page.md")[0] == 1
+    assert "**supported**" not in Path("page.md").read_text()
+
+
+def test_cases_that_end_alike_share_a_line(committed: Evoclaims, project: Project) -> None:
+    project.write(
+        """
+@says("a")
+@pytest.mark.parametrize("method", ["right", "wrong", "coin", "broken"])
+def test_a(trials, verdict, method):
+    verdict(trials(method, on="parity").solves_every_level.in_most_trials())
+"""
+    )
+    Path("page.md").write_text(PAGE.replace("full smoke smoke:traded", "smoke full"))
+    committed("tables", "page.md")
+    assert (
+        "| a | a at full size | broken, coin: not run<br>right: **supported** (10 of 10 trials; A)<br>"
+        "wrong: **refuted** (0 of 10 trials; A) | not run |"
+    ) in Path("page.md").read_text()
+
+
+def test_published_numbers_are_a_table_too(committed: Evoclaims) -> None:
+    Path("reported.toml").write_text(
+        'trials = 10\n[plots.parity.mean_success]\nplace = "x"\nscale = [0, 1]\nmethods.right.mean = [1]\n'
+    )
+    Path("page.md").write_text(PAGE.replace("verdicts full smoke smoke:traded", "numbers smoke all"))
+    committed("tables", "page.md")
+    text = Path("page.md").read_text()
+    assert "✓ inside | 7 to 10 trials at 1, ours 10" in text
+    assert "✗ outside | 7 to 10 trials at 1, ours 0" in text
+    assert "* traded: 1 outside" in text
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("# Nothing\n", "There is no table to write"),
+        (PAGE.replace("verdicts", "verdict"), "There is no kind of table named 'verdict'. Did you mean 'verdicts'?"),
+        (PAGE.replace("verdicts full", "verdicts ful"), "There is no tier named 'ful'."),
+        (PAGE.replace("smoke:traded", "smoke:trade"), "There is no variant named 'trade'."),
+        (None, "Cannot read page.md"),
+    ],
+)
+def test_a_mistake_is_a_sentence(committed: Evoclaims, text: str | None, said: str) -> None:
+    Path("page.md").unlink() if text is None else Path("page.md").write_text(text)
+    status, _, err = committed("tables", "page.md")
+    assert (status, said in " ".join(err.split())) == (2, True), err

@@ -1,0 +1,90 @@
+"""Published numbers beside ours, in the page and in Markdown; and what the paper's own numbers would not pass."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from laboratory import Laboratory, better_solves, better_wins
+
+from evoclaims.figures.readings import Reading, Readings
+from evoclaims.figures.replication import Replication
+from evoclaims.judging.repetition import Answer, PublishedMean, repetition
+from evoclaims.judging.verdict import Outcome
+from evoclaims.paper.reported import Reported
+from evoclaims.report import replication_cells
+from evoclaims.report.build import gather
+from evoclaims.report.html import html
+from evoclaims.report.markdown import markdown
+from evoclaims.report.model import Page
+
+
+def _number(values: list[float], error: float | None = 20.0, variant: str = "") -> Replication:
+    readings = Readings(
+        "<neat>", "maze", "reward", tuple(Reading(seed, "", "done", x, x) for seed, x in enumerate(values))
+    )
+    found = repetition(PublishedMean(900.0, error, 10), values, 10)
+    return Replication("full", variant, Reported(900.0, error, "Fig. 1", 10), readings, found)
+
+
+NUMBERS = (_number([700.0, 900.0] * 5), _number([900.0] * 10, variant="rows"), _number([]))
+PAGE = Page(title="A Paper", name="paper", boards=(), numbers=NUMBERS, put_to_the_paper=("G2 <would> not pass",))
+
+
+def test_cells_say_what_is_published_what_is_ours_and_whether_it_is_inside() -> None:
+    first, second, third = map(replication_cells.cells, NUMBERS)
+    assert first == (
+        "<neat> on maze: reward",
+        "the protocol",
+        "900 ± 20",
+        "800 ± 110 (10)",
+        "✗ outside",
+        "879.8 to 920.2 (SD: outside); 836 to 964 (SE: outside)",
+    )
+    assert (second[1], second[4]) == ("rows", "✓ inside")
+    assert third[3:] == ("–", "? cannot be said", "879.8 to 920.2 (SD); 836 to 964 (SE)")
+    assert replication_cells.answer(_number([], error=None)) == "? cannot be said: not run"
+
+
+def test_the_page_has_a_line_for_each_number_and_escapes_it() -> None:
+    text = html(PAGE)
+    assert "Do the numbers replicate?" in text
+    assert "&lt;neat&gt; on maze: reward" in text
+    for colour, answer in (("supported", "✓ inside"), ("refuted", "✗ outside"), ("inconclusive", "? cannot be said")):
+        assert f'<td class="is-{colour}">{answer}</td>' in text
+    assert "G2 &lt;would&gt; not pass" in text
+    assert replication_cells.HOW.split(",")[0] in text
+
+
+def test_markdown_has_the_same_table() -> None:
+    lines = markdown(PAGE).splitlines()
+    assert "## Do the numbers replicate?" in lines
+    assert "| number | protocol | published | ours | replicates | 95% of repetitions |" in lines
+    assert sum("&lt;neat&gt; on maze: reward" in line for line in lines) == 3
+    assert "the protocol: 1 outside, 1 cannot be said" in lines
+
+
+def test_without_numbers_nothing_is_said_of_them() -> None:
+    bare = Page(title="A Paper", name="paper", boards=())
+    assert "replicate?" not in html(bare)
+    assert "replicate?" not in markdown(bare)
+
+
+def test_a_claim_that_the_papers_own_numbers_would_not_pass_says_so(filled: Laboratory) -> None:
+    """Here the trials at hand stand for the paper's: `better` does not solve, but is better."""
+    solves, wins = filled.judge(better_solves, id="T1"), filled.judge(better_wins, id="T2")
+    assert (solves.outcome, wins.outcome) == (Outcome.REFUTED, Outcome.SUPPORTED)
+    control, unknown = replace(solves, where="control"), replace(solves, outcome=Outcome.ERROR)
+    for papers, told in (((solves, wins), True), ((control, wins), False), ((unknown, wins), False), ((), False)):
+        page = gather(
+            filled.reproduction,
+            {"full": [solves, wins]},
+            filled.archive,
+            {},
+            sentences={},
+            put_to_the_paper=papers,
+        )
+        first, second = page.sections
+        assert any("the paper's own numbers would not pass this assertion" in line for line in first.warnings) is told
+        assert not any("would not pass" in line for line in second.warnings)
+        assert bool(page.put_to_the_paper) is bool(papers)
+    assert Answer.UNKNOWN not in {number.answer for number in NUMBERS[:2]}
