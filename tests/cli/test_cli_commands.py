@@ -232,6 +232,32 @@ def test_plan_tells_times_as_of_a_device_that_trials_were_made_on(evoclaims: Evo
     assert "No trial of the smoke tier at hand was made on a device called 'abacus'" in err
 
 
+def test_plan_tells_what_the_reference_trials_have_cost(evoclaims: Evoclaims, stored: Store) -> None:
+    assert "reference trials" not in evoclaims("plan")[1]
+    assert evoclaims("reference")[0] == 0
+    path = Path("reference/smoke/right-parity.jsonl")
+    device = {"platform": "gpu", "kind": "NVIDIA Abacus", "count": 1}
+    timing = {"run": 7000.0, "compile": 200.0, "batch": 10, "started": "2026-01-01T00:00:00+00:00"}
+    references.write(path, [replace(t, provenance={"device": device}, timing=timing) for t in references.load(path)])
+    Path("reference/smoke/wrong-parity.jsonl").unlink()
+    out = evoclaims("plan")[1]
+    assert "took on one NVIDIA Abacus" in out
+    assert re.search(r"^right on parity +10 +0 +0 +0 s +2 h 00 min$", out, re.MULTILINE)
+    assert re.search(r"^wrong on parity +10 +0 +0 +0 s +not run$", out, re.MULTILINE)
+    assert re.search(r"^total +0 +0 s +2 h 00 min and more$", out, re.MULTILINE)
+    assert "Fewer than 10 reference trials: wrong on parity (0)." in out
+    assert re.search(r"^a +10 +.*supported or refuted +2 h 00 min$", out, re.MULTILINE)
+    assert re.search(r"^b +10 +.*supported or refuted +not run$", out, re.MULTILINE)
+
+
+def test_plan_tells_the_hours_of_a_cpu_core(evoclaims: Evoclaims, stored: Store) -> None:
+    assert evoclaims("reference")[0] == 0
+    out = evoclaims("plan", "--tier", "full")[1]
+    assert "CPU core hours" in out
+    assert "took on one" not in out
+    assert re.search(r"^right on parity +0 +10 +80 +unknown +< 1$", out, re.MULTILINE)
+
+
 def test_plan_times_a_few_steps_where_it_is_asked_to_and_stores_none(evoclaims: Evoclaims) -> None:
     status, out, _ = evoclaims("plan", "--measure", "--tier", "full")
     assert status == 0

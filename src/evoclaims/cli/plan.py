@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Final
 
 from rich.markup import escape
 from rich.table import Table
@@ -14,6 +15,7 @@ from evoclaims.core.errors import UserError
 from evoclaims.judging.verdict import Outcome
 from evoclaims.paper.cost import Pace, known_pace, measured_pace
 from evoclaims.paper.reproduction import Tier
+from evoclaims.paper.spent import Spent, spent
 from evoclaims.report.console import PlainSpokenConsole
 from evoclaims.report.live_line import duration
 from evoclaims.trials import devices
@@ -21,6 +23,12 @@ from evoclaims.trials.spec import Condition, TrialSpec
 from evoclaims.trials.store import Store
 from evoclaims.trials.time_limit import answers
 from evoclaims.verdicts.claim_report import ClaimReport
+
+Costs = Mapping[tuple[str, str], Spent]
+"""What the reference trials have cost, by method and task."""
+
+HOUR: Final = 3600
+"""Seconds."""
 
 
 def main(options: argparse.Namespace) -> int:
@@ -38,14 +46,17 @@ def main(options: argparse.Namespace) -> int:
         return measured_pace(condition, chosen) if known is None and options.measure else known
 
     paces = {names: pace(tier.condition(*names), *names) for names in used}
+    costs = {names: spent(reproduction, options.tier, *names) for names in used}
     if options.like and not any(paces.values()):
         raise UserError(f"No trial of the {options.tier} tier at hand was made on a device called {options.like!r}.")
     console = PlainSpokenConsole(file=styled())
     where = f"as they took on one {kind}" if options.like else f"on {len(chosen)} × {kind}"
     console.print(escape(f"Conditions of the {options.tier} tier, {where}"))
-    console.print(_conditions(tier, store, used, paces, project.config.seconds(None)))
+    console.print(_conditions(tier, store, used, paces, costs, project.config.seconds(None)))
+    for sentence in _about(costs, tier.protocol.last.n):
+        console.print(escape(sentence))
     console.print(f"\nClaims: the smallest p that the protocol allows (n trials a side, α {tier.protocol.alpha:g})")
-    console.print(_claims(reports))
+    console.print(_claims(reports, costs))
     if any(pace is None for pace in paces.values()):
         console.print("\nTimes are unknown where no trial has run on such a device; --measure times a few steps.")
     return 0
@@ -56,17 +67,22 @@ def _conditions(
     store: Store,
     used: Sequence[tuple[str, str]],
     paces: dict[tuple[str, str], Pace | None],
+    costs: Costs,
     limit: float,
 ) -> Table:
     """Build the table of conditions; steps and times are upper bounds, since a trial that has solved all levels stops.
 
-    Trials that ran out of less time than `limit` (seconds) count as missing, too.
+    Trials that ran out of less time than `limit` (seconds) count as missing, too. Where there are reference trials,
+    their cost is shown.
     """
     table = Table(box=None, pad_edge=False)
-    for heading in ("condition", "cached", "missing", "environment steps", "time, at most"):
+    kinds, cores = _kinds(costs), any(cost.core_pace for cost in costs.values())
+    measured = [f"took on one {kind}" for kind in kinds] + ["CPU core hours"] * cores
+    for heading in ("condition", "cached", "missing", "environment steps", "time, at most", *measured):
         table.add_column(heading, justify="left" if heading == "condition" else "right")
     seeds = tier.protocol.seeds(tier.protocol.last.n)
     steps, seconds, unknown = 0, 0.0, False
+    needed = {names: costs[names].core_seconds(tier.condition(*names).environment_steps * len(seeds)) for names in used}
     for names in used:
         condition = tier.condition(*names)
         versions = condition.versions
@@ -81,18 +97,66 @@ def _conditions(
             str(missing),
             f"{owed:,}",
             "unknown" if time is None else duration(time),
+            *(_took(costs, [names], kind) for kind in kinds),
+            *([_core_hours(needed[names])] if cores else []),
         )
         steps, seconds, unknown = steps + owed, seconds + (time or 0.0), unknown or time is None
-    table.add_row("total", "", "", f"{steps:,}", duration(seconds) + (" and more" if unknown else ""), style="bold")
+    table.add_row(
+        "total",
+        "",
+        "",
+        f"{steps:,}",
+        duration(seconds) + (" and more" if unknown else ""),
+        *(_took(costs, used, kind) for kind in kinds),
+        *([_core_hours(sum(filter(None, needed.values())))] if cores else []),
+        style="bold",
+    )
     return table
 
 
-def _claims(reports: Sequence[ClaimReport]) -> Table:
+def _kinds(costs: Costs) -> list[str]:
+    """Return the kinds of accelerators that reference trials were made on."""
+    return sorted({kind for cost in costs.values() for kind in cost.seconds})
+
+
+def _took(costs: Costs, names: Sequence[tuple[str, str]], kind: str) -> str:
+    """Return the time that the reference trials of some conditions took on a kind of accelerator."""
+    found = [costs[name] for name in names]
+    seconds = sum(cost.seconds.get(kind, 0.0) for cost in found)
+    missing = any(not cost.trials for cost in found)
+    if not seconds:
+        return "not run" if missing else "–"
+    return duration(seconds) + (" and more" if missing else "")
+
+
+def _core_hours(seconds: float | None) -> str:
+    """Return hours of one core of a CPU."""
+    if seconds is None:
+        return "unknown"
+    hours = seconds / HOUR
+    return f"{hours:,.0f}" if hours >= 1 else "< 1"
+
+
+def _about(costs: Costs, n: int) -> list[str]:
+    """Say how to read the cost of the reference trials, and which are missing."""
+    if not any(cost.trials for cost in costs.values()):
+        return []
+    few = [f"{' on '.join(names)} ({cost.trials})" for names, cost in costs.items() if cost.trials < n]
+    sentences = [
+        "Measured on the committed reference trials: what they took, with compiling. Estimated from them: the hours of "
+        "a CPU's core that all trials' whole budgets would take, at the pace of that method and task at any tier."
+    ]
+    return [*sentences, f"Fewer than {n} reference trials: {', '.join(few)}."] if few else sentences
+
+
+def _claims(reports: Sequence[ClaimReport], costs: Costs) -> Table:
     """Build the table of claims."""
     table = Table(box=None, pad_edge=False)
-    for heading in ("claim", "n", "α", "p for", "p against", "can be decided"):
+    kinds = _kinds(costs)
+    for heading in ("claim", "n", "α", "p for", "p against", "can be decided", *(f"took on one {k}" for k in kinds)):
         table.add_column(heading, justify="left" if heading == "claim" else "right")
     for report in reports:
+        used = [(source.method, source.task) for source in report.sources]
         for look in report.attainable:
             smallest = {Outcome.SUPPORTED: look.supported, Outcome.REFUTED: look.refuted}
             reach = [outcome for outcome, p in smallest.items() if p <= look.alpha]
@@ -103,5 +167,6 @@ def _claims(reports: Sequence[ClaimReport]) -> Table:
                 f"{look.supported:.2g}",
                 f"{look.refuted:.2g}",
                 " or ".join(reach) or "no",
+                *(_took(costs, used, kind) for kind in kinds if look is report.attainable[-1]),
             )
     return table

@@ -7,6 +7,7 @@ from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Final
 
+from evoclaims.judging.verdict import Outcome
 from evoclaims.report.formatting import plural
 from evoclaims.report.markdown_text import literal, table
 from evoclaims.report.table_cells import NONE, in_the_papers_order
@@ -17,6 +18,14 @@ Versions = dict[str, str]
 
 _SHOWN: Final = ("python", "jax", "jaxlib")
 """Packages whose versions are shown for every trial; others only where a trial depends on them."""
+
+HOW: Final = (
+    "In parentheses: in how many of the judged trials the event holds that decided, or the effect (A12) or the finding "
+    "of the part that decided; then a letter for the device and the versions that the trials were made with."
+)
+"""How to read the table."""
+
+NOT_RUN: Final = "*not run*: there are no trials of it yet, or the variant changes none of them."
 
 
 def overview(columns: Mapping[str, Sequence[ClaimReport]], sentences: Mapping[str, str], reader: Reader) -> str:
@@ -37,7 +46,13 @@ def overview(columns: Mapping[str, Sequence[ClaimReport]], sentences: Mapping[st
         (literal(claim), literal(sentence), *(_cell(found[heading], made) for heading in columns))
         for (claim, sentence), found in rows.items()
     ]
-    return "\n\n".join((table(("claim", "the paper says", *map(literal, columns)), lines), made.legend()))
+    missing = any(report.outcome is Outcome.NOT_RUN for reports in columns.values() for report in reports)
+    blocks = (
+        table(("claim", "the paper says", *map(literal, columns)), lines),
+        HOW + f" {NOT_RUN}" * missing,
+        made.legend(),
+    )
+    return "\n\n".join(filter(None, blocks))
 
 
 class Environments:

@@ -1,0 +1,80 @@
+"""What committed trials have cost: time of an accelerator by condition, and the pace of a CPU's core."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from evoclaims.paper import references
+from evoclaims.paper.reproduction import Reproduction
+from evoclaims.trials.result import TrialResult
+
+
+@dataclass(frozen=True)
+class Spent:
+    """What the reference trials of a condition have cost, and would cost.
+
+    Attributes:
+        trials: how many there are.
+        seconds: of one accelerator, by its kind, with compiling; empty when no trial was made on one.
+        core_pace: seconds of a CPU's core per environment step, by trials of the same method and task, if need be of
+            another tier; None where none was made on a CPU.
+    """
+
+    trials: int
+    seconds: Mapping[str, float]
+    core_pace: float | None
+
+    def core_seconds(self, steps: int) -> float | None:
+        """Return the seconds of a CPU's core that so many environment steps would take; None where nothing is known."""
+        return None if self.core_pace is None else self.core_pace * steps
+
+
+def spent(reproduction: Reproduction, tier: str, method: str, task: str) -> Spent:
+    """Return what the committed trials of a condition have cost.
+
+    Raises:
+        UserError: when a file of reference trials cannot be read.
+    """
+    condition = reproduction.tier(tier).condition(method, task)
+    trials = [trial for trial in _committed(reproduction, tier, method, task) if trial.condition == condition.id]
+    seconds: dict[str, float] = defaultdict(float)
+    for batch in _batches(trials):
+        device = _device(batch[0])
+        if device.get("platform") != "cpu":
+            seconds[str(device.get("kind"))] += batch[0].timing["run"] + batch[0].timing["compile"]
+    others = (_committed(reproduction, name, method, task) for name in reproduction.tiers if name != tier)
+    paces = (_core_pace(found) for found in (trials, *others))
+    return Spent(len(trials), dict(seconds), next((pace for pace in paces if pace is not None), None))
+
+
+def _committed(reproduction: Reproduction, tier: str, method: str, task: str) -> tuple[TrialResult, ...]:
+    """Read a file of reference trials."""
+    return references.load(references.path_of(reproduction.references, tier, method, task))
+
+
+def _core_pace(trials: Iterable[TrialResult]) -> float | None:
+    """Return the seconds of a core per environment step; a batch takes as many cores as it has trials, if there are."""
+    used = steps = 0.0
+    for batch in _batches(trials):
+        device = _device(batch[0])
+        if device.get("platform") == "cpu":
+            used += batch[0].timing["run"] * min(int(device.get("count") or 1), len(batch))
+            steps += sum(trial.metrics.get("environment_steps", 0.0) for trial in batch)
+    return used / steps if steps else None
+
+
+def _batches(trials: Iterable[TrialResult]) -> list[list[TrialResult]]:
+    """Return trials by batch, which share their times; those that did not end by themselves are left out."""
+    found: dict[tuple[str, str], list[TrialResult]] = defaultdict(list)
+    for trial in trials:
+        if trial.status == "done":
+            found[str(trial.timing["started"]), str(_device(trial).get("kind"))].append(trial)
+    return list(found.values())
+
+
+def _device(trial: TrialResult) -> Mapping[str, Any]:
+    """Return what a record says about its device; nothing for old records."""
+    return trial.provenance.get("device") or {}

@@ -1,0 +1,65 @@
+"""What reference trials have cost: per batch, on the accelerator that they were made on, and per core of a CPU."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Any
+
+import pytest
+from hand_made_paper import CONDITIONS
+
+from evoclaims.paper import references
+from evoclaims.paper.reproduction import Reproduction
+from evoclaims.paper.spent import spent
+from evoclaims.trials.result import TrialResult
+from evoclaims.trials.spec import Condition
+
+BETTER = CONDITIONS["better", "small"]
+GPU = {"platform": "gpu", "kind": "NVIDIA H200", "count": 1}
+CPU = {"platform": "cpu", "kind": "cpu", "count": 2}
+
+
+@pytest.fixture
+def batch(made: Callable[..., TrialResult]) -> Callable[..., list[TrialResult]]:
+    """A function that makes trials of one batch, which ran for 60 seconds after compiling for 3."""
+
+    def make(
+        seeds: Sequence[int], device: dict[str, Any], started: str = "now", condition: Condition = BETTER
+    ) -> list[TrialResult]:
+        timing = {"run": 60.0, "compile": 3.0, "batch": len(seeds), "started": started}
+        return [replace(made(condition, seed, 1.0, device=device), timing=timing) for seed in seeds]
+
+    return make
+
+
+def _commit(reproduction: Reproduction, tier: str, trials: list[TrialResult]) -> None:
+    references.write(references.path_of(reproduction.references, tier, "better", "small"), trials)
+
+
+def test_a_batch_is_paid_once_and_batches_add_up(reproduction: Reproduction, batch: Any) -> None:
+    _commit(reproduction, "full", [*batch(range(5), GPU), *batch(range(5, 10), GPU, "later")])
+    found = spent(reproduction, "full", "better", "small")
+    assert (found.trials, found.seconds, found.core_pace) == (10, {"NVIDIA H200": 126.0}, None)
+    assert found.core_seconds(1_000) is None
+
+
+def test_a_core_s_pace_is_the_tier_s_own_or_another_s(reproduction: Reproduction, batch: Any) -> None:
+    """Records have 100 environment steps and their seed: seeds 0 and 1 took two cores 60 s for 201 steps."""
+    _commit(reproduction, "smoke", batch(range(2), CPU))
+    found = spent(reproduction, "full", "better", "small")
+    assert (found.trials, found.seconds) == (0, {})
+    assert found.core_seconds(201) == pytest.approx(120.0)
+    _commit(reproduction, "full", batch(range(1), CPU))
+    assert spent(reproduction, "full", "better", "small").core_seconds(100) == pytest.approx(60.0)
+
+
+def test_trials_of_another_condition_or_without_an_end_count_for_nothing(
+    reproduction: Reproduction, batch: Any
+) -> None:
+    stale = batch(range(2), GPU, condition=CONDITIONS["better", "large"])
+    crashed = [replace(trial, status="timeout") for trial in batch(range(2, 4), GPU)]
+    _commit(reproduction, "full", [*stale, *crashed])
+    found = spent(reproduction, "full", "better", "small")
+    assert (found.trials, found.seconds) == (2, {})
+    assert spent(reproduction, "full", "worse", "small").trials == 0
