@@ -34,6 +34,14 @@ methods.better.mean = [5]
 place = "Fig. 3"
 methods.better.mean = [70]
 
+[plots.small.covered]
+place = "Fig. 4"
+methods.better.mean = [0.6]
+
+[plots.small.failures]
+place = "Fig. 5"
+methods.better.mean = [0.25]
+
 [plots.large.last_success]
 place = "§1"
 methods.better.mean = [1]
@@ -41,11 +49,19 @@ methods.better.mean = [1]
 
 
 class Stepped(TrialGroup):
-    """With a measure of the paper's own."""
+    """With measures of the paper's own; the last is computed from what it reads."""
 
     @property
     def steps(self) -> Any:
         return self.measure("steps", lambda t: t.metrics["environment_steps"], "lower")
+
+    @property
+    def covered(self) -> Any:
+        return self.measure("covered", lambda t: t.curves["coverage"][-1])
+
+    @property
+    def failures(self) -> Any:
+        return self.measure("failures", lambda t: 1 - t.metrics["share"], "lower")
 
 
 @pytest.fixture
@@ -85,6 +101,8 @@ def test_a_curve_below_1_does_not_pass_as_solving(put: Callable[..., ClaimReport
         (lambda trials: trials("better").mean_success.between(0.92, 0.93), Outcome.SUPPORTED),
         (lambda trials: trials("better").reward.between(4, 6), Outcome.SUPPORTED),
         (lambda trials: trials("better").steps.between(60, 80), Outcome.SUPPORTED),
+        (lambda trials: trials("better").covered.between(0.5, 0.7), Outcome.SUPPORTED),
+        (lambda trials: trials("better").failures.between(0.2, 0.3), Outcome.ERROR),
         (lambda trials: trials("better", "large").solves_the_last_level.in_most_trials(), Outcome.SUPPORTED),
     ],
 )

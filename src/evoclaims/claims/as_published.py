@@ -3,17 +3,23 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import takewhile
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, Final
 
 from evoclaims.claims.fetching import NotStoredError
 from evoclaims.judging.measure import Profile
 from evoclaims.paper.reproduction import Reproduction
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.spec import Condition, TrialSpec
+
+PARTS: Final = ("metrics", "levels", "curves")
+"""The parts of a record that measures read."""
+
+Numbers = dict[str, dict[str, Any]]
+"""What a record has in each part, by name."""
 
 
 @dataclass(frozen=True)
@@ -39,46 +45,54 @@ class AsPublished:
         conditions = self.reproduction.tier(self.tier).conditions
         names = [name for name, known in conditions.items() if known.id == condition.id]
         for method, task in names:
-            metrics, levels = self._numbers(method, task, condition)
-            if metrics or levels:
-                return [_record(TrialSpec(condition, seed), metrics, levels) for seed in seeds]
+            numbers = self._numbers(method, task, condition)
+            if any(numbers.values()):
+                return [_record(TrialSpec(condition, seed), numbers) for seed in seeds]
         label = " on ".join(names[0]) if names else condition.label
         raise NotStoredError(f"no number of {label} is published")
 
-    def _numbers(
-        self, method: str, task: str, condition: Condition
-    ) -> tuple[dict[str, float], dict[str, tuple[float, ...]]]:
-        """Return metrics and levels as a record has them, with what follows from them."""
-        metrics: dict[str, float] = {}
-        levels: dict[str, tuple[float, ...]] = {}
+    def _numbers(self, method: str, task: str, condition: Condition) -> Numbers:
+        """Return the published numbers where a record has them, with what follows from them."""
+        numbers: Numbers = {part: {} for part in PARTS}
         group = self.reproduction.trials(method, task, condition, self)
         for quantity, plot in self.reproduction.published.plots.get(task, {}).items():
             means = tuple(map(float, plot["methods"].get(method, {}).get("mean", ())))
             measure: Any = getattr(group, quantity)
-            asked_metrics, asked_levels = _asked(measure.read)
-            if isinstance(measure, Profile) and len(means) == measure.size:
-                levels |= dict.fromkeys(asked_levels, means)
-            elif not isinstance(measure, Profile) and means:
-                metrics |= dict.fromkeys(asked_metrics, means[0])
-        return {**metrics, **_implied(metrics, levels, condition.task.levels)}, levels
+            if means and (not isinstance(measure, Profile) or len(means) == measure.size):
+                value = means if isinstance(measure, Profile) else means[0]
+                for part, found in _placed(measure.read, value).items():
+                    numbers[part].update(found)
+        implied = _implied(numbers["metrics"], numbers["levels"], condition.task.levels)
+        numbers["metrics"].update(implied)
+        return numbers
 
 
-def _asked(read: Any) -> tuple[list[str], list[str]]:
-    """Return the names of the metrics and of the levels that a measure reads from a record."""
-    metrics, levels = _Noting(), _Noting()
-    read(SimpleNamespace(metrics=metrics, levels=levels, curves={}))
-    return metrics.asked, levels.asked
+def _placed(read: Callable[[Any], Any], value: Any) -> Numbers:
+    """Return the part of a record in which a measure finds `value`; nothing if it computes more than it reads.
+
+    The measure is given a record that has every name and notes which one is asked for, then one with that name alone.
+    """
+    asking = {part: _Noting(0.0 if part == "metrics" else (0.0,)) for part in PARTS}
+    try:
+        read(SimpleNamespace(**asking))
+        ((part, name),) = [(part, name) for part in PARTS for name in asking[part].asked]
+        held = value if part == "metrics" or isinstance(value, tuple) else (value,)
+        placed = {known: {name: held} if known == part else {} for known in PARTS}
+        return placed if read(SimpleNamespace(**placed)) == value else {}
+    except (ArithmeticError, LookupError, TypeError, ValueError):  # it needs more than one number
+        return {}
 
 
 class _Noting(dict[str, Any]):
-    """A mapping that has every name and notes those that are read."""
+    """A mapping that has every name, with one value, and notes those that are read."""
 
-    def __init__(self) -> None:
+    def __init__(self, value: Any) -> None:
         self.asked: list[str] = []
+        self._value = value
 
-    def __missing__(self, name: str) -> float:
+    def __missing__(self, name: str) -> Any:
         self.asked.append(name)
-        return 0.0
+        return self._value
 
 
 def _implied(metrics: Mapping[str, float], levels: Mapping[str, tuple[float, ...]], count: int) -> dict[str, float]:
@@ -94,7 +108,7 @@ def _implied(metrics: Mapping[str, float], levels: Mapping[str, tuple[float, ...
     return {"furthest_solved": count - 1.0} if metrics.get("last_success") == 1.0 else {}
 
 
-def _record(spec: TrialSpec, metrics: Mapping[str, float], levels: Mapping[str, tuple[float, ...]]) -> TrialResult:
+def _record(spec: TrialSpec, numbers: Numbers) -> TrialResult:
     """Return a record of a finished trial with these numbers."""
     return TrialResult(
         id=spec.id,
@@ -102,9 +116,9 @@ def _record(spec: TrialSpec, metrics: Mapping[str, float], levels: Mapping[str, 
         spec=spec.plain,
         seed=spec.seed,
         status="done",
-        metrics=metrics,
-        levels=levels,
-        curves={},
+        metrics=numbers["metrics"],
+        levels=numbers["levels"],
+        curves=numbers["curves"],
         digest="",
         timing={},
         provenance={},

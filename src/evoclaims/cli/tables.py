@@ -78,10 +78,11 @@ def _verdicts(project: Project, words: list[str]) -> str:
     asked = [(tier, variant) for tier, _, variant in (word.partition(":") for word in words or tiers)]
     for column in asked:
         project.reproduction.tier(*column)
-    *columns, papers = project.judge_variants([*asked, (tiers[0], "")])
-    headings = [f"{tier}, {variant}" if variant else tier for tier, variant in asked]
-    sentences = {report.name: report.statement for report in papers}
-    return overview(dict(zip(headings, columns, strict=True)), sentences, Reader(project.archive))
+    every = list(dict.fromkeys((*asked, (tiers[0], ""))))
+    judged = dict(zip(every, project.judge_variants(every), strict=True))
+    columns = {f"{tier}, {variant}" if variant else tier: judged[tier, variant] for tier, variant in asked}
+    sentences = {report.name: report.statement for report in judged[tiers[0], ""]}
+    return overview(columns, sentences, Reader(project.archive))
 
 
 def _numbers(project: Project, words: list[str]) -> str:
