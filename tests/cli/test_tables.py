@@ -40,16 +40,17 @@ def test_a_table_is_written_between_its_marks_once(committed: Evoclaims, project
         "| a | a at full size | not run | **supported** (10 of 10 trials; A) | **refuted** (0 of 10 trials; A) |"
         in lines
     )
-    assert "| b | b at full size | not run | **refuted** (0 of 10 trials; A) | not run |" in lines
+    assert "| b | b at full size | not run | **refuted** (0 of 10 trials; A) | – |" in lines
     (legend,) = [line for line in lines if line.startswith("* A: cpu; ")]
     assert "jax " in legend
     assert "python " in legend
-    assert any(line.startswith("In parentheses") and "*not run*" in line for line in lines)
+    assert any(line.startswith("In parentheses") and "*not run*" in line and "–: the variant" in line for line in lines)
     assert committed("tables", "page.md") == (0, "page.md: as it was\n", "")
     assert "An old table" not in text
     Path("page.md").write_text(PAGE.replace("full smoke smoke:traded", "smoke"))
     committed("tables", "page.md")
     assert "not run" not in Path("page.md").read_text()
+    assert "variant" not in Path("page.md").read_text()
 
 
 def test_a_store_changes_no_table(committed: Evoclaims, trials_of_both: Path) -> None:

@@ -25,7 +25,8 @@ HOW: Final = (
 )
 """How to read the table."""
 
-NOT_RUN: Final = "*not run*: there are no trials of it yet, or the variant changes none of them."
+NOT_RUN: Final = "*not run*: there are no trials of it yet."
+NOT_CHANGED: Final = f"{NONE}: the variant changes none of the claim's trials, or they have not run."
 
 
 def overview(columns: Mapping[str, Sequence[ClaimReport]], sentences: Mapping[str, str], reader: Reader) -> str:
@@ -46,12 +47,10 @@ def overview(columns: Mapping[str, Sequence[ClaimReport]], sentences: Mapping[st
         (literal(claim), literal(sentence), *(_cell(found[heading], made) for heading in columns))
         for (claim, sentence), found in rows.items()
     ]
-    missing = any(report.outcome is Outcome.NOT_RUN for reports in columns.values() for report in reports)
-    blocks = (
-        table(("claim", "the paper says", *map(literal, columns)), lines),
-        HOW + f" {NOT_RUN}" * missing,
-        made.legend(),
-    )
+    every = [report for reports in columns.values() for report in reports]
+    missing = any(report.outcome is Outcome.NOT_RUN and not report.variant for report in every)
+    says = [HOW, *([NOT_RUN] if missing else []), *([NOT_CHANGED] if any(report.variant for report in every) else [])]
+    blocks = (table(("claim", "the paper says", *map(literal, columns)), lines), " ".join(says), made.legend())
     return "\n\n".join(filter(None, blocks))
 
 
@@ -108,7 +107,7 @@ def _cell(reports: Sequence[ClaimReport], made: Environments) -> str:
 def _verdict(report: ClaimReport, made: Environments) -> str:
     """Return a verdict with its evidence in short, such as "**refuted** (2 of 10 trials; A)"."""
     if not report.n:
-        return literal(report.outcome)
+        return NONE if report.variant and report.outcome is Outcome.NOT_RUN else literal(report.outcome)
     return f"**{literal(report.outcome)}** ({literal(_evidence(report))}; {made.letters(report)})"
 
 
