@@ -46,6 +46,26 @@ def test_a_repetition_of_normal_trials_is_inside_in_95_of_100_draws(reading: Spr
     assert inside / DRAWN == pytest.approx(0.95, abs=3 * math.sqrt(0.95 * 0.05 / DRAWN))
 
 
+@pytest.mark.parametrize(
+    ("population", "lowest", "highest"),
+    [
+        ([0.5, 0.55, 0.6, 0.75, 0.75, 0.8, 0.9, 1.0, 1.0, 1.0], 0.93, 0.97),
+        ([0.7, 0.93, 0.96, 0.98, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0], 0.7, 0.9),
+    ],
+    ids=["spread over the scale", "most at its end"],
+)
+def test_where_most_trials_are_at_the_end_of_the_scale_fewer_repetitions_are_inside(
+    population: list[float], lowest: float, highest: float
+) -> None:
+    """As docs/replication.md warns: such a population is not normal, and one low trial makes much of its spread."""
+    rng = np.random.default_rng(20261122)
+    inside = 0
+    for theirs, ours in zip(*rng.choice(population, (2, DRAWN, 10)), strict=True):
+        published = PublishedMean(float(theirs.mean()), statistics.stdev(theirs), 10, UNIT)
+        inside += repetition(published, [*map(float, ours)], 10).predictions[0].answer is Answer.INSIDE
+    assert lowest <= inside / DRAWN <= highest
+
+
 @pytest.mark.parametrize("probability", [0.5, 0.9, 0.99])
 def test_a_repetition_of_trials_all_at_the_end_of_the_scale_is_seldom_outside(probability: float) -> None:
     """Exactly: all ten published trials are at the end, and too few of ours; for any probability at most 5%."""
