@@ -25,6 +25,7 @@ PACKAGES: Final = (
     "qdax",
     "mujoco",
     "mujoco-mjx",
+    "llvmlite",
     "scipy",
     "statsmodels",
     "pandas",
