@@ -19,5 +19,6 @@ REPRODUCTION = Reproduction(
     },
     variants=VARIANTS,
     trials=PaperTrials,
+    mutants=f"{__name__}.mutants",
     figures=tuple(f"{__name__}.{name}" for name in (*(f"fig{n}" for n in range(3, 11)), "tables")),
 )

@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+import csv
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
-from tiny_project import Evoclaims
+import pytest
+from tiny_project import BODIES, Evoclaims, Project
 
 from evoclaims.trials.store import Store
-from evoclaims.verdicts.mutation_matrix import Fate, load
+from evoclaims.verdicts.mutation_matrix import Fate, dump, load
+from evoclaims.verdicts.sensitivity import Tried
 
 BLIND = "parity: blind"
+Sentence = Callable[[pytest.RunResult, str], None]
 
 
 def test_a_claim_notices_a_blind_task_and_no_fault_in_what_never_learns(evoclaims: Evoclaims, stored: Store) -> None:
@@ -18,11 +24,12 @@ def test_a_claim_notices_a_blind_task_and_no_fault_in_what_never_learns(evoclaim
     matrix = load(Path("mutants.toml"))
     right = matrix["smoke", "a"]
     assert BLIND in right.named(Fate.KILLED)
+    assert right.methods == right.unnoticed == ("right",)
     assert "parity: wrong-row" in right.named(Fate.KILLED)
     assert "right: minimizes" in right.named(Fate.EQUIVALENT)
-    assert not right.insensitive
-    assert f"{BLIND}" in out
-    assert "mutants change a verdict" in out.splitlines()[-2]
+    assert right.tried is Tried.SENSITIVE
+    assert (f"{BLIND}" in out, right.untried) == (True, ())
+    assert "planted faults change a verdict" in out.splitlines()[-2]
     before = len(stored.ids())
     assert evoclaims("mutants", "--mutant=blind")[0] == 0
     assert len(stored.ids()) == before
@@ -46,7 +53,49 @@ def test_a_users_mistake_is_one_sentence(evoclaims: Evoclaims, stored: Store) ->
         assert said in err
 
 
-def test_without_verdicts_there_is_nothing_to_change(evoclaims: Evoclaims) -> None:
-    status, _, err = evoclaims("mutants")
+def _insensitive() -> None:
+    """Write a matrix in which no fault changes the claim `a`, of whatever it is about now."""
+    path = Path("mutants.toml")
+    row = load(path)["smoke", "a"]
+    survived = tuple(replace(one, part="method", fate=Fate.SURVIVED) for one in row.attempts)
+    path.write_text(dump({("smoke", "a"): replace(row, attempts=survived, untried=())}))
+
+
+def test_a_claim_that_notices_no_fault_is_called_insensitive_wherever_it_is_shown(
+    evoclaims: Evoclaims, stored: Store, project: Project
+) -> None:
+    said = "planted faults: not tried"
+    assert said in evoclaims("status")[1]
+    assert evoclaims("mutants", "--mutant=paralysed")[0] == 0
+    assert said in evoclaims("status")[1]  # only one of those that apply
+    _insensitive()
+    counted = "1 supported but insensitive, 1 refuted"
+    _, out, _ = evoclaims("status")
+    assert f"claims (smoke): {counted}\nplanted faults: 1 insensitive, 1 not tried" in out
+    assert [line.strip() for line in out.splitlines()].count("insensitive") == 1  # below "✓ supported,"
+    assert "wrote claims-smoke.svg: supported but insensitive 1 / refuted 1" in evoclaims("badge")[1]
+    assert f"claims (smoke): {counted}" in evoclaims("report", "--tier=smoke")[1]
+    for page in ("report/report.md", "report/index.html"):
+        assert "Insensitive. Planted faults: 0 of 1 change this verdict" in Path(page).read_text()
+    assert evoclaims("export", "--verdicts", "--tier=smoke", "--as=csv")[0] == 0
+    heading, *rows = csv.reader(Path("verdicts.csv").read_text().splitlines())
+    assert [row[heading.index("faults")] for row in rows] == ["insensitive", "not tried"]
+    run = project.run("-msmoke", own_store=True)
+    run.stdout.fnmatch_lines([f"claims: {counted}", "planted faults: 1 insensitive, 1 not tried"])
+    project.write(a=BODIES["supported"].replace("in_most_trials()", "in_most_trials(p0=0.6)"), b="refuted")
+    _, out, _ = evoclaims("status")
+    assert "claims (smoke): 1 supported, 1 refuted" in out  # the matrix is about another claim than that of now
+    assert said in out
+
+
+def test_a_matrix_that_is_damaged_is_told_before_the_first_trial(project: Project, sentence: Sentence) -> None:
+    project.write(a="supported")
+    Path("mutants.toml").write_text("schema = 1\n[smoke.a")
+    sentence(project.run("-msmoke"), "mutants.toml holds no matrix of mutants")
+
+
+def test_stored_trials_alone_are_judged_if_asked_for(evoclaims: Evoclaims, project: Project) -> None:
+    status, _, err = evoclaims("mutants", "--stored")
     assert (status, err.count("\n")) == (2, 1)
     assert "No claim of the smoke tier is judged yet" in err
+    assert not Path("mutants.toml").exists()

@@ -18,6 +18,7 @@ PACKAGES = (
     "evoclaims.networks",
     "evoclaims.envs",
     "evoclaims.figures",
+    "evoclaims.mutants",
 )
 PYTHON = [
     path.relative_to(ROOT) for folder in ("claims", "reproductions") for path in sorted((ROOT / folder).rglob("*.py"))

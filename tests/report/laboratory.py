@@ -34,6 +34,7 @@ from evoclaims.trials.spec import Condition
 from evoclaims.trials.store import Store
 from evoclaims.verdicts.claim_report import ClaimReport
 from evoclaims.verdicts.history import History
+from evoclaims.verdicts.mutation_matrix import Matrix
 
 SMALL = Settings(population=16, nodes=12, connections=24, activations=("tanh",), species=Species(most=4))
 METHODS: dict[str, Any] = {"better": HandBuilt(), "worse": HandBuilt(negated=True), "neat": Neat(SMALL)}
@@ -112,6 +113,7 @@ class Laboratory:
         *reports: ClaimReport,
         history: History | None = None,
         figures: Sequence[PaperFigure] = (),
+        mutants: Matrix | None = None,
         sentences: dict[str, str] | None = None,
     ) -> Page:
         """Gather reports by their tiers."""
@@ -123,6 +125,7 @@ class Laboratory:
             history or {},
             sentences=sentences or {},
             figures=figures,
+            mutants=mutants,
             generated="Written by a test.",
         )
 

@@ -2,13 +2,28 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from hand_made_verdicts import report, verdict
 
 from evoclaims.core.errors import UserError
 from evoclaims.judging.verdict import Outcome
-from evoclaims.verdicts.mutation_matrix import Attempt, Fate, Matrix, Sensitivity, dump, fate, load, score
+from evoclaims.verdicts.mutation_matrix import (
+    Attempt,
+    Fate,
+    Matrix,
+    Part,
+    Sensitivity,
+    described,
+    dump,
+    fate,
+    load,
+    tried,
+)
+from evoclaims.verdicts.mutation_score import score
+from evoclaims.verdicts.sensitivity import Tried
 
 SUPPORTED, REFUTED = Outcome.SUPPORTED, Outcome.REFUTED
 
@@ -29,41 +44,83 @@ def test_a_mutant_is_killed_where_the_outcome_differs_and_only_there(
     assert fate(sound, faulty, equivalent=True, drifted=drifted) is Fate.EQUIVALENT
 
 
-def row(**fates: Fate) -> Sensitivity:
-    attempts = tuple(Attempt(name, "neat", REFUTED, one) for name, one in fates.items())
-    return Sensitivity(SUPPORTED, "f" * 64, attempts)
+def attempt(name: str, fate: Fate, target: str = "neat", part: Part = "method") -> Attempt:
+    return Attempt(name, part, target, REFUTED if fate is Fate.KILLED else SUPPORTED, fate)
 
 
-def test_a_claim_is_insensitive_when_mutants_were_tried_and_none_has_changed_it() -> None:
-    assert row(a=Fate.SURVIVED, b=Fate.DRIFTED).insensitive
-    assert not row(a=Fate.SURVIVED, b=Fate.KILLED).insensitive
-    assert not row(a=Fate.EQUIVALENT, b=Fate.BROKEN).insensitive
-    assert not row().insensitive
+def row(*attempts: Attempt, untried: tuple[str, ...] = (), **fates: Fate) -> Sensitivity:
+    own = tuple(attempt(name, one) for name, one in fates.items())
+    return Sensitivity(SUPPORTED, "f" * 64, ("neat",), (*own, *attempts), untried)
 
 
-def test_a_target_is_unnoticed_when_none_of_its_mutants_has_changed_the_verdict() -> None:
-    attempts = (
-        Attempt("minimizes", "neat", REFUTED, Fate.KILLED),
-        Attempt("minimizes", "ppo", SUPPORTED, Fate.SURVIVED),
+BLIND = attempt("blind", Fate.KILLED, "maze", "task")
+
+
+@pytest.mark.parametrize(
+    ("one", "found"),
+    [
+        (row(a=Fate.SURVIVED, b=Fate.DRIFTED), Tried.INSENSITIVE),
+        (row(a=Fate.SURVIVED, b=Fate.KILLED), Tried.SENSITIVE),
+        (row(a=Fate.EQUIVALENT, b=Fate.BROKEN), Tried.NOT_TRIED),
+        (row(), Tried.NOT_TRIED),
+        (row(BLIND, a=Fate.SURVIVED), Tried.INSENSITIVE),  # a fault of its task says nothing about its methods
+        (row(BLIND, a=Fate.EQUIVALENT), Tried.SENSITIVE),  # a method that never learns can have no fault
+        (row(replace(BLIND, fate=Fate.SURVIVED)), Tried.INSENSITIVE),
+        (row(BLIND, untried=("neat: a",)), Tried.NOT_TRIED),
+        (row(a=Fate.SURVIVED, untried=("neat: b",)), Tried.NOT_TRIED),
+        (row(a=Fate.KILLED, untried=("neat: b",)), Tried.SENSITIVE),
+    ],
+)
+def test_a_claim_is_insensitive_when_no_fault_of_its_methods_changes_it(one: Sensitivity, found: Tried) -> None:
+    assert one.tried is found
+
+
+def test_a_method_is_unnoticed_when_none_of_its_own_mutants_has_changed_the_verdict() -> None:
+    attempts = (attempt("minimizes", Fate.KILLED), attempt("minimizes", Fate.SURVIVED, "ppo"), BLIND)
+    assert Sensitivity(SUPPORTED, "", ("neat", "ppo", "cma_es"), attempts).unnoticed == ("ppo", "cma_es")
+
+
+NOT_TRIED = "Planted faults: not tried."
+
+
+def test_a_row_is_about_a_verdict_of_the_same_conditions_rules_and_outcome_and_no_other() -> None:
+    judged = report("A", verdict=verdict(fingerprint="f" * 64))
+    matrix = {("smoke", "A"): row(a=Fate.SURVIVED)}
+    assert tried(matrix, judged) is Tried.INSENSITIVE
+    assert (
+        described(matrix, judged) == "Insensitive. Planted faults: 0 of 1 change this verdict, none of those in neat."
     )
-    assert Sensitivity(SUPPORTED, "", attempts).unnoticed(("neat", "ppo", "cma_es")) == ("ppo", "cma_es")
+    for other in (
+        report("A", verdict=verdict(fingerprint="e" * 64)),
+        report("A", "refuted", verdict=verdict("refuted", fingerprint="f" * 64)),
+        replace(judged, tier="full"),
+        replace(judged, variant="sigmoid"),
+        report("B", verdict=verdict(fingerprint="f" * 64)),
+    ):
+        assert tried(matrix, other) is Tried.NOT_TRIED
+        assert described(matrix, other) == NOT_TRIED
+    assert described({("smoke", "A"): row(a=Fate.KILLED)}, judged) == "Planted faults: 1 of 1 change this verdict."
+    assert described({("smoke", "A"): row(untried=("a",))}, judged) == NOT_TRIED
 
 
 MATRIX: Matrix = {
-    ("smoke", "A"): row(a=Fate.KILLED, b=Fate.SURVIVED, c=Fate.DRIFTED, d=Fate.EQUIVALENT),
+    ("smoke", "A"): row(BLIND, a=Fate.KILLED, b=Fate.SURVIVED, c=Fate.DRIFTED, d=Fate.EQUIVALENT),
     ("smoke", "B[x]"): row(a=Fate.SURVIVED, c=Fate.SURVIVED),
+    ("smoke", "C"): replace(row(a=Fate.KILLED), methods=("neat", "ppo")),
+    ("smoke", "D"): row(untried=("neat: a",)),
     ("full", "A"): row(b=Fate.KILLED),
 }
 
 
 def test_the_score_counts_each_mutant_once_by_the_best_that_notices_it() -> None:
     found = score(MATRIX, "smoke")
-    assert (found.mutants, found.by_verdict, found.by_drift, found.claims) == (3, 1, 1, 2)
-    assert found.insensitive == ("B[x]",)
+    assert (found.mutants, found.by_verdict, found.by_drift, found.claims) == (4, 2, 1, 3)
+    assert (found.insensitive, found.partly) == (("B[x]",), ("C",))
     assert str(found) == (
-        "1 of 3 mutants change a verdict, 1 more are told by the drift check; 1 of 2 claims are changed by none of "
-        "those tried"
+        "Mutation score (smoke): 2 of 4 planted faults change a verdict, 1 more are found by the drift check; of 3 "
+        "claims 1 are insensitive, and 1 notice faults in some of their methods alone."
     )
+    assert str(score(MATRIX, "middle")) == "Mutation score (middle): not tried."
 
 
 def test_the_file_gives_back_what_was_written(tmp_path: Path) -> None:
@@ -78,7 +135,8 @@ def test_the_file_gives_back_what_was_written(tmp_path: Path) -> None:
     [
         ("[", "holds no matrix of mutants"),
         ("schema = 2\n", "reads schema 1"),
-        ('schema = 1\n[smoke.A]\noutcome = "fine"\nfingerprint = ""\nattempts = []\n', "'fine'"),
+        ('schema = 1\n[smoke.A]\noutcome = "fine"\nfingerprint = ""\nuntried = []\n', "'fine'"),
+        (dump({("smoke", "A"): row(a=Fate.SURVIVED)}).replace('"survived"', '"lived"'), "'lived' is not a valid Fate"),
         ('schema = 1\n[smoke.A]\noutcome = "refuted"\n', "fingerprint"),
     ],
 )

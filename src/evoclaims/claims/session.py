@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 from evoclaims.claims.as_published import AsPublished
 from evoclaims.claims.claim import Claim, Expectation
@@ -24,7 +25,9 @@ from evoclaims.paper.trial_group import Fetch, TrialGroup
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.spec import Condition, TrialSpec
 from evoclaims.trials.store import Store
+from evoclaims.verdicts import mutation_matrix
 from evoclaims.verdicts.claim_report import ClaimReport, located, named, save, succeeding
+from evoclaims.verdicts.mutation_matrix import Matrix
 from evoclaims.verdicts.upgrade import Succession, Upgrade, predecessors, upgrade
 
 
@@ -60,6 +63,15 @@ class Session:
     variant: str = ""
     again: Mapping[str, Collection[int]] = field(default_factory=dict)
 
+    @cached_property
+    def mutants(self) -> Matrix:
+        """The committed matrix of mutants.
+
+        Raises:
+            UserError: when the file holds no matrix.
+        """
+        return mutation_matrix.load(self.reproduction.folder / mutation_matrix.FILE)
+
     def group(self, method: str, on: str, tier: str) -> TrialGroup:
         """Return the trials of a method on a task, not yet run."""
         condition = self.reproduction.tier(tier, self.variant).condition(method, on)
@@ -86,7 +98,7 @@ class Session:
         return judged(claim, case, tier, assertion, protocol, verdict, self.again)
 
     def complete(self, report: ClaimReport, expectation: Expectation | None) -> ClaimReport:
-        """Return a report with the variant, an accepted outcome, and the file that holds it.
+        """Return a report with the variant, an accepted outcome, what mutants showed, and the file that holds it.
 
         A session that runs trials saves the report; one that only reads them refers to an earlier run's file. What the
         paper's own numbers give is neither expected nor kept.
@@ -94,6 +106,8 @@ class Session:
         if isinstance(self.fetch, AsPublished):
             return report
         complete, root = expecting(replace(report, variant=self.variant), expectation), self.store.root
+        if not self.variant:  # mutants are tried on the protocol itself
+            complete = replace(complete, tried=mutation_matrix.tried(self.mutants, complete))
         if isinstance(self.fetch, StoredOnly):
             return located(complete, root)
         return save(succeeding(complete, root), root)

@@ -105,6 +105,10 @@ def _parser() -> argparse.ArgumentParser:
     device(mutants)
     mutants.add_argument("--mutant", metavar="NAME", help="only this fault, such as minimizes")
     mutants.add_argument("--of", metavar="TARGET", help="only faults of this method or this task")
+    mutants.add_argument(
+        "--numprocesses", metavar="N", default="1", help="how many processes run trials; auto: one for each core"
+    )
+    mutants.add_argument("--stored", action="store_true", help="run nothing: judge the trials that have run")
 
     status = add("status", "show the verdicts that the stored trials give; run nothing")
     tier(status)

@@ -23,7 +23,7 @@ from evoclaims.report.paper_figures import paper_figures
 from evoclaims.trials import devices
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.spec import Condition
-from evoclaims.verdicts import history
+from evoclaims.verdicts import history, mutation_matrix
 from evoclaims.verdicts.robustness import matrix
 
 
@@ -58,6 +58,7 @@ def main(options: argparse.Namespace) -> int:
         robustness=robustness,
         numbers=replications(archive, reproduction, tiers[0], ("", *reproduction.variants)),
         put_to_the_paper=by_the_paper,
+        mutants=mutation_matrix.load(reproduction.folder / mutation_matrix.FILE),
         generated=f"Written on {datetime.now(UTC):%Y-%m-%d %H:%M} UTC by evoclaims {metadata.version('evoclaims')}.",
     )
     folder = Path(options.out)

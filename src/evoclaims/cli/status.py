@@ -21,6 +21,7 @@ def main(options: argparse.Namespace) -> int:
         terminal_table.verdict_table(reports, console.width, console.is_terminal),
         terminal_table.explanations(reports, console.width, console.is_terminal),
         f"claims ({options.tier}): {table_cells.totals(reports)}",
+        table_cells.faults(reports),
     ):
         if part:
             print(part, file=styled())

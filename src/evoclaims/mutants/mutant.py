@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from typing import Any, Final, Literal
+from typing import Any, Final
 
 from evoclaims.envs.gates.circuit import Circuit
 from evoclaims.methods.cma_es import CmaEs
@@ -13,8 +13,7 @@ from evoclaims.mutants import of_methods, of_tasks
 from evoclaims.mutants.planting import Fault, plant
 from evoclaims.paper.variant import Conditions
 from evoclaims.trials.spec import Condition
-
-Part = Literal["method", "task"]
+from evoclaims.verdicts.mutation_matrix import Part
 
 
 @dataclass(frozen=True)
@@ -35,7 +34,7 @@ class Mutant:
         """Return the faulty conditions of one method, or one task, by the names under which claims ask for them."""
         place = 0 if self.part == "method" else 1
         changed = {names: self.change(one) for names, one in sound.items() if names[place] == target}
-        return {names: faulty for names, faulty in changed.items() if faulty is not None}
+        return {names: one for names, one in changed.items() if one is not None and one.id != sound[names].id}
 
     def targets(self, sound: Conditions) -> tuple[str, ...]:
         """Return the methods, or tasks, that the fault can be planted in, in their order."""
@@ -44,33 +43,32 @@ class Mutant:
         return tuple(name for name in names if self.conditions(sound, name))
 
 
-def of_method(fault: type[Fault], only: type = object) -> Mutant:
+def of_method(fault: type[Fault], only: type | tuple[type, ...] = object) -> Mutant:
     """Return the mutant that plants a fault in any method of a class."""
+    return with_method(fault.says, lambda method: plant(fault, method), only)
+
+
+def with_method(says: str, change: Callable[[Any], Any], only: type | tuple[type, ...] = object) -> Mutant:
+    """Return the mutant that changes any method of a class, such as one of its parameters."""
     return Mutant(
-        fault.says,
-        "method",
-        lambda one: replace(one, method=_planted(fault, one.method)) if isinstance(one.method, only) else None,
+        says, "method", lambda one: replace(one, method=change(one.method)) if isinstance(one.method, only) else None
     )
 
 
-def of_task(fault: type[Fault], only: type = object) -> Mutant:
+def of_task(fault: type[Fault], only: type | tuple[type, ...] = object) -> Mutant:
     """Return the mutant that plants a fault in any task of a class."""
-    return Mutant(
-        fault.says,
-        "task",
-        lambda one: replace(one, task=_planted(fault, one.task)) if isinstance(one.task, only) else None,
-    )
+    return with_task(fault.says, lambda task: plant(fault, task), only)
 
 
-def _planted(fault: type[Fault], component: Any) -> Any:
-    """Plant a fault; types cannot say that the result is a method or task again."""
-    return plant(fault, component)
+def with_task(says: str, change: Callable[[Any], Any], only: type | tuple[type, ...] = object) -> Mutant:
+    """Return the mutant that changes any task of a class, such as one of its parameters."""
+    return Mutant(says, "task", lambda one: replace(one, task=change(one.task)) if isinstance(one.task, only) else None)
 
 
-def _drawing_all(one: Condition) -> Condition | None:
-    """MAP-Elites that draws every individual anew, and never varies an elite."""
-    method: Any = one.method
-    return replace(one, method=replace(method, initial=2**30)) if isinstance(method, MapElites) else None
+def _staying(one: Condition) -> Condition | None:
+    """Training and examinations that stay at the first level of several."""
+    faulty: Any = plant(of_tasks.StaysAtFirstLevel, one.task)
+    return replace(one, task=faulty) if one.task.levels > 1 else None
 
 
 MUTANTS: Final[Mapping[str, Mutant]] = {
@@ -80,13 +78,13 @@ MUTANTS: Final[Mapping[str, Mutant]] = {
     "forgets-champion": of_method(of_methods.ForgetsChampion),
     "one-seed": of_method(of_methods.HasOneSeed),
     "fixed-step-size": of_method(of_methods.KeepsItsStepSize, CmaEs),
-    "random-archive": Mutant("varies no elite", "method", _drawing_all),
+    "random-archive": with_method("varies no elite", lambda method: replace(method, initial=2**30), MapElites),
     "blind": of_task(of_tasks.Blind),
     "paralysed": of_task(of_tasks.Paralysed),
     "pays-nothing": of_task(of_tasks.PaysNothing),
     "reverses-rewards": of_task(of_tasks.ReversesReward),
     "pays-at-random": of_task(of_tasks.PaysAtRandom),
-    "first-level-only": of_task(of_tasks.StaysAtFirstLevel),
+    "first-level-only": Mutant(of_tasks.StaysAtFirstLevel.says, "task", _staying),
     "ignores-an-input": of_task(of_tasks.IgnoresAnInput, Circuit),
     "wrong-row": of_task(of_tasks.HasAWrongRow, Circuit),
 }

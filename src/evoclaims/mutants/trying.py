@@ -1,54 +1,24 @@
-"""Trying mutants on claims: the faulty conditions, and which faults each claim notices."""
+"""Trying mutants on claims: which faults each claim notices, judged from trials at hand."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 
 from evoclaims.judging.baseline import ALPHA, DriftCase, check_drift
-from evoclaims.mutants.mutant import Mutant
+from evoclaims.judging.verdict import Outcome
+from evoclaims.mutants.conditions import Names, Planted
 from evoclaims.paper.archive import Archive
 from evoclaims.paper.references import METRICS, load, path_of
 from evoclaims.paper.reproduction import Reproduction
-from evoclaims.paper.variant import Conditions, Variant
+from evoclaims.paper.variant import Variant
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.spec import Condition
 from evoclaims.verdicts.acceptance import UNDECIDED
 from evoclaims.verdicts.claim_report import ClaimReport
 from evoclaims.verdicts.history import key_of
-from evoclaims.verdicts.mutation_matrix import Attempt, Matrix, Sensitivity, fate
-
-Names = tuple[str, str]
-"""A method and a task, as claims name them."""
-
-
-@dataclass(frozen=True)
-class Planted:
-    """A fault in one method, or one task, of a tier.
-
-    Attributes:
-        mutant: the fault's name.
-        target: the method or task that has it.
-        conditions: the faulty ones.
-    """
-
-    mutant: str
-    target: str
-    conditions: Conditions
-
-    @property
-    def name(self) -> str:
-        """A name such as "cma_es: minimizes"."""
-        return f"{self.target}: {self.mutant}"
-
-
-def plantings(sound: Conditions, mutants: Mapping[str, Mutant]) -> tuple[Planted, ...]:
-    """Return every fault in every method or task that it can be planted in."""
-    return tuple(
-        Planted(name, target, mutant.conditions(sound, target))
-        for name, mutant in mutants.items()
-        for target in mutant.targets(sound)
-    )
+from evoclaims.verdicts.mutation_matrix import Attempt, Fate, Matrix, Sensitivity, fate
 
 
 def under_faults(reproduction: Reproduction, tier: str, planted: Sequence[Planted]) -> Reproduction:
@@ -107,50 +77,69 @@ def noticed(
     sound: Sequence[ClaimReport],
     planted: Sequence[Planted],
     faulty: Sequence[Sequence[ClaimReport]],
+    failed: Collection[tuple[str, Names]],
 ) -> Matrix:
-    """Return which faults each claim notices, of those that its conditions can have.
+    """Return which faults each judged claim notices, of those that its conditions can have and that have run.
 
     Args:
         comparison: of trials.
         sound: reports of the claims without a fault.
         planted: the faults.
         faulty: reports under each of them.
+        failed: conditions that have just failed to run, by the name of the fault and their own.
     """
     reports = {
         (one.name, key_of(report)): report for one, several in zip(planted, faulty, strict=True) for report in several
     }
-    trials = {(one.name, names): (names, condition) for one in planted for names, condition in one.conditions.items()}
-    equivalent = {key: comparison.equivalent(*both) for key, both in trials.items()}
-    drifted = {key: comparison.drifted(*both) for key, both in trials.items()}
 
-    def attempts(report: ClaimReport) -> Iterator[Attempt]:
-        asked = {(source.method, source.task) for source in report.sources}
-        for one in planted:
-            touched = [(one.name, names) for names in one.conditions if names in asked]
-            if touched:
-                outcome = reports[one.name, key_of(report)].outcome
-                became = fate(
-                    report.outcome,
-                    outcome,
-                    equivalent=all(equivalent[key] for key in touched),
-                    drifted=any(drifted[key] for key in touched),
-                )
-                yield Attempt(one.mutant, one.target, outcome, became)
+    @cache
+    def compared(fault: str, names: Names) -> tuple[bool, bool]:
+        condition = conditions[fault, names]
+        return comparison.equivalent(names, condition), comparison.drifted(names, condition)
 
-    return {
-        key_of(report): Sensitivity(report.outcome, report.fingerprint, tuple(attempts(report)))
-        for report in sound
-        if report.outcome not in UNDECIDED
-    }
+    conditions = {(one.name, names): condition for one in planted for names, condition in one.conditions.items()}
+
+    def attempt(report: ClaimReport, one: Planted, touched: Sequence[Names]) -> Attempt | None:
+        outcome = reports[one.name, key_of(report)].outcome
+        if any((one.name, names) in failed for names in touched):
+            became = Fate.BROKEN
+        elif outcome is Outcome.NOT_RUN:
+            return None
+        else:
+            equivalent, drifted = zip(*(compared(one.name, names) for names in touched), strict=True)
+            became = fate(report.outcome, outcome, equivalent=all(equivalent), drifted=any(drifted))
+        return Attempt(one.mutant, one.part, one.target, outcome if became is Fate.KILLED else report.outcome, became)
+
+    def row(report: ClaimReport) -> Sensitivity:
+        tries = {one.name: attempt(report, one, touched) for one in planted if (touched := one.touching(report))}
+        return Sensitivity(
+            report.outcome,
+            report.fingerprint,
+            tuple(dict.fromkeys(source.method for source in report.sources)),
+            tuple(one for one in tries.values() if one is not None),
+        )
+
+    return {key_of(report): row(report) for report in sound if report.outcome not in UNDECIDED}
 
 
-def merged(before: Matrix, now: Matrix) -> Matrix:
-    """Return a matrix where new attempts replace old ones; others stay while their claim is unchanged."""
-    rows = dict(before)
+def merged(before: Matrix, now: Matrix, tier: str, applicable: Mapping[tuple[str, str], Collection[str]]) -> Matrix:
+    """Return a matrix where new attempts replace old ones, and what no longer applies is left out.
+
+    Old attempts stay while their claim is unchanged.
+
+    Args:
+        before: all tiers.
+        now: new rows of one tier.
+        tier: its name.
+        applicable: names of all mutants that each claim of the tier can notice, by claim; other claims are left out.
+    """
+    rows = {key: row for key, row in before.items() if key[0] != tier or key in applicable}
     for key, row in now.items():
-        old = before.get(key)
+        old, attempts = before.get(key), {attempt.name: attempt for attempt in row.attempts}
         if old is not None and (old.fingerprint, old.outcome) == (row.fingerprint, row.outcome):
-            kept = {attempt.name: attempt for attempt in (*old.attempts, *row.attempts)}
-            row = replace(row, attempts=tuple(kept.values()))
-        rows[key] = row
+            attempts = {attempt.name: attempt for attempt in old.attempts} | attempts
+        known = {name: attempts[name] for name in applicable[key] if name in attempts}
+        if known:
+            untried = tuple(name for name in applicable[key] if name not in known)
+            rows[key] = replace(row, attempts=tuple(known.values()), untried=untried)
     return rows

@@ -51,6 +51,8 @@ class Reproduction:
         figures: modules that redraw the paper's figures and tables, in paper order; each holds FIGURE, an
             `evoclaims.figures.Figure` with the module's last name, and is imported only when it is drawn.
         trials: class that `trials(...)` returns: `TrialGroup`, or a subclass with the paper's own measures.
+        mutants: module with the paper's own planted faults; it holds MUTANTS, `evoclaims.mutants.Mutant` by name, and
+            is imported only when they are tried.
 
     Raises:
         UserError: when `trials` is neither.
@@ -63,6 +65,7 @@ class Reproduction:
     figures: tuple[str, ...] = ()
     variants: Mapping[str, Variant] = field(default_factory=dict)
     trials: type[TrialGroup] = TrialGroup
+    mutants: str = ""
 
     def __post_init__(self) -> None:
         """Check the class of the trials."""

@@ -55,6 +55,7 @@ def make_session(config: pytest.Config) -> Session:
     made = Session(reproduction, store, fetch, trials, variant, run.again)
     reproduction.tier("smoke", made.variant)
     made.protocol("smoke")
+    _ = made.mutants  # a damaged file is told before the first trial
     fetch.check()
     config.stash[SESSION] = made
     if line is not None:

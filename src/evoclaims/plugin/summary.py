@@ -159,6 +159,8 @@ class Summary:
             if warning:
                 terminalreporter.write_line(self._said(f"warning: {warning}"), yellow=True)
         terminalreporter.write_line(f"claims: {table_cells.totals(self.reports)}", bold=True)
+        if table_cells.faults(self.reports):
+            terminalreporter.write_line(table_cells.faults(self.reports))
         if not any(report.n for report in self.reports):
             what = "No trial was looked at" if self._judged else "No claim was judged"
             terminalreporter.write_line(f"{what}: nothing was measured.", red=True)

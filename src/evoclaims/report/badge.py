@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import unicodedata
-from collections import Counter
 from collections.abc import Sequence
 from html import escape
 from typing import Final
 
 from evoclaims.core.printable import printable
 from evoclaims.judging.verdict import Outcome
+from evoclaims.report import table_cells
 from evoclaims.verdicts.claim_report import ClaimReport
+from evoclaims.verdicts.sensitivity import Tally
 
 GREEN, BLUE, RED, GREY = "#2e7d32", "#1565c0", "#c62828", "#616161"
 _NARROW: Final = frozenset("fijlrtI.,:;|!'()[]{}/ ")
@@ -54,8 +55,7 @@ def svg(label: str, message: str, colour: str) -> str:
 
 def message_of(reports: Sequence[ClaimReport]) -> str:
     """Return the number of claims by outcome, such as "supported 24 / refuted 5 / inconclusive 2"."""
-    counts = Counter(report.outcome for report in reports)
-    return " / ".join(f"{outcome} {counts[outcome]}" for outcome in Outcome if counts[outcome]) or "no claims"
+    return " / ".join(f"{said} {count}" for said, count in table_cells.counts(reports).items()) or "no claims"
 
 
 def colour_of(reports: Sequence[ClaimReport]) -> str:
@@ -65,7 +65,7 @@ def colour_of(reports: Sequence[ClaimReport]) -> str:
         return RED
     if not judged:
         return GREY
-    return GREEN if all(report.outcome == Outcome.SUPPORTED for report in reports) else BLUE
+    return GREEN if all(report.counted_as is Tally.SUPPORTED for report in reports) else BLUE
 
 
 def _width(character: str) -> float:

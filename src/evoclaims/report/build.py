@@ -15,12 +15,14 @@ from evoclaims.paper.reproduction import Reproduction
 from evoclaims.report import origin, replication_cells, table_cells, training_curves
 from evoclaims.report.champion import Draw, champion_of, network
 from evoclaims.report.evidence import Part, judged_parts, unjudged_part
+from evoclaims.report.fault_grid import fault_grid
 from evoclaims.report.formatting import Anchors, clean, counted, listed, places, plural
 from evoclaims.report.model import Board, ConditionTrials, Page, PaperFigure, Section, ShownChampion
 from evoclaims.report.trial_summary import Reader, TrialSummary
 from evoclaims.verdicts.acceptance import UNDECIDED
 from evoclaims.verdicts.claim_report import ClaimReport
 from evoclaims.verdicts.history import Entry, History, eras, key_of
+from evoclaims.verdicts.mutation_matrix import Matrix, described
 from evoclaims.verdicts.robustness import Robustness
 from evoclaims.verdicts.source_trials import SourceTrials
 
@@ -41,6 +43,7 @@ def gather(
     robustness: Sequence[Robustness] = (),
     numbers: Sequence[Replication] = (),
     put_to_the_paper: Sequence[ClaimReport] = (),
+    mutants: Matrix | None = None,
     generated: str = "",
 ) -> Page:
     """Return the data of a whole report.
@@ -57,9 +60,11 @@ def gather(
         robustness: how claims end under variants of the protocol.
         numbers: published ones beside ours.
         put_to_the_paper: reports of claims that were judged from the paper's own numbers.
+        mutants: the committed matrix of planted faults; None for none.
         generated: when, and by which version.
     """
-    gathered = _Gathering(reproduction, archive, history, sentences, draws, put_to_the_paper)
+    tried = mutants or {}
+    gathered = _Gathering(reproduction, archive, history, sentences, draws, put_to_the_paper, tried)
     boards = tuple(
         Board(tier, tuple(gathered.section(report) for report in table_cells.in_the_papers_order(reports)))
         for tier, reports in verdicts.items()
@@ -76,6 +81,7 @@ def gather(
         robustness=tuple(robustness),
         numbers=tuple(numbers),
         put_to_the_paper=tuple(replication_cells.put_to_the_paper(put_to_the_paper)),
+        faults=tuple(fault_grid(tried, tier, reports) for tier, reports in verdicts.items() if reports),
         generated=generated,
     )
 
@@ -110,9 +116,11 @@ class _Gathering:
         sentences: Mapping[str, str],
         draws: Sequence[Draw],
         put_to_the_paper: Sequence[ClaimReport],
+        mutants: Matrix,
     ) -> None:
         self._reproduction, self._archive, self._history = reproduction, archive, history
         self._sentences, self._draws, self._anchors = sentences, draws, Anchors()
+        self._mutants = mutants
         self._failing = {
             (report.tier, report.name): replication_cells.would_not_pass(report)
             for report in put_to_the_paper
@@ -142,6 +150,7 @@ class _Gathering:
             warnings=(*_broken(every), *origin.warnings(made), *self._of_the_paper(report)),
             history=eras(entries),
             change=_change(entries, report),
+            faults=described(self._mutants, report) if report.n else "",
         )
 
     def _of_the_paper(self, report: ClaimReport) -> tuple[str, ...]:

@@ -17,6 +17,7 @@ from markupsafe import Markup
 
 from evoclaims.judging.verdict import Outcome
 from evoclaims.report import charts, formatting, replication_cells
+from evoclaims.report.fault_grid import LEGEND
 from evoclaims.report.model import Page
 
 _VIEW_BOX: Final = re.compile(rb'viewBox="[-\d.]+ [-\d.]+ ([\d.]+) ([\d.]+)"')
@@ -48,6 +49,7 @@ def html(page: Page) -> str:
         .render(
             page=page,
             outcomes=list(Outcome),
+            legend=LEGEND,
             style=style,
             script=script,
             policy=policy(style, script),

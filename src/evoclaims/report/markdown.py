@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from evoclaims.figures.replication import Replication
-from evoclaims.judging.verdict import Outcome
 from evoclaims.report import replication_cells, table_cells
+from evoclaims.report.fault_grid import LEGEND
 from evoclaims.report.formatting import p_value, plural
 from evoclaims.report.markdown_text import literal, table
 from evoclaims.report.model import Board, Page, Section
+from evoclaims.verdicts.sensitivity import Tally
 
 
 def markdown(page: Page) -> str:
@@ -21,6 +22,8 @@ def markdown(page: Page) -> str:
         if board.sections:
             blocks += [f"## Claims at the {literal(board.tier)} tier", _overview(board)]
             blocks += [block for section in board.sections for block in _section(section, page)]
+    if page.faults:
+        blocks += ["## Which planted faults do the claims notice?", *_faults(page)]
     if page.robustness:
         blocks += ["## Which conclusions hang on a detail?", _details(page), _robustness(page)]
     if page.numbers:
@@ -32,10 +35,33 @@ def markdown(page: Page) -> str:
 def _scoreboard(page: Page) -> str:
     """Count verdicts by tier."""
     boards = [board for board in page.boards if board.sections]
+    tallies = [tally for tally in Tally if any(tally in board.counts for board in boards)]
     return table(
-        ("tier", *map(str, Outcome), "looked into and accepted"),
-        ((literal(b.tier), *(str(b.count(outcome)) for outcome in Outcome), str(b.accepted)) for b in boards),
+        ("tier", *map(str, tallies), "looked into and accepted"),
+        ((literal(b.tier), *(str(b.counts.get(tally, 0)) for tally in tallies), str(b.accepted)) for b in boards),
     )
+
+
+def _faults(page: Page) -> Iterator[str]:
+    """Yield a grid for each tier: one line per claim, and a column per fault."""
+    yield literal(f"{LEGEND}; one sign for each method or task of the claim that had the fault.")
+    for grid in page.faults:
+        yield literal(grid.score)
+        if grid.rows:
+            yield table(
+                ("claim", "verdict", *map(literal, grid.mutants), "no fault noticed in"),
+                (
+                    (
+                        literal(row.report.name),
+                        literal(table_cells.verdict(row.report)),
+                        *(row.cells[name].symbols if name in row.cells else "" for name in grid.mutants),
+                        literal(row.unnoticed),
+                    )
+                    for row in grid.rows
+                ),
+            )
+        if grid.untried:
+            yield literal(f"Not tried: {', '.join(grid.untried)}.")
 
 
 def _details(page: Page) -> str:
@@ -97,6 +123,7 @@ def _section(section: Section, page: Page) -> Iterator[str]:
     for warning in (*section.warnings, section.change):
         yield f"**{literal(warning)}**" if warning else ""
     yield literal(report.reason)
+    yield literal(section.faults)
     if report.because:
         yield f"Accepted as {literal(report.expected or '')}: {literal(report.because)}"
     parts = [part for part in section.parts if part.numbers]

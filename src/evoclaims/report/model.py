@@ -7,13 +7,16 @@ from dataclasses import dataclass, field
 
 from evoclaims.figures.replication import Replication
 from evoclaims.judging.verdict import Outcome
+from evoclaims.report import table_cells
 from evoclaims.report.evidence import Part
+from evoclaims.report.fault_grid import FaultGrid
 from evoclaims.report.formatting import counted, place_key
 from evoclaims.report.origin import Made
 from evoclaims.report.training_curves import CurvePanel
 from evoclaims.verdicts.claim_report import ClaimReport
 from evoclaims.verdicts.history import Entry
 from evoclaims.verdicts.robustness import Robustness
+from evoclaims.verdicts.sensitivity import Tally
 
 
 @dataclass(frozen=True)
@@ -65,6 +68,7 @@ class Section:
         warnings: what a reader should know first.
         history: accepted verdicts, oldest first; a new tuple begins where what is judged has changed.
         change: what differs from the last accepted verdict; empty when nothing does.
+        faults: which planted faults change the verdict.
     """
 
     report: ClaimReport
@@ -79,6 +83,7 @@ class Section:
     warnings: tuple[str, ...] = ()
     history: tuple[tuple[Entry, ...], ...] = ()
     change: str = ""
+    faults: str = ""
 
     @property
     def devices(self) -> str:
@@ -98,9 +103,11 @@ class Board:
     tier: str
     sections: tuple[Section, ...]
 
-    def count(self, outcome: Outcome) -> int:
-        """Return how many claims have an outcome."""
-        return sum(section.report.outcome is outcome for section in self.sections)
+    @property
+    def counts(self) -> Mapping[Tally, int]:
+        """The number of claims by what they count as; of outcomes that no claim has, too."""
+        found = table_cells.counts(section.report for section in self.sections)
+        return {tally: found.get(tally, 0) for tally in Tally if tally in found or tally is not Tally.INSENSITIVE}
 
     @property
     def accepted(self) -> int:
@@ -145,6 +152,7 @@ class Page:
         robustness: claims that were judged under a variant too.
         numbers: published ones beside ours.
         put_to_the_paper: what the claims' assertions make of the published numbers, in sentences.
+        faults: which planted faults the claims notice, by tier.
         generated: when, and by which version; free text.
     """
 
@@ -159,6 +167,7 @@ class Page:
     robustness: tuple[Robustness, ...] = ()
     numbers: tuple[Replication, ...] = ()
     put_to_the_paper: tuple[str, ...] = ()
+    faults: tuple[FaultGrid, ...] = ()
     generated: str = ""
 
     @property

@@ -23,7 +23,8 @@ def run_summary(reports: Sequence[ClaimReport], notes: Sequence[str] = ()) -> st
     rows = (map(literal, _cells(report)) for report in table_cells.ordered(reports))
     lines = ["## Claims", "", f"**{literal(table_cells.totals(reports))}**", ""]
     lines += [table(COLUMNS, rows, numbers=("n", "p"))]
-    lines += ["", *(f"* {literal(note)}" for note in (*mixed_versions.lines(reports), *notes))]
+    further = filter(None, (table_cells.faults(reports), *mixed_versions.lines(reports), *notes))
+    lines += ["", *(f"* {literal(note)}" for note in further)]
     return "\n".join(lines).rstrip("\n") + "\n"
 
 

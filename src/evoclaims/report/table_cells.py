@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Sequence
 
-from evoclaims.judging.verdict import Direction, Outcome
+from evoclaims.judging.verdict import Direction
 from evoclaims.report.formatting import p_value, place_key, places
 from evoclaims.verdicts import mixed_versions
 from evoclaims.verdicts.claim_report import ClaimReport
 from evoclaims.verdicts.history import in_order, key_of
+from evoclaims.verdicts.sensitivity import Tally, Tried
 
 NONE = "–"
 """Not measured."""
@@ -26,8 +27,12 @@ def in_the_papers_order(reports: Iterable[ClaimReport]) -> list[ClaimReport]:
 
 
 def verdict(report: ClaimReport) -> str:
-    """Return the outcome, such as "✗ refuted"; with an asterisk if it was examined and accepted."""
-    return f"{report.outcome.symbol} {report.outcome}{'*' * report.as_expected}"
+    """Return the outcome, such as "✗ refuted"; with an asterisk if it was examined and accepted.
+
+    Beside it stands "insensitive" if no planted fault changes it.
+    """
+    insensitive = f", {report.tried}" * (report.tried is Tried.INSENSITIVE)
+    return f"{report.outcome.symbol} {report.outcome}{'*' * report.as_expected}{insensitive}"
 
 
 def verdict_of_versions(report: ClaimReport) -> str:
@@ -61,7 +66,22 @@ def p(report: ClaimReport, *, attainable: bool = True) -> str:
     return f"{against}{p_value(decision.p)}{smallest}"
 
 
+def counts(reports: Iterable[ClaimReport]) -> dict[Tally, int]:
+    """Return the number of claims by what they count as, without zeros."""
+    found = Counter(report.counted_as for report in reports)
+    return {tally: found[tally] for tally in Tally if found[tally]}
+
+
 def totals(reports: Sequence[ClaimReport]) -> str:
     """Return the counts in one line, such as "3 supported, 1 refuted"."""
-    counts = Counter(report.outcome for report in reports)
-    return ", ".join(f"{counts[outcome]} {outcome}" for outcome in Outcome if counts[outcome]) or "no verdicts"
+    return ", ".join(f"{count} {said}" for said, count in counts(reports).items()) or "no verdicts"
+
+
+def faults(reports: Iterable[ClaimReport]) -> str:
+    """Return a line on how many verdicts planted faults change; empty if nothing is judged."""
+    found = Counter(report.tried for report in reports if report.n)
+    if not found:
+        return ""
+    if set(found) == {Tried.NOT_TRIED}:
+        return "planted faults: not tried"
+    return "planted faults: " + ", ".join(f"{found[one]} {one}" for one in Tried if found[one])

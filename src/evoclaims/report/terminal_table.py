@@ -18,6 +18,7 @@ from evoclaims.report import table_cells
 from evoclaims.report.console import PlainSpokenConsole
 from evoclaims.verdicts import mixed_versions
 from evoclaims.verdicts.claim_report import ClaimReport
+from evoclaims.verdicts.sensitivity import Tried
 
 WIDE = 120
 """Columns from which each claim's file of evidence is shown too."""
@@ -48,7 +49,7 @@ def verdict_table(reports: Sequence[ClaimReport], width: int, colour: bool) -> s
         cells = (
             _literal(report.name),
             _literal(f"{report.statement} ({report.where})"),
-            f"[{_COLOURS[report.outcome]}]{table_cells.verdict_of_versions(report)}[/]",
+            f"[{_COLOURS[report.outcome]}]{table_cells.verdict_of_versions(report)}[/]".replace(", ", ",\n"),
             table_cells.trials(report),
             table_cells.effect(report),
             table_cells.p(report),
@@ -59,6 +60,8 @@ def verdict_table(reports: Sequence[ClaimReport], width: int, colour: bool) -> s
     captions = [f"evidence: {printable(folder)}/<claim>.json" for folder in folders]
     if any(report.as_expected for report in reports):
         captions.append("* looked into and accepted, see below")
+    if any(report.tried is Tried.INSENSITIVE for report in reports):
+        captions.append("insensitive: no fault planted in the claim's methods changes its verdict, so it is no support")
     captions += mixed_versions.lines(reports)
     return "\n".join([_rendered(table, width, colour), *captions])
 

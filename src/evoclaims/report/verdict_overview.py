@@ -13,6 +13,7 @@ from evoclaims.report.markdown_text import literal, table
 from evoclaims.report.table_cells import NONE, in_the_papers_order
 from evoclaims.report.trial_summary import Reader
 from evoclaims.verdicts.claim_report import ClaimReport
+from evoclaims.verdicts.sensitivity import Tried
 
 Versions = dict[str, str]
 
@@ -108,7 +109,8 @@ def _verdict(report: ClaimReport, made: Environments) -> str:
     """Return a verdict with its evidence in short, such as "**refuted** (2 of 10 trials; A)"."""
     if not report.n:
         return NONE if report.variant and report.outcome is Outcome.NOT_RUN else literal(report.outcome)
-    return f"**{literal(report.outcome)}** ({literal(_evidence(report))}; {made.letters(report)})"
+    insensitive = f", {report.tried}" * (report.tried is Tried.INSENSITIVE)
+    return f"**{literal(report.outcome)}**{insensitive} ({literal(_evidence(report))}; {made.letters(report)})"
 
 
 def _evidence(report: ClaimReport) -> str:

@@ -15,6 +15,7 @@ from evoclaims.core.errors import UserError
 from evoclaims.core.file_names import file_name
 from evoclaims.core.files import write_atomically
 from evoclaims.judging.verdict import Outcome, Verdict
+from evoclaims.verdicts.sensitivity import Tally, Tried, tally
 from evoclaims.verdicts.source_trials import SourceTrials, versions_of
 from evoclaims.verdicts.versions import Several
 
@@ -63,6 +64,7 @@ class ClaimReport:
         variant: name of the variant of the protocol; empty for the protocol itself.
         unsaved: why that file could not be written; empty if it was, or need not be.
         before: the verdict that the store held before this run, if any.
+        tried: whether planted faults change the verdict, according to the committed matrix of mutants.
     """
 
     claim: str
@@ -81,11 +83,17 @@ class ClaimReport:
     variant: str = ""
     unsaved: str = ""
     before: LastVerdict | None = None
+    tried: Tried = Tried.NOT_TRIED
 
     @property
     def name(self) -> str:
         """Id and parameters, such as "G1[n_parity]"."""
         return named(self.claim, self.case)
+
+    @property
+    def counted_as(self) -> Tally:
+        """What the claim counts as, wherever claims are counted."""
+        return tally(self.outcome, self.tried)
 
     @property
     def as_expected(self) -> bool:

@@ -56,6 +56,7 @@ def verdict_rows(reports: Iterable[ClaimReport]) -> list[Row]:
             },
             "expected": report.expected,
             "because": report.because,
+            "faults": report.tried,
             "statement": report.statement,
             "where": report.where,
         }

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, Literal
 
 import msgspec
 import tomli_w
@@ -16,9 +16,15 @@ from evoclaims.core.errors import UserError
 from evoclaims.core.files import read_file
 from evoclaims.core.printable import printable
 from evoclaims.judging.verdict import Outcome
+from evoclaims.verdicts.claim_report import ClaimReport
+from evoclaims.verdicts.history import key_of
+from evoclaims.verdicts.sensitivity import Tried
 
 FILE: Final = "mutants.toml"
 SCHEMA: Final = 1
+
+Part = Literal["method", "task"]
+"""What has a fault."""
 
 
 class Fate(StrEnum):
@@ -30,6 +36,25 @@ class Fate(StrEnum):
     EQUIVALENT = "equivalent"
     BROKEN = "broken"
 
+    @property
+    def symbol(self) -> str:
+        """One character for the grid."""
+        return _SYMBOLS[self]
+
+    @property
+    def counts(self) -> bool:
+        """Whether a check could have noticed the fault, and trials say whether it did."""
+        return self not in (Fate.EQUIVALENT, Fate.BROKEN)
+
+
+_SYMBOLS: Final = {
+    Fate.KILLED: "●",
+    Fate.DRIFTED: "◐",
+    Fate.SURVIVED: "○",
+    Fate.EQUIVALENT: "=",
+    Fate.BROKEN: "!",
+}
+
 
 @dataclass(frozen=True)
 class Attempt:
@@ -37,14 +62,16 @@ class Attempt:
 
     Attributes:
         mutant: its name, such as "minimizes".
-        target: the method or task that has the fault, as claims name it.
-        outcome: of the claim, judged on the faulty trials.
+        part: what has the fault.
+        target: the method or task that has it, as claims name it.
+        outcome: of the claim with the fault, if that changed it; else the claim's own.
         fate: killed by the verdict: the outcome differs from the one without the fault; killed by drift: the outcome is
             the same, but the drift check finds the fault; equivalent: the faulty trials equal the sound ones, so that
             no check can find it; broken: the faulty trials crashed, which says nothing about the claim.
     """
 
     mutant: str
+    part: Part
     target: str
     outcome: Outcome
     fate: Fate
@@ -62,31 +89,69 @@ class Sensitivity:
     Attributes:
         outcome: without a fault.
         fingerprint: of what was judged.
+        methods: those that the claim names.
         attempts: the mutants that were tried on its methods and tasks.
+        untried: names of those that were not.
     """
 
     outcome: Outcome
     fingerprint: str
+    methods: tuple[str, ...]
     attempts: tuple[Attempt, ...]
+    untried: tuple[str, ...] = ()
 
     def named(self, fate: Fate) -> tuple[str, ...]:
         """Return the mutants with a fate."""
         return tuple(attempt.name for attempt in self.attempts if attempt.fate is fate)
 
     @property
-    def insensitive(self) -> bool:
-        """Whether mutants were tried and none changed the verdict: the claim tests nothing that it names."""
-        counted = [one for one in self.attempts if one.fate not in (Fate.EQUIVALENT, Fate.BROKEN)]
-        return bool(counted) and not self.named(Fate.KILLED)
+    def tried(self) -> Tried:
+        """Whether a fault of the methods that the claim names changes its verdict.
 
-    def unnoticed(self, targets: Sequence[str]) -> tuple[str, ...]:
-        """Return the targets whose mutants all left the verdict unchanged."""
-        noticed = {one.target for one in self.attempts if one.fate is Fate.KILLED}
-        return tuple(target for target in targets if target not in noticed)
+        Where no fault of its methods can be noticed, since they never learn, those of its tasks count instead. While
+        some mutants are untried, only a change by a fault of its methods says something.
+        """
+        counted = [attempt for attempt in self.attempts if attempt.fate.counts]
+        considered = [attempt for attempt in counted if attempt.part == "method"]
+        if not self.untried:
+            considered = considered or counted
+        if any(attempt.fate is Fate.KILLED for attempt in considered):
+            return Tried.SENSITIVE
+        return Tried.INSENSITIVE if considered and not self.untried else Tried.NOT_TRIED
+
+    @property
+    def unnoticed(self) -> tuple[str, ...]:
+        """The methods that the claim names, and none of whose own faults changes its verdict."""
+        noticed = {one.target for one in self.attempts if one.part == "method" and one.fate is Fate.KILLED}
+        return tuple(method for method in self.methods if method not in noticed)
 
 
 Matrix = Mapping[tuple[str, str], Sensitivity]
 """By tier and claim, such as ("smoke", "G1[n_parity]")."""
+
+
+def current(matrix: Matrix, report: ClaimReport) -> Sensitivity | None:
+    """Return a claim's row if it is about this verdict: the same conditions, rules and outcome; else None."""
+    row = None if report.variant else matrix.get(key_of(report))
+    return row if row is not None and (row.fingerprint, row.outcome) == (report.fingerprint, report.outcome) else None
+
+
+def tried(matrix: Matrix, report: ClaimReport) -> Tried:
+    """Return whether planted faults change a claim's verdict; "not tried" where no row is about it."""
+    row = current(matrix, report)
+    return Tried.NOT_TRIED if row is None else row.tried
+
+
+def described(matrix: Matrix, report: ClaimReport) -> str:
+    """Return a sentence on which planted faults change a claim's verdict."""
+    row = current(matrix, report)
+    if row is None or row.tried is Tried.NOT_TRIED:
+        return "Planted faults: not tried."
+    killed = sum(attempt.fate is Fate.KILLED for attempt in row.attempts)
+    said = f"Planted faults: {killed} of {sum(attempt.fate.counts for attempt in row.attempts)} change this verdict"
+    if row.unnoticed:
+        said += f", none of those in {' or '.join(row.unnoticed)}"
+    return f"Insensitive. {said}." if row.tried is Tried.INSENSITIVE else f"{said}."
 
 
 def fate(sound: Outcome, faulty: Outcome, *, equivalent: bool, drifted: bool) -> Fate:
@@ -107,50 +172,6 @@ def fate(sound: Outcome, faulty: Outcome, *, equivalent: bool, drifted: bool) ->
     return Fate.DRIFTED if drifted else Fate.SURVIVED
 
 
-@dataclass(frozen=True)
-class MutationScore:
-    """How many mutants are noticed; equivalent and broken ones do not count.
-
-    Attributes:
-        mutants: pairs of fault and target that were tried.
-        by_verdict: those that change the verdict of at least one claim.
-        by_drift: those that change none but are found by the drift check.
-        claims: that mutants were tried on.
-        insensitive: claims that no mutant changed.
-    """
-
-    mutants: int
-    by_verdict: int
-    by_drift: int
-    claims: int
-    insensitive: tuple[str, ...]
-
-    def __str__(self) -> str:
-        """Return one line for a table's foot."""
-        return (
-            f"{self.by_verdict} of {self.mutants} mutants change a verdict, {self.by_drift} more are told by the drift "
-            f"check; {len(self.insensitive)} of {self.claims} claims are changed by none of those tried"
-        )
-
-
-def score(matrix: Matrix, tier: str) -> MutationScore:
-    """Return the mutation score of a tier."""
-    rows = {claim: row for (one, claim), row in matrix.items() if one == tier}
-    fates: dict[tuple[str, str], set[Fate]] = {}
-    for row in rows.values():
-        for attempt in row.attempts:
-            fates.setdefault((attempt.mutant, attempt.target), set()).add(attempt.fate)
-    tried = [found for found in fates.values() if found - {Fate.EQUIVALENT, Fate.BROKEN}]
-    killed = sum(Fate.KILLED in found for found in tried)
-    return MutationScore(
-        mutants=len(tried),
-        by_verdict=killed,
-        by_drift=sum(Fate.DRIFTED in found and Fate.KILLED not in found for found in tried),
-        claims=len(rows),
-        insensitive=tuple(claim for claim, row in rows.items() if row.insensitive),
-    )
-
-
 def load(path: Path) -> Matrix:
     """Read a matrix; empty if there is no such file.
 
@@ -161,20 +182,64 @@ def load(path: Path) -> Matrix:
         plain = tomllib.loads(read_file(path).decode())
         if plain.pop("schema", None) != SCHEMA:
             raise ValueError(f"this version of evoclaims reads schema {SCHEMA}")
-        rows = msgspec.convert(plain, dict[str, dict[str, Sensitivity]])
+        tiers = msgspec.convert(plain, dict[str, dict[str, _Written]])
+        return {(tier, claim): _read(row) for tier, rows in tiers.items() for claim, row in rows.items()}
     except FileNotFoundError:
         return {}
     except (OSError, ValueError, RecursionError) as error:
         raise UserError(
-            f"{path} holds no matrix of mutants: {printable(error)}. Restore it from version control, or write it anew "
-            "with `evoclaims mutants`."
+            f"{path} holds no matrix of mutants: {printable(error)}. Restore it from version control, or remove it and "
+            "write it anew with `evoclaims mutants`."
         ) from error
-    return {(tier, claim): row for tier, claims in rows.items() for claim, row in claims.items()}
 
 
 def dump(matrix: Matrix) -> str:
-    """Return a matrix as TOML."""
+    """Return a matrix as TOML, with one line for each attempt."""
     tiers: dict[str, dict[str, Any]] = {}
     for (tier, claim), row in sorted(matrix.items()):
-        tiers.setdefault(tier, {})[printable(claim)] = msgspec.to_builtins(row)
+        tiers.setdefault(tier, {})[printable(claim)] = msgspec.to_builtins(_written(row))
     return "# Written by `evoclaims mutants`.\n" + tomli_w.dumps({"schema": SCHEMA, **tiers})
+
+
+@dataclass(frozen=True)
+class _Written:
+    """A row as the file has it: what each fault did, by method or task; "refuted" where it made the claim so."""
+
+    outcome: Outcome
+    fingerprint: str
+    untried: tuple[str, ...]
+    method: dict[str, dict[str, str]]
+    task: dict[str, dict[str, str]]
+
+
+def _written(row: Sensitivity) -> _Written:
+    """Return a row as the file has it."""
+    written = _Written(row.outcome, row.fingerprint, row.untried, {name: {} for name in row.methods}, {})
+    for one in row.attempts:
+        parts: dict[Part, dict[str, dict[str, str]]] = {"method": written.method, "task": written.task}
+        said = str(one.outcome if one.fate is Fate.KILLED else one.fate)
+        parts[one.part].setdefault(one.target, {})[one.mutant] = said
+    return written
+
+
+def _read(written: _Written) -> Sensitivity:
+    """Return a row of the file; a `ValueError` for what is neither an outcome nor a fate."""
+
+    def attempt(part: Part, target: str, mutant: str, said: str) -> Attempt:
+        if said in set(Outcome):
+            return Attempt(mutant, part, target, Outcome(said), Fate.KILLED)
+        return Attempt(mutant, part, target, written.outcome, Fate(said))
+
+    parts: tuple[tuple[Part, dict[str, dict[str, str]]], ...] = ("method", written.method), ("task", written.task)
+    return Sensitivity(
+        outcome=written.outcome,
+        fingerprint=written.fingerprint,
+        methods=tuple(written.method),
+        attempts=tuple(
+            attempt(part, target, mutant, said)
+            for part, targets in parts
+            for target, faults in targets.items()
+            for mutant, said in faults.items()
+        ),
+        untried=written.untried,
+    )

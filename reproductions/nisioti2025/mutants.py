@@ -1,0 +1,139 @@
+"""Faults that only this paper's methods and tasks can have; its claims should notice them (`evoclaims mutants`)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar
+
+import jax.numpy as jnp
+
+from evoclaims.envs import Box, DeceptiveMaze, Obstacles, Rangefinders, Ruling, SteppingStones
+from evoclaims.methods import HyperNeat, Neat, Ppo
+from evoclaims.methods.neat import Attribute, Mutation
+from evoclaims.mutants import Fault, of_task, with_method, with_task
+from evoclaims.networks import Substrate
+
+MAZES = (SteppingStones, DeceptiveMaze)
+
+
+def _with_mutation(method: Any, mutation: Mutation) -> Any:
+    """Return NEAT or HyperNEAT with other mutations."""
+    return replace(method, settings=replace(method.settings, mutation=mutation))
+
+
+def _growing_nothing(method: Any) -> Any:
+    """NEAT that never changes a network's structure."""
+    structure = dict.fromkeys(("node_add", "node_delete", "connection_add", "connection_delete"), 0.0)
+    return _with_mutation(method, replace(method.settings.mutation, **structure))
+
+
+def _keeping_values(method: Any) -> Any:
+    """NEAT or HyperNEAT that never changes a weight, a bias or a response."""
+    mutation = method.settings.mutation
+
+    def frozen(attribute: Attribute) -> Attribute:
+        return replace(attribute, mutate_rate=0.0, replace_rate=0.0)
+
+    values = {name: frozen(getattr(mutation, name)) for name in ("weight", "bias", "response")}
+    return _with_mutation(method, replace(mutation, **values))
+
+
+def _in_a_point(method: Any) -> Any:
+    """HyperNEAT whose neurons all lie at one point, so that the CPPN gives every connection the same weight."""
+    if method.substrate is None:
+        return method
+    return replace(method, substrate=Substrate(tuple(((0.0, 0.0),) * len(layer) for layer in method.substrate.layers)))
+
+
+class StonesPayNothing(Fault):
+    """Stepping stones whose reward is the nearness of the next stone alone."""
+
+    says: ClassVar[str] = "pays nothing for stones"
+
+    def rule(self, memory: Any, before: Any, after: Any, action: Any) -> Ruling:
+        """Take the stones' reward, and the bonus of the last one, off a step's."""
+        ruling: Ruling = self.sound.rule(memory, before, after, action)
+        return replace(ruling, reward=jnp.minimum(ruling.reward - ruling.memory.crossed, 1.0))
+
+
+class StonesUncounted(Fault):
+    """Stepping stones that the rule never counts as crossed."""
+
+    says: ClassVar[str] = "counts no stone"
+
+    def rule(self, memory: Any, before: Any, after: Any, action: Any) -> Ruling:
+        """Keep the count as it was."""
+        ruling: Ruling = self.sound.rule(memory, before, after, action)
+        return replace(ruling, memory=memory)
+
+
+class WallsUnderground(Fault):
+    """A maze whose walls lie under the floor, so that robots pass."""
+
+    says: ClassVar[str] = "has no walls"
+
+    @property
+    def boxes(self) -> tuple[Box, ...]:
+        """The walls, all of them below the floor."""
+        return tuple(replace(box, bottom=-3.0, top=-2.0) for box in self.sound.boxes)
+
+
+class FlatObstacles(Fault):
+    """Obstacles that do not rise above the floor."""
+
+    says: ClassVar[str] = "has flat obstacles"
+
+    @property
+    def tops(self) -> tuple[float, ...]:
+        """Height of each obstacle, m."""
+        return (0.0,) * len(self.sound.tops)
+
+
+class TargetFromAfar(Fault):
+    """A deceptive maze that counts its target as reached from the other side of the wall."""
+
+    says: ClassVar[str] = "reaches its target from afar"
+
+    @property
+    def plan(self) -> Any:
+        """The maze, with a target of 4 m around its place."""
+        return self.sound.plan._replace(within=4.0)
+
+
+@dataclass(frozen=True)
+class _Unseeing(Rangefinders):
+    """Rays that never meet anything."""
+
+    def read(self, scene: Any, pose: Any) -> Any:
+        """Return 1 for every ray."""
+        return jnp.ones(self.size)
+
+
+class UnseeingRays(Fault):
+    """A maze in which the robot's rays meet nothing."""
+
+    says: ClassVar[str] = "has rays that see nothing"
+
+    @property
+    def sensor(self) -> Rangefinders:
+        """As many rays as those of the sound maze."""
+        return _Unseeing(self.sound.sensor.count)
+
+
+MUTANTS = {
+    "learning-rate-0": with_method(
+        "has a learning rate of 0", lambda method: replace(method, learning_rate=0.0), only=Ppo
+    ),
+    "grows-nothing": with_method("never changes structure", _growing_nothing, only=Neat),
+    "keeps-values": with_method("never changes values", _keeping_values, only=(Neat, HyperNeat)),
+    "substrate-in-a-point": with_method("has its neurons in a point", _in_a_point, only=HyperNeat),
+    "stones-pay-nothing": of_task(StonesPayNothing, only=SteppingStones),
+    "stones-uncounted": of_task(StonesUncounted, only=SteppingStones),
+    "stones-from-afar": with_task(
+        "counts stones from 1 m away", lambda task: replace(task, within=1.0), only=SteppingStones
+    ),
+    "no-walls": of_task(WallsUnderground, only=MAZES),
+    "unseeing-rays": of_task(UnseeingRays, only=MAZES),
+    "flat-obstacles": of_task(FlatObstacles, only=Obstacles),
+    "target-from-afar": of_task(TargetFromAfar, only=DeceptiveMaze),
+}

@@ -1,0 +1,93 @@
+"""The grid of claims and planted faults: which fault changes which verdict, as data for tables."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from evoclaims.report import table_cells
+from evoclaims.verdicts.claim_report import ClaimReport
+from evoclaims.verdicts.history import key_of
+from evoclaims.verdicts.mutation_matrix import Attempt, Fate, Matrix, current
+from evoclaims.verdicts.mutation_score import score
+
+LEGEND: Final = ", ".join(f"{fate.symbol} {fate}" for fate in Fate)
+"""What the symbols of a cell say."""
+
+
+@dataclass(frozen=True)
+class GridCell:
+    """One fault tried on one claim, in each method or task that the claim is about.
+
+    Attributes:
+        symbols: one for each of them.
+        says: which of them, in words.
+    """
+
+    symbols: str
+    says: str
+
+
+@dataclass(frozen=True)
+class GridRow:
+    """One claim.
+
+    Attributes:
+        report: of it.
+        cells: by mutant.
+        unnoticed: methods that it names, and none of whose own faults changes its verdict.
+    """
+
+    report: ClaimReport
+    cells: Mapping[str, GridCell]
+    unnoticed: str
+
+
+@dataclass(frozen=True)
+class FaultGrid:
+    """The claims of one tier on which faults were tried.
+
+    Attributes:
+        tier: its name.
+        score: the mutation score, in a sentence.
+        mutants: the faults that were tried.
+        rows: the claims.
+        untried: names of further judged claims, of which no row of the matrix tells; empty if it tells of none.
+    """
+
+    tier: str
+    score: str
+    mutants: tuple[str, ...]
+    rows: tuple[GridRow, ...]
+    untried: tuple[str, ...]
+
+
+def fault_grid(matrix: Matrix, tier: str, reports: Iterable[ClaimReport]) -> FaultGrid:
+    """Return the grid of a tier; rows of the matrix that are about other verdicts than those of now are left out."""
+    ordered = table_cells.ordered(reports)
+    found = {report.name: (report, row) for report in ordered if (row := current(matrix, report)) is not None}
+    rows = tuple(
+        GridRow(report, _cells(row.attempts), "" if row.untried else ", ".join(row.unnoticed))
+        for report, row in found.values()
+    )
+    return FaultGrid(
+        tier=tier,
+        score=str(score({key_of(report): row for report, row in found.values()}, tier)),
+        mutants=tuple(dict.fromkeys(mutant for row in rows for mutant in row.cells)),
+        rows=rows,
+        untried=tuple(report.name for report in ordered if rows and report.n and report.name not in found),
+    )
+
+
+def _cells(attempts: Sequence[Attempt]) -> dict[str, GridCell]:
+    """Return a cell for each mutant that was tried."""
+    by_mutant: dict[str, list[Attempt]] = {}
+    for attempt in attempts:
+        by_mutant.setdefault(attempt.mutant, []).append(attempt)
+    return {
+        mutant: GridCell(
+            "".join(one.fate.symbol for one in several), "; ".join(f"{one.target}: {one.fate}" for one in several)
+        )
+        for mutant, several in by_mutant.items()
+    }

@@ -1,0 +1,25 @@
+"""The mutation score that the README quotes is that of the committed matrix, which is about claims that there are."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from evoclaims.mutants import catalogue
+from evoclaims.verdicts import history, mutation_matrix
+from evoclaims.verdicts.mutation_score import score
+from reproductions.nisioti2025 import REPRODUCTION
+
+ROOT = Path(__file__).parents[2]
+MATRIX = mutation_matrix.load(REPRODUCTION.folder / mutation_matrix.FILE)
+
+
+def test_the_readme_quotes_the_mutation_score_of_the_committed_matrix() -> None:
+    readme = " ".join((ROOT / "README.md").read_text(encoding="utf-8").split())
+    assert str(score(MATRIX, "smoke")) in readme, "quote this sentence in the README"
+
+
+def test_the_committed_matrix_is_about_accepted_verdicts_and_known_mutants() -> None:
+    accepted = history.load(REPRODUCTION.folder / history.FILE)
+    assert MATRIX.keys() <= accepted.keys()
+    tried = {attempt.mutant for row in MATRIX.values() for attempt in row.attempts}
+    assert tried <= catalogue.load(REPRODUCTION).keys()

@@ -1,0 +1,102 @@
+"""What a call adds to the matrix, what it leaves as it was, and what it takes out."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any, cast
+
+from hand_made_verdicts import report, verdict
+
+from evoclaims.envs.gates.parity import NParity
+from evoclaims.judging.verdict import Outcome
+from evoclaims.methods.hand_built import HandBuilt
+from evoclaims.mutants.conditions import Planted
+from evoclaims.mutants.trying import Comparison, merged, noticed
+from evoclaims.trials.budget import Budget
+from evoclaims.trials.spec import Condition
+from evoclaims.verdicts.claim_report import ClaimReport
+from evoclaims.verdicts.history import key_of
+from evoclaims.verdicts.mutation_matrix import Attempt, Fate, Sensitivity
+from evoclaims.verdicts.source_trials import SourceTrials
+
+CONDITION = Condition(HandBuilt(), NParity(2), "curriculum", Budget(generations=1))
+NAMES = ("neat", "maze")
+BLIND = Planted("blind", "task", "maze", {NAMES: CONDITION})
+MINIMIZES = Planted("minimizes", "method", "neat", {NAMES: CONDITION})
+
+
+def judged(outcome: str = "supported", *, task: str = "maze") -> ClaimReport:
+    source = SourceTrials("neat", task, "c" * 64, (), {}, ())
+    return report("A", outcome, verdict=None if outcome == "not run" else verdict(outcome), sources=(source,))
+
+
+class _Compared:
+    """Stands for a comparison of trials: none is equivalent, none has drifted."""
+
+    def equivalent(self, names: Any, faulty: Condition) -> bool:
+        return False
+
+    def drifted(self, names: Any, faulty: Condition) -> bool:
+        return False
+
+
+def tried(planted: Planted, sound: ClaimReport, faulty: ClaimReport, failed: Any = ()) -> Sensitivity | None:
+    return noticed(cast(Comparison, _Compared()), [sound], [planted], [[faulty]], failed).get(key_of(sound))
+
+
+def test_a_fault_is_tried_where_its_conditions_have_run_and_the_claim_is_about_them() -> None:
+    row = tried(BLIND, judged(), judged("refuted"))
+    assert row is not None
+    assert (row.outcome, row.methods, row.named(Fate.KILLED)) == (Outcome.SUPPORTED, ("neat",), ("maze: blind",))
+    for faulty, sound in (("not run", judged()), ("refuted", judged(task="room"))):
+        row = tried(BLIND, sound, judged(faulty))
+        assert row is not None
+        assert row.attempts == ()
+    assert tried(BLIND, judged("not run"), judged("refuted")) is None
+
+
+def test_a_condition_that_has_just_failed_is_broken_and_one_that_was_not_run_is_not() -> None:
+    row = tried(BLIND, judged(), judged("not run"), failed={("maze: blind", NAMES)})
+    assert row is not None
+    assert row.named(Fate.BROKEN) == ("maze: blind",)
+    row = tried(BLIND, judged(), judged("not run"), failed={("neat: minimizes", NAMES)})
+    assert row is not None
+    assert row.attempts == ()
+
+
+def attempt(planted: Planted, fate: Fate) -> Attempt:
+    return Attempt(planted.mutant, planted.part, planted.target, Outcome.REFUTED, fate)
+
+
+KEY = ("smoke", "A")
+BEFORE = Sensitivity(Outcome.SUPPORTED, "f" * 64, ("neat",), (attempt(BLIND, Fate.SURVIVED),))
+NOW = replace(BEFORE, attempts=(attempt(MINIMIZES, Fate.KILLED),))
+BOTH = {KEY: ("neat: minimizes", "maze: blind")}
+
+
+def test_attempts_of_several_calls_add_up_and_new_ones_take_the_place_of_old_ones() -> None:
+    row = merged({KEY: BEFORE}, {KEY: NOW}, "smoke", BOTH)[KEY]
+    assert [one.name for one in row.attempts] == ["neat: minimizes", "maze: blind"]
+    assert row.untried == ()
+    again = replace(BEFORE, attempts=(attempt(BLIND, Fate.KILLED),))
+    row = merged({KEY: BEFORE}, {KEY: again}, "smoke", BOTH)[KEY]
+    assert (row.attempts, row.untried) == (again.attempts, ("neat: minimizes",))
+
+
+def test_attempts_on_another_verdict_are_forgotten() -> None:
+    for changed in (replace(NOW, fingerprint="e" * 64), replace(NOW, outcome=Outcome.REFUTED)):
+        row = merged({KEY: BEFORE}, {KEY: changed}, "smoke", BOTH)[KEY]
+        assert (row.attempts, row.untried) == (NOW.attempts, ("maze: blind",))
+
+
+def test_what_no_longer_applies_is_taken_out() -> None:
+    full = ("full", "A")
+    assert merged({KEY: BEFORE, full: BEFORE}, {}, "smoke", {}) == {full: BEFORE}
+    row = merged({KEY: BEFORE}, {KEY: NOW}, "smoke", {KEY: ("neat: minimizes",)})[KEY]
+    assert row.attempts == NOW.attempts
+
+
+def test_a_claim_on_which_nothing_was_tried_keeps_its_row() -> None:
+    nothing = replace(BEFORE, attempts=())
+    assert merged({KEY: BEFORE}, {KEY: nothing}, "smoke", BOTH)[KEY].attempts == BEFORE.attempts
+    assert merged({}, {KEY: nothing}, "smoke", BOTH) == {}
