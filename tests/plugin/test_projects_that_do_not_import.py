@@ -104,7 +104,7 @@ CLAIM_FILES = [
     (
         "test_more.py",
         "import pytest\n\n@pytest.mark.parametrize('x', [1])\ndef test_b(): ...\n",
-        "In claims/test_more.py::test_b: function uses no argument 'x'",
+        "test_b: function uses no argument 'x'",
     ),
     ("conftest.py", "\nimport a_package_that_is_not_installed\n", "(claims/conftest.py, line 2)"),
     ("conftest.py", "raise SystemExit(3)\n", "SystemExit: 3 (claims/conftest.py, line 1)"),
@@ -128,6 +128,7 @@ def test_claims_that_do_not_import_are_one_line_on_the_command_line(
     assert out == ""
     assert err.count("\n") == 1
     assert err.startswith(f"evoclaims: The claims in {project.path / 'claims'} cannot be collected: ")
+    assert f"claims/{name}" in err
     assert err.endswith(f"{said}.\n")
 
 

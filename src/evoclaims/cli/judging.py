@@ -108,7 +108,10 @@ class _Run:
     ) -> None:
         """Keep what broke a file of claims."""
         if isinstance(report, pytest.CollectReport) and call.excinfo is not None:
-            self.troubles.append(_told(call.excinfo.value, self._root))
+            told = _told(call.excinfo.value, self._root)
+            # pytest 8 names a test that it cannot collect without its file.
+            nowhere = isinstance(call.excinfo.value, pytest.fail.Exception) and node.path.name not in told
+            self.troubles.append(f"{node.nodeid}: {told}" if nowhere else told)
 
     def pytest_internalerror(self, excinfo: pytest.ExceptionInfo[BaseException]) -> bool:
         """Keep what a plugin or a conftest.py has raised, and print nothing of it."""
