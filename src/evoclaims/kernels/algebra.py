@@ -47,6 +47,13 @@ class Algebra:
             return self.apply("ne", number, number.dtype.type(0))
         return self._shared("cast", (number,), dtype)
 
+    def bits(self, number: Number, dtype: Any) -> Number:
+        """Return the number that has the same bits in another dtype; float32 and int32."""
+        dtype = np.dtype(dtype)
+        if number.dtype == dtype:
+            return number
+        return number.view(dtype) if is_known(number) else self._shared("bits", (number,), dtype)
+
     def _shared(self, name: str, operands: tuple[Number, ...], dtype: np.dtype[Any]) -> ScalarOperation:
         """Return the one object for an operation on these operands."""
         keys = [(o.dtype.str, o.tobytes()) if is_known(o) else ("", id(o)) for o in operands]
@@ -141,6 +148,12 @@ def _not(algebra: Algebra, a: Expression) -> Number | None:
     return a.operands[0] if isinstance(a, ScalarOperation) and a.name == "not" else None
 
 
+def _shift(algebra: Algebra, a: Number, places: Number) -> Number | None:
+    if not is_known(places) or not 0 <= places < 32:
+        raise Unsupported("a shift by a number of bits that may be too large")
+    return None
+
+
 def _select(algebra: Algebra, condition: Number, yes: Number, no: Number) -> Number | None:
     if is_known(condition):
         return yes if condition else no
@@ -164,6 +177,9 @@ RULES: Final[dict[str, Rule]] = {
     "or": _or,
     "rem": _rem,
     "select": _select,
+    "shift_left": _shift,
+    "shift_right_arithmetic": _shift,
+    "shift_right_logical": _shift,
     "sub": _sub,
 }
 """Simplifications by operation: each returns a simpler number, or None if there is none."""

@@ -11,7 +11,7 @@ from jax.lax import RoundingMethod
 
 from evoclaims.kernels import expressions as ex
 from evoclaims.kernels.elementary import power
-from evoclaims.kernels.interpreter import Numbers, Scalars, filled, listed, primitive
+from evoclaims.kernels.interpreter import Numbers, Scalars, check, filled, listed, primitive
 from evoclaims.kernels.unsupported import Unsupported
 
 
@@ -35,6 +35,14 @@ def _clamp(s: Scalars, equation: Any, low: Numbers, x: Numbers, high: Numbers) -
 @primitive("convert_element_type")
 def _convert_element_type(s: Scalars, equation: Any, x: Numbers) -> Sequence[Numbers]:
     return [s.each(lambda n: s.algebra.cast(n, equation.params["new_dtype"]), x)]
+
+
+@primitive("bitcast_convert_type")
+def _bitcast(s: Scalars, equation: Any, x: Numbers) -> Sequence[Numbers]:
+    dtypes = check(equation.invars[0].aval.dtype), check(equation.params["new_dtype"])
+    if np.dtype(bool) in dtypes:
+        raise Unsupported("the bits of a condition")
+    return [s.each(lambda n: s.algebra.bits(n, dtypes[1]), x)]
 
 
 IDENTITIES: Final[dict[str, Callable[[np.dtype[Any]], float]]] = {

@@ -1,14 +1,16 @@
-"""Functions made of simple operations: sine, cosine, arc tangent, powers, signs."""
+"""Functions made of simple operations: sine, cosine, arc tangent, whole powers, signs; `exponentials` has others."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import partial
 from typing import Final
 
 import numpy as np
 
+from evoclaims.kernels import exponentials
 from evoclaims.kernels.algebra import Algebra
+from evoclaims.kernels.exponentials import polynomial
 from evoclaims.kernels.expressions import Number, is_known
 from evoclaims.kernels.unsupported import Unsupported
 
@@ -24,14 +26,6 @@ COSINE: Final = (2.443315711809948e-5, -1.388731625493765e-3, 4.166664568298827e
 ARC_TANGENT: Final = (8.05374449538e-2, -1.38776856032e-1, 1.99777106478e-1, -3.33329491539e-1)
 
 
-def _polynomial(a: Algebra, z: Number, coefficients: Sequence[float]) -> Number:
-    """Evaluate by Horner's rule."""
-    value: Number = F(coefficients[0])
-    for coefficient in coefficients[1:]:
-        value = a.apply("add", a.apply("mul", value, z), F(coefficient))
-    return value
-
-
 def _circular(quarters: int, a: Algebra, x: Number) -> Number:
     """Return the sine of x + `quarters` · π/2 (Cephes).
 
@@ -42,9 +36,9 @@ def _circular(quarters: int, a: Algebra, x: Number) -> Number:
     for part in PIO2:
         x = a.apply("sub", x, a.apply("mul", turns, part))
     z = a.apply("mul", x, x)
-    sine = a.apply("add", x, a.apply("mul", a.apply("mul", x, z), _polynomial(a, z, SINE)))
+    sine = a.apply("add", x, a.apply("mul", a.apply("mul", x, z), polynomial(a, z, SINE)))
     near_one = a.apply("sub", F(1), a.apply("mul", z, F(0.5)))
-    cosine = a.apply("add", near_one, a.apply("mul", a.apply("mul", z, z), _polynomial(a, z, COSINE)))
+    cosine = a.apply("add", near_one, a.apply("mul", a.apply("mul", z, z), polynomial(a, z, COSINE)))
     quadrant = a.apply("add", a.cast(turns, np.int32), np.int32(quarters))
     odd = a.apply("ne", a.apply("and", quadrant, np.int32(1)), np.int32(0))
     lower_half = a.apply("ne", a.apply("and", quadrant, np.int32(2)), np.int32(0))
@@ -66,7 +60,7 @@ def _atan2(a: Algebra, y: Number, x: Number) -> Number:
     far = a.apply("gt", t, F(np.tan(np.pi / 8)))
     t = a.apply("select", far, a.apply("div", a.apply("sub", t, F(1)), a.apply("add", t, F(1))), t)
     z = a.apply("mul", t, t)
-    angle = a.apply("add", t, a.apply("mul", a.apply("mul", t, z), _polynomial(a, z, ARC_TANGENT)))
+    angle = a.apply("add", t, a.apply("mul", a.apply("mul", t, z), polynomial(a, z, ARC_TANGENT)))
     angle = a.apply("add", angle, a.apply("select", far, F(np.pi / 4), F(0)))
     angle = a.apply("select", steep, a.apply("sub", F(np.pi / 2), angle), angle)
     angle = a.apply("select", a.apply("lt", x, F(0)), a.apply("sub", F(np.pi), angle), angle)
@@ -84,10 +78,10 @@ def power(a: Algebra, x: Number, exponent: int) -> Number:
 
 
 def _pow(a: Algebra, x: Number, y: Number) -> Number:
-    """Return x to the y for a known integer y."""
-    if not is_known(y) or not np.isfinite(y) or y != int(y):
-        raise Unsupported("a power that is not an integer")
-    return power(a, x, int(y))
+    """Return x to the y."""
+    if is_known(y) and y == np.trunc(y) and abs(y) <= LARGEST_POWER:
+        return power(a, x, int(y))
+    return exponentials.power(a, x, a.cast(y, np.float32))
 
 
 def _sign(a: Algebra, x: Number) -> Number:
@@ -100,11 +94,20 @@ def _sign(a: Algebra, x: Number) -> Number:
 ELEMENTARY: Final[dict[str, Callable[..., Number]]] = {
     "atan2": _atan2,
     "cos": partial(_circular, 1),
+    "erf": exponentials.erf,
+    "erf_inv": exponentials.erf_inv,
+    "exp": exponentials.exp,
+    "exp2": exponentials.exp2,
+    "expm1": exponentials.expm1,
     "is_finite": lambda a, x: a.apply("lt", a.apply("abs", x), x.dtype.type(np.inf)),
+    "log": exponentials.log,
+    "log1p": exponentials.log1p,
+    "logistic": exponentials.logistic,
     "pow": _pow,
     "rsqrt": lambda a, x: a.apply("div", x.dtype.type(1), a.apply("sqrt", x)),
     "sign": _sign,
     "sin": partial(_circular, 0),
     "square": lambda a, x: a.apply("mul", x, x),
+    "tanh": exponentials.tanh,
 }
 """By jax's names; each function takes the algebra and the operands."""

@@ -36,7 +36,7 @@ class Input(Expression):
 
 @dataclass(frozen=True, eq=False, slots=True)
 class ScalarOperation(Expression):
-    """A simple operation on numbers: one of `KNOWN`, or "cast"."""
+    """A simple operation on numbers: one of `KNOWN`, "cast", or "bits" (see `Algebra`)."""
 
     name: str
     operands: tuple[Number, ...]
@@ -161,6 +161,9 @@ KNOWN: Final[dict[str, Callable[..., Any]]] = {
     "rem": _remainder,
     "rint": np.rint,
     "select": np.where,
+    "shift_left": np.left_shift,
+    "shift_right_arithmetic": np.right_shift,
+    "shift_right_logical": lambda a, b: (a.view(np.uint32) >> b.view(np.uint32)).view(np.int32),
     "sqrt": np.sqrt,
     "sub": np.subtract,
     "xor": np.bitwise_xor,

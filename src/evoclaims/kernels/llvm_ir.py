@@ -44,6 +44,9 @@ BINARY: Final = {
         "mul": "mul",
         "or": "or",
         "rem": "srem",
+        "shift_left": "shl",
+        "shift_right_arithmetic": "ashr",
+        "shift_right_logical": "lshr",
         "sub": "sub",
         "xor": "xor",
     },
@@ -70,7 +73,11 @@ INTRINSICS: Final = {
     "b": {},
 }
 CASTS: Final = {"bf": "uitofp", "bi": "zext", "if": "sitofp"}
-OTHERS: Final = {"f": ("cast", "neg", "select"), "i": ("abs", "cast", "neg", "not", "select"), "b": ("cast", "not")}
+OTHERS: Final = {
+    "f": ("bits", "cast", "neg", "select"),
+    "i": ("abs", "bits", "cast", "neg", "not", "select"),
+    "b": ("cast", "not"),
+}
 
 
 @dataclass(frozen=True)
@@ -223,6 +230,8 @@ class Instructions:
         if name == "abs":
             return self.call(self.mangled("abs", "i32"), type_, [(type_, operands[0]), ("i1", "false")])
         to = self.vector(TYPES[operation.dtype.kind])
+        if name == "bits":
+            return self.put(f"bitcast {type_} {operands[0]} to {to}")
         if kind == "f":  # to an integer: no overflow, and NaN is 0
             return self.call(self.mangled("fptosi.sat", "i32", "f32"), to, [(type_, operands[0])])
         return self.put(f"{CASTS[kind + operation.dtype.kind]} {type_} {operands[0]} to {to}")
