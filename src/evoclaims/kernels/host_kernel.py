@@ -1,8 +1,7 @@
-"""A kernel for the processor: LLVM's text of a loop over the batch, and of the function that XLA calls.
+"""A kernel for the processor: LLVM's text of a loop over the batch.
 
 A vector lane computes an element of the batch, as in ispc. Arrays are stored element by element, so that lanes gather
-their numbers and scatter their results. XLA calls the kernel through its foreign function interface (`c_api.h` of
-jaxlib, a stable ABI): the handler written here takes the arrays' addresses out of the call frame.
+their numbers and scatter their results.
 """
 
 from __future__ import annotations
@@ -13,19 +12,10 @@ from typing import Final
 from evoclaims.kernels.expressions import Input, in_order
 from evoclaims.kernels.interpreter import Numbers
 from evoclaims.kernels.llvm_ir import BYTES, STORED, SUFFIXES, Instructions, Row
+from evoclaims.kernels.xla_handler import handler
 
-ENTRY: Final = "handler"
-"""The symbol that XLA calls."""
-EXTENSION_START, API, ARGUMENTS, RESULTS = 8, 16, 72, 112
-"""Offsets, in bytes, in XLA_FFI_CallFrame: the extensions, the API, the arrays of pointers to buffers."""
-DATA: Final = 24
-"""Offset of the address of the data in XLA_FFI_Buffer."""
-METADATA: Final = 24
-"""Offset of the address of XLA_FFI_Metadata in the extension that asks for it."""
-API_VERSION: Final = 32
-"""Offset of the version (major, minor) in XLA_FFI_Api."""
-METADATA_VERSION: Final = 24
-"""Offset of the version (major, minor) in XLA_FFI_Metadata."""
+WIDE: Final = 'nounwind "prefer-vector-width"="512" "min-legal-vector-width"="512"'
+"""Attributes of a function that uses the widest vectors there are."""
 
 
 def text(results: Sequence[Numbers], arrays: Mapping[int, Row], lanes: int) -> str:
@@ -41,12 +31,12 @@ def text(results: Sequence[Numbers], arrays: Mapping[int, Row], lanes: int) -> s
     """
     page = Instructions(lanes, [number for result in results for number in result.flat])
     _block(page, results, arrays)
-    given = [f"ptr %a{a}, i64 %shared{a}" for a in arrays] + [f"ptr %z{z}" for z in range(len(results))]
-    parameters = ", ".join([*given, "i64 %row", "i64 %last"])
+    given = [f"i64 %shared{a}" for a in arrays]
+    given += [f"ptr %a{a}" for a in arrays] + [f"ptr %z{z}" for z in range(len(results))]
     body = "\n".join(page.lines)
-    wide = 'nounwind "prefer-vector-width"="512" "min-legal-vector-width"="512"'
-    block = f"define internal void @block({parameters}) {wide} {{\n{body}\n}}\n"
-    return "\n".join(page.declared) + "\n" + block + _handler(list(arrays), len(results), lanes)
+    block = f"define internal void @block({', '.join([*given, 'i64 %row', 'i64 %last'])}) {WIDE} {{\n{body}\n}}\n"
+    called = handler(1 + len(arrays), len(arrays), len(results))
+    return "\n".join(page.declared) + "\n" + block + _loop(given, lanes) + called
 
 
 def _block(page: Instructions, results: Sequence[Numbers], arrays: Mapping[int, Row]) -> None:
@@ -58,7 +48,7 @@ def _block(page: Instructions, results: Sequence[Numbers], arrays: Mapping[int, 
     page.label("entry")
     left = page.put("sub i64 %last, %row")
     few = page.call("llvm.umin.i64", "i64", [("i64", left), ("i64", str(lanes - 1))])
-    last = _in_all_lanes(page, "i32", page.put(f"trunc i64 {few} to i32"))
+    last = page.in_all_lanes("i32", page.put(f"trunc i64 {few} to i32"))
     numbers = f"<{', '.join(f'i32 {lane}' for lane in range(lanes))}>"
     inside = page.put(f"icmp ule {integers} {numbers}, {last}")
     lane = page.call(page.mangled("umin", "i32"), integers, [(integers, numbers), (integers, last)])
@@ -101,18 +91,11 @@ def _rows(page: Instructions, array: int, row: Row, lane: str) -> tuple[str, str
     # Whole numbers below 2³² are exact as doubles, and so is the whole part of their quotient. Processors divide
     # vectors of doubles, but not of integers.
     doubles, integers = page.vector("double"), page.vector("i32")
-    before = _in_all_lanes(page, "double", page.put(f"uitofp i64 {skipped} to double"))
-    shared = _in_all_lanes(page, "double", page.put(f"uitofp i64 %shared{array} to double"))
+    before = page.in_all_lanes("double", page.put(f"uitofp i64 {skipped} to double"))
+    shared = page.in_all_lanes("double", page.put(f"uitofp i64 %shared{array} to double"))
     place = page.put(f"fadd {doubles} {page.put(f'uitofp {integers} {lane} to {doubles}')}, {before}")
     further = page.put(f"fptosi {doubles} {page.put(f'fdiv {doubles} {place}, {shared}')} to {integers}")
     return address, page.put(f"mul {integers} {further}, {page.splat('i32', str(row.size))}")
-
-
-def _in_all_lanes(page: Instructions, type_: str, value: str) -> str:
-    """Copy a number into all lanes."""
-    vector = page.vector(type_)
-    one = page.put(f"insertelement {vector} poison, {type_} {value}, i64 0")
-    return page.put(f"shufflevector {vector} {one}, {vector} poison, <{page.lanes} x i32> zeroinitializer")
 
 
 def _addresses(page: Instructions, address: str, offsets: str, place: int, kind: str) -> str:
@@ -121,65 +104,21 @@ def _addresses(page: Instructions, address: str, offsets: str, place: int, kind:
     return page.put(f"getelementptr {STORED[kind]}, ptr {base}, {page.vector('i32')} {offsets}")
 
 
-def _handler(arrays: Sequence[int], results: int, lanes: int) -> str:
-    """Return the text of the function that XLA calls."""
+def _loop(given: Sequence[str], lanes: int) -> str:
+    """Return the text of the loop over the batch; `given` are the parameters of `block` besides its rows."""
     lines = [
-        f"define ptr @{ENTRY}(ptr %frame) nounwind {{",
+        f"define internal void @work({', '.join(['i64 %rows', *given])}) nounwind {{",
         "entry:",
-        *_loaded("%extension", "ptr", "%frame", EXTENSION_START),
-        *_loaded("%api", "ptr", "%frame", API),
-        "%called = icmp eq ptr %extension, null",
-        "br i1 %called, label %call, label %asked",
-        "asked:",  # XLA asks which version of the interface this is: the fields read here are in all of them
-        *_loaded("%metadata", "ptr", "%extension", METADATA),
-        *_loaded("%version", "i64", "%api", API_VERSION),
-        f"%answer = getelementptr i8, ptr %metadata, i64 {METADATA_VERSION}",
-        "store i64 %version, ptr %answer",
-        "ret ptr null",
-        "call:",
-        *_loaded("%arguments", "ptr", "%frame", ARGUMENTS),
-        *_loaded("%results", "ptr", "%frame", RESULTS),
-        *_buffer("%layout", "%arguments", 0),
-        *_count("%rows", 0),
         "%last = sub i64 %rows, 1",
-    ]
-    for place, array in enumerate(arrays, 1):
-        lines += [*_buffer(f"%a{array}", "%arguments", place), *_count(f"%shared{array}", place)]
-    for place in range(results):
-        lines += _buffer(f"%z{place}", "%results", place)
-    given = [f"ptr %a{a}, i64 %shared{a}" for a in arrays] + [f"ptr %z{z}" for z in range(results)]
-    lines += [
         "br label %again",
         "again:",
-        "%row = phi i64 [ 0, %call ], [ %following, %again ]",
+        "%row = phi i64 [ 0, %entry ], [ %following, %again ]",
         f"call void @block({', '.join([*given, 'i64 %row', 'i64 %last'])})",
         f"%following = add i64 %row, {lanes}",
         "%more = icmp ult i64 %following, %rows",
         "br i1 %more, label %again, label %done",
         "done:",
-        "ret ptr null",
+        "ret void",
         "}",
     ]
     return "\n".join(lines) + "\n"
-
-
-def _loaded(register: str, type_: str, address: str, offset: int) -> list[str]:
-    """Return instructions that read a field of a struct."""
-    at = f"{register}.at"
-    return [f"{at} = getelementptr i8, ptr {address}, i64 {offset}", f"{register} = load {type_}, ptr {at}"]
-
-
-def _count(register: str, place: int) -> list[str]:
-    """Return instructions that read a number of the first argument."""
-    return [
-        *_loaded(f"{register}.short", "i32", "%layout", 4 * place),
-        f"{register} = zext i32 {register}.short to i64",
-    ]
-
-
-def _buffer(register: str, buffers: str, place: int) -> list[str]:
-    """Return instructions that read the address of the data of a buffer."""
-    return [
-        *_loaded(f"{register}.buffer", "ptr", buffers, 8 * place),
-        *_loaded(register, "ptr", f"{register}.buffer", DATA),
-    ]

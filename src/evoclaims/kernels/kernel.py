@@ -2,27 +2,23 @@
 
 from __future__ import annotations
 
-import ctypes
 import math
 import warnings
 from collections.abc import Callable, Sequence
 from functools import cached_property
-from typing import Any, Final
+from typing import Any
 
 import jax
 import jax.numpy as jnp
-import numpy as np
 from jax.extend.core import jaxpr_as_fun
 from jaxtyping import Array
 
-from evoclaims.kernels import gpu_kernel, host_kernel, llvm_ir, machine_code
+from evoclaims.kernels import calls, gpu_kernel, host_kernel, llvm_ir, machine_code
 from evoclaims.kernels.expressions import Input, everything
 from evoclaims.kernels.interpreter import Numbers
 from evoclaims.kernels.scalarize import scalarize
 from evoclaims.kernels.unsupported import Unsupported
 
-GPU_TARGET: Final = "__gpu$xla.gpu.ptx"
-"""XLA's name for a kernel given as PTX."""
 Shapes = tuple[jax.ShapeDtypeStruct, ...]
 
 
@@ -71,15 +67,6 @@ class Kernel:
         used = {e.array for e in everything(n for r in self.results for n in r.flat) if isinstance(e, Input)}
         return {i: llvm_ir.Row(math.prod(self.shapes[i].shape), self.shapes[i].dtype.kind) for i in sorted(used)}
 
-    @cached_property
-    def host_target(self) -> str:
-        """The name under which XLA knows the kernel for this machine's processor."""
-        text = host_kernel.text([self.results[i] for i in self.written], self.read, machine_code.lanes())
-        name = f"evoclaims_{machine_code.key_of(text)}"
-        handler = ctypes.CFUNCTYPE(ctypes.c_void_p)(machine_code.address(text, host_kernel.ENTRY))
-        jax.ffi.register_ffi_target(name, jax.ffi.pycapsule(handler), platform="cpu")
-        return name
-
     def as_it_is(self, *leaves: Array) -> list[Array]:
         """Call the function itself, for every element of a batch."""
         depths = self.depths(leaves)
@@ -104,8 +91,9 @@ class Kernel:
         """Call the kernel for this machine's processor, for every element of a batch."""
 
         def call(rows: int, shared: list[int], shapes: Shapes) -> Any:
-            layout = np.array([rows, *(shared[i] for i in self.read)], np.int32)
-            return jax.ffi.ffi_call(self.host_target, shapes)(layout, *(leaves[i] for i in self.read))
+            text = host_kernel.text([self.results[i] for i in self.written], self.read, machine_code.lanes())
+            layout = [rows, *(shared[i] for i in self.read)]
+            return calls.on_host(text, layout, [leaves[i] for i in self.read], shapes)
 
         return self._call(leaves, call)
 
@@ -115,20 +103,7 @@ class Kernel:
         def call(rows: int, shared: list[int], shapes: Shapes) -> Any:
             given = {i: shared[i] for i in self.read}
             text = gpu_kernel.text([self.results[i] for i in self.written], self.read, given, rows)
-            one, none = np.int32(1), np.int32(0)
-            return jax.ffi.ffi_call(GPU_TARGET, shapes)(
-                *(leaves[i] for i in self.read),
-                name=gpu_kernel.ENTRY,
-                kernel_type="ptx",
-                kernel_data=gpu_kernel.ptx(text),
-                grid_x=np.int32(-(-rows // gpu_kernel.BLOCK)),
-                grid_y=one,
-                grid_z=one,
-                block_x=np.int32(gpu_kernel.BLOCK),
-                block_y=one,
-                block_z=one,
-                shared_mem_bytes=none,
-            )
+            return calls.on_gpu(text, [leaves[i] for i in self.read], shapes, rows)
 
         return self._call(leaves, call)
 

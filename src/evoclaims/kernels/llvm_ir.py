@@ -127,6 +127,7 @@ class Instructions:
         lanes: elements of the batch that an instruction computes.
         lines: the instructions.
         declared: declarations of the intrinsic functions used.
+        block: the basic block that is being written.
     """
 
     def __init__(self, lanes: int, results: Sequence[Number]) -> None:
@@ -135,7 +136,7 @@ class Instructions:
         self.lines: list[str] = []
         self.declared: dict[str, None] = {}
         self._fused = _products_to_fuse(results)
-        self._block = ""
+        self.block = ""
         self._registers = 0
         self._loops = 0
 
@@ -157,7 +158,7 @@ class Instructions:
     def label(self, name: str) -> None:
         """Begin a basic block."""
         self.lines.append(f"{name}:")
-        self._block = name
+        self.block = name
 
     def vector(self, type_: str) -> str:
         """Return the type of a vector of lanes; with one lane, of the number itself."""
@@ -179,6 +180,14 @@ class Instructions:
     def splat(self, type_: str, value: str) -> str:
         """Return a constant in all lanes."""
         return value if self.lanes == 1 else f"splat ({type_} {value})"
+
+    def in_all_lanes(self, type_: str, value: str) -> str:
+        """Copy a number into all lanes."""
+        if self.lanes == 1:
+            return value
+        vector = self.vector(type_)
+        one = self.put(f"insertelement {vector} poison, {type_} {value}, i64 0")
+        return self.put(f"shufflevector {vector} {one}, {vector} poison, <{self.lanes} x i32> zeroinitializer")
 
     def operand(self, number: Number, registers: dict[int, Any]) -> str:
         """Return a number's register, or its literal if it is known."""
@@ -254,7 +263,7 @@ class Instructions:
         self.compute(in_order(loop.taken), registers, load)
         self._loops += 1
         again, after = f"again{self._loops}", f"after{self._loops}"
-        before, start = self._block, [self.operand(s, registers) for s in loop.start]
+        before, start = self.block, [self.operand(s, registers) for s in loop.start]
         self.write(f"br label %{again}")
         self.label(again)
         head = len(self.lines)
@@ -265,15 +274,15 @@ class Instructions:
         following = self.put(f"add i32 {rounds}, 1")
         more = self.put(f"icmp ult i32 {following}, {loop.rounds}")
         self.lines[head:head] = [
-            _either(register, self.vector(TYPES[c.dtype.kind]), (first, before), (result, self._block))
+            either(register, self.vector(TYPES[c.dtype.kind]), (first, before), (result, self.block))
             for register, c, first, result in zip(carried, loop.carried, start, results, strict=True)
-        ] + [_either(rounds, "i32", ("0", before), (following, self._block))]
+        ] + [either(rounds, "i32", ("0", before), (following, self.block))]
         self.write(f"br i1 {more}, label %{again}, label %{after}")
         self.label(after)
         return results
 
 
-def _either(register: str, type_: str, *sources: tuple[str, str]) -> str:
+def either(register: str, type_: str, *sources: tuple[str, str]) -> str:
     """Return the instruction that takes the value of the block it was reached from; sources are (value, block)."""
     return f"{register} = phi {type_} {', '.join(f'[ {value}, %{block} ]' for value, block in sources)}"
 

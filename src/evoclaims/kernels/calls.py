@@ -1,0 +1,102 @@
+"""Calls of kernels in XLA's programs, and what all of jax's primitives that call kernels have in common."""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Callable, Sequence
+from functools import cache, partial
+from typing import Any, Final, Protocol
+
+import jax
+import numpy as np
+from jax.extend.core import Primitive
+from jax.interpreters import ad, mlir
+from jaxtyping import Array
+
+from evoclaims.kernels import gpu_kernel, machine_code
+from evoclaims.kernels.xla_handler import ENTRY
+
+GPU_TARGET: Final = "__gpu$xla.gpu.ptx"
+"""XLA's name for a kernel given as PTX."""
+Shapes = Sequence[jax.ShapeDtypeStruct]
+
+
+class Callee(Protocol):
+    """A kernel; each method computes every element of a batch."""
+
+    def as_it_is(self, *leaves: Array) -> list[Array]:
+        """Call the function itself."""
+
+    def on_host(self, *leaves: Array) -> list[Array]:
+        """Call the kernel for this machine's processor."""
+
+    def on_gpu(self, *leaves: Array) -> list[Array]:
+        """Call the kernel for NVIDIA's GPUs."""
+
+
+def on_host(text: str, layout: Sequence[int], operands: Sequence[Array], shapes: Shapes) -> Any:
+    """Call a kernel of this processor, given as LLVM's text; `layout` are numbers for its `work`."""
+    return jax.ffi.ffi_call(_host_target(text), shapes)(np.array(layout, np.int32), *operands)
+
+
+def on_gpu(text: str, operands: Sequence[Array], shapes: Shapes, threads: int) -> Any:
+    """Call a kernel of NVIDIA's GPUs, given as LLVM's text."""
+    one, none = np.int32(1), np.int32(0)
+    return jax.ffi.ffi_call(GPU_TARGET, shapes)(
+        *operands,
+        name=gpu_kernel.ENTRY,
+        kernel_type="ptx",
+        kernel_data=gpu_kernel.ptx(text),
+        grid_x=np.int32(-(-threads // gpu_kernel.BLOCK)),
+        grid_y=one,
+        grid_z=one,
+        block_x=np.int32(gpu_kernel.BLOCK),
+        block_y=one,
+        block_z=one,
+        shared_mem_bytes=none,
+    )
+
+
+def register(primitive: Primitive) -> None:
+    """Register what a primitive whose parameter `kernel` is a `Callee` does: on each platform, alone, as derivatives."""
+    primitive.def_impl(partial(_alone, primitive))
+    ad.primitive_jvps[primitive] = _derivative
+    mlir.register_lowering(primitive, _lowered(lambda kernel: kernel.as_it_is))
+    mlir.register_lowering(primitive, _lowered(lambda kernel: kernel.on_host), platform="cpu")
+    mlir.register_lowering(primitive, _lowered(_for_gpu), platform="cuda")
+
+
+@cache
+def _host_target(text: str) -> str:
+    """Return the name under which XLA knows the kernel of a text; compile it first."""
+    name = f"evoclaims_{machine_code.key_of(text)}"
+    handler = ctypes.CFUNCTYPE(ctypes.c_void_p)(machine_code.address(text, ENTRY))
+    jax.ffi.register_ffi_target(name, jax.ffi.pycapsule(handler), platform="cpu")
+    return name
+
+
+def _alone(primitive: Primitive, *leaves: Array, kernel: Callee) -> list[Array]:
+    """Run outside of compiled programs."""
+    made: list[Array] = jax.jit(partial(primitive.bind, kernel=kernel))(*leaves)
+    return made
+
+
+def _derivative(values: Sequence[Any], tangents: Sequence[Any], kernel: Callee) -> Any:
+    """Return the results and their derivatives, both of the function itself."""
+    return jax.jvp(kernel.as_it_is, tuple(values), tuple(map(ad.instantiate_zeros, tangents)))
+
+
+def _lowered(choose: Callable[[Callee], Callable[..., list[Array]]]) -> Any:
+    """Return a lowering rule: a method of the kernel."""
+
+    def rule(context: Any, *operands: Any, kernel: Callee) -> Any:
+        return mlir.lower_fun(choose(kernel), multiple_results=True)(context, *operands)
+
+    return rule
+
+
+def _for_gpu(kernel: Callee) -> Callable[..., list[Array]]:
+    """Return the kernel's call; GPUs that are too old get the function itself. A program may be lowered without one."""
+    capability = getattr(jax.devices()[0], "compute_capability", None)
+    is_new_enough = capability is None or float(capability) >= gpu_kernel.CAPABILITY
+    return kernel.on_gpu if is_new_enough else kernel.as_it_is
