@@ -28,18 +28,12 @@ def text(results: Sequence[Numbers], arrays: Mapping[int, Row], shared: Mapping[
         rows: elements of the batch.
     """
     page = Instructions(1, [number for result in results for number in result.flat])
-    page.label("entry")
-    block, thread = (page.call(f"llvm.nvvm.read.ptx.sreg.{name}.x", "i32", []) for name in ("ctaid", "tid"))
-    first = page.put(f"mul i32 {block}, {BLOCK}")
-    row = page.put(f"add i32 {first}, {thread}")
-    inside = page.put(f"icmp ult i32 {row}, {rows}")
-    page.write(f"br i1 {inside}, label %work, label %done")
-    page.label("work")
+    row = begin(page, rows)
 
     def place(parameter: str, row: str, size: int, kind: str) -> str:
         wide = page.put(f"zext i32 {row} to i64")
-        begin = page.put(f"mul i64 {wide}, {size}")
-        return page.put(f"getelementptr {STORED[kind]}, ptr addrspace(1) {parameter}, i64 {begin}")
+        first = page.put(f"mul i64 {wide}, {size}")
+        return page.put(f"getelementptr {STORED[kind]}, ptr addrspace(1) {parameter}, i64 {first}")
 
     addresses: dict[int, str] = {}
     for array, of in arrays.items():
@@ -66,13 +60,30 @@ def text(results: Sequence[Numbers], arrays: Mapping[int, Row], shared: Mapping[
                 value = page.put(f"zext i1 {value} to i8")
             where = number_at(address, at, kind)
             page.write(f"store {STORED[kind]} {value}, ptr addrspace(1) {where}, align {BYTES[kind]}")
+    return finished(page, [*(f"%a{a}" for a in arrays), *(f"%z{z}" for z in range(len(results)))])
+
+
+def begin(page: Instructions, threads: int) -> str:
+    """Begin a kernel; return the register with the thread's number, which is below `threads`."""
+    page.label("entry")
+    block, thread = (page.call(f"llvm.nvvm.read.ptx.sreg.{name}.x", "i32", []) for name in ("ctaid", "tid"))
+    first = page.put(f"mul i32 {block}, {BLOCK}")
+    number = page.put(f"add i32 {first}, {thread}")
+    inside = page.put(f"icmp ult i32 {number}, {threads}")
+    page.write(f"br i1 {inside}, label %work, label %done")
+    page.label("work")
+    return number
+
+
+def finished(page: Instructions, parameters: Sequence[str]) -> str:
+    """Return the text of a kernel that has begun; its parameters are addresses."""
     page.write("br label %done")
     page.label("done")
     page.write("ret void")
-    given = [f"ptr addrspace(1) %a{a}" for a in arrays] + [f"ptr addrspace(1) %z{z}" for z in range(len(results))]
+    given = ", ".join(f"ptr addrspace(1) {name}" for name in parameters)
     body = "\n".join(page.lines)
     attributes = f'nounwind "nvvm.maxntid"="{BLOCK},1,1"'
-    kernel = f"define ptx_kernel void @{ENTRY}({', '.join(given)}) {attributes} {{\n{body}\n}}\n"
+    kernel = f"define ptx_kernel void @{ENTRY}({given}) {attributes} {{\n{body}\n}}\n"
     return 'target triple = "nvptx64-nvidia-cuda"\n' + "\n".join(page.declared) + "\n" + kernel
 
 

@@ -155,6 +155,12 @@ class Instructions:
         self.lines.append(f"{register} = {instruction}")
         return register
 
+    def allocate(self, type_: str, count: int, alignment: int) -> str:
+        """Return the address of fresh memory of this call; to be used before any loop."""
+        register = self.register()
+        self.lines.insert(1, f"{register} = alloca {type_}, i32 {count}, align {alignment}")  # after the first label
+        return register
+
     def label(self, name: str) -> None:
         """Begin a basic block."""
         self.lines.append(f"{name}:")

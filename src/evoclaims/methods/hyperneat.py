@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import ClassVar
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, Int, PRNGKeyArray
@@ -46,7 +48,8 @@ class SubstrateNetwork:
     def express(self, genome: Genome) -> list[Float[Array, "to from"]]:
         """Return the weights into each layer except the first."""
         cppn = GraphNetwork(self.inputs, self.outputs, self.activations, self.output)
-        q = cppn.apply_rows(cppn.express(genome), jnp.asarray(self.substrate.queries))[:, 0]
+        queries = jnp.asarray(self.substrate.queries)
+        q = jax.vmap(partial(cppn.apply, cppn.express(genome)))(queries)[:, 0]
         size = jnp.maximum(jnp.abs(q) - self.threshold, 0.0) / (1 - self.threshold) * self.max_weight
         weights = jnp.sign(q) * size
         shapes = self.substrate.shapes

@@ -18,8 +18,11 @@ from jax.custom_batching import custom_vmap
 from jaxtyping import Array, Bool, Float, Int
 
 from evoclaims.core.pytree import pytree
+from evoclaims.kernels.grouped import GroupKernel
 from evoclaims.networks.activations import ACTIVATIONS, apply_activation, check_activations
 from evoclaims.networks.genome import Genome
+from evoclaims.networks.network_kernel import network_kernel
+from evoclaims.networks.wiring import Wiring, wired
 
 BLOCK: Final = 16
 """Nodes per matrix product on accelerators; 8 to 32 take about the same time there."""
@@ -63,28 +66,31 @@ class GraphNetwork:
         """Check the names."""
         check_activations((*self.activations, self.output))
 
-    def express(self, genome: Genome) -> Graph:
-        """Write a genome's genes into matrices."""
-        size = genome.nodes.key.shape[0]
-        genes = genome.connections
-        # Empty slots write outside the matrix, where writes are dropped.
-        target = jnp.where(genome.has_connection, genes.target, size)
-        linked = jnp.zeros((size, size), bool).at[target, genes.source].set(True, mode="drop")
-        weights = jnp.zeros((size, size)).at[target, genes.source].set(genes.weight, mode="drop")
-        outputs = genome.slots_of_outputs(self.inputs, self.outputs)
-        return Graph(
-            weights=weights,
-            linked=linked,
-            bias=genome.nodes.bias,
-            response=genome.nodes.response,
-            activation=jnp.asarray(genome.nodes.activation).at[outputs].set(len(self.activations)),
-            outputs=outputs,
-        )
+    def express(self, genome: Genome) -> Wiring:
+        """Return a genome's network, ready to run."""
+        return wired(genome, self.inputs, self.outputs, len(self.activations))
 
-    def apply(self, graph: Graph, observation: Float[Array, " inputs"]) -> Float[Array, " outputs"]:
-        """Map one observation to one output; a vmap over only observations runs them through the graph together."""
-        result: Array = _one_or_many(self)(graph, observation)
+    def apply(self, wiring: Wiring, observation: Float[Array, " inputs"]) -> Float[Array, " outputs"]:
+        """Map one observation to one output; a vmap over only observations runs them through the network together."""
+        capacity = wiring.bias.shape[-1], wiring.weight.shape[-1]
+        (result,) = _kernel(self, capacity)(*jax.tree.leaves(wiring), observation)
         return result
+
+    def matrices(self, wiring: Wiring) -> Graph:
+        """Return a network in matrix form."""
+        nodes, connections = wiring.bias.shape[0], wiring.weight.shape[0]
+        # The connection at a place leads to the first slot whose connections end behind it. Places behind all of them
+        # write outside the matrix, where writes are dropped.
+        places = jnp.arange(connections, dtype=jnp.int32)
+        target = jnp.sum(wiring.ends[:, None] <= places[None, :], axis=0, dtype=jnp.int32)
+        return Graph(
+            weights=jnp.zeros((nodes, nodes)).at[target, wiring.source].set(wiring.weight, mode="drop"),
+            linked=jnp.zeros((nodes, nodes), bool).at[target, wiring.source].set(True, mode="drop"),
+            bias=wiring.bias,
+            response=wiring.response,
+            activation=wiring.activation,
+            outputs=wiring.outputs,
+        )
 
     def apply_rows(self, graph: Graph, rows: Float[Array, "rows inputs"]) -> Float[Array, "rows outputs"]:
         """Map many observations at once."""
@@ -171,6 +177,17 @@ def _fire_block(
 
     made: tuple[Array, Array] = jax.lax.fori_loop(0, earlier.shape[0], fire, (jnp.zeros_like(earlier), emits))
     return made
+
+
+@cache
+def _kernel(network: GraphNetwork, capacity: tuple[int, int]) -> GroupKernel:
+    """Return the kernel of the forward pass; where none can be had, it is computed by matrices."""
+
+    def function(*leaves: Array) -> list[Array]:
+        *genome, observation = leaves
+        return [_one_or_many(network)(network.matrices(Wiring(*genome)), observation)]
+
+    return network_kernel(network.inputs, network.outputs, network.activations, network.output, capacity, function)
 
 
 @cache

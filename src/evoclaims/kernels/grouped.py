@@ -1,0 +1,176 @@
+"""Running a kernel over groups of rows, as jax's primitive `grouped`; `group_kernel` has the kernels' texts."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Final
+
+import jax
+import jax.numpy as jnp
+from jax.core import ShapedArray
+from jax.extend.core import Primitive
+from jax.interpreters import batching
+from jaxtyping import Array
+
+from evoclaims.kernels import calls, group_kernel, machine_code
+from evoclaims.kernels.group_kernel import Sizes, Writer
+from evoclaims.kernels.unsupported import Unsupported
+
+Shapes = tuple[jax.ShapeDtypeStruct, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class GroupKernel:
+    """A function of some arrays of a group and some of a row, of float32 and int32.
+
+    Attributes:
+        name: what it computes, for the warning.
+        function: it in jax: takes all arrays, and returns a list.
+        groups, rows: shapes of the group's arguments, and the row's.
+        outputs: shapes of the results, none of them empty.
+        write: writes it in LLVM's instructions.
+        numbers: the expressions that it computes.
+    """
+
+    name: str
+    function: Callable[..., Sequence[Array]]
+    groups: Shapes
+    rows: Shapes
+    outputs: Shapes
+    write: Writer
+    numbers: Sequence[Any] = ()
+
+    def __call__(self, *leaves: Array) -> list[Array]:
+        """Compute it, for any batch. With only the rows batched, or the groups, these are not copied."""
+        if not self.supported:
+            return list(self.function(*leaves))
+        made: list[Array] = CALL.bind(*leaves, kernel=self)
+        return made
+
+    @cached_property
+    def supported(self) -> bool:
+        """Whether it can be a kernel on this machine; a warning says once why not."""
+        try:
+            machine_code.lanes()
+        except Unsupported as reason:
+            warnings.warn(f"{self.name} is not one kernel, and slower, because of {reason}.", stacklevel=5)
+            return False
+        return True
+
+    @property
+    def sizes(self) -> Sizes:
+        """The numbers in each array."""
+        groups, rows, results = (
+            tuple(math.prod(each.shape) for each in shapes) for shapes in (self.groups, self.rows, self.outputs)
+        )
+        return Sizes(groups, rows, results)
+
+    def batch(self, leaves: Sequence[Any]) -> tuple[int, ...]:
+        """Return the batch dimensions; arguments that lack one have size 1 there."""
+        shapes = (*self.groups, *self.rows)
+        parts = [leaf.shape[: leaf.ndim - len(own.shape)] for leaf, own in zip(leaves, shapes, strict=True)]
+        return tuple(1 if set(sizes) == {1} else next(s for s in sizes if s != 1) for sizes in zip(*parts, strict=True))
+
+    def as_it_is(self, *leaves: Array) -> list[Array]:
+        """Call the function itself, for every element of a batch."""
+        batch = self.batch(leaves)
+        if not batch:
+            return list(self.function(*leaves))
+        has = [leaf.shape[0] == batch[0] for leaf in leaves]
+        given = [leaf if own else leaf[0] for leaf, own in zip(leaves, has, strict=True)]
+        made: list[Array] = jax.vmap(self.as_it_is, [0 if own else None for own in has], axis_size=batch[0])(*given)
+        return made
+
+    def on_host(self, *leaves: Array) -> list[Array]:
+        """Call the kernel for this machine's processor, for every element of a batch."""
+
+        def call(groups: int, rows: int, own: list[bool], operands: list[Array], shapes: Shapes) -> Any:
+            lanes = group_kernel.lanes_for(rows, machine_code.lanes())
+            text = group_kernel.host_text(self.write, self.numbers, self.sizes, lanes)
+            return calls.on_host(text, [groups, rows, *own], operands, shapes)
+
+        return self._call(leaves, call)
+
+    def on_gpu(self, *leaves: Array) -> list[Array]:
+        """Call the kernel for NVIDIA's GPUs, for every element of a batch."""
+
+        def call(groups: int, rows: int, own: list[bool], operands: list[Array], shapes: Shapes) -> Any:
+            text = group_kernel.gpu_text(self.write, self.numbers, self.sizes, groups, rows, own)
+            return calls.on_gpu(text, operands, shapes, groups * rows)
+
+        return self._call(leaves, call)
+
+    def _call(self, leaves: Sequence[Array], call: Callable[..., Any]) -> list[Array]:
+        """Return the results of a kernel for every element of a batch.
+
+        Args:
+            leaves: the arguments.
+            call: gets the numbers of groups and of rows of each, which arrays of rows each group has its own of, the
+                arrays, and the shapes of the results, [groups, rows, numbers]; returns these results.
+        """
+        batch = self.batch(leaves)
+        if not math.prod(batch):
+            return [jnp.zeros((*batch, *out.shape), out.dtype) for out in self.outputs]
+        of_groups, of_rows = leaves[: len(self.groups)], leaves[len(self.groups) :]
+        level = range(len(batch))
+        inner = [i for i in level if batch[i] > 1 and all(leaf.shape[i] == 1 for leaf in of_groups)]
+        outer = [i for i in level if i not in inner]
+        groups, rows = (math.prod(batch[i] for i in levels) for levels in (outer, inner))
+
+        def sorted_(leaf: Array, repeated: Sequence[int]) -> Array:
+            """Move a leaf's dimensions of groups to the front, and give it full size in those of `repeated`."""
+            moved = jnp.transpose(leaf, (*outer, *inner, *range(len(batch), leaf.ndim)))
+            sizes = [batch[i] if i in repeated else leaf.shape[i] for i in (*outer, *inner)]
+            return jnp.broadcast_to(moved, (*sizes, *leaf.shape[len(batch) :]))
+
+        sizes = self.sizes
+        operands = [
+            sorted_(leaf, outer).reshape(groups, size) for leaf, size in zip(of_groups, sizes.groups, strict=True)
+        ]
+        own = [any(leaf.shape[i] > 1 for i in outer) for leaf in of_rows]
+        for leaf, size, has_own in zip(of_rows, sizes.rows, own, strict=True):
+            full = sorted_(leaf, level if has_own else inner)
+            operands.append(full.reshape(groups * rows if has_own else rows, size))
+        shapes = [
+            jax.ShapeDtypeStruct((groups * rows, size), out.dtype)
+            for out, size in zip(self.outputs, sizes.results, strict=True)
+        ]
+        made = call(groups, rows, own, operands, shapes)
+        order = (*outer, *inner)
+        back = [order.index(i) for i in level]
+        results = []
+        for out, result in zip(self.outputs, made, strict=True):
+            shaped = result.reshape(*(batch[i] for i in order), *out.shape)
+            results.append(jnp.transpose(shaped, (*back, *range(len(batch), shaped.ndim))))
+        return results
+
+
+CALL: Final = Primitive("grouped")
+"""A kernel's call: all arguments have the same number of batch dimensions in front, of size 1 where it is the same
+in the whole batch."""
+CALL.multiple_results = True
+
+
+@CALL.def_abstract_eval
+def _shapes(*leaves: ShapedArray, kernel: GroupKernel) -> list[ShapedArray]:
+    """Return the results' shapes."""
+    return [ShapedArray((*kernel.batch(leaves), *out.shape), out.dtype) for out in kernel.outputs]
+
+
+def _batched(
+    leaves: Sequence[Array], axes: Sequence[int | None], kernel: GroupKernel
+) -> tuple[list[Array], list[int]]:
+    """Add a batch dimension in front of the others."""
+    moved = [
+        leaf[None] if axis is None else jnp.moveaxis(leaf, axis, 0) for leaf, axis in zip(leaves, axes, strict=True)
+    ]
+    results = CALL.bind(*moved, kernel=kernel)
+    return results, [0] * len(results)
+
+
+batching.primitive_batchers[CALL] = _batched
+calls.register(CALL)
