@@ -45,6 +45,20 @@ FUNCTIONS: dict[str, tuple[Callable[..., Any], tuple[Any, ...]]] = {
     "roots and powers": (lambda x: (jnp.sqrt(x * x), jax.lax.rsqrt(x * x + 1.0), x**3, x**-2, jnp.square(x)), (X,)),
     "a power by a float": (lambda x: jnp.power(x, 2.0), (X,)),
     "sine and cosine": (lambda x: (jnp.sin(x * 50.0), jnp.cos(x * 50.0)), (X,)),
+    "exponentials": (lambda x: (jnp.exp(x), jnp.exp2(x), jnp.expm1(x), jnp.tanh(x), jax.nn.sigmoid(x)), (X,)),
+    "logarithms": (lambda x: (jnp.log(x * x), jnp.log1p(x * x)), (X,)),
+    "errors": (lambda x: (jax.lax.erf(x), jax.lax.erf_inv(x / 9)), (X,)),
+    "any power": (lambda x, y: (jnp.power(x * x, y), jnp.power(jnp.abs(x), 0.5), jnp.power(x * x, 17.5)), (X, Y)),
+    "bits": (
+        lambda x, i: (
+            jax.lax.bitcast_convert_type(x, jnp.int32),
+            jax.lax.bitcast_convert_type(i, jnp.float32),
+            i << 3,
+            i >> 2,
+            jax.lax.shift_right_logical(i, jnp.int32(28)),
+        ),
+        (X, I),
+    ),
     "an angle": (jnp.arctan2, (X, Y)),
     "places of a mask that is known": (lambda x: x[jnp.nonzero(jnp.arange(x.shape[0]) % 2 == 0, size=1)[0]], (X,)),
     "rounding": (lambda x: (jnp.floor(x * 3), jnp.ceil(x * 3), jnp.sign(x), jnp.round(x * 3), jnp.trunc(x * 3)), (X,)),
@@ -140,7 +154,6 @@ FUNCTIONS: dict[str, tuple[Callable[..., Any], tuple[Any, ...]]] = {
 }
 
 NO_KERNELS: dict[str, Callable[..., Any]] = {
-    "exponentials": jnp.exp,
     "writing at a computed place": lambda x: x.at[jnp.int32(x[0]) % 4].set(0.0),
     "a function applied at places": lambda x: x.at[1].apply(jnp.sin),
     "a loop over rows": lambda x: jax.lax.scan(lambda c, r: (c + r, c), 0.0, x),
@@ -148,7 +161,8 @@ NO_KERNELS: dict[str, Callable[..., Any]] = {
     "known bytes": lambda x: (x, jnp.zeros(3, jnp.int8)),
     "a remainder of floats": lambda x: jax.lax.rem(x, jnp.full_like(x, 0.3)),
     "division by what may be 0": lambda x: jax.lax.div(7 + 0 * x.astype(int), x.astype(int)),
-    "roots as powers": lambda x: jnp.power(jnp.abs(x), 0.5),
+    "a shift by a computed number": lambda x: jax.lax.shift_left(x.astype(int), x.astype(int)),
+    "the bits of halves": lambda x: jax.lax.bitcast_convert_type(x, jnp.float16),
     "a large power": lambda x: x**17,
     "the larger condition": lambda x: jnp.maximum(x > 0, x < 1),
     "rounding halves away from zero": jax.lax.round,

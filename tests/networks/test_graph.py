@@ -13,6 +13,7 @@ import pytest
 from evoclaims.core.errors import UnknownNameError
 from evoclaims.networks.genome import EMPTY, Connections, Genome, Nodes
 from evoclaims.networks.graph import BLOCK, Graph, GraphNetwork
+from evoclaims.networks.wiring import Wiring
 
 Gene = tuple[int, float, float, int]
 """Key, bias, response, activation."""
@@ -120,13 +121,13 @@ ROWS = jnp.array([[0.5, 0.25], [np.nan, 0.25], [0.5, np.nan], [np.nan, np.nan], 
 @pytest.mark.parametrize("rows", [ROWS, ROWS[1:2]], ids=["many", "one"])
 def test_all_ways_to_batch_agree_row_by_row(rows: Any) -> None:
     graphs = [NETWORK.express(genome) for genome in (PARTLY, UNFED)]
-    population: Graph = jax.tree.map(lambda *leaf: jnp.stack(leaf), *graphs)
+    population: Wiring = jax.tree.map(lambda *leaf: jnp.stack(leaf), *graphs)
     wanted = [[np.asarray(NETWORK.apply(graph, row)) for row in rows] for graph in graphs]
     apply = NETWORK.apply
     by_row = jax.jit(jax.vmap(apply, (None, 0)))
     for graph, one in zip(graphs, wanted, strict=True):
         np.testing.assert_allclose(by_row(graph, rows), one, atol=1e-6)
-        np.testing.assert_allclose(jax.jit(NETWORK.apply_rows)(graph, rows), one, atol=1e-6)
+        np.testing.assert_allclose(jax.jit(NETWORK.apply_rows)(NETWORK.matrices(graph), rows), one, atol=1e-6)
     genomes_of_rows = jax.jit(jax.vmap(jax.vmap(apply, (None, 0)), (0, None)))(population, rows)
     np.testing.assert_allclose(genomes_of_rows, wanted, atol=1e-6)
     rows_of_genomes = jax.jit(jax.vmap(jax.vmap(apply, (0, None)), (None, 0)))(population, rows)
@@ -137,7 +138,7 @@ def test_all_ways_to_batch_agree_row_by_row(rows: Any) -> None:
 
 
 def test_the_matrix_is_strictly_lower_triangular() -> None:
-    graph = NETWORK.express(UNFED)
+    graph = NETWORK.matrices(NETWORK.express(UNFED))
     linked = np.asarray(graph.linked)
     assert linked.sum() == 4
     assert not np.triu(linked).any()

@@ -58,7 +58,7 @@ def on_gpu(text: str, operands: Sequence[Array], shapes: Shapes, threads: int) -
 
 
 def register(primitive: Primitive) -> None:
-    """Register what a primitive whose parameter `kernel` is a `Callee` does: on each platform, alone, as derivatives."""
+    """Register what a primitive with a `Callee` as parameter `kernel` does: on each platform, alone, as derivatives."""
     primitive.def_impl(partial(_alone, primitive))
     ad.primitive_jvps[primitive] = _derivative
     mlir.register_lowering(primitive, _lowered(lambda kernel: kernel.as_it_is))

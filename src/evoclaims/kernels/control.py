@@ -17,7 +17,8 @@ def repeat(
 
     Args:
         page: where to.
-        begin, end: values; without a round when `begin` is not smaller.
+        begin: the first number.
+        end: where it stops; there is no round if `begin` is not smaller.
         carried: what the first round gets.
         body: writes a round; gets the loop's number and what is carried, and returns what the next round gets.
     """

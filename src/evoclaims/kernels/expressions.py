@@ -5,6 +5,7 @@ A number is known (a NumPy scalar) or an expression of inputs. Equal operations 
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
@@ -115,6 +116,27 @@ def everything(numbers: Iterable[Number]) -> list[Expression]:
     order = in_order(numbers)
     loops = {id(e.loop): e.loop for e in order if isinstance(e, LoopResult)}
     return order + [inner for loop in loops.values() for inner in everything(loop.results)]
+
+
+def products_to_fuse(results: Sequence[Number]) -> frozenset[int]:
+    """Return the ids of the products of floats that are used once, in a sum or difference."""
+    expressions = everything(results)
+    uses: Counter[int] = Counter(id(r) for r in results)
+    for expression in expressions:
+        match expression:
+            case ScalarOperation(operands=operands):
+                uses.update(map(id, operands))
+            case LoopResult(loop=around):
+                uses.update(map(id, (*around.start, *around.results, *around.taken)))
+    chosen = set()
+    for expression in expressions:
+        if isinstance(expression, ScalarOperation) and expression.name in ("add", "sub"):
+            for operand in reversed(expression.operands):
+                product = isinstance(operand, ScalarOperation) and operand.name == "mul" and operand.dtype.kind == "f"
+                if product and uses[id(operand)] == 1:
+                    chosen.add(id(operand))
+                    break
+    return frozenset(chosen)
 
 
 def _parents(expression: Expression) -> list[Expression]:

@@ -112,9 +112,7 @@ def host_text(write: Writer, numbers: Sequence[Any], sizes: Sizes, lanes: int) -
     return "\n".join(page.declared) + "\n" + block + _loops(sizes, lanes) + called
 
 
-def gpu_text(
-    write: Writer, numbers: Sequence[Any], sizes: Sizes, groups: int, rows: int, own: Sequence[bool]
-) -> str:
+def gpu_text(write: Writer, numbers: Sequence[Any], sizes: Sizes, groups: int, rows: int, own: Sequence[bool]) -> str:
     """Return the text of a kernel for NVIDIA's GPUs, a thread per row of a group; see `host_text`.
 
     Its parameters are the addresses of the arrays of groups, those of rows, and the results.

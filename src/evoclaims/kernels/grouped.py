@@ -6,7 +6,7 @@ import math
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from typing import Any, Final
 
 import jax
@@ -28,7 +28,7 @@ class GroupKernel:
     """A function of some arrays of a group and some of a row, of float32 and int32.
 
     Attributes:
-        name: what it computes, for the warning.
+        name: what it is part of, for the warning that it cannot be had; kernels of one name warn once.
         function: it in jax: takes all arrays, and returns a list.
         groups, rows: shapes of the group's arguments, and the row's.
         outputs: shapes of the results, none of them empty.
@@ -53,11 +53,11 @@ class GroupKernel:
 
     @cached_property
     def supported(self) -> bool:
-        """Whether it can be a kernel on this machine; a warning says once why not."""
+        """Whether it can be a kernel on this machine."""
         try:
             machine_code.lanes()
         except Unsupported as reason:
-            warnings.warn(f"{self.name} is not one kernel, and slower, because of {reason}.", stacklevel=5)
+            _warn_once(f"{self.name} is not one kernel, and slower, because of {reason}.")
             return False
         return True
 
@@ -149,6 +149,12 @@ class GroupKernel:
         return results
 
 
+@cache
+def _warn_once(text: str) -> None:
+    """Warn, whatever the filters of warnings say, at most once in a process."""
+    warnings.warn(text, stacklevel=6)
+
+
 CALL: Final = Primitive("grouped")
 """A kernel's call: all arguments have the same number of batch dimensions in front, of size 1 where it is the same
 in the whole batch."""
@@ -161,9 +167,7 @@ def _shapes(*leaves: ShapedArray, kernel: GroupKernel) -> list[ShapedArray]:
     return [ShapedArray((*kernel.batch(leaves), *out.shape), out.dtype) for out in kernel.outputs]
 
 
-def _batched(
-    leaves: Sequence[Array], axes: Sequence[int | None], kernel: GroupKernel
-) -> tuple[list[Array], list[int]]:
+def _batched(leaves: Sequence[Array], axes: Sequence[int | None], kernel: GroupKernel) -> tuple[list[Array], list[int]]:
     """Add a batch dimension in front of the others."""
     moved = [
         leaf[None] if axis is None else jnp.moveaxis(leaf, axis, 0) for leaf, axis in zip(leaves, axes, strict=True)

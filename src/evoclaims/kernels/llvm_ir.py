@@ -8,7 +8,6 @@ the machine or LLVM's version.
 from __future__ import annotations
 
 import struct
-from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
@@ -23,6 +22,7 @@ from evoclaims.kernels.expressions import (
     everything,
     in_order,
     is_known,
+    products_to_fuse,
 )
 from evoclaims.kernels.unsupported import Unsupported
 
@@ -135,7 +135,7 @@ class Instructions:
         self.lanes = lanes
         self.lines: list[str] = []
         self.declared: dict[str, None] = {}
-        self._fused = _products_to_fuse(results)
+        self._fused = products_to_fuse(results)
         self.block = ""
         self._registers = 0
         self._loops = 0
@@ -291,24 +291,3 @@ class Instructions:
 def either(register: str, type_: str, *sources: tuple[str, str]) -> str:
     """Return the instruction that takes the value of the block it was reached from; sources are (value, block)."""
     return f"{register} = phi {type_} {', '.join(f'[ {value}, %{block} ]' for value, block in sources)}"
-
-
-def _products_to_fuse(results: Sequence[Number]) -> frozenset[int]:
-    """Return the ids of the products of floats that are used once, in a sum or difference."""
-    expressions = everything(results)
-    uses: Counter[int] = Counter(id(r) for r in results)
-    for expression in expressions:
-        match expression:
-            case ScalarOperation(operands=operands):
-                uses.update(map(id, operands))
-            case LoopResult(loop=around):
-                uses.update(map(id, (*around.start, *around.results, *around.taken)))
-    chosen = set()
-    for expression in expressions:
-        if isinstance(expression, ScalarOperation) and expression.name in ("add", "sub"):
-            for operand in reversed(expression.operands):
-                product = isinstance(operand, ScalarOperation) and operand.name == "mul" and operand.dtype.kind == "f"
-                if product and uses[id(operand)] == 1:
-                    chosen.add(id(operand))
-                    break
-    return frozenset(chosen)

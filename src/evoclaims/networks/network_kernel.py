@@ -150,9 +150,7 @@ class _Walk:
 
     def _sum(self, a: str, b: str, c: str) -> str:
         """Return a · b + c, rounded once."""
-        return self.page.call(
-            self.page.mangled("fma", "f32"), self.floats, [(self.floats, each) for each in (a, b, c)]
-        )
+        return self.page.call(self.page.mangled("fma", "f32"), self.floats, [(self.floats, each) for each in (a, b, c)])
 
     def _emits(self, value: str) -> str:
         """Return whether a node emits its value."""

@@ -68,7 +68,7 @@ def _sorting(nodes: int, connections: int) -> GroupKernel:
         _write(lanes, nodes, connections, groups, results)
 
     return GroupKernel(
-        name="Sorting a genome's connections",
+        name="The forward pass of genomes",
         function=lambda *genes: _sorted(nodes, *genes),
         groups=(whole, whole, numbers, one),
         rows=(),

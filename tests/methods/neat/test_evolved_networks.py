@@ -63,8 +63,11 @@ def test_rows_through_genomes(network: GraphNetwork, graphs: Any, wanted: Any) -
     np.testing.assert_allclose(answers, wanted, atol=TOLERANCE)
 
 
-def test_rows_without_gaps_through_genomes(network: GraphNetwork, graphs: Any, wanted: Any) -> None:
-    answers = jax.jit(jax.vmap(network.apply_rows, (0, None)))(graphs, WHOLE)
+def test_rows_without_gaps_through_genomes_as_matrices(network: GraphNetwork, graphs: Any, wanted: Any) -> None:
+    def answers_of(wiring: Any) -> Any:
+        return network.apply_rows(network.matrices(wiring), WHOLE)
+
+    answers = jax.jit(jax.vmap(answers_of))(graphs)
     np.testing.assert_allclose(answers, wanted[:, : len(WHOLE)], atol=TOLERANCE)
 
 
@@ -94,7 +97,8 @@ def test_genomes_in_blocks_of_nodes(network: GraphNetwork, graphs: Any, wanted: 
     values = np.zeros((20, len(ROWS)), np.float32)
     values[:3] = np.nan_to_num(ROWS).T
 
-    def answers(graph: Any) -> Any:
+    def answers(wiring: Any) -> Any:
+        graph = network.matrices(wiring)
         made, emits = network._in_blocks(graph, (jax.numpy.asarray(values), jax.numpy.asarray(present)))
         return jax.numpy.where(emits[graph.outputs], jax.numpy.tanh(made[graph.outputs]), 0.0).T
 
