@@ -3,7 +3,10 @@
 Node i computes z = bias + response · Σ w x over its connections (TensorNEAT, Wang et al. 2024). A hidden node emits
 its activation function of z. An output emits z to other nodes, and its result is the output function of z. A node
 without a connection from an emitting node emits nothing, nor does an input that is not finite; the result of an
-output that emits nothing is 0. A value that overflows is passed on as 0.
+output that emits nothing is 0. A value that overflows is passed on as 0, and so is the sine of an angle beyond 50,000,
+which the kernel (`network_kernel`) does not compute.
+
+Machines without the kernel compute the pass by matrices.
 """
 
 from __future__ import annotations
@@ -66,15 +69,22 @@ class GraphNetwork:
         """Check the names."""
         check_activations((*self.activations, self.output))
 
-    def express(self, genome: Genome) -> Wiring:
-        """Return a genome's network, ready to run."""
-        return wired(genome, self.inputs, self.outputs, len(self.activations))
+    def express(self, genome: Genome) -> Wiring | Graph:
+        """Return a genome's network: a list of connections where there is a kernel for it, else matrices."""
+        wiring = wired(genome, self.inputs, self.outputs, len(self.activations))
+        return wiring if self._kernel_for(wiring).supported else self.matrices(wiring)
 
-    def apply(self, wiring: Wiring, observation: Float[Array, " inputs"]) -> Float[Array, " outputs"]:
+    def apply(self, network: Wiring | Graph, observation: Float[Array, " inputs"]) -> Float[Array, " outputs"]:
         """Map one observation to one output; a vmap over only observations runs them through the network together."""
-        capacity = wiring.bias.shape[-1], wiring.weight.shape[-1]
-        (result,) = _kernel(self, capacity)(*jax.tree.leaves(wiring), observation)
+        if isinstance(network, Graph):
+            result: Array = _one_or_many(self)(network, observation)
+            return result
+        (result,) = self._kernel_for(network)(*jax.tree.leaves(network), observation)
         return result
+
+    def _kernel_for(self, wiring: Wiring) -> GroupKernel:
+        """Return the kernel for networks of the same capacity."""
+        return _kernel(self, (wiring.bias.shape[-1], wiring.weight.shape[-1]))
 
     def matrices(self, wiring: Wiring) -> Graph:
         """Return a network in matrix form."""
@@ -181,7 +191,7 @@ def _fire_block(
 
 @cache
 def _kernel(network: GraphNetwork, capacity: tuple[int, int]) -> GroupKernel:
-    """Return the kernel of the forward pass; where none can be had, it is computed by matrices."""
+    """Return the kernel of the forward pass; platforms without it compute the pass by matrices."""
 
     def function(*leaves: Array) -> list[Array]:
         *genome, observation = leaves
