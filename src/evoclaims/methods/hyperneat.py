@@ -81,7 +81,7 @@ class HyperNeat:
 
     name: ClassVar[str] = "hyperneat"
     revision: ClassVar[int] = 1
-    packages: ClassVar[tuple[str, ...]] = ()
+    packages: ClassVar[tuple[str, ...]] = ("llvmlite",)
 
     settings: Settings = PAPER
     hidden: tuple[int, ...] = (16,)

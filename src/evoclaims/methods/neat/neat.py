@@ -20,7 +20,7 @@ class Neat:
 
     name: ClassVar[str] = "neat"
     revision: ClassVar[int] = 1
-    packages: ClassVar[tuple[str, ...]] = ()
+    packages: ClassVar[tuple[str, ...]] = ("llvmlite",)
 
     settings: Settings = PAPER
 
