@@ -18,7 +18,9 @@ from evoclaims.core.errors import UserError
 from evoclaims.core.foreign import implicit_promotions
 from evoclaims.core.pytree import strong
 from evoclaims.envs.base import Episode
+from evoclaims.envs.gates.parity import NParity
 from evoclaims.methods.cma_es import CmaEs, ordinal_weights
+from evoclaims.networks.all_skips import AllSkips
 
 DIMENSIONS, POPULATION = 5, 16
 Vector = NDArray[np.float64]
@@ -84,7 +86,7 @@ class Hansen:
         n, c_c, c_sigma = self.n, self.c_c, self.c_sigma
         eigenvalues, basis = np.linalg.eigh(self.C)
         inverse_root = basis @ np.diag(eigenvalues**-0.5) @ basis.T
-        y = (population[np.argsort(error)] - self.mean) / self.sigma
+        y = (population[np.argsort(error, kind="stable")] - self.mean) / self.sigma
         y_w = self.weights[: self.mu] @ y[: self.mu]  # (41)
         self.mean = self.mean + self.sigma * y_w  # (42)
         self.p_sigma = (1 - c_sigma) * self.p_sigma + np.sqrt(c_sigma * (2 - c_sigma) * self.mu_eff) * (
@@ -201,26 +203,69 @@ def test_the_mean_moves_by_the_weighted_best_half(benches: dict[str, Any], monke
     np.testing.assert_allclose(after, mean, atol=1e-5)
 
 
-def test_on_a_smooth_function_every_generation_is_the_tutorials(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Same populations, separate states: mean, σ, C and both paths agree, whether or not h_σ stalls p_c.
-
-    The optimum is so far away that σ has to grow first, which is when h_σ stalls.
-    """
-    method, task, mine = CmaEs(POPULATION, Itself()), Ellipsoid(optimum=1e3), Hansen(DIMENSIONS, POPULATION)
+def _generations_beside_the_tutorials(method: Any, task: Any, generations: int, monkeypatch: pytest.MonkeyPatch) -> Any:
+    """Check mean, σ, C and both paths after each generation; yield the tutorial's own state and what it was told."""
+    size = method.network.size(task.observation_size, task.action_size)
+    mine = Hansen(size, method.population)
     generation = _watched_generation(method, task, monkeypatch)
-    state, stalls = method.init(jax.random.key(0), task), 0
-    for number in range(40):
+    state = method.init(jax.random.key(0), task)
+    for number in range(generations):
         state, population, error = generation(jax.random.key(number), state)
         mine.tell(np.asarray(population, np.float64), np.asarray(error, np.float64))
-        stalls += mine.stalled
         theirs = state.distribution
         np.testing.assert_allclose(theirs.mean, mine.mean, atol=1e-4 * mine.sigma)
         np.testing.assert_allclose(theirs.std, mine.sigma, rtol=1e-4)
         np.testing.assert_allclose(theirs.C, mine.C, atol=1e-4 * np.abs(mine.C).max())
         np.testing.assert_allclose(theirs.p_std, mine.p_sigma, atol=1e-3)
         np.testing.assert_allclose(theirs.p_c, mine.p_c, atol=1e-3)
+        yield mine, error
+
+
+def test_on_a_smooth_function_every_generation_is_the_tutorials(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Same populations, separate states, whether or not h_σ stalls p_c.
+
+    The optimum is so far away that σ has to grow first, which is when h_σ stalls.
+    """
+    method, task, stalls = CmaEs(POPULATION, Itself()), Ellipsoid(optimum=1e3), 0
+    for mine, _ in _generations_beside_the_tutorials(method, task, 40, monkeypatch):
+        stalls += mine.stalled
     assert 0 < stalls < 40
     assert np.linalg.cond(mine.C) > 10  # it has learnt something to be compared
+
+
+def test_on_ties_at_the_smoke_tiers_size_every_generation_is_the_tutorials(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Same populations, separate states, 221 parameters and 256 individuals with a handful of fitness values."""
+    method, task = CmaEs(256, AllSkips(16)), NParity(bits=4)
+    for mine, error in _generations_beside_the_tutorials(method, task, 12, monkeypatch):
+        assert mine.n == 221
+        assert len(np.unique(error)) < 10
+    assert abs(mine.sigma - 1) > 0.05
+
+
+def test_at_the_papers_size_the_constants_are_those_of_an_independent_package() -> None:
+    """From `cma` 4.4.0: CMAEvolutionStrategy(475 * [0], 1, {"popsize": 256}).
+
+    Its c_σ has n + μ_eff + 3 for Hansen's n + μ_eff + 5, and its c_μ 1/4 more in the numerator: both half a per cent.
+    From 4.4.4 on it has another damping, 2.41 here.
+    """
+    task = NParity(bits=6)
+    method = CmaEs(256, AllSkips(24))
+    assert method.network.size(task.observation_size, task.action_size) == 475
+    _, ours = method._search(task)
+    theirs = {
+        "mu_eff": 66.85779557916017,
+        "c_mean": 1.0,
+        "c_std": 0.12637755417625496,
+        "d_std": 1.1263775541762548,
+        "c_c": 0.008639501415405277,
+        "c_1": 8.813346841674727e-06,
+        "c_mu": 0.0005722665898127517,
+    }
+    for name, value in theirs.items():
+        np.testing.assert_allclose(getattr(ours, name), value, rtol=5e-3, err_msg=name)
+    weights = np.asarray(ours.weights)
+    np.testing.assert_allclose(weights[[0, -1]], [0.0387998095069943, -0.014198058841922212], rtol=1e-4)
+    np.testing.assert_allclose(weights[128:].sum(), -1.0154007712464193, rtol=1e-4)
 
 
 def test_individuals_are_drawn_with_the_mean_step_size_and_covariance_of_the_state(
