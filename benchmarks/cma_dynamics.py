@@ -4,13 +4,14 @@
     python benchmarks/cma_dynamics.py parity3 --seeds 40 [--side ours|ours-damped|cma|cma-published|random] [--out FILE]
 
 parity3 and parity4: three and four of N-parity's four bits, asked from the first generation on; parity: two, three and
-four bits after one another; alu: the first three operations of Simple ALU after one another. Every side trains
-`AllSkips(16)` for at most 300 generations of 256 from a mean of 0 and a step size of 1. The sides:
+four bits after one another; alu2 and alu: the first two, or three, operations of Simple ALU after one another. Every side
+trains `AllSkips(16)` for at most 300 generations of 256 from a mean of 0 and a step size of 1. The sides:
 
 ours: `CmaEs`, which breaks ties by index.
 ours-damped: the same with the damping of the step size that cma has had since 4.4.4, here twice Hansen's (2016).
-cma: the package's defaults, with ties broken at random and without its criteria for stopping.
-cma-published: the same with Hansen's damping, which cma had up to 4.4.0.
+cma: the package's defaults, with ties broken at random and without its criteria for stopping. From 300 parameters on
+(Simple ALU's network has 364) these replace Hansen's path of the step size by a two-point rule.
+cma-published: the same with Hansen's path for any number of parameters, and his damping, which cma had up to 4.4.0.
 random: `RandomSearch`.
 
 Runs are kept in the file as they end; the same call again goes on. All runs in it are compared by exact two-sided
@@ -53,6 +54,7 @@ TASKS: dict[str, tuple[Circuit, tuple[int, ...]]] = {
     "parity3": (NParity(bits=4), (1,)),
     "parity4": (NParity(bits=4), (2,)),
     "parity": (NParity(bits=4), (0, 1, 2)),
+    "alu2": (SimpleAlu(level_count=3), (0, 1)),
     "alu": (SimpleAlu(level_count=3), (0, 1, 2)),
 }
 Climber = Callable[[int, int], float]
@@ -94,7 +96,9 @@ def by_cma(published: bool, task: Circuit, seed: int) -> Climber:
     import cma
 
     n = NETWORK.size(task.observation_size, task.action_size)
-    options = {"popsize": POPULATION, "seed": seed + 1, "verbose": -9, "tolflatfitness": 10**9}
+    options: dict[str, Any] = {"popsize": POPULATION, "seed": seed + 1, "verbose": -9, "tolflatfitness": 10**9}
+    if published:
+        options["AdaptSigma"] = cma.sigma_adaptation.CMAAdaptSigmaCSA
     search = cma.CMAEvolutionStrategy(np.zeros(n), 1.0, options)
     if published:
         search.adapt_sigma.initialize(search)
