@@ -4,8 +4,8 @@
     python benchmarks/cma_dynamics.py parity3 --seeds 40 [--side ours|ours-damped|cma|cma-published|random] [--out FILE]
 
 parity3 and parity4: three and four of N-parity's four bits, asked from the first generation on; parity: two, three and
-four bits after one another; alu2 and alu: the first two, or three, operations of Simple ALU after one another. Every side
-trains `AllSkips(16)` for at most 300 generations of 256 from a mean of 0 and a step size of 1. The sides:
+four bits after one another; alu2 and alu: the first two, or three, operations of Simple ALU after one another. Every
+side trains `AllSkips(16)` for at most 300 generations of 256 from a mean of 0 and a step size of 1. The sides:
 
 ours: `CmaEs`, which breaks ties by index.
 ours-damped: the same with the damping of the step size that cma has had since 4.4.4, here twice Hansen's (2016).

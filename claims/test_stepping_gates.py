@@ -40,9 +40,9 @@ PAIRS = [
     where="§5.1, Fig. 3",
     smoke="CMA-ES solves all three levels of 4-parity, and the first three levels of Simple ALU",
     expect=Outcome.REFUTED,
-    because="local optima: nearly all of the population ties one row short; full: 2 of 10 solve 6-parity, none of 10 gets "
-    "past XOR in the ALU. The published code trains a 4 x 32 perceptron instead of the network of appendix A.3, whose "
-    "landscape is kinder (docs/protocol.md)",
+    because="local optima: nearly all of the population ties one row short; full: 2 of 10 solve 6-parity, none of 10 "
+    "gets past XOR in the ALU. The published code trains a 4 x 32 perceptron instead of the network of appendix A.3, "
+    "whose landscape is kinder (docs/protocol.md)",
 )
 @pytest.mark.parametrize("task", TASKS)
 def test_cma_es_solves_every_level(trials, verdict, task):
