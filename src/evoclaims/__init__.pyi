@@ -1,5 +1,6 @@
 from evoclaims.claims.claim import claim as claim
 from evoclaims.claims.claim import expected as expected
+from evoclaims.claims.claim import without_smoke as without_smoke
 from evoclaims.core.errors import UserError as UserError
 from evoclaims.judging.measure import Event as Event
 from evoclaims.judging.measure import Measure as Measure

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from evoclaims import Outcome, claim, expected
-from evoclaims.claims.claim import Claim, Expectation, claim_of, expectation_of
+from evoclaims.claims.claim import Claim, Expectation, claim_of, expectation_of, gap_of
 from evoclaims.claims.reporting import broken, expecting
 from evoclaims.core.errors import UserError
 from evoclaims.verdicts.claim_report import ClaimReport, save
@@ -52,6 +52,23 @@ def test_an_accepted_outcome_must_be_known_and_have_a_reason() -> None:
         expected(Outcome.REFUTED, because=" ")
     with pytest.raises(UserError, match="says because="):
         claim("T1", **TEXTS, expect=Outcome.REFUTED)
+
+
+def test_a_claim_without_a_smoke_test_says_why_and_keeps_its_sentence() -> None:
+    texts = {**TEXTS, "smoke": None}
+    with pytest.raises(UserError, match="has no smoke test says because="):
+        claim("T1", **texts)
+    with pytest.raises(UserError, match="accept the outcome with @expected"):
+        claim("T1", **texts, expect=Outcome.REFUTED, because="it is")
+
+    @claim("T1", **texts, because="nothing so small shows it")
+    def test_it() -> None: ...
+
+    item: Any = Item(*test_it.pytestmark)  # type: ignore[attr-defined]
+    found = claim_of(item)
+    assert found is not None
+    assert found.statement("smoke") == TEXTS["says"]
+    assert (gap_of(item, "smoke"), gap_of(item, "full")) == ("nothing so small shows it", "")
 
 
 CLAIMS = """

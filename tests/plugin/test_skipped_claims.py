@@ -62,6 +62,35 @@ def test_a_skipped_claim_beside_a_judged_one_is_listed_and_fails_nothing(project
     assert [report["outcome"] for report in _reports(project)] == ["not run", "supported"]
 
 
+GAPS = f"""
+from evoclaims import without_smoke
+
+@claim('whole', says='whole at full size', where='§1', smoke=None, because='no small task shows it')
+def test_whole(trials, verdict):
+    {BODY}
+
+@says('part')
+@pytest.mark.parametrize('case', ['shown', pytest.param('hidden', marks=without_smoke(because='too slow'))])
+def test_part(trials, verdict, case):
+    {BODY}
+"""
+
+
+def test_a_claim_without_a_smoke_test_is_listed_with_the_reason_and_judged_in_full(project: Any) -> None:
+    project.write(GAPS)
+    result = project.run("-m", "smoke or full", "--claims-json=out.json")
+    assert result.ret == 0
+    result.stdout.fnmatch_lines(["*- part?hidden?: it has no smoke test: too slow"])
+    found = {(report["tier"], report["claim"], report["case"]): report for report in _reports(project)}
+    gaps = {key: report["reason"] for key, report in found.items() if report["outcome"] == "not run"}
+    assert gaps == {
+        ("smoke", "whole", ""): "it has no smoke test: no small task shows it",
+        ("smoke", "part", "hidden"): "it has no smoke test: too slow",
+    }
+    assert found["smoke", "whole", ""]["statement"] == "whole at full size"
+    assert {report["outcome"] for key, report in found.items() if key not in gaps} == {"supported"}
+
+
 def test_a_claim_that_was_judged_is_not_listed_again_when_its_fixture_skips_at_the_end(project: Any) -> None:
     project.write(
         "@pytest.fixture\ndef late():\n    yield\n    pytest.skip('too late')\n\n"

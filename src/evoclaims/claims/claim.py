@@ -15,6 +15,7 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 CLAIM_MARK = "claim"
 EXPECT_MARK = "claim_expect"
+GAP_MARK = "claim_without_smoke"
 
 
 @dataclass(frozen=True)
@@ -25,17 +26,17 @@ class Claim:
         id: a short name, such as "G1".
         says: the paper's own words.
         where: section and figure.
-        smoke: the scaled-down statement that the smoke tier judges instead.
+        smoke: the scaled-down statement that the smoke tier judges instead; None if it judges none.
     """
 
     id: str
     says: str
     where: str
-    smoke: str
+    smoke: str | None
 
     def statement(self, tier: str) -> str:
-        """Return what is judged at a tier."""
-        return self.smoke if tier == "smoke" else self.says
+        """Return what is judged at a tier; the paper's own words where the smoke tier judges nothing."""
+        return self.smoke if tier == "smoke" and self.smoke is not None else self.says
 
 
 @dataclass(frozen=True)
@@ -54,7 +55,7 @@ class Expectation:
 
 
 def claim(
-    claim_id: str, /, *, says: str, where: str, smoke: str, expect: Outcome | None = None, because: str = ""
+    claim_id: str, /, *, says: str, where: str, smoke: str | None, expect: Outcome | None = None, because: str = ""
 ) -> Callable[[F], F]:
     """Mark a test as the check of a claim; the test runs once per tier.
 
@@ -62,17 +63,25 @@ def claim(
         claim_id: a short name, such as "G1".
         says: the paper's own words.
         where: section and figure.
-        smoke: the scaled-down statement of the smoke tier.
+        smoke: the scaled-down statement of the smoke tier; None if no small instance can show the sentence, which is
+            then not judged there (see `without_smoke` for one parameter of a claim).
         expect: an accepted outcome, for every tier and parameter; a narrower one (see `expected`) overrides it.
-        because: why it is accepted; required with `expect`.
+        because: why it is accepted, or why there is no smoke test; required with `expect` and with `smoke=None`.
 
     Raises:
-        UserError: when a text is missing.
+        UserError: when a text is missing, or `because` would have to explain two things.
     """
     for word, text in {"id": claim_id, "says": says, "where": where, "smoke": smoke}.items():
-        if not text.strip():
+        if text is not None and not text.strip():
             raise UserError(f"The claim {claim_id or '(without id)'} lacks its {word}.")
+    if smoke is None and expect is not None:
+        raise UserError(
+            f"The claim {claim_id} has smoke=None and expect=...: its because=... says why there is no smoke test, so "
+            "accept the outcome with @expected(...)."
+        )
     marks = [pytest.mark.claim(Claim(claim_id, says, where, smoke))]
+    if smoke is None:
+        marks.append(without_smoke(because=because))
     if expect is not None:
         marks.append(expected(expect, because=because))
 
@@ -95,6 +104,23 @@ def expected(outcome: Outcome | str, *, because: str, tier: str | None = None) -
     if not because.strip():
         raise UserError(f"An accepted {outcome} verdict says because=...: what is known about why.")
     return pytest.mark.claim_expect(Expectation(Outcome(outcome), because, tier))
+
+
+def without_smoke(*, because: str) -> pytest.MarkDecorator:
+    """Return a mark for what the smoke tier does not judge: for one `pytest.param(..., marks=...)` of a claim.
+
+    Raises:
+        UserError: without a reason.
+    """
+    if not because.strip():
+        raise UserError("What has no smoke test says because=...: why no small instance can show it.")
+    return pytest.mark.claim_without_smoke(because)
+
+
+def gap_of(item: pytest.Item, tier: str) -> str:
+    """Return why a test has no instance at a tier; empty if it has one."""
+    mark = item.get_closest_marker(GAP_MARK) if tier == "smoke" else None
+    return str(mark.args[0]) if mark else ""
 
 
 def claim_of(item: pytest.Item) -> Claim | None:

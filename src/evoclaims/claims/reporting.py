@@ -1,4 +1,4 @@
-"""Making the report of a claim: judged, broken before that, or skipped."""
+"""Making the report of a claim: judged, broken before that, skipped, or without a test at the tier."""
 
 from __future__ import annotations
 
@@ -47,6 +47,11 @@ def broken(claim: Claim, case: str, tier: str, reason: str) -> ClaimReport:
 def skipped(claim: Claim, case: str, tier: str, reason: str) -> ClaimReport:
     """Build the report of a claim whose test was skipped, with pytest's reason."""
     return _unjudged(claim, case, tier, Outcome.NOT_RUN, f"its test was skipped ({reason or 'no reason given'})")
+
+
+def without_instance(claim: Claim, case: str, tier: str, because: str) -> ClaimReport:
+    """Build the report of a claim that has no test at a tier."""
+    return _unjudged(claim, case, tier, Outcome.NOT_RUN, f"it has no {tier} test: {because}")
 
 
 def expecting(report: ClaimReport, expectation: Expectation | None) -> ClaimReport:

@@ -41,6 +41,7 @@ def pytest_configure(config: pytest.Config) -> None:
         "full: claims at the paper's budgets; only run when asked for",
         "claim(claim): the claim that a test checks (set by @claim)",
         "claim_expect(expectation): an accepted outcome (set by expected(...))",
+        "claim_without_smoke(because): no smoke test (set by smoke=None and without_smoke(...))",
     ):
         config.addinivalue_line("markers", line)
     if not hasattr(config, "workerinput"):  # an xdist worker leaves the summary to its controller
@@ -134,6 +135,24 @@ def pytest_unconfigure(config: pytest.Config) -> None:
         end_without(int(config.stash[_ended].exitstatus))
 
 
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    """Skip a claim that has no test at its tier."""
+    because = _gap(item)
+    if because:
+        pytest.skip(because)
+
+
+def _gap(item: pytest.Item) -> str:
+    """Return why a claim has no test at its tier; empty if it has one, or is no claim."""
+    if item.get_closest_marker("claim_without_smoke") is None:
+        return ""
+    from evoclaims.claims.claim import gap_of
+    from evoclaims.claims.collected import ClaimTest
+
+    return gap_of(item, ClaimTest.of(item).tier)
+
+
 @pytest.fixture
 def claim_tier() -> str:
     """The tier that a claim is judged at; parametrized for every claim."""
@@ -212,9 +231,11 @@ def _claim_report(item: pytest.Item, call: pytest.CallInfo[None], report: pytest
     """Return the report of a claim test: its verdict, the error that prevented one, or why it was skipped."""
     from evoclaims.claims.claim import expectation_of
     from evoclaims.claims.collected import ClaimTest
-    from evoclaims.claims.reporting import broken, skipped
+    from evoclaims.claims.reporting import broken, skipped, without_instance
 
     test, verdicts = ClaimTest.of(item), item.stash.get(_verdicts, None)
+    if because := _gap(item):
+        return without_instance(test.claim, test.case, test.tier, because)
     if report.skipped:  # or failed as an xfail mark expects
         said = report.longrepr[2] if isinstance(report.longrepr, tuple) else f"xfail: {getattr(report, 'wasxfail', '')}"
         return skipped(test.claim, test.case, test.tier, said.removeprefix("Skipped: "))

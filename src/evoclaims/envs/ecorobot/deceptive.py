@@ -19,7 +19,7 @@ from evoclaims.envs.ecorobot.robot_task import ROBOT_PACKAGES, Outing, Ruling
 Difficulty = Literal["easy", "difficult"]
 
 
-class Plan(NamedTuple):
+class MazePlan(NamedTuple):
     """A maze: walls, the ground between them, start, target, and the distance that counts as reached, m."""
 
     walls: tuple[Box, ...]
@@ -29,7 +29,7 @@ class Plan(NamedTuple):
     within: float
 
 
-EASY: Final = Plan(
+EASY: Final = MazePlan(
     walls=(
         Box((0.0, 0.0), (6.0, 0.3), bottom=-1.0, top=1.0),
         Box((0.0, 11.5), (6.0, 0.3), bottom=-1.0, top=1.0),
@@ -42,7 +42,7 @@ EASY: Final = Plan(
     target=(-4.0, 9.0),
     within=1.1,
 )
-DIFFICULT: Final = Plan(stones.WALLS, stones.AREA, stones.START, stones.TARGET, within=0.1)
+DIFFICULT: Final = MazePlan(stones.WALLS, stones.AREA, stones.START, stones.TARGET, within=0.1)
 PLANS: Final = {"easy": EASY, "difficult": DIFFICULT}
 
 
@@ -82,7 +82,7 @@ class DeceptiveMaze(Maze):
             raise UnknownNameError("difficulty", self.difficulty, get_args(Difficulty))
 
     @property
-    def plan(self) -> Plan:
+    def plan(self) -> MazePlan:
         """The maze."""
         return PLANS[self.difficulty]
 

@@ -58,6 +58,11 @@ class Obstacles(RobotTask):
             raise UnknownNameError("profile of heights", self.heights, get_args(Heights))
 
     @property
+    def obstacle_places(self) -> tuple[float, ...]:
+        """The obstacles' x, m."""
+        return PLACES
+
+    @property
     def tops(self) -> tuple[float, ...]:
         """Height of each obstacle, m."""
         profiles = {"hierarchical": (0.1,) * 5 + (0.2,) * 5 + (0.3,) * 5, "medium": (0.2,) * 15, "high": (0.3,) * 15}
@@ -68,7 +73,7 @@ class Obstacles(RobotTask):
         """The obstacles."""
         return tuple(
             Box((x, 0.0), (HALF_THICKNESS, 3.0), bottom=top - DEPTH, top=top)
-            for x, top in zip(PLACES, self.tops, strict=True)
+            for x, top in zip(self.obstacle_places, self.tops, strict=True)
         )
 
     def memory(self, pose: Pose) -> FurthestRun:
@@ -85,5 +90,5 @@ class Obstacles(RobotTask):
     def measures(self, outing: Outing) -> dict[str, Array]:
         """Return the number of obstacles passed, and the furthest x, m."""
         furthest = outing.memory.furthest
-        behind = jnp.asarray(np.array(PLACES) + HALF_THICKNESS, jnp.float32)
+        behind = jnp.asarray(np.array(self.obstacle_places) + HALF_THICKNESS, jnp.float32)
         return {"obstacles": jnp.sum(furthest > behind).astype(jnp.float32), "furthest": furthest}

@@ -30,7 +30,7 @@ AREA: Final[Area] = ((-4.0, 4.0), (0.0, 7.0))
 START: Final = (-3.0, 1.0)
 TARGET: Final = (-3.0, 6.0)
 STONES: Final = ((-1.0, 2.5), (3.2, 1.0), (3.2, 2.5), (0.0, 4.5), (1.0, 6.0), (-2.0, 6.0), TARGET)
-"""In order; the target is the last."""
+"""In order, m; the target is the last."""
 BONUS: Final = 1000.0
 
 
@@ -61,6 +61,11 @@ class SteppingStones(Maze):
     shows_goal: bool = False
 
     @property
+    def stones(self) -> tuple[tuple[float, float], ...]:
+        """The stones' places in order, m; the target is the last."""
+        return STONES
+
+    @property
     def boxes(self) -> tuple[Box, ...]:
         """The walls."""
         return WALLS
@@ -78,7 +83,7 @@ class SteppingStones(Maze):
     @property
     def target(self) -> tuple[float, float]:
         """The last stone."""
-        return TARGET
+        return self.stones[-1]
 
     def memory(self, pose: Pose) -> StonesCrossed:
         """Start without a stone."""
@@ -88,7 +93,7 @@ class SteppingStones(Maze):
         """Count a stone when the robot is at the next one."""
         crossed = memory.crossed + (self._distance(memory, after) <= self.within).astype(jnp.int32)
         now = StonesCrossed(crossed=crossed)
-        done = crossed == len(STONES)
+        done = crossed == len(self.stones)
         reward = crossed.astype(jnp.float32) + 1.0 - self._distance(now, after) / ARENA
         return Ruling(memory=now, reward=reward + jnp.where(done, BONUS, 0.0), ended=done)
 
@@ -98,7 +103,7 @@ class SteppingStones(Maze):
 
     def reached(self, outing: Outing) -> Bool[Array, ""]:
         """Whether all stones are crossed."""
-        return outing.memory.crossed == len(STONES)
+        return outing.memory.crossed == len(self.stones)
 
     def measures(self, outing: Outing) -> dict[str, Array]:
         """Return the number of stones crossed."""
@@ -106,7 +111,7 @@ class SteppingStones(Maze):
 
     def _next(self, memory: StonesCrossed) -> Float[Array, 2]:
         """Return the next stone's place; after the last, the last one's."""
-        return jnp.asarray(STONES, jnp.float32)[jnp.minimum(memory.crossed, len(STONES) - 1)]
+        return jnp.asarray(self.stones, jnp.float32)[jnp.minimum(memory.crossed, len(self.stones) - 1)]
 
     def _distance(self, memory: StonesCrossed, pose: Pose) -> Float[Array, ""]:
         """Return the distance to the next stone, m."""

@@ -7,7 +7,7 @@ from functools import singledispatch
 
 from evoclaims.envs.ecorobot.deceptive import DeceptiveMaze
 from evoclaims.envs.ecorobot.robot_task import RobotTask
-from evoclaims.envs.ecorobot.stones import STONES, SteppingStones
+from evoclaims.envs.ecorobot.stones import SteppingStones
 
 
 @dataclass(frozen=True)
@@ -35,8 +35,8 @@ def marks(task: RobotTask) -> tuple[Mark, ...]:
 
 @marks.register
 def _of_stepping_stones(task: SteppingStones) -> tuple[Mark, ...]:
-    last = len(STONES)
-    return tuple(Mark(place, task.within, str(i), i == last) for i, place in enumerate(STONES, start=1))
+    last = len(task.stones)
+    return tuple(Mark(place, task.within, str(i), i == last) for i, place in enumerate(task.stones, start=1))
 
 
 @marks.register
