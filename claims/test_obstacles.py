@@ -1,29 +1,12 @@
-"""§5.2.1: what the paper says about the half-cheetah among obstacles (Figs. 7 and 8).
-
-Smoke judges the sentences after a few generations of episodes of 100 steps, which end before the first obstacle.
-"""
+"""§5.2.1: what the paper says about the half-cheetah among obstacles (Figs. 7 and 8)."""
 
 import pytest
 
-from evoclaims import Outcome, claim, expected
+from evoclaims import claim
 
-HYPERNEAT_RUNS_AT_ONCE = expected(
-    Outcome.REFUTED,
-    tier="smoke",
-    because="3 generations: the weights that HyperNEAT's first networks draw already run forward, mean reward 46; NEAT "
-    "(-15) and PPO (5) have hardly begun",
-)
-PPO_HOLDS_STILL = expected(
-    Outcome.REFUTED,
-    tier="smoke",
-    because="10,000 steps: PPO has learnt to hold still, which costs next to nothing (4 of control cost against NEAT's "
-    "58); NEAT's champions of 3 generations flail",
-)
-TOO_EARLY_TO_TELL = expected(
-    Outcome.REFUTED,
-    tier="smoke",
-    because="after 3 generations NEAT and CMA-ES are as good as their first networks: undecided with jax 0.10, "
-    "supported with 0.11, refuted with 0.12",
+NOBODY_RUNS_YET = (
+    "in 128,000 steps, over obstacles of 5 to 20 cm right before the start, no method has learnt to run: NEAT's "
+    "champions flail (median reward -30), HyperNEAT's collect 26; longer trials take minutes a condition"
 )
 
 
@@ -31,16 +14,10 @@ TOO_EARLY_TO_TELL = expected(
     "O1",
     says="NEAT performs best at locomoting over obstacles of increasing height",
     where="§5.2.1, Fig. 7",
-    smoke="NEAT collects the most reward in 9,600 steps",
+    smoke=None,
+    because=NOBODY_RUNS_YET,
 )
-@pytest.mark.parametrize(
-    "other",
-    [
-        pytest.param("hyperneat", marks=HYPERNEAT_RUNS_AT_ONCE),
-        pytest.param("cma_es", marks=TOO_EARLY_TO_TELL),
-        pytest.param("ppo", marks=PPO_HOLDS_STILL),
-    ],
-)
+@pytest.mark.parametrize("other", ["hyperneat", "cma_es", "ppo"])
 def test_neat_is_best_over_obstacles(trials, verdict, other):
     neat = trials("neat", on="obstacles")
     rest = trials(other, on="obstacles")
@@ -51,9 +28,10 @@ def test_neat_is_best_over_obstacles(trials, verdict, other):
     "O2",
     says="PPO performs much better in this task",
     where="§5.2.1, Fig. 7",
-    smoke="PPO collects more reward in 10,000 steps than HyperNEAT and CMA-ES",
+    smoke=None,
+    because=NOBODY_RUNS_YET,
 )
-@pytest.mark.parametrize("other", [pytest.param("hyperneat", marks=HYPERNEAT_RUNS_AT_ONCE), "cma_es"])
+@pytest.mark.parametrize("other", ["hyperneat", "cma_es"])
 def test_ppo_is_second_over_obstacles(trials, verdict, other):
     ppo = trials("ppo", on="obstacles")
     rest = trials(other, on="obstacles")
@@ -65,9 +43,9 @@ def test_ppo_is_second_over_obstacles(trials, verdict, other):
     says="Policies learned by PPO are fast but bumpy, incurring the control cost penalty of this robot and often "
     "flipping it over",
     where="§5.2.1, Fig. 7",
-    smoke="After 10,000 steps PPO's policies pay more control cost than NEAT's, and flip the robot over more often",
+    smoke=None,
+    because=NOBODY_RUNS_YET,
 )
-@PPO_HOLDS_STILL
 def test_ppo_is_bumpy(trials, verdict):
     ppo = trials("ppo", on="obstacles")
     neat = trials("neat", on="obstacles")
@@ -78,17 +56,13 @@ def test_ppo_is_bumpy(trials, verdict):
     "O4",
     says="For the medium-difficulty task, NEAT's performance drops while the performance of PPO remains unchanged",
     where="§5.2.1, Fig. 8",
-    smoke="On ground where the first obstacle is not reached yet, NEAT's and PPO's rewards do not depend on its height",
+    smoke=None,
+    because=NOBODY_RUNS_YET,
 )
-def test_medium_obstacles_hold_back_neat_alone(trials, verdict, claim_tier):
+def test_medium_obstacles_hold_back_neat_alone(trials, verdict):
     neat, neat_medium = trials("neat", on="obstacles"), trials("neat", on="obstacles_medium")
     ppo, ppo_medium = trials("ppo", on="obstacles"), trials("ppo", on="obstacles_medium")
-    unchanged = ppo.reward.equivalent_to(ppo_medium.reward, margin={"full": 500, "smoke": 50}[claim_tier])
-    neat_s = {
-        "full": neat.reward > neat_medium.reward,
-        "smoke": neat.reward.equivalent_to(neat_medium.reward, margin=50),
-    }
-    verdict(neat_s[claim_tier] & unchanged)
+    verdict((neat.reward > neat_medium.reward) & ppo.reward.equivalent_to(ppo_medium.reward, margin=500))
 
 
 @claim(
@@ -96,9 +70,9 @@ def test_medium_obstacles_hold_back_neat_alone(trials, verdict, claim_tier):
     says="For the high-difficulty task PPO fails dramatically while NEAT's performance degrades more gracefully: PPO "
     "has gotten stuck at the first obstacle while NEAT overpasses the obstacles",
     where="§5.2.1, Fig. 8",
-    smoke="In 10,000 steps PPO passes no high obstacle, and NEAT collects more reward",
+    smoke=None,
+    because=NOBODY_RUNS_YET,
 )
-@PPO_HOLDS_STILL
 def test_high_obstacles_stop_ppo(trials, verdict):
     neat = trials("neat", on="obstacles_high")
     ppo = trials("ppo", on="obstacles_high")

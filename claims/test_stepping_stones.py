@@ -1,6 +1,6 @@
 """§5.2.1: what the paper says about the maze with stepping stones (Figs. 5 and 6).
 
-Smoke judges the sentences after a few generations of short episodes; so early, no method gets far.
+Smoke judges the same relations in a room with three stones, one before a wall and two behind it (docs/smoke.md).
 """
 
 import pytest
@@ -45,42 +45,51 @@ LEARNED = [
     "S1",
     says="NEAT accrues the highest rewards, reaching on average five out of seven stepping stones",
     where="§5.2.1, Fig. 5",
-    smoke="After 8 generations of 32 genomes NEAT reaches no more than one stepping stone",
+    smoke="NEAT reaches on average two out of three stepping stones",
 )
 def test_neat_reaches_five_stones(trials, verdict, claim_tier):
     neat = trials("neat", on="stones")
-    verdict({"full": neat.stones.between(4, 6), "smoke": neat.stones.between(0, 1)}[claim_tier])
+    verdict({"full": neat.stones.between(4, 6), "smoke": neat.stones.between(1.5, 3)}[claim_tier])
 
 
 @claim(
     "S2",
     says="HyperNEAT and CMA-ES manage to reach about three stepping stones",
     where="§5.2.1, Fig. 5",
-    smoke="After 8 generations HyperNEAT and CMA-ES reach no more than one stepping stone",
+    smoke="HyperNEAT and CMA-ES reach stepping stones, unlike a random policy, but fewer than NEAT",
 )
 @pytest.mark.parametrize("method", EVOLVED)
 def test_others_reach_three_stones(trials, verdict, claim_tier, method):
     evolved = trials(method, on="stones")
-    verdict({"full": evolved.stones.between(2, 4), "smoke": evolved.stones.between(0, 1)}[claim_tier])
+    if claim_tier == "full":
+        verdict(evolved.stones.between(2, 4))
+        return
+    neat, random_policy = trials("neat", on="stones"), trials("random_policy", on="stones")
+    verdict((evolved.stones < neat.stones) & (evolved.stones > random_policy.stones))
 
 
 @claim(
     "S3",
     says="PPO reaches only the first stepping stone",
     where="§5.2.1, Fig. 5",
-    smoke="After 50,000 steps PPO reaches no more than the first stepping stone",
+    smoke="PPO reaches, unlike a random policy, the first of three stepping stones, but not the others, unlike NEAT",
 )
 @pytest.mark.parametrize("method", LEARNED)
-def test_ppo_stays_at_the_first_stone(trials, verdict, method):
+def test_ppo_stays_at_the_first_stone(trials, verdict, claim_tier, method):
     ppo = trials(method, on="stones")
-    verdict(ppo.crosses_at_most(1).stays())
+    if claim_tier == "full":
+        verdict(ppo.crosses_at_most(1).stays())
+        return
+    neat, random_policy = trials("neat", on="stones"), trials("random_policy", on="stones")
+    gets_there = (ppo.stones > random_policy.stones) & (neat.stones > ppo.stones)
+    verdict(ppo.crosses_at_most(1.5).stays() & gets_there)
 
 
 @claim(
     "S4",
     says="NEAT accrues the highest rewards",
     where="§5.2.1, Fig. 5",
-    smoke="NEAT accrues the highest rewards in 51,200 steps",
+    smoke="NEAT accrues the highest rewards in the room with three stones",
 )
 @pytest.mark.parametrize("other", ["hyperneat", "cma_es", "map_elites", "ppo", "goal_ppo"])
 def test_neat_collects_more_reward(trials, verdict, other):
@@ -93,24 +102,26 @@ def test_neat_collects_more_reward(trials, verdict, other):
     "S5",
     says="MAP-Elites performs equally bad but exhibits a drastically different behavior",
     where="§5.2.1, Fig. 5",
-    smoke="After 8 iterations the best elite of MAP-Elites reaches no more than the first stepping stone",
+    smoke="MAP-Elites reaches as few of three stepping stones as PPO, give or take one, and fewer than NEAT",
 )
-def test_map_elites_collects_few_stones(trials, verdict):
-    map_elites = trials("map_elites", on="stones")
-    verdict(map_elites.crosses_at_most(1).stays())
+def test_map_elites_collects_few_stones(trials, verdict, claim_tier):
+    map_elites, ppo, neat = (trials(method, on="stones") for method in ("map_elites", "ppo", "neat"))
+    as_few = map_elites.stones.equivalent_to(ppo.stones, margin=1) & (map_elites.stones < neat.stones)
+    verdict({"full": map_elites.crosses_at_most(1).stays(), "smoke": as_few}[claim_tier])
 
 
 @claim(
     "S6",
     says="The agent has explored the whole maze (in contrast to PPO that only reached the first stepping stone)",
     where="§5.2.1, Fig. 6",
-    smoke="After 8 iterations the elites of MAP-Elites stand on more of the maze than PPO's way leads through",
+    smoke="The elites of MAP-Elites stand on a sixth of the room, more than PPO's way leads through",
 )
 def test_map_elites_explores_the_maze(trials, verdict, claim_tier):
     map_elites = trials("map_elites", on="stones")
     ppo = trials("ppo", on="stones")
     more = map_elites.archive_coverage > ppo.path_coverage
-    verdict({"full": more & map_elites.archive_coverage.between(0.8, 1.0), "smoke": more}[claim_tier])
+    least = {"full": 0.8, "smoke": 0.15}[claim_tier]
+    verdict(more & map_elites.archive_coverage.between(least, 1.0))
 
 
 @claim(
@@ -118,7 +129,8 @@ def test_map_elites_explores_the_maze(trials, verdict, claim_tier):
     says="The classical deceptive task (that only differs from our maze in the absence of stepping stones) is solved "
     "by MAP-Elites, which explores it in the same way",
     where="§5.2.1, Fig. 6",
-    smoke="After 8 iterations MAP-Elites has not found the target, and covers the maze with stones and without alike",
+    smoke="Without stones MAP-Elites finds the target behind the wall, and its elites, too, stand on more of the room "
+    "than PPO's way leads through",
 )
 @expected(
     Outcome.REFUTED,
@@ -127,17 +139,19 @@ def test_map_elites_explores_the_maze(trials, verdict, claim_tier):
 )
 def test_map_elites_finds_the_target_without_stones(trials, verdict, claim_tier):
     plain = trials("map_elites", on="deceptive_maze_difficult")
-    stones = trials("map_elites", on="stones")
-    alike = plain.archive_coverage.equivalent_to(stones.archive_coverage, margin=0.1)
-    found = {"full": plain.has_found_the_target, "smoke": plain.never_reaches_the_target}[claim_tier]
-    verdict(found.in_most_trials() & alike)
+    stones, ppo = trials("map_elites", on="stones"), trials("ppo", on="stones")
+    alike = {
+        "full": plain.archive_coverage.equivalent_to(stones.archive_coverage, margin=0.1),
+        "smoke": plain.archive_coverage > ppo.path_coverage,
+    }
+    verdict(plain.has_found_the_target.in_most_trials() & alike[claim_tier])
 
 
 @claim(
     "S8",
     says="A difference is that CMA-ES performs worse than NEAT",
     where="§5.2.1, Fig. 5",
-    smoke="In 51,200 steps CMA-ES collects less reward than NEAT",
+    smoke="CMA-ES collects less reward than NEAT in the room with three stones",
 )
 def test_cma_es_is_below_neat(trials, verdict):
     cma_es = trials("cma_es", on="stones")

@@ -34,6 +34,7 @@ from evoclaims.methods import (
 )
 from evoclaims.methods.neat import Settings, Species
 from evoclaims.networks import AllSkips, Mlp, Substrate, on_circle
+from reproductions.nisioti2025.small_worlds import SmallDeceptiveMaze, ThreeStones
 from reproductions.nisioti2025.waypoints import Waypoints
 
 Conditions = dict[tuple[str, str], Condition]
@@ -65,7 +66,7 @@ class Size:
     """The settings of one size.
 
     Attributes:
-        maze_steps, robot_steps: steps per episode, in mazes with the simplest robot and for robots with limbs.
+        tasks: by the names that claims use.
         neat, limbed_neat: settings of NEAT with the simplest robot and with robots that have limbs.
         cppn: settings of HyperNEAT's CPPNs.
         cma_es: population of CMA-ES.
@@ -75,8 +76,7 @@ class Size:
         budgets: of each method, by task.
     """
 
-    maze_steps: int
-    robot_steps: int
+    tasks: Mapping[str, RobotTask]
     neat: Settings
     limbed_neat: Settings
     cppn: Settings
@@ -87,21 +87,27 @@ class Size:
     budgets: Mapping[str, Mapping[str, Budget]]
 
 
+def _tasks(
+    stones: type[SteppingStones], maze: type[DeceptiveMaze], obstacles: type[Obstacles], *, steps: int
+) -> dict[str, RobotTask]:
+    """Return the tasks in worlds of these kinds, with episodes of as many steps."""
+    return {
+        STONES: stones(episode_steps=steps),
+        STONES_ANT: stones(robot=ANT, episode_steps=steps),
+        EASY: maze(episode_steps=steps),
+        EASY_ANT: maze(robot=ANT, episode_steps=steps),
+        DIFFICULT: maze(episode_steps=steps, difficulty="difficult"),
+        HIERARCHICAL: obstacles(episode_steps=steps),
+        MEDIUM: obstacles(episode_steps=steps, heights="medium"),
+        HIGH: obstacles(episode_steps=steps, heights="high"),
+        CHEETAH_RUN: Locomotion(robot=HALF_CHEETAH, episode_steps=steps),
+        ANT_RUN: Locomotion(robot=ANT, episode_steps=steps),
+    }
+
+
 def _conditions(size: Size) -> Conditions:
     """Return every condition at a size."""
-    stones, ant_stones = SteppingStones(episode_steps=size.maze_steps), _ant(SteppingStones, size)
-    tasks: dict[str, RobotTask] = {
-        STONES: stones,
-        STONES_ANT: ant_stones,
-        EASY: DeceptiveMaze(episode_steps=size.maze_steps),
-        EASY_ANT: _ant(DeceptiveMaze, size),
-        DIFFICULT: DeceptiveMaze(episode_steps=size.maze_steps, difficulty="difficult"),
-        HIERARCHICAL: Obstacles(episode_steps=size.robot_steps),
-        MEDIUM: Obstacles(episode_steps=size.robot_steps, heights="medium"),
-        HIGH: Obstacles(episode_steps=size.robot_steps, heights="high"),
-        CHEETAH_RUN: Locomotion(robot=HALF_CHEETAH, episode_steps=size.robot_steps),
-        ANT_RUN: _ant(Locomotion, size),
-    }
+    tasks = size.tasks
     simple = {name for name, task in tasks.items() if task.robot == SIMPLE_ROB}
     placed = HyperNeat(size.cppn, substrate=SIMPLE_ROB_SUBSTRATE)
     layered = HyperNeat(size.cppn, extent="unit")
@@ -118,19 +124,16 @@ def _conditions(size: Size) -> Conditions:
         # Control C4: no training.
         "waypoints": dict.fromkeys(tasks, Waypoints()),
     }
-    goals = {STONES: replace(stones, shows_goal=True), STONES_ANT: replace(ant_stones, shows_goal=True)}
-    whole = {STONES: replace(stones, shows_goal=True, episode_steps=1_000)}
-    seen: dict[str, Mapping[str, RobotTask]] = {"goal_ppo": goals, "waypoints": whole}
+    goals = {name: replace(task, shows_goal=True) for name, task in tasks.items() if isinstance(task, SteppingStones)}
+    seen: dict[str, Mapping[str, RobotTask]] = {
+        "goal_ppo": goals,
+        "waypoints": {STONES: SteppingStones(shows_goal=True)},
+    }
     return {
         (method, task): Condition(methods[method][task], seen.get(method, tasks)[task], "whole_budget", budget)
         for method, budgets in size.budgets.items()
         for task, budget in budgets.items()
     }
-
-
-def _ant(kind: Any, size: Size) -> Any:
-    """Return a task for the ant."""
-    return kind(robot=ANT, episode_steps=size.robot_steps)
 
 
 def _generations(**by_task: int) -> Mapping[str, Budget]:
@@ -144,8 +147,7 @@ _LOOK = Budget(generations=1, reports=1)
 
 FULL = _conditions(
     Size(
-        maze_steps=1_000,
-        robot_steps=1_000,
+        tasks=_tasks(SteppingStones, DeceptiveMaze, Obstacles, steps=1_000),
         neat=_EVOLVING,
         limbed_neat=_EVOLVING,
         cppn=replace(_EVOLVING, activations=CPPN_FUNCTIONS),
@@ -184,9 +186,10 @@ FULL = _conditions(
     )
 )
 
-_SMALL = Settings(population=32, nodes=32, connections=96, species=Species(most=4, survival=0.2))
-_SHORT = Budget(environment_steps=50_000, reports=10)
-_SHORTER = Budget(environment_steps=10_000, reports=10)
+_SMALL = Settings(population=64, nodes=32, connections=96, species=Species(most=4, survival=0.2))
+_SHORT = Budget(environment_steps=160_000, reports=10)
+_SHORTER = Budget(environment_steps=64_000, reports=10)
+_SHORTEST = Budget(environment_steps=10_000, reports=10)
 
 
 def _few(generations: int) -> Budget:
@@ -196,13 +199,12 @@ def _few(generations: int) -> Budget:
 
 SMOKE = _conditions(
     Size(
-        maze_steps=200,
-        robot_steps=100,
-        neat=_SMALL,
+        tasks=_tasks(ThreeStones, SmallDeceptiveMaze, Obstacles, steps=100),
+        neat=replace(_SMALL, population=128),
         limbed_neat=replace(_SMALL, nodes=64, connections=320),
         cppn=replace(_SMALL, activations=CPPN_FUNCTIONS),
-        cma_es=32,
-        hidden=4,
+        cma_es=128,
+        hidden=12,
         ppo=Ppo(
             policy_layers=(32,) * 2,
             value_layers=(32,) * 2,
@@ -216,37 +218,37 @@ SMOKE = _conditions(
             normalize_observations=True,
             level_test=LevelTest(every=0),
         ),
-        map_elites=MapElites(network=Mlp((16,) * 2), batch=32, initial=32),
+        map_elites=MapElites(network=Mlp((16,) * 2), batch=128, initial=128, iso_sigma=0.1, line_sigma=0.2),
         budgets={
             "neat": {
-                STONES: _few(8),
-                STONES_ANT: _few(3),
+                STONES: _few(25),
+                STONES_ANT: _few(10),
                 HIERARCHICAL: _few(3),
                 MEDIUM: _few(3),
                 HIGH: _few(3),
             },
             "hyperneat": {
-                STONES: _few(8),
-                STONES_ANT: _few(3),
+                STONES: _few(20),
+                STONES_ANT: _few(10),
                 EASY: _few(8),
                 EASY_ANT: _few(3),
-                DIFFICULT: _few(8),
+                DIFFICULT: _few(200),
                 HIERARCHICAL: _few(3),
             },
-            "cma_es": {STONES: _few(8), STONES_ANT: _few(3), HIERARCHICAL: _few(3)},
+            "cma_es": {STONES: _few(12), STONES_ANT: _few(5), HIERARCHICAL: _few(3)},
             "ppo": {
                 STONES: _SHORT,
                 STONES_ANT: _SHORTER,
                 EASY: _SHORT,
-                HIERARCHICAL: _SHORTER,
-                MEDIUM: _SHORTER,
-                HIGH: _SHORTER,
-                CHEETAH_RUN: _SHORTER,
-                ANT_RUN: _SHORTER,
+                HIERARCHICAL: _SHORTEST,
+                MEDIUM: _SHORTEST,
+                HIGH: _SHORTEST,
+                CHEETAH_RUN: _SHORTEST,
+                ANT_RUN: _SHORTEST,
             },
             "goal_ppo": {STONES: _SHORT},
-            "map_elites": {STONES: _few(8), DIFFICULT: _few(8)},
-            "random_policy": {CHEETAH_RUN: _LOOK, ANT_RUN: _LOOK},
+            "map_elites": {STONES: _few(10), EASY: _few(100), DIFFICULT: _few(100)},
+            "random_policy": {STONES: _LOOK, CHEETAH_RUN: _LOOK, ANT_RUN: _LOOK},
             "waypoints": {STONES: _LOOK},
         },
     )
