@@ -22,7 +22,7 @@ NO_ROOM_FAVOURS_HYPERNEAT = (
 )
 def test_the_ant_stays_at_the_first_stone(trials, verdict, claim_tier):
     ant, simple = trials("neat", on="stones_ant"), trials("neat", on="stones")
-    contrast = ant.crosses_at_most(1.5).stays() & simple.stones.between(1.5, 3)
+    contrast = ant.crosses_at_most(1.5).stays() & simple.stones.between(1.25, 3)
     verdict({"full": ant.crosses_at_most(1).stays(), "smoke": contrast}[claim_tier])
 
 

@@ -235,7 +235,7 @@ SMOKE = _conditions(
                 DIFFICULT: _few(200),
                 HIERARCHICAL: _few(3),
             },
-            "cma_es": {STONES: _few(12), STONES_ANT: _few(5), HIERARCHICAL: _few(3)},
+            "cma_es": {STONES: _few(10), STONES_ANT: _few(5), HIERARCHICAL: _few(3)},
             "ppo": {
                 STONES: _SHORT,
                 STONES_ANT: _SHORTER,
@@ -247,7 +247,7 @@ SMOKE = _conditions(
                 ANT_RUN: _SHORTEST,
             },
             "goal_ppo": {STONES: _SHORT},
-            "map_elites": {STONES: _few(10), EASY: _few(100), DIFFICULT: _few(100)},
+            "map_elites": {STONES: _few(8), EASY: _few(100), DIFFICULT: _few(100)},
             "random_policy": {STONES: _LOOK, CHEETAH_RUN: _LOOK, ANT_RUN: _LOOK},
             "waypoints": {STONES: _LOOK},
         },
