@@ -232,7 +232,7 @@ SMOKE = _conditions(
                 STONES_ANT: _few(10),
                 EASY: _few(8),
                 EASY_ANT: _few(3),
-                DIFFICULT: _few(200),
+                DIFFICULT: _few(100),
                 HIERARCHICAL: _few(3),
             },
             "cma_es": {STONES: _few(10), STONES_ANT: _few(5), HIERARCHICAL: _few(3)},
