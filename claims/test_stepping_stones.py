@@ -102,12 +102,16 @@ def test_neat_collects_more_reward(trials, verdict, other):
     "S5",
     says="MAP-Elites performs equally bad but exhibits a drastically different behavior",
     where="§5.2.1, Fig. 5",
-    smoke="MAP-Elites reaches as few of three stepping stones as PPO, give or take one, and fewer than NEAT",
+    smoke="MAP-Elites collects about as little reward as PPO: more than a random policy does, but far less than NEAT",
 )
 def test_map_elites_collects_few_stones(trials, verdict, claim_tier):
-    map_elites, ppo, neat = (trials(method, on="stones") for method in ("map_elites", "ppo", "neat"))
-    as_few = map_elites.stones.equivalent_to(ppo.stones, margin=1) & (map_elites.stones < neat.stones)
-    verdict({"full": map_elites.crosses_at_most(1).stays(), "smoke": as_few}[claim_tier])
+    map_elites = trials("map_elites", on="stones")
+    if claim_tier == "full":
+        verdict(map_elites.crosses_at_most(1).stays())
+        return
+    ppo, neat, random_policy = (trials(method, on="stones") for method in ("ppo", "neat", "random_policy"))
+    some = (map_elites.reward > random_policy.reward) & (map_elites.reward < neat.reward)
+    verdict(map_elites.reward.equivalent_to(ppo.reward, margin=100) & some)
 
 
 @claim(
