@@ -235,7 +235,7 @@ SMOKE = _conditions(
                 DIFFICULT: _few(100),
                 HIERARCHICAL: _few(3),
             },
-            "cma_es": {STONES: _few(10), STONES_ANT: _few(5), HIERARCHICAL: _few(3)},
+            "cma_es": {STONES: _few(8), STONES_ANT: _few(5), HIERARCHICAL: _few(3)},
             "ppo": {
                 STONES: _SHORT,
                 STONES_ANT: _SHORTER,
