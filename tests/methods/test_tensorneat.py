@@ -22,7 +22,6 @@ from evoclaims.envs.gates.parity import NParity
 from evoclaims.methods.hyperneat import HyperNeat
 from evoclaims.methods.hyperneat_tensorneat import HyperneatTensorneat
 from evoclaims.methods.neat.distance import distance
-from evoclaims.methods.neat.homology import index
 from evoclaims.methods.neat.neat import Neat
 from evoclaims.methods.neat.reproduction import offspring
 from evoclaims.methods.neat.settings import Attribute, Mutation, Settings, Species
@@ -230,7 +229,7 @@ def test_ours_and_tensorneats_distance_agree(evolved: Any) -> None:
     others = jax.tree.map(lambda leaf: jnp.roll(leaf, 7, axis=0), genomes)
 
     def ours(one: Any, other: Any) -> Any:
-        return distance(LIVELY.species, one, index(other), other.node_count, other.connection_count)
+        return distance(LIVELY.species, one, other)
 
     def theirs(one: Genes, other: Genes) -> Any:
         with implicit_promotions():

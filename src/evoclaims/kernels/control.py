@@ -44,6 +44,22 @@ def repeat(
     return registers
 
 
+def walk(page: Instructions, start: str, ends: Callable[[str], str], following: Callable[[str], str]) -> str:
+    """Write a walk through int32, from `start` on; return the first at which it `ends`, an i1."""
+    name = page.register().removeprefix("%")
+    before = page.block
+    page.write(f"br label %{name}.head")
+    page.label(f"{name}.head")
+    at = len(page.lines)
+    current = page.register()
+    page.write(f"br i1 {ends(current)}, label %{name}.done, label %{name}.body")
+    page.label(f"{name}.body")
+    page.lines[at:at] = [either(current, "i32", (start, before), (following(current), page.block))]
+    page.write(f"br label %{name}.head")
+    page.label(f"{name}.done")
+    return current
+
+
 def choose(page: Instructions, index: str, type_: str, cases: Sequence[Callable[[], str]]) -> str:
     """Write a choice; return the value of the case that `index`, an int32, says, or else of the last."""
     name = page.register().removeprefix("%")

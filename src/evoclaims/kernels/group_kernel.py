@@ -19,6 +19,8 @@ BYTES: Final = 4
 """Of a number: float32 or int32."""
 LANES: Final = 4
 """Vectors of rows computed together, so that operations that wait for each other are not all there is to do."""
+ALL: Final = 2**30
+"""Rows that are given at a time to a kernel that goes through a group's rows itself."""
 
 
 @dataclass(frozen=True)
@@ -35,11 +37,12 @@ class Rows:
 
     Attributes:
         page: the instructions.
+        count: how many rows there are, an i32.
     """
 
     def __init__(self, page: Instructions, count: str) -> None:
         """Start; lanes from `count`, an i32, on compute the last row, and store nothing."""
-        self.page = page
+        self.page, self.count = page, count
         if page.lanes > 1:
             integers = page.vector("i32")
             numbers = f"<{', '.join(f'i32 {lane}' for lane in range(page.lanes))}>"
@@ -88,7 +91,7 @@ def lanes_for(rows: int, widest: int) -> int:
     return min(1 << (rows - 1).bit_length(), LANES * widest)
 
 
-def host_text(write: Writer, numbers: Sequence[Any], sizes: Sizes, lanes: int) -> str:
+def host_text(write: Writer, numbers: Sequence[Any], sizes: Sizes, lanes: int, together: int) -> str:
     """Return the text of a kernel for processors.
 
     Its arguments are an array of int32, [groups, rows of each, and of each array of rows whether (1) or not (0) groups
@@ -98,7 +101,8 @@ def host_text(write: Writer, numbers: Sequence[Any], sizes: Sizes, lanes: int) -
         write: what is computed.
         numbers: the expressions that `write` computes.
         sizes: of the arrays.
-        lanes: rows computed at a time.
+        lanes: in a vector.
+        together: rows that `write` is given at a time: as many as lanes, unless it goes through them itself.
     """
     page = Instructions(lanes, numbers)
     page.label("entry")
@@ -109,7 +113,7 @@ def host_text(write: Writer, numbers: Sequence[Any], sizes: Sizes, lanes: int) -
     given = [f"ptr {name}" for name in (*groups, *rows, *results)]
     block = f"define internal void @block({', '.join([*given, 'i32 %count'])}) {WIDE} {{\n{body}\n}}\n"
     called = handler(2 + len(rows), len(groups) + len(rows), len(results))
-    return "\n".join(page.declared) + "\n" + block + _loops(sizes, lanes) + called
+    return "\n".join(page.declared) + "\n" + block + _loops(sizes, together) + called
 
 
 def gpu_text(write: Writer, numbers: Sequence[Any], sizes: Sizes, groups: int, rows: int, own: Sequence[bool]) -> str:
@@ -145,7 +149,7 @@ def _moved(page: Instructions, name: str, size: int, row: str) -> None:
     page.write(f"{name} = addrspacecast ptr addrspace(1) {place} to ptr")
 
 
-def _loops(sizes: Sizes, lanes: int) -> str:
+def _loops(sizes: Sizes, together: int) -> str:
     """Return the text of the loops over groups and their rows, which call `block`."""
     groups, rows, results = _named(sizes)
     counts = ["i64 %groups", "i64 %rows", *(f"i64 {name}.own" for name in rows)]
@@ -163,8 +167,8 @@ def _loops(sizes: Sizes, lanes: int) -> str:
         "%row = phi i64 [ 0, %each ], [ %row.next, %again ]",
         "%place = add i64 %before, %row",
         "%left = sub i64 %rows, %row",
-        f"%few = icmp ult i64 %left, {lanes}",
-        f"%some = select i1 %few, i64 %left, i64 {lanes}",
+        f"%few = icmp ult i64 %left, {together}",
+        f"%some = select i1 %few, i64 %left, i64 {together}",
         "%count = trunc i64 %some to i32",
     ]
     for name, size in zip(groups, sizes.groups, strict=True):
@@ -176,7 +180,7 @@ def _loops(sizes: Sizes, lanes: int) -> str:
         lines += _address(name, "%place", size)
     lines += [
         f"call void @block({', '.join([*given, 'i32 %count'])})",
-        f"%row.next = add i64 %row, {lanes}",
+        f"%row.next = add i64 %row, {together}",
         "%more.rows = icmp ult i64 %row.next, %rows",
         "br i1 %more.rows, label %again, label %after",
         "after:",

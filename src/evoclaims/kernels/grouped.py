@@ -34,6 +34,8 @@ class GroupKernel:
         outputs: shapes of the results, none of them empty.
         write: writes it in LLVM's instructions.
         numbers: the expressions that it computes.
+        one_lane: whether `write` goes through all rows of a group itself, one after the other, rather than computing a
+            vector of them.
     """
 
     name: str
@@ -43,6 +45,7 @@ class GroupKernel:
     outputs: Shapes
     write: Writer
     numbers: Sequence[Any] = ()
+    one_lane: bool = False
 
     def __call__(self, *leaves: Array) -> list[Array]:
         """Compute it, for any batch. With only the rows batched, or the groups, these are not copied."""
@@ -89,8 +92,9 @@ class GroupKernel:
         """Call the kernel for this machine's processor, for every element of a batch."""
 
         def call(groups: int, rows: int, own: list[bool], operands: list[Array], shapes: Shapes) -> Any:
-            lanes = group_kernel.lanes_for(rows, machine_code.lanes())
-            text = group_kernel.host_text(self.write, self.numbers, self.sizes, lanes)
+            lanes = 1 if self.one_lane else group_kernel.lanes_for(rows, machine_code.lanes())
+            together = group_kernel.ALL if self.one_lane else lanes
+            text = group_kernel.host_text(self.write, self.numbers, self.sizes, lanes, together)
             return calls.on_host(text, [groups, rows, *own], operands, shapes)
 
         return self._call(leaves, call)

@@ -2,15 +2,61 @@
 
 from __future__ import annotations
 
-import jax
-import numpy as np
-from genomes import dags, made, read
-from hypothesis import given, settings
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from typing import Any
 
-from evoclaims.methods.neat.homology import counterparts, index
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from assembler import assemble, kernels_for_gpus
+from genomes import at, dags, made, read, same, stacked
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from without_kernels import BREEDING, without_kernels
+
+from evoclaims.methods.neat.homology import Counterparts, counterparts
 from evoclaims.networks.genome import Genome
 
-_counterparts = jax.jit(lambda genome, other: counterparts(genome, index(other)))
+_counterparts = jax.jit(counterparts)
+MAPS: dict[str, Any] = {
+    "pairs": jax.vmap(counterparts),
+    "all with one": jax.vmap(counterparts, (0, None)),
+    "one with all": jax.vmap(counterparts, (None, 0)),
+    "all with all": jax.vmap(jax.vmap(counterparts, (0, None)), (None, 0)),
+    "trials": jax.vmap(jax.vmap(counterparts, (0, None))),
+}
+"""Batches of genomes, and of others."""
+
+
+def _in_batch(name: str, genomes: Genome, others: Genome) -> tuple[Genome, Genome]:
+    """Return what a batch is given of some genomes and as many others."""
+    if name == "trials":
+        return jax.tree.map(lambda leaf: jnp.stack([leaf, leaf[::-1]]), genomes), at(others, np.array([0, -1]))
+    return at(genomes, 0) if name == "one with all" else genomes, at(others, 0) if name == "all with one" else others
+
+
+@cache
+def _compiled(name: str, kernel: bool) -> Any:
+    """Return the function that finds what a batch has in common, 0 where it is arbitrary."""
+
+    def found(*genomes: Genome) -> Any:
+        found: Counterparts = MAPS[name](*_in_batch(name, *genomes))
+        nodes = found.nodes
+        attributes = [jnp.where(found.has_node, each, 0) for each in (nodes.bias, nodes.response, nodes.activation)]
+        return found.has_node, attributes, jax.lax.bitcast_convert_type(found.weight, jnp.int32), found.has_connection
+
+    return jax.jit(found)
+
+
+def _check_both_ways(name: str, genomes: Genome, others: Genome) -> None:
+    """Assert that the kernel finds the same bits as the function in jax."""
+    made = _compiled(name, True)(genomes, others)
+    with without_kernels(BREEDING):
+        wanted = _compiled(name, False)(genomes, others)
+    assert same(made, wanted)
 
 
 @settings(max_examples=80, deadline=None)
@@ -38,3 +84,54 @@ def test_genes_of_another_order_and_of_neighbouring_large_keys_are_told_apart() 
     found = _counterparts(one, other)
     assert np.asarray(found.has_node).tolist()[:5] == [True, True, False, True, True]
     np.testing.assert_array_equal(np.asarray(found.weight)[:4], [np.nan, np.nan, 4.0, np.nan])
+
+
+@pytest.mark.parametrize("name", MAPS)
+@settings(max_examples=15, deadline=None)
+@given(st.lists(dags(activations=3), min_size=3, max_size=3), st.lists(dags(activations=3), min_size=3, max_size=3))
+def test_the_kernel_finds_the_same_bits_in_every_batch(name: str, genomes: list[Genome], others: list[Genome]) -> None:
+    """An only genome is the other's row; genomes with the same other are rows of a group."""
+    for count in (1, 3):
+        _check_both_ways(name, stacked(genomes[:count]), stacked(others[:count]))
+
+
+@pytest.mark.parametrize("capacity", [(100, 400), (33, 7), (1, 1)])
+def test_the_kernel_finds_the_same_bits_at_other_capacities(capacity: tuple[int, int]) -> None:
+    """Also among genomes that fill their arrays, and keys that share a hash."""
+    draw = np.random.default_rng(3)
+    nodes, connections = capacity
+    pairs = [(s, t) for s in range(nodes) for t in range(s + 1, nodes)]
+
+    def drawn(full: bool) -> Genome:
+        order = np.sort(draw.choice(3 * nodes, nodes if full else draw.integers(nodes + 1), replace=False)) * 2**16
+        links = [(order[s], order[t]) for s, t in pairs if t < len(order)]
+        chosen = draw.permutation(len(links))[: connections if full else draw.integers(connections + 1)]
+        return made(order.tolist(), {links[i]: draw.normal() for i in chosen}, capacity=capacity)
+
+    genomes, others = (stacked([drawn(full) for full in (True, True, False, False)]) for _ in range(2))
+    for name in MAPS:
+        _check_both_ways(name, genomes, others)
+
+
+def test_numbers_are_moved_as_bits() -> None:
+    """A weight of NaN counts as missing."""
+    payload = np.uint32(0x7FC12345).view(np.float32)
+    odd = [float("inf"), -0.0, 1e-45, payload]
+    genome = made([0, 1, 2, 3], {(0, 1): 1.0, (0, 2): 1.0, (0, 3): 1.0, (1, 2): 1.0})
+    weights, biases = (np.concatenate([odd, rest[4:]]) for rest in (genome.connections.weight, genome.nodes.bias))
+    strange = replace(
+        genome,
+        connections=replace(genome.connections, weight=weights.astype(np.float32)),
+        nodes=replace(genome.nodes, bias=biases.astype(np.float32)),
+    )
+    found = _counterparts(genome, strange)
+    assert np.asarray(found.has_connection).tolist()[:4] == [True, True, True, False]
+    assert np.asarray(found.weight).tobytes()[:16] == weights.astype(np.float32).tobytes()[:16]
+    assert np.asarray(found.nodes.bias).tobytes()[:16] == biases.astype(np.float32).tobytes()[:16]
+
+
+@pytest.mark.parametrize("name", MAPS)
+def test_nvidias_assembler_takes_the_kernel(name: str, tmp_path: Path) -> None:
+    genomes = stacked([made([0, 1, 2], {(0, 2): 1.0})] * 3)
+    (text,) = kernels_for_gpus(MAPS[name], *_in_batch(name, genomes, genomes))
+    assemble(text, tmp_path)

@@ -3,21 +3,18 @@
 from __future__ import annotations
 
 import jax.numpy as jnp
-from jaxtyping import Array, Float, Int
+from jaxtyping import Array, Float
 
-from evoclaims.methods.neat.homology import Index, counterparts
+from evoclaims.methods.neat.homology import counterparts
 from evoclaims.methods.neat.settings import Species
 from evoclaims.networks.genome import Genome
 
 
-def distance(
-    settings: Species, genome: Genome, other: Index, other_nodes: Int[Array, ""], other_connections: Int[Array, ""]
-) -> Float[Array, ""]:
+def distance(settings: Species, genome: Genome, other: Genome) -> Float[Array, ""]:
     """Return the distance of nodes plus that of connections.
 
     Each is (c_disjoint · D + c_difference · Σ |Δ attributes|) / max(n₁, n₂), where D counts the genes without a
-    counterpart and the sum is over homologous genes; 0 when neither genome has such genes. The other genome is given
-    by its index and its counts of nodes and connections.
+    counterpart and the sum is over homologous genes; 0 when neither genome has such genes.
     """
     found = counterparts(genome, other)
     nodes = genome.nodes
@@ -34,6 +31,6 @@ def distance(
         total += settings.difference * jnp.sum(jnp.where(has, difference, 0.0))
         return total / jnp.maximum(jnp.maximum(count, other_count), 1).astype(jnp.float32)
 
-    return part(found.has_node, node_difference, genome.node_count, other_nodes) + part(
-        found.has_connection, weight_difference, genome.connection_count, other_connections
+    return part(found.has_node, node_difference, genome.node_count, other.node_count) + part(
+        found.has_connection, weight_difference, genome.connection_count, other.connection_count
     )

@@ -2,24 +2,16 @@
 
 from __future__ import annotations
 
+from functools import cache, partial
+
+import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int
 
 from evoclaims.core.pytree import pytree
-from evoclaims.networks.genome import Genome, Nodes
-
-
-@pytree
-class Index:
-    """A genome prepared for looking up its genes.
-
-    Attributes:
-        nodes: its node genes.
-        weights: weights[i, j] of the connection from slot j to slot i; NaN where there is none.
-    """
-
-    nodes: Nodes
-    weights: Float[Array, "nodes nodes"]
+from evoclaims.kernels.grouped import GroupKernel
+from evoclaims.methods.neat.homology_kernel import write_search
+from evoclaims.networks.genome import Connections, Genome, Nodes
 
 
 @pytree
@@ -42,31 +34,50 @@ class Counterparts:
         return ~jnp.isnan(self.weight)
 
 
-def index(genome: Genome) -> Index:
-    """Write a genome's connections into a matrix."""
-    size = genome.nodes.key.shape[0]
-    genes = genome.connections
-    target = jnp.where(genome.has_connection, genes.target, size)
-    weights = jnp.full((size, size), jnp.nan).at[target, genes.source].set(genes.weight, mode="drop")
-    return Index(nodes=genome.nodes, weights=weights)
-
-
-def counterparts(genome: Genome, other: Index) -> Counterparts:
+def counterparts(genome: Genome, other: Genome) -> Counterparts:
     """Find the counterparts of `genome`'s genes in `other`."""
-    same = (genome.nodes.key[:, None] == other.nodes.key[None, :]) & genome.has_node[:, None]
-    # One reduction; the comparison is never written to memory. -1 where nothing matches.
-    slot: Int[Array, " nodes"] = jnp.max(jnp.where(same, jnp.arange(same.shape[1]), -1), axis=1)
-    has_node = slot >= 0
-    source, target = genome.connections.source, genome.connections.target
-    there = genome.has_connection & has_node[source] & has_node[target]
-    weight = jnp.where(there, other.weights[slot[target], slot[source]], jnp.nan)
-    return Counterparts(
-        nodes=Nodes(
-            key=other.nodes.key[slot],
-            bias=other.nodes.bias[slot],
-            response=other.nodes.response[slot],
-            activation=other.nodes.activation[slot],
-        ),
-        has_node=has_node,
-        weight=weight,
+    search = _search(genome.nodes.key.shape[-1], genome.connections.weight.shape[-1])
+    genes = genome.connections
+    own = genome.nodes.key, genes.source, genes.target, genome.node_count, genome.connection_count
+    slot, bias, response, activation, weight = search(*jax.tree.leaves(other), *own)
+    nodes = Nodes(key=genome.nodes.key, bias=bias, response=response, activation=activation)
+    return Counterparts(nodes=nodes, has_node=slot >= 0, weight=weight)
+
+
+@cache
+def _search(nodes: int, connections: int) -> GroupKernel:
+    """Return the kernel that finds counterparts in genomes of a capacity; genomes with the same other are a group."""
+    (slots, places, one), (of_nodes, of_connections) = (
+        [jax.ShapeDtypeStruct(shape, dtype) for shape in shapes]
+        for shapes, dtype in ((((nodes,), (connections,), ()), jnp.int32), (((nodes,), (connections,)), jnp.float32))
     )
+    return GroupKernel(
+        name="The breeding of genomes",
+        function=_searched,
+        groups=(slots, of_nodes, of_nodes, slots, places, places, of_connections, one, one),
+        rows=(slots, places, places, one, one),
+        outputs=(slots, of_nodes, of_nodes, slots, of_connections),
+        write=partial(write_search, (nodes, connections)),
+        one_lane=True,
+    )
+
+
+def _searched(*leaves: Array) -> list[Array]:
+    """Return the other's slot of each node or -1, its bias, response and activation, and each connection's weight."""
+    other = Genome(Nodes(*leaves[:4]), Connections(*leaves[4:7]), *leaves[7:9])
+    key, source, target, node_count, connection_count = leaves[9:]
+    size = key.shape[0]
+    has_node, has_connection = jnp.arange(size) < node_count, jnp.arange(source.shape[0]) < connection_count
+    same = (key[:, None] == other.nodes.key[None, :]) & has_node[:, None]
+    # One reduction; the comparison is never written to memory. -1 where nothing matches.
+    slot: Int[Array, " nodes"] = jnp.max(jnp.where(same, jnp.arange(size, dtype=jnp.int32), -1), axis=1)
+    there = has_connection & (slot[source] >= 0) & (slot[target] >= 0)
+    weight = jnp.where(there, _matrix(other)[slot[target], slot[source]], jnp.nan)
+    return [slot, *(leaf[slot] for leaf in leaves[1:4]), weight]
+
+
+def _matrix(genome: Genome) -> Float[Array, "nodes nodes"]:
+    """Return weights[i, j] of the connection from slot j to slot i; NaN where there is none."""
+    size, genes = genome.nodes.key.shape[0], genome.connections
+    target = jnp.where(genome.has_connection, genes.target, size)
+    return jnp.full((size, size), jnp.nan).at[target, genes.source].set(genes.weight, mode="drop")

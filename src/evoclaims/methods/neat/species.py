@@ -13,7 +13,6 @@ from jaxtyping import Array, Bool, Float, Int
 
 from evoclaims.core.pytree import pytree
 from evoclaims.methods.neat.distance import distance
-from evoclaims.methods.neat.homology import index
 from evoclaims.methods.neat.settings import Species
 from evoclaims.networks.genome import Genome
 
@@ -80,9 +79,7 @@ def speciate(settings: Species, species: SpeciesState, population: Genome, gener
     everyone = jnp.arange(population.node_count.shape[0], dtype=jnp.int32)
 
     def to_all(centre: Genome) -> Array:
-        prepared = index(centre)
-        one = jax.vmap(lambda g: distance(settings, g, prepared, centre.node_count, centre.connection_count))
-        result: Array = one(population)
+        result: Array = jax.vmap(lambda genome: distance(settings, genome, centre))(population)
         return result
 
     def recentre(place: Array, grouping: _Grouping) -> _Grouping:
