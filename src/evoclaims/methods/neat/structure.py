@@ -6,13 +6,16 @@ Every function maps one genome to one genome and keeps the slots in topological 
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int, PRNGKeyArray
 
 from evoclaims.core.pytree import select
+from evoclaims.kernels.grouped import GroupKernel
 from evoclaims.methods.neat.settings import Mutation
+from evoclaims.methods.neat.structure_kernels import descendants_kernel, packing_kernel
 from evoclaims.networks.genome import EMPTY, Connections, Genome, Nodes
 
 
@@ -106,9 +109,19 @@ def delete_node(u: Float[Array, ""], genome: Genome, inputs: int, outputs: int) 
 
 def packed(genes: Connections, kept: Bool[Array, " connections"]) -> Connections:
     """Move the kept connections to the front, in their order."""
-    size = kept.shape[0]
-    place = jnp.where(kept, jnp.cumsum(kept, dtype=jnp.int32) - 1, size)
-    return jax.tree.map(lambda leaf: jnp.zeros_like(leaf).at[place].set(leaf, mode="drop"), genes)
+    return Connections(*_packing(kept.shape[0])(genes.source, genes.target, genes.weight, _one_if(kept)))
+
+
+@cache
+def _packing(connections: int) -> GroupKernel:
+    """Return the kernel of `packed`."""
+
+    def function(*leaves: Array) -> list[Array]:
+        *genes, kept = leaves
+        place = jnp.where(kept > 0, jnp.cumsum(kept, dtype=jnp.int32) - 1, connections)
+        return [jnp.zeros_like(leaf).at[place].set(leaf, mode="drop") for leaf in genes]
+
+    return packing_kernel(connections, function)
 
 
 def add_connection(u: Float[Array, ""], v: Float[Array, ""], genome: Genome, inputs: int) -> Genome:
@@ -140,15 +153,26 @@ def add_connection(u: Float[Array, ""], v: Float[Array, ""], genome: Genome, inp
 
 def descendants(genome: Genome, start: Int[Array, ""]) -> Bool[Array, " nodes"]:
     """Return which nodes `start` leads to, itself included."""
-    size = genome.nodes.key.shape[0]
     genes = genome.connections
-    target = jnp.where(genome.has_connection, genes.target, size)
-    linked = jnp.zeros((size, size), bool).at[target, genes.source].set(True, mode="drop")
+    search = _search(genome.nodes.key.shape[0], genes.weight.shape[0])
+    (reached,) = search(genes.source, genes.target, genome.connection_count, start)
+    return reached > 0
 
-    def visit(slot: Array, reached: Array) -> Array:
-        return reached.at[slot].set(reached[slot] | jnp.any(linked[slot] & reached))
 
-    return jax.lax.fori_loop(0, size, visit, jnp.arange(size) == start)
+@cache
+def _search(nodes: int, connections: int) -> GroupKernel:
+    """Return the kernel of `descendants`."""
+
+    def function(source: Array, target: Array, count: Array, start: Array) -> list[Array]:
+        there = jnp.arange(connections) < count
+        linked = jnp.zeros((nodes, nodes), bool).at[jnp.where(there, target, nodes), source].set(True, mode="drop")
+
+        def visit(slot: Array, reached: Array) -> Array:
+            return reached.at[slot].set(reached[slot] | jnp.any(linked[slot] & reached))
+
+        return [_one_if(jax.lax.fori_loop(0, nodes, visit, jnp.arange(nodes) == start))]
+
+    return descendants_kernel(nodes, connections, function)
 
 
 def position_after(
