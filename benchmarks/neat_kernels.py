@@ -15,7 +15,7 @@ from __future__ import annotations
 import argparse
 import resource
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
@@ -38,6 +38,7 @@ from evoclaims.networks.graph import GraphNetwork
 
 NETWORK = GraphNetwork(TASK.observation_size, TASK.action_size)
 ROWS = jnp.asarray(TASK.table.inputs)
+BREEDING = "The breeding of genomes", "The drawing of random numbers"
 
 
 def by_kernel(genome: Genome, rows: Any) -> Any:
@@ -66,12 +67,12 @@ def _cpu() -> float:
 
 
 @contextmanager
-def without_kernels(name: str) -> Iterator[None]:
-    """Let the kernels of a name be what they are in jax, in functions that are traced meanwhile."""
+def without_kernels(names: Sequence[str]) -> Iterator[None]:
+    """Let the kernels of these names be what they are in jax, in functions that are traced meanwhile."""
     call = GroupKernel.__call__
 
     def chosen(kernel: GroupKernel, *leaves: Any) -> list[Any]:
-        return list(kernel.function(*leaves)) if kernel.name == name else call(kernel, *leaves)
+        return list(kernel.function(*leaves)) if kernel.name in names else call(kernel, *leaves)
 
     with patch.object(GroupKernel, "__call__", chosen):
         yield
@@ -122,7 +123,7 @@ def main() -> None:
         in_turns(name, rounds, passes, genomes, rows)
     for name, (function, *arguments) in parts_of_breeding(full).items():
         kernels = jax.jit(function).lower(*arguments).compile()
-        with without_kernels("The breeding of genomes"):
+        with without_kernels(BREEDING):
             passes = [kernels, jax.jit(lambda *given, function=function: function(*given)).lower(*arguments).compile()]
         results = [jax.device_get(jax.tree.leaves(each(*arguments))) for each in passes]
         if any(a.tobytes() != b.tobytes() for a, b in zip(*results, strict=True)):

@@ -2,23 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 from unittest.mock import patch
 
 from evoclaims.kernels.grouped import GroupKernel
 
-BREEDING = "The breeding of genomes"
+BREEDING = "The breeding of genomes", "The drawing of random numbers"
+"""Names of the kernels of NEAT that are not its networks'."""
 
 
 @contextmanager
-def without_kernels(name: str) -> Iterator[None]:
-    """While functions are traced, let the kernels of one name be what they are in jax."""
+def without_kernels(names: Sequence[str]) -> Iterator[None]:
+    """While functions are traced, let the kernels of these names be what they are in jax."""
     call = GroupKernel.__call__
 
     def chosen(kernel: GroupKernel, *leaves: Any) -> list[Any]:
-        return list(kernel.function(*leaves)) if kernel.name == name else call(kernel, *leaves)
+        return list(kernel.function(*leaves)) if kernel.name in names else call(kernel, *leaves)
 
     with patch.object(GroupKernel, "__call__", chosen):
         yield
