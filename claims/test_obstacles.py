@@ -46,6 +46,12 @@ def test_ppo_is_second_over_obstacles(trials, verdict, other):
     smoke=None,
     because=NOBODY_RUNS_YET,
 )
+@expected(
+    Outcome.REFUTED,
+    tier="full",
+    because="PPO is upside-down for 56 to 99% of an episode, NEAT's champions in one trial of five; but their control costs "
+    "515 to 593, PPO's 73 to 213",
+)
 def test_ppo_is_bumpy(trials, verdict):
     ppo = trials("ppo", on="obstacles")
     neat = trials("neat", on="obstacles")

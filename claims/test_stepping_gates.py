@@ -216,6 +216,7 @@ def test_neat_grows_large_networks(trials, verdict, task):
     smoke="After 8 generations in the maze with stepping stones, at most half of the neurons of NEAT's champions are "
     "hidden",
 )
+@expected(Outcome.REFUTED, tier="full", because="the champions have 98 to 100 neurons, as many as the arrays hold")
 @pytest.mark.parametrize("task", ["stones"])
 def test_neat_s_networks_stay_small_in_the_maze(trials, verdict, task):
     neat = trials("neat", on=task)

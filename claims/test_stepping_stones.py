@@ -27,6 +27,9 @@ EVOLVED = [
         ),
     ),
 ]
+LUCKY = (
+    "NEAT's champions are those of one lucky episode: it collects 2,700 to 5,000, ten others 600 to 2,400 on average"
+)
 LEARNED = [
     "ppo",
     pytest.param(
@@ -46,6 +49,12 @@ LEARNED = [
     says="NEAT accrues the highest rewards, reaching on average five out of seven stepping stones",
     where="§5.2.1, Fig. 5",
     smoke="NEAT reaches on average two out of three stepping stones",
+)
+@expected(
+    Outcome.REFUTED,
+    tier="full",
+    because="champions whose one episode in training collects 2,700 to 5,000 cross 0 to 1.8 stones (mean 0.8) in ten "
+    "other episodes (docs/protocol.md)",
 )
 def test_neat_reaches_five_stones(trials, verdict, claim_tier):
     neat = trials("neat", on="stones")
@@ -91,7 +100,18 @@ def test_ppo_stays_at_the_first_stone(trials, verdict, claim_tier, method):
     where="§5.2.1, Fig. 5",
     smoke="NEAT accrues the highest rewards in the room with three stones; the others' are above a random policy's",
 )
-@pytest.mark.parametrize("other", ["hyperneat", "cma_es", "map_elites", "ppo", "goal_ppo"])
+@pytest.mark.parametrize(
+    "other",
+    [
+        "hyperneat",
+        pytest.param(
+            "cma_es", marks=expected(Outcome.REFUTED, tier="full", because=f"{LUCKY}; CMA-ES, 1,100 to 2,700")
+        ),
+        "map_elites",
+        "ppo",
+        pytest.param("goal_ppo", marks=expected(Outcome.REFUTED, tier="full", because=f"{LUCKY}; PPO, 900 to 4,200")),
+    ],
+)
 def test_neat_collects_more_reward(trials, verdict, claim_tier, other):
     neat = trials("neat", on="stones")
     rest = trials(other, on="stones")
@@ -160,6 +180,7 @@ def test_map_elites_finds_the_target_without_stones(trials, verdict, claim_tier)
     where="§5.2.1, Fig. 5",
     smoke="CMA-ES collects less reward than NEAT in the room with three stones, but more than a random policy",
 )
+@expected(Outcome.REFUTED, tier="full", because=f"{LUCKY}; CMA-ES, 1,100 to 2,700")
 def test_cma_es_is_below_neat(trials, verdict, claim_tier):
     cma_es = trials("cma_es", on="stones")
     neat = trials("neat", on="stones")
