@@ -2,7 +2,7 @@
 
 import pytest
 
-from evoclaims import claim
+from evoclaims import Outcome, claim, expected
 
 NOBODY_RUNS_YET = (
     "in 128,000 steps, over obstacles of 5 to 20 cm right before the start, no method has learnt to run: NEAT's "
@@ -49,8 +49,8 @@ def test_ppo_is_second_over_obstacles(trials, verdict, other):
 @expected(
     Outcome.REFUTED,
     tier="full",
-    because="PPO is upside-down for 56 to 99% of an episode, NEAT's champions in one trial of five; but their control costs "
-    "515 to 593, PPO's 73 to 213",
+    because="PPO is upside-down for 56 to 99% of an episode, NEAT's champions in one trial of five; but their control "
+    "costs 515 to 593, PPO's 73 to 213",
 )
 def test_ppo_is_bumpy(trials, verdict):
     ppo = trials("ppo", on="obstacles")

@@ -10,10 +10,9 @@ import pytest
 
 from evoclaims.core.errors import UserError
 from evoclaims.envs.base import Numbered
-from evoclaims.envs.ecorobot.deceptive import DeceptiveMaze
 from evoclaims.envs.ecorobot.obstacles import Obstacles
 from evoclaims.envs.ecorobot.pose import Pose
-from evoclaims.envs.ecorobot.stones import STONES, SteppingStones, StonesCrossed
+from evoclaims.envs.ecorobot.stones import SteppingStones, StonesCrossed
 from evoclaims.mutants import catalogue
 from evoclaims.mutants.conditions import plantings
 from evoclaims.mutants.mutant import MUTANTS
@@ -21,6 +20,7 @@ from reproductions.nisioti2025 import REPRODUCTION
 from reproductions.nisioti2025.mutants import MUTANTS as OWN
 
 SMOKE = REPRODUCTION.tiers["smoke"].conditions
+STONES: Any = SMOKE["neat", "stones"].task
 EVERY = {one.name: one for one in plantings(SMOKE, catalogue.load(REPRODUCTION))}
 
 PLANTED_AT_FIRST = {
@@ -58,23 +58,24 @@ def ruled(task: Any, crossed: int, place: tuple[float, float]) -> tuple[float, i
 
 
 def test_stones_that_pay_nothing_are_counted_all_the_same() -> None:
-    sound, task = SteppingStones(), faulty("stones: stones-pay-nothing", "neat", "stones").task
-    reward, crossed, ended = ruled(sound, 2, STONES[2])
-    assert ruled(task, 2, STONES[2]) == (pytest.approx(reward - 3, abs=1e-6), crossed, ended)
-    assert crossed == 3
-    assert ruled(sound, 6, STONES[6])[0] > 1_000
-    assert ruled(task, 6, STONES[6]) == (1.0, 7, True)
+    sound, task = STONES, faulty("stones: stones-pay-nothing", "neat", "stones").task
+    second, last = len(sound.stones) - 2, len(sound.stones) - 1
+    reward, crossed, ended = ruled(sound, second, sound.stones[second])
+    assert ruled(task, second, sound.stones[second]) == (pytest.approx(reward - crossed, abs=1e-6), crossed, ended)
+    assert crossed == second + 1
+    assert ruled(sound, last, sound.stones[last])[0] > 1_000
+    assert ruled(task, last, sound.stones[last]) == (1.0, last + 1, True)
 
 
 def test_uncounted_stones_stay_uncounted() -> None:
     task = faulty("stones: stones-uncounted", "neat", "stones").task
-    assert ruled(task, 2, STONES[2])[1] == 2
+    assert ruled(task, 1, STONES.stones[1])[1] == 1
 
 
 def test_stones_from_afar_are_counted_from_afar() -> None:
     task = faulty("stones: stones-from-afar", "neat", "stones").task
-    near = (STONES[0][0] + 0.9, STONES[0][1])
-    assert (ruled(SteppingStones(), 0, near)[1], ruled(task, 0, near)[1]) == (0, 1)
+    (x, y) = STONES.stones[0]
+    assert [ruled(one, 0, (x + 0.9, y))[1] for one in (STONES, task)] == [0, 1]
 
 
 @pytest.mark.parametrize(("name", "task"), [("no-walls", "stones"), ("no-walls", "deceptive_maze_easy")])
@@ -101,9 +102,9 @@ def test_flat_obstacles_do_not_rise() -> None:
 
 def test_a_target_from_afar_is_reached_before_the_wall() -> None:
     task = faulty("deceptive_maze_easy: target-from-afar", "ppo", "deceptive_maze_easy").task
-    below_the_wall = at((-4.0, 7.0))
-    for maze, reached in ((task, True), (DeceptiveMaze(), False)):
-        ruling = maze.rule(maze.memory(at((-3.0, 1.0))), below_the_wall, below_the_wall, jnp.zeros(2))
+    before_the_wall = at((-1.0, 1.5))
+    for maze, reached in ((task, True), (SMOKE["ppo", "deceptive_maze_easy"].task, False)):
+        ruling = maze.rule(maze.memory(at((-1.0, 0.5))), before_the_wall, before_the_wall, jnp.zeros(2))  # type: ignore[attr-defined]
         assert bool(ruling.memory.done) == reached
 
 
