@@ -87,17 +87,20 @@ def test_the_ant_does_not_escape(trials, verdict):
     "D4",
     says="MAP-Elites finds the target of the classical deceptive task, where HyperNEAT fails",
     where="§5.2.1, §5.2.3, Figs. 6 and 10",
-    smoke="MAP-Elites finds the target behind the wall, where HyperNEAT fails",
+    smoke="MAP-Elites finds the target behind the wall, where HyperNEAT ends at the wall",
 )
 @expected(
     Outcome.REFUTED,
     tier="full",
     because="HyperNEAT fails, but MAP-Elites, too, has found the target in three trials of ten only (see S7)",
 )
-def test_hyperneat_fails_in_the_difficult_maze(trials, verdict):
+def test_hyperneat_fails_in_the_difficult_maze(trials, verdict, claim_tier):
     hyperneat = trials("hyperneat", on="deceptive_maze_difficult")
     map_elites = trials("map_elites", on="deceptive_maze_difficult")
-    verdict(hyperneat.never_reaches_the_target.stays() & map_elites.has_found_the_target.in_most_trials())
+    says = hyperneat.never_reaches_the_target.stays() & map_elites.has_found_the_target.in_most_trials()
+    if claim_tier == "smoke":
+        says &= hyperneat.ends_within(1.0).in_most_trials()
+    verdict(says)
 
 
 @claim(

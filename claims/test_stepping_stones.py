@@ -125,7 +125,7 @@ def test_neat_collects_more_reward(trials, verdict, claim_tier, other):
     "S5",
     says="MAP-Elites performs equally bad but exhibits a drastically different behavior",
     where="§5.2.1, Fig. 5",
-    smoke="MAP-Elites collects about as little reward as PPO: more than a random policy does, but far less than NEAT",
+    smoke="MAP-Elites collects about as little reward as PPO: both more than a random policy, but far less than NEAT",
 )
 def test_map_elites_collects_few_stones(trials, verdict, claim_tier):
     map_elites = trials("map_elites", on="stones")
@@ -133,22 +133,25 @@ def test_map_elites_collects_few_stones(trials, verdict, claim_tier):
         verdict(map_elites.crosses_at_most(1).stays())
         return
     ppo, neat, random_policy = (trials(method, on="stones") for method in ("ppo", "neat", "random_policy"))
-    some = (map_elites.reward > random_policy.reward) & (map_elites.reward < neat.reward)
-    verdict(map_elites.reward.equivalent_to(ppo.reward, margin=400) & some)
+    some = (map_elites.reward > random_policy.reward) & (ppo.reward > random_policy.reward)
+    verdict(map_elites.reward.equivalent_to(ppo.reward, margin=400) & some & (map_elites.reward < neat.reward))
 
 
 @claim(
     "S6",
     says="The agent has explored the whole maze (in contrast to PPO that only reached the first stepping stone)",
     where="§5.2.1, Fig. 6",
-    smoke="The elites of MAP-Elites stand on a tenth of the room, more than PPO's way leads through",
+    smoke="The elites of MAP-Elites stand on a tenth of the room, more than PPO's way to the first stone leads through",
 )
 def test_map_elites_explores_the_maze(trials, verdict, claim_tier):
     map_elites = trials("map_elites", on="stones")
     ppo = trials("ppo", on="stones")
     more = map_elites.archive_coverage > ppo.path_coverage
     least = {"full": 0.8, "smoke": 0.1}[claim_tier]
-    verdict(more & map_elites.archive_coverage.between(least, 1.0))
+    says = more & map_elites.archive_coverage.between(least, 1.0)
+    if claim_tier == "smoke":
+        says &= ppo.stones > trials("random_policy", on="stones").stones
+    verdict(says)
 
 
 @claim(
@@ -156,8 +159,7 @@ def test_map_elites_explores_the_maze(trials, verdict, claim_tier):
     says="The classical deceptive task (that only differs from our maze in the absence of stepping stones) is solved "
     "by MAP-Elites, which explores it in the same way",
     where="§5.2.1, Fig. 6",
-    smoke="Without stones MAP-Elites finds the target behind the wall, and its elites, too, stand on more of the room "
-    "than PPO's way leads through",
+    smoke="Without stones MAP-Elites finds the target behind the wall; its elites, too, stand on a tenth of the room",
 )
 @expected(
     Outcome.REFUTED,
@@ -166,10 +168,10 @@ def test_map_elites_explores_the_maze(trials, verdict, claim_tier):
 )
 def test_map_elites_finds_the_target_without_stones(trials, verdict, claim_tier):
     plain = trials("map_elites", on="deceptive_maze_difficult")
-    stones, ppo = trials("map_elites", on="stones"), trials("ppo", on="stones")
+    stones = trials("map_elites", on="stones")
     alike = {
         "full": plain.archive_coverage.equivalent_to(stones.archive_coverage, margin=0.1),
-        "smoke": plain.archive_coverage > ppo.path_coverage,
+        "smoke": plain.archive_coverage.between(0.1, 1.0) & stones.archive_coverage.between(0.1, 1.0),
     }
     verdict(plain.has_found_the_target.in_most_trials() & alike[claim_tier])
 
