@@ -1,7 +1,7 @@
 """The smoke tier's mazes: rooms with one wall, in which a few thousand policies show what the paper says of its mazes.
 
 The straight way ends at the wall, so that a method that only follows the rising reward stays there, or at the first
-stone. docs/smoke.md has what some fifty trials of each method did in them.
+stone. docs/smoke.md has what fifty trials of each method did in them.
 """
 
 from __future__ import annotations
