@@ -21,6 +21,7 @@ from evoclaims.kernels.words import at, load
 ROTATIONS: Final = ((13, 15, 26, 6), (17, 29, 16, 24))
 """Of the rounds of Threefry-2x32 (Salmon et al. 2011, Table 2)."""
 PARITY: Final = 0x1BD11BDA
+"""What makes the third key (ibid., §2)."""
 THREEFRY: Final = "threefry2x32"
 
 
