@@ -67,6 +67,11 @@ class Kernel:
         used = {e.array for e in everything(n for r in self.results for n in r.flat) if isinstance(e, Input)}
         return {i: llvm_ir.Row(math.prod(self.shapes[i].shape), self.shapes[i].dtype.kind) for i in sorted(used)}
 
+    @cached_property
+    def _host_text(self) -> str:
+        """LLVM's text of the kernel for this machine's processor, which is the same for every batch."""
+        return host_kernel.text([self.results[i] for i in self.written], self.read, machine_code.lanes())
+
     def as_it_is(self, *leaves: Array) -> list[Array]:
         """Call the function itself, for every element of a batch."""
         depths = self.depths(leaves)
@@ -91,9 +96,8 @@ class Kernel:
         """Call the kernel for this machine's processor, for every element of a batch."""
 
         def call(rows: int, shared: list[int], shapes: Shapes) -> Any:
-            text = host_kernel.text([self.results[i] for i in self.written], self.read, machine_code.lanes())
             layout = [rows, *(shared[i] for i in self.read)]
-            return calls.on_host(text, layout, [leaves[i] for i in self.read], shapes)
+            return calls.on_host(self._host_text, layout, [leaves[i] for i in self.read], shapes)
 
         return self._call(leaves, call)
 
