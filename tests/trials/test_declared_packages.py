@@ -16,6 +16,8 @@ import pytest
 from jax.extend import core as jaxprs
 
 from evoclaims.core.packages import ALWAYS, UNDECLARED, packages_of
+from evoclaims.envs.ecorobot import robot_task
+from evoclaims.kernels import machine_code
 from evoclaims.methods.map_elites import MapElites
 from evoclaims.networks.mlp import Mlp
 from evoclaims.trials.devices import MATMUL_PRECISION
@@ -84,6 +86,8 @@ def _computing(condition: Condition) -> tuple[set[str], set[str]]:
     """Trace a condition's programs; return the files whose lines made equations, and those whose functions ran."""
     ran, programs, shapes = set(), [], None
     jax.clear_caches()  # a function traced before keeps the lines that called it then
+    robot_task._kernel.cache_clear()
+    machine_code.lanes.cache_clear()
 
     def note(frame: Any, event: str, argument: Any) -> None:
         if event == "call":

@@ -20,8 +20,8 @@ def main(options: argparse.Namespace) -> int:
     for part in (
         terminal_table.verdict_table(reports, console.width, console.is_terminal),
         terminal_table.explanations(reports, console.width, console.is_terminal),
-        f"claims ({options.tier}): {table_cells.totals(reports)}",
         table_cells.faults(reports),
+        f"claims ({options.tier}): {table_cells.totals(reports)}",
     ):
         if part:
             print(part, file=styled())

@@ -120,7 +120,7 @@ def _paint(
     if found is None:
         style = {"ha": "center", "va": "center", "fontsize": TEXT, "color": FAINT, "zorder": 9}
         box = {"facecolor": "white", "edgecolor": FAINT, "linewidth": 0.5, "boxstyle": "round,pad=0.4"}
-        axis.text(0.5, 0.5, "no map of elites\nis stored", transform=axis.transAxes, bbox=box, **style)
+        axis.text(0.5, 0.08, "no map of elites is stored", transform=axis.transAxes, bbox=box, **style)
     else:
         mesh = paint_elites(axis, task, found.fitnesses)
         bar = axis.figure.colorbar(mesh, cax=axis.inset_axes((1.03, 0.1, 0.03, 0.8)))

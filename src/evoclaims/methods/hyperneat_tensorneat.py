@@ -32,6 +32,7 @@ class HyperneatTensorneat(NeatTensorneat):
 
     name: ClassVar[str] = "hyperneat_tensorneat"
     revision: ClassVar[int] = 1
+    packages: ClassVar[tuple[str, ...]] = ("llvmlite", "tensorneat")
 
     settings: Settings = PAPER
     hidden: tuple[int, ...] = (16,)

@@ -158,9 +158,9 @@ class Summary:
         for warning in (*warnings, self._write_step_summary(notes)):
             if warning:
                 terminalreporter.write_line(self._said(f"warning: {warning}"), yellow=True)
-        terminalreporter.write_line(f"claims: {table_cells.totals(self.reports)}", bold=True)
         if table_cells.faults(self.reports):
             terminalreporter.write_line(table_cells.faults(self.reports))
+        terminalreporter.write_line(f"claims: {table_cells.totals(self.reports)}", bold=True)
         if not any(report.n for report in self.reports):
             what = "No trial was looked at" if self._judged else "No claim was judged"
             terminalreporter.write_line(f"{what}: nothing was measured.", red=True)
