@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import re
-import shutil
-import subprocess
 from collections.abc import Callable
 from fractions import Fraction
 from pathlib import Path
@@ -14,6 +11,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from assembler import assemble, kernels_for_gpus
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from kernel_functions import FUNCTIONS, NO_KERNELS, X, Y
@@ -37,18 +35,9 @@ def test_a_kernel_computes_what_jax_does(case: str) -> None:
 @pytest.mark.parametrize("case", FUNCTIONS)
 def test_nvidias_assembler_takes_every_kernel(case: str, tmp_path: Path) -> None:
     function, arguments = FUNCTIONS[case]
-    lowered = (
-        jax.jit(jax.vmap(one_kernel(function, "This"))).trace(*arguments).lower(lowering_platforms=("cuda",)).as_text()
-    )
-    (ptx,) = re.findall(r'kernel_data = "([^"]*)"', lowered)
-    ptx = re.sub(r"\\([0-9A-F]{2})", lambda code: chr(int(code[1], 16)), ptx)
+    (ptx,) = kernels_for_gpus(jax.vmap(one_kernel(function, "This")), *arguments)
     assert ".visible .entry kernel(" in ptx
-    if shutil.which("ptxas") is None:
-        pytest.skip("needs NVIDIA's assembler, ptxas")
-    (tmp_path / "kernel.ptx").write_text(ptx)
-    command = ["ptxas", "-arch=sm_80", "kernel.ptx", "-o", "kernel.cubin"]
-    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
-    assert not done.returncode, done.stderr
+    assemble(ptx, tmp_path)
 
 
 @pytest.mark.parametrize(("widest", "error"), [(10_000, 1e-7), (WIDEST, 6e-7)])
