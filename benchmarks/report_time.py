@@ -38,7 +38,7 @@ REPRODUCTION = '''
 from pathlib import Path
 
 from evoclaims.envs.gates.parity import NParity
-from evoclaims.judging.protocol import Protocol
+from evoclaims.judging.design import Design
 from evoclaims.methods.hand_built import HandBuilt
 from evoclaims.paper.reproduction import Reproduction, Tier
 from evoclaims.trials.budget import Budget
@@ -52,7 +52,7 @@ REPRODUCTION = Reproduction(
     "many",
     "Many Trials",
     Path(__file__).parent,
-    {{"smoke": Tier(CONDITIONS, Protocol.fixed(10)), "full": Tier(CONDITIONS, Protocol.fixed({trials}))}},
+    {{"smoke": Tier(CONDITIONS, Design.fixed(10)), "full": Tier(CONDITIONS, Design.fixed({trials}))}},
 )
 '''
 

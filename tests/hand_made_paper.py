@@ -11,7 +11,7 @@ from made_trials import trial_of
 
 from evoclaims.claims.claim import Claim
 from evoclaims.envs.gates.parity import NParity
-from evoclaims.judging.protocol import Protocol
+from evoclaims.judging.design import Design
 from evoclaims.methods.hand_built import HandBuilt
 from evoclaims.paper.reproduction import Reproduction, Tier
 from evoclaims.trials.budget import Budget
@@ -61,7 +61,7 @@ def served() -> Callable[..., Any]:
 @pytest.fixture
 def reproduction(tmp_path: Path) -> Reproduction:
     """Two methods on two tasks; six trials at the smoke tier, ten at the full one."""
-    tiers = {"smoke": Tier(CONDITIONS, Protocol.fixed(6)), "full": Tier(CONDITIONS, Protocol.fixed(10))}
+    tiers = {"smoke": Tier(CONDITIONS, Design.fixed(6)), "full": Tier(CONDITIONS, Design.fixed(10))}
     return Reproduction("tiny", "A Tiny Paper", tmp_path / "reproduction", tiers)
 
 

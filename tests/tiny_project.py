@@ -43,7 +43,7 @@ import jax
 import jax.numpy as jnp
 
 from evoclaims.envs.gates.parity import NParity
-from evoclaims.judging.protocol import Protocol
+from evoclaims.judging.design import Design
 from evoclaims.methods.base import Policy, Progress
 from evoclaims.methods.hand_built import HandBuilt
 from evoclaims.paper.reproduction import Reproduction, Tier
@@ -102,7 +102,7 @@ REPRODUCTION = Reproduction(
     name="tiny",
     title="A Tiny Paper",
     folder=Path(__file__).parent,
-    tiers={"smoke": Tier(conditions(1), Protocol.fixed(10)), "full": Tier(conditions(2), Protocol.fixed(10))},
+    tiers={"smoke": Tier(conditions(1), Design.fixed(10)), "full": Tier(conditions(2), Design.fixed(10))},
     variants={"traded": Variant("The right network is wrong", {"smoke": traded_in(1), "full": traded_in(2)})},
 )
 '''

@@ -14,8 +14,8 @@ REPRODUCTION = Reproduction(
     title="When Does Neuroevolution Outcompete Reinforcement Learning in Transfer Learning Tasks?",
     folder=Path(__file__).parent,
     tiers={
-        "smoke": Tier(conditions={**stepping_gates.SMOKE, **ecorobot.SMOKE}, protocol=FIXED_10),
-        "full": Tier(conditions={**stepping_gates.FULL, **ecorobot.FULL}, protocol=SEQUENTIAL),
+        "smoke": Tier(conditions={**stepping_gates.SMOKE, **ecorobot.SMOKE}, design=FIXED_10),
+        "full": Tier(conditions={**stepping_gates.FULL, **ecorobot.FULL}, design=SEQUENTIAL),
     },
     variants=VARIANTS,
     trials=PaperTrials,

@@ -2,13 +2,13 @@ from evoclaims.claims.claim import claim as claim
 from evoclaims.claims.claim import expected as expected
 from evoclaims.claims.claim import without_smoke as without_smoke
 from evoclaims.core.errors import UserError as UserError
+from evoclaims.judging.design import FIXED_10 as FIXED_10
+from evoclaims.judging.design import SEQUENTIAL as SEQUENTIAL
+from evoclaims.judging.design import Design as Design
+from evoclaims.judging.design import Look as Look
 from evoclaims.judging.measure import Event as Event
 from evoclaims.judging.measure import Measure as Measure
 from evoclaims.judging.measure import Profile as Profile
-from evoclaims.judging.protocol import FIXED_10 as FIXED_10
-from evoclaims.judging.protocol import SEQUENTIAL as SEQUENTIAL
-from evoclaims.judging.protocol import Look as Look
-from evoclaims.judging.protocol import Protocol as Protocol
 from evoclaims.judging.verdict import Outcome as Outcome
 from evoclaims.paper.reproduction import Reproduction as Reproduction
 from evoclaims.paper.reproduction import Tier as Tier

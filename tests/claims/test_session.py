@@ -53,7 +53,7 @@ def test_a_claim_ends_supported_or_refuted_and_names_its_trials(session: Session
     assert other.failed
 
 
-def test_the_full_tier_judges_the_papers_own_sentence_with_its_own_protocol(session: Session, says: Claim) -> None:
+def test_the_full_tier_judges_the_papers_own_sentence_with_its_own_design(session: Session, says: Claim) -> None:
     better, worse = _pair(session, "full")
     report = session.settle(says, "", "full", better.mean_success > worse.mean_success)
     assert (report.name, report.n, report.statement) == ("T1", 10, says.says)
@@ -62,7 +62,7 @@ def test_the_full_tier_judges_the_papers_own_sentence_with_its_own_protocol(sess
 
 def test_a_fixed_number_of_trials_takes_the_place_of_the_looks(session: Session, says: Claim) -> None:
     fixed = replace(session, trials=4)
-    assert [(look.n, look.alpha) for look in fixed.protocol("full").looks] == [(4, pytest.approx(0.05))]
+    assert [(look.n, look.alpha) for look in fixed.design("full").looks] == [(4, pytest.approx(0.05))]
     better, worse = _pair(fixed)
     assert fixed.settle(says, "", "smoke", better.mean_success > worse.mean_success).n == 4
     report = replace(session, trials=1).settle(says, "", "smoke", better.mean_success > worse.mean_success)
@@ -72,7 +72,7 @@ def test_a_fixed_number_of_trials_takes_the_place_of_the_looks(session: Session,
 
 def test_a_number_of_trials_that_no_test_can_take_is_a_sentence(session: Session) -> None:
     with pytest.raises(UserError, match="A look takes 1 to"):
-        replace(session, trials=0).protocol("smoke")
+        replace(session, trials=0).design("smoke")
 
 
 @pytest.mark.parametrize(

@@ -32,7 +32,7 @@ from evoclaims.networks.all_skips import AllSkips
 
 SMALL = Settings(population=8, nodes=8, connections=12, activations=("tanh", "sin"), species=Species(most=2))
 METHODS |= {"neat": Neat(SMALL), "hyperneat": HyperNeat(SMALL, hidden=(2,)), "cma_es": CmaEs(4, AllSkips(hidden=1))}
-REPRODUCTION = replace(REPRODUCTION, tiers={"smoke": Tier(conditions(3), Protocol.fixed(10))})
+REPRODUCTION = replace(REPRODUCTION, tiers={"smoke": Tier(conditions(3), Design.fixed(10))})
 """
 
 OWN = Path(".evoclaims")

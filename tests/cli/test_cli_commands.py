@@ -11,7 +11,7 @@ import pytest
 from tiny_project import Evoclaims
 
 from evoclaims.cli import main
-from evoclaims.judging.protocol import SEQUENTIAL
+from evoclaims.judging.design import SEQUENTIAL
 from evoclaims.paper import references
 from evoclaims.paper.reproduction import Reproduction
 from evoclaims.trials.store import Store
@@ -120,7 +120,7 @@ def with_raising(generations):
     return {**found, ("right", "parity"): conditions(generations)["right", "parity"]}
 
 
-REPRODUCTION = replace(REPRODUCTION, tiers={"smoke": Tier(with_raising(1), Protocol.fixed(10))}, variants={})
+REPRODUCTION = replace(REPRODUCTION, tiers={"smoke": Tier(with_raising(1), Design.fixed(10))}, variants={})
 """
 
 
@@ -335,7 +335,7 @@ def test_reference_takes_the_trials_of_a_look_and_never_fewer_than_are_committed
     evoclaims: Evoclaims, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     plain = Reproduction.tier
-    monkeypatch.setattr(Reproduction, "tier", lambda self, *names: replace(plain(self, *names), protocol=SEQUENTIAL))
+    monkeypatch.setattr(Reproduction, "tier", lambda self, *names: replace(plain(self, *names), design=SEQUENTIAL))
     evoclaims("run", "right", "--trials", "6")
     evoclaims("run", "wrong", "--trials", "4")
     status, out, _ = evoclaims("reference")
@@ -354,7 +354,7 @@ def test_reference_takes_the_trials_of_a_look_and_never_fewer_than_are_committed
 
 def test_stored_trials_join_those_that_are_committed(evoclaims: Evoclaims, monkeypatch: pytest.MonkeyPatch) -> None:
     plain = Reproduction.tier
-    monkeypatch.setattr(Reproduction, "tier", lambda self, *names: replace(plain(self, *names), protocol=SEQUENTIAL))
+    monkeypatch.setattr(Reproduction, "tier", lambda self, *names: replace(plain(self, *names), design=SEQUENTIAL))
     evoclaims("run", "right", "--trials", "5")
     evoclaims("reference")
     evoclaims("run", "right", "--trials", "4", "--first-seed", "5", "--storage", "later")

@@ -164,7 +164,7 @@ class TestThem:
 
     @says("d")
     def test_d(self, trials, verdict):
-        assert not self.seen  # by the same test under another protocol
+        assert not self.seen  # by the same test under another design
         self.seen += ("this one",)
         verdict(trials("right", on="parity").solves_every_level.in_most_trials())
 """

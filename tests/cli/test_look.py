@@ -54,8 +54,8 @@ ROBOTS = {
     ("random", "course"): Condition(RANDOM, Obstacles(episode_steps=2), "whole_budget", BUDGET),
 }
 REPRODUCTION = replace(REPRODUCTION, tiers={
-    "smoke": Tier({**conditions(1), **ROBOTS}, Protocol.fixed(10)),
-    "full": Tier(conditions(2), Protocol.fixed(10)),
+    "smoke": Tier({**conditions(1), **ROBOTS}, Design.fixed(10)),
+    "full": Tier(conditions(2), Design.fixed(10)),
 })
 """
 

@@ -53,7 +53,7 @@ class Tracing(Coin):
 
 
 METHODS = {STUCK}
-TIERS = {"smoke": Tier(conditions(1), Protocol.fixed(10)), "full": Tier(conditions(2), Protocol.fixed(10))}
+TIERS = {"smoke": Tier(conditions(1), Design.fixed(10)), "full": Tier(conditions(2), Design.fixed(10))}
 REPRODUCTION = replace(REPRODUCTION, tiers=TIERS)
 '''
 

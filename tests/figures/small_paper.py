@@ -18,7 +18,7 @@ from evoclaims.figures.bar_panel import Series
 from evoclaims.figures.figure import Drawing, Heading, Painter, Scope
 from evoclaims.figures.files import DOTS_PER_INCH, svg
 from evoclaims.figures.style import plain
-from evoclaims.judging.protocol import Protocol
+from evoclaims.judging.design import Design
 from evoclaims.methods.hand_built import HandBuilt
 from evoclaims.paper.archive import Archive
 from evoclaims.paper.reproduction import Reproduction, Tier
@@ -46,7 +46,7 @@ class Paper:
 
     def __init__(self, folder: Path) -> None:
         self.store = Store(folder / "store")
-        tiers = {"full": Tier(CONDITIONS, Protocol.fixed(10))}
+        tiers = {"full": Tier(CONDITIONS, Design.fixed(10))}
         self.reproduction = Reproduction("tiny", "A Tiny Paper", folder / "reproduction", tiers)
 
     def put(self, method: str, task: str, values: Mapping[int, Any] | list[Any]) -> None:

@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import pytest
 
+from evoclaims.judging.design import FIXED_10, Look
 from evoclaims.judging.fingerprint import fingerprint
 from evoclaims.judging.judge import judge
-from evoclaims.judging.protocol import FIXED_10, Look
 
 
 def test_everything_that_decides_is_in_the_fingerprint(source) -> None:

@@ -87,7 +87,7 @@ def test_the_rank_test_is_exactly_valid_for_every_tie_pattern_of_four_against_fo
 
 
 @pytest.mark.parametrize(("effect", "power", "trials"), [(0.86, 0.92, 8.5), (0.98, 1.0, 5.6)])
-def test_the_sequential_protocol_has_the_specifications_power(effect: float, power: float, trials: float) -> None:
+def test_the_sequential_design_has_the_specifications_power(effect: float, power: float, trials: float) -> None:
     shift = float(norm.ppf(effect)) * 2**0.5
     rng = np.random.default_rng(0)
     above, below = rng.normal(shift, 1, (2000, 10)).tolist(), rng.normal(0, 1, (2000, 10)).tolist()

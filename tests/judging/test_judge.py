@@ -9,8 +9,8 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from evoclaims.judging.design import FIXED_10, SEQUENTIAL, Design, Look
 from evoclaims.judging.judge import attainability, judge, needed_trials
-from evoclaims.judging.protocol import FIXED_10, SEQUENTIAL, Look, Protocol
 from evoclaims.judging.verdict import Outcome
 
 HIGH, LOW = [float(i) for i in range(10, 20)], [float(i) for i in range(10)]
@@ -18,7 +18,7 @@ HIGH, LOW = [float(i) for i in range(10, 20)], [float(i) for i in range(10)]
 
 def test_an_underpowered_claim_is_never_looked_at(source) -> None:
     a, b = source("a", HIGH), source("b", LOW)
-    verdict = judge(a.score() > b.score(), Protocol.fixed(2))
+    verdict = judge(a.score() > b.score(), Design.fixed(2))
     assert verdict.outcome is Outcome.INCONCLUSIVE
     assert verdict.reason == "underpowered: needs n = 3 at alpha = 0.05"
     assert a.asked == b.asked == []
@@ -39,7 +39,7 @@ def test_the_needed_trials_are_the_fewest_that_could_support(source, kind, n) ->
         "exact": lambda: a.solved().in_every_trial(),
     }[kind]()
     assert needed_trials(assertion, FIXED_10) == n
-    ((look, p),) = attainability(assertion, Protocol.fixed(n))
+    ((look, p),) = attainability(assertion, Design.fixed(n))
     assert p.supported <= look.alpha
 
 
@@ -51,7 +51,7 @@ def test_support_that_no_size_reaches_is_said_so(source) -> None:
 
 
 def test_a_direction_out_of_reach_is_named_in_the_reason(source) -> None:
-    verdict = judge(source("a", [1.0] * 5).solved().in_most_trials(), Protocol.fixed(5))
+    verdict = judge(source("a", [1.0] * 5).solved().in_most_trials(), Design.fixed(5))
     assert verdict.outcome is Outcome.INCONCLUSIVE
     assert "underpowered for support: needs n = 9" in verdict.reason
 
@@ -79,13 +79,13 @@ def test_an_open_claim_goes_on_to_the_next_look(source) -> None:
 
 def test_a_look_that_can_decide_nothing_is_skipped(source) -> None:
     a, b = source("a", HIGH), source("b", LOW)
-    verdict = judge(a.score() > b.score(), Protocol((Look(2, 0.01), Look(10, 0.04))))
+    verdict = judge(a.score() > b.score(), Design((Look(2, 0.01), Look(10, 0.04))))
     assert (verdict.outcome, a.asked) == (Outcome.SUPPORTED, [tuple(range(10))])
 
 
-def test_seeds_start_where_the_protocol_says(source, trial) -> None:
+def test_seeds_start_where_the_design_says(source, trial) -> None:
     a = source("a", LOW)
-    judge(a.solved().in_every_trial(), Protocol((Look(3, 0.05),), first_seed=4))
+    judge(a.solved().in_every_trial(), Design((Look(3, 0.05),), first_seed=4))
     assert a.asked == [(4, 5, 6)]
 
 
@@ -100,8 +100,8 @@ def test_four_of_five_solved_is_curtailed_since_nothing_can_change_the_verdict(s
 def test_a_verdict_that_every_completion_reaches_is_given_early(source) -> None:
     # 8 of 9 have p = 0.0195 at p0 = 0.5: not decisive at 0.003, but even 8 of 10 (p = 0.055) is at 0.06.
     looks = (Look(9, 0.003), Look(10, 0.06))
-    supported = judge(source("a", [1.0] * 8 + [0.0]).solved().stays(p0=0.5), Protocol(looks))
-    refuted = judge(source("a", [0.0] * 8 + [1.0]).solved().stays(p0=0.5), Protocol(looks))
+    supported = judge(source("a", [1.0] * 8 + [0.0]).solved().stays(p0=0.5), Design(looks))
+    refuted = judge(source("a", [0.0] * 8 + [1.0]).solved().stays(p0=0.5), Design(looks))
     assert [(v.outcome, v.n) for v in (supported, refuted)] == [(Outcome.SUPPORTED, 9), (Outcome.REFUTED, 9)]
     assert "stopped early" in supported.reason
 
@@ -172,14 +172,14 @@ def test_nan_in_a_finished_trial_makes_the_verdict_an_error(source) -> None:
 
 def test_what_a_source_raises_reaches_the_caller(source) -> None:
     with pytest.raises(KeyError):
-        judge(source("a", [1.0]).solved().in_every_trial(), Protocol.fixed(3))
+        judge(source("a", [1.0]).solved().in_every_trial(), Design.fixed(3))
 
 
 def test_a_source_that_returns_other_seeds_is_a_mistake(source, trial) -> None:
     a = source("a", LOW)
     a.trials[2] = trial(7, 1.0)
     with pytest.raises(ValueError, match="returned the seeds"):
-        judge(a.solved().in_every_trial(), Protocol.fixed(3))
+        judge(a.solved().in_every_trial(), Design.fixed(3))
 
 
 def test_a_condition_named_twice_is_fetched_once(source) -> None:

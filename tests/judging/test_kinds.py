@@ -7,8 +7,8 @@ from itertools import product
 
 import pytest
 
+from evoclaims.judging.design import FIXED_10, Design
 from evoclaims.judging.judge import judge
-from evoclaims.judging.protocol import FIXED_10, Protocol
 from evoclaims.judging.verdict import Outcome
 
 SUPPORTED, REFUTED, INCONCLUSIVE = Outcome.SUPPORTED, Outcome.REFUTED, Outcome.INCONCLUSIVE
@@ -55,7 +55,7 @@ def test_evidence_both_ways_decides_neither(source) -> None:
     # A ranks above B over all pairs, but seed by seed mostly just below: the pairs reject the margin.
     a = [10.0, 20, 30, 40, 50, 60, 70, 80, 90, 100]
     b = [11.0, 21, 31, 41, 51, 61, 0, 0, 0, 0]
-    wide = Protocol(looks=FIXED_10.looks, a12_margin=0.75)
+    wide = Design(looks=FIXED_10.looks, a12_margin=0.75)
     verdict = judge(source("a", a).score() > source("b", b).score(), wide)
     assert verdict.p is not None
     assert verdict.p_refuted is not None
@@ -75,10 +75,10 @@ def test_solves_and_stays(source, word, successes, outcome) -> None:
     assert verdict.evidence[0].kind == {"in_most_trials": "solves", "stays": "stays"}[word]
 
 
-def test_an_overriding_p0_takes_the_place_of_the_protocols(source) -> None:
+def test_an_overriding_p0_takes_the_place_of_the_designs(source) -> None:
     event = source("a", [1.0] * 9 + [0.0]).solved()
     assert judge(event.in_most_trials(p0=0.5), FIXED_10).outcome is SUPPORTED
-    assert judge(event.in_most_trials(), Protocol(FIXED_10.looks, p0=0.5)).outcome is SUPPORTED
+    assert judge(event.in_most_trials(), Design(FIXED_10.looks, p0=0.5)).outcome is SUPPORTED
 
 
 @pytest.mark.parametrize(
@@ -101,7 +101,7 @@ def test_band(source, values, outcome) -> None:
 @pytest.mark.parametrize(("n", "outcome"), [(5, INCONCLUSIVE), (6, REFUTED)])
 def test_a_band_is_refuted_at_half_of_alpha(source, n, outcome) -> None:
     # All five beyond one end have p = 0.031, all six 0.016; alpha / 2 is 0.025.
-    assert judge(source("a", [9.0] * n).score().between(4, 6), Protocol.fixed(n)).outcome is outcome
+    assert judge(source("a", [9.0] * n).score().between(4, 6), Design.fixed(n)).outcome is outcome
 
 
 @pytest.mark.parametrize(
@@ -143,12 +143,12 @@ def test_equivalent(source, a, outcome) -> None:
 def test_equivalence_is_refuted_at_half_of_alpha(source) -> None:
     # Three against three: a complete separation has p = 0.05, which alpha / 2 does not allow.
     assertion = source("a", shifted(30)).score().equivalent_to(source("b", RISING).score(), margin=8.0)
-    assert judge(assertion, Protocol.fixed(3)).outcome is INCONCLUSIVE
+    assert judge(assertion, Design.fixed(3)).outcome is INCONCLUSIVE
 
 
 @pytest.mark.parametrize(("last", "outcome"), [(1.0, SUPPORTED), (0.0, REFUTED), ("diverged", REFUTED)])
 def test_exact_needs_every_trial_and_reports_no_p(source, last, outcome) -> None:
-    verdict = judge(source("a", [1.0, 1.0, last]).solved().in_every_trial(), Protocol.fixed(3))
+    verdict = judge(source("a", [1.0, 1.0, last]).solved().in_every_trial(), Design.fixed(3))
     assert verdict.outcome is outcome
     assert verdict.p is verdict.evidence[0].p is None
 
@@ -156,14 +156,14 @@ def test_exact_needs_every_trial_and_reports_no_p(source, last, outcome) -> None
 @pytest.mark.parametrize("values", [RISING, [1.0] * 10, [0.0] * 5 + [9.0] * 5])
 @pytest.mark.parametrize("n", [6, 9, 10])
 def test_no_condition_is_above_itself(source, n, values) -> None:
-    verdict = judge(source("a", values).score().never_above_itself(), Protocol.fixed(n))
+    verdict = judge(source("a", values).score().never_above_itself(), Design.fixed(n))
     assert verdict.outcome is SUPPORTED
     assert f"of {math.comb(n, n // 2)} splits" in verdict.reason
 
 
 def test_beyond_ten_trials_a_fixed_sample_of_splits_is_judged(source) -> None:
     measure = source("a", [float(i) for i in range(14)]).score()
-    verdicts = [judge(measure.never_above_itself(), Protocol.fixed(14)) for _ in range(2)]
+    verdicts = [judge(measure.never_above_itself(), Design.fixed(14)) for _ in range(2)]
     assert verdicts[0] == verdicts[1]
     assert verdicts[0].outcome is SUPPORTED
     assert "of 252 splits" in verdicts[0].reason
@@ -177,11 +177,11 @@ def test_the_control_catches_a_judge_that_cries_wolf(source, n, monkeypatch) -> 
     real = greater.rank_test
     monkeypatch.setattr(greater, "rank_test", lambda a, b: ExactTest(real(a, b).p / 5, 0.0))
     measure = source("a", [float(i) for i in range(n)]).score()
-    assert judge(measure.never_above_itself(), Protocol.fixed(n)).outcome is REFUTED
+    assert judge(measure.never_above_itself(), Design.fixed(n)).outcome is REFUTED
 
 
 def test_the_control_is_underpowered_where_no_split_could_come_out_supported(source) -> None:
-    verdict = judge(source("a", RISING).score().never_above_itself(), Protocol.fixed(5))
+    verdict = judge(source("a", RISING).score().never_above_itself(), Design.fixed(5))
     assert verdict.outcome is INCONCLUSIVE
     assert "underpowered: needs n = 6" in verdict.reason
 

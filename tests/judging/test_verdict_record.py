@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from evoclaims.judging.assertion import Assertion
+from evoclaims.judging.design import FIXED_10, Design
 from evoclaims.judging.judge import judge
-from evoclaims.judging.protocol import FIXED_10, Protocol
 from evoclaims.judging.verdict import Bound, Direction, Outcome
 
 RISING = [float(i) for i in range(10)]
@@ -21,7 +21,7 @@ def test_each_outcome_has_its_symbol() -> None:
 
 
 def test_a_sample_says_how_each_failed_trial_ended(source) -> None:
-    verdict = judge(source("a", [1.0, "diverged", 0.0, "timeout"]).solved().stays(), Protocol.fixed(4))
+    verdict = judge(source("a", [1.0, "diverged", 0.0, "timeout"]).solved().stays(), Design.fixed(4))
     (sample,) = verdict.evidence[0].samples
     assert (sample.failed, sample.endings) == ((1, 3), ("diverged", "timeout"))
 
@@ -70,4 +70,4 @@ def test_the_part_that_decided_is_named_whatever_the_compound(source) -> None:
     assert decided_by(no | open_) == "open"
     assert decided_by((yes | open_) & (yes & no)) == "no"
     assert decided_by((no & yes) | (open_ & yes)) == "open"
-    assert judge(yes, Protocol.fixed(1)).deciding_part is None
+    assert judge(yes, Design.fixed(1)).deciding_part is None

@@ -14,9 +14,9 @@ from evoclaims.paper.config import SuiteConfig, find_root, load_config, load_rep
 TABLE = '[tool.evoclaims]\nreproduction = "a_tiny_paper"\n'
 MODULE = """
 from pathlib import Path
-from evoclaims.judging.protocol import Protocol
+from evoclaims.judging.design import Design
 from evoclaims.paper.reproduction import Reproduction, Tier
-REPRODUCTION = Reproduction("tiny", "A Tiny Paper", Path(__file__).parent, {"smoke": Tier({}, Protocol.fixed(3))})
+REPRODUCTION = Reproduction("tiny", "A Tiny Paper", Path(__file__).parent, {"smoke": Tier({}, Design.fixed(3))})
 """
 
 
@@ -117,7 +117,7 @@ def test_a_module_without_a_reproduction_is_a_sentence(project: Path) -> None:
             4,
         ),
         (
-            "from evoclaims.judging.protocol import Protocol\nP = Protocol.fixed(0)\n",
+            "from evoclaims.judging.design import Design\nP = Design.fixed(0)\n",
             "does not import: A look takes",
             2,
         ),

@@ -19,7 +19,7 @@ from evoclaims.claims.session import Session
 from evoclaims.core.keys import TRAINING, trial_key
 from evoclaims.envs.gates.parity import NParity
 from evoclaims.judging.assertion import Assertion
-from evoclaims.judging.protocol import Protocol
+from evoclaims.judging.design import Design
 from evoclaims.methods.hand_built import HandBuilt
 from evoclaims.methods.neat.neat import Neat
 from evoclaims.methods.neat.settings import Settings, Species
@@ -69,7 +69,7 @@ class Laboratory:
     """One store and the claims about it."""
 
     folder: Path
-    protocol: Protocol = field(default_factory=lambda: Protocol.fixed(6))
+    design: Design = field(default_factory=lambda: Design.fixed(6))
 
     @property
     def store(self) -> Store:
@@ -77,7 +77,7 @@ class Laboratory:
 
     @cached_property
     def reproduction(self) -> Reproduction:
-        tiers = {"smoke": Tier(CONDITIONS, self.protocol), "full": Tier(CONDITIONS, self.protocol)}
+        tiers = {"smoke": Tier(CONDITIONS, self.design), "full": Tier(CONDITIONS, self.design)}
         return Reproduction("tiny", "A Tiny Paper", self.folder / "reproduction", tiers)
 
     @property

@@ -8,8 +8,8 @@ from typing import ClassVar
 from laboratory import Laboratory
 
 from evoclaims.judging.assertion import Assertion, Finding
+from evoclaims.judging.design import Design
 from evoclaims.judging.exact import sign_test
-from evoclaims.judging.protocol import Protocol
 from evoclaims.judging.reading import NumberReading
 from evoclaims.judging.sample import Trials
 from evoclaims.judging.verdict import Bound, PValues
@@ -31,14 +31,14 @@ class AtLeast(Assertion):
     def describe(self) -> str:
         return f"the median of {self.measure.describe()} is at least {self.least:g}"
 
-    def attainable(self, n: int, protocol: Protocol) -> PValues:
+    def attainable(self, n: int, design: Design) -> PValues:
         return PValues(sign_test(n, n).p, sign_test(n, n).p)
 
-    def find(self, trials: Trials, protocol: Protocol, alpha: float) -> Finding:
+    def find(self, trials: Trials, design: Design, alpha: float) -> Finding:
         sample = self.measure.sample(trials)
         n, k = len(sample.values), sum(value >= self.least for value in sample.values)
         p = PValues(sign_test(k, n).p, sign_test(n - k, n).p)
-        return self.found(p, self.attainable(n, protocol), alpha, (sample,), bounds=(Bound("least", self.least),))
+        return self.found(p, self.attainable(n, design), alpha, (sample,), bounds=(Bound("least", self.least),))
 
 
 def test_a_new_kind_is_judged_and_shown_in_every_form(filled: Laboratory) -> None:

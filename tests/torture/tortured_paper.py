@@ -19,7 +19,7 @@ from trial_toys import Walker
 
 from evoclaims.claims import fetching
 from evoclaims.envs.gates.parity import NParity
-from evoclaims.judging.protocol import Protocol
+from evoclaims.judging.design import Design
 from evoclaims.paper.reproduction import Reproduction, Tier
 from evoclaims.trials.budget import Budget
 from evoclaims.trials.progress import RunProgress, Watcher
@@ -37,7 +37,7 @@ REPRODUCTION = Reproduction(
     name="tortured",
     title="A Paper That Is Judged All the Same",
     folder=Path(__file__).parent,
-    tiers={name: Tier(CONDITIONS, Protocol.fixed(TRIALS)) for name in ("smoke", "full")},
+    tiers={name: Tier(CONDITIONS, Design.fixed(TRIALS)) for name in ("smoke", "full")},
 )
 
 _log = os.open(os.environ["TORTURE_LOG"], os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o644)

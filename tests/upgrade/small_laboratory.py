@@ -27,7 +27,7 @@ from mujoco import mjx
 
 from evoclaims.envs.base import Episode, TaskState
 from evoclaims.envs.gates.parity import NParity
-from evoclaims.judging.protocol import Protocol
+from evoclaims.judging.design import Design
 from evoclaims.methods.cma_es import CmaEs
 from evoclaims.methods.hand_built import HandBuilt
 from evoclaims.methods.map_elites import MapElites
@@ -126,7 +126,7 @@ REPRODUCTION = Reproduction(
     name="laboratory",
     title="A Small Laboratory",
     folder=Path(__file__).parent,
-    tiers={"smoke": Tier(CONDITIONS, Protocol.fixed(10)), "full": Tier(CONDITIONS, Protocol.fixed(10))},
+    tiers={"smoke": Tier(CONDITIONS, Design.fixed(10)), "full": Tier(CONDITIONS, Design.fixed(10))},
 )
 '''
 

@@ -64,15 +64,15 @@ def test_a_condition_with_several_names_is_one_row_with_all_of_them(trial: Any) 
 
 
 def test_names_are_those_of_the_protocol_and_else_of_a_variant(reproduction: Reproduction) -> None:
-    protocol, conditions = reproduction.tiers["smoke"].protocol, dict(reproduction.tiers["smoke"].conditions)
+    design, conditions = reproduction.tiers["smoke"].design, dict(reproduction.tiers["smoke"].conditions)
     removed = conditions.pop(("worse", "large"))
     swapped = {("better", "small"): conditions["worse", "small"], ("better", "large"): removed}
     names = names_of(
         replace(
             reproduction,
             tiers={
-                "smoke": Tier(conditions, protocol),
-                "full": Tier({("a", "b"): conditions["better", "small"]}, protocol),
+                "smoke": Tier(conditions, design),
+                "full": Tier({("a", "b"): conditions["better", "small"]}, design),
             },
             variants={"v": Variant("swapped", {"smoke": swapped})},
         )

@@ -7,8 +7,8 @@ from dataclasses import replace
 
 from evoclaims.claims.claim import Claim, Expectation
 from evoclaims.judging.assertion import Assertion
+from evoclaims.judging.design import Design
 from evoclaims.judging.judge import attainability
-from evoclaims.judging.protocol import Protocol
 from evoclaims.judging.verdict import Outcome, Verdict
 from evoclaims.paper.trial_group import TrialGroup
 from evoclaims.trials.spec import TrialSpec
@@ -22,19 +22,19 @@ def judged(
     case: str,
     tier: str,
     assertion: Assertion,
-    protocol: Protocol,
+    design: Design,
     verdict: Verdict,
     again: Mapping[str, Collection[int]],
 ) -> ClaimReport:
     """Build the report of a claim that was judged; `again` holds the seeds that were run again, by condition id."""
     groups = [source for source in assertion.sources() if isinstance(source, TrialGroup)]
-    seeds = protocol.seeds(verdict.n)
+    seeds = design.seeds(verdict.n)
     return replace(
         _unjudged(claim, case, tier, verdict.outcome, verdict.reason),
         verdict=verdict,
         sources=tuple(_source(group, seeds, again.get(group.fingerprint, ())) for group in groups),
         attainable=tuple(
-            Attainable(look.n, look.alpha, p.supported, p.refuted) for look, p in attainability(assertion, protocol)
+            Attainable(look.n, look.alpha, p.supported, p.refuted) for look, p in attainability(assertion, design)
         ),
     )
 

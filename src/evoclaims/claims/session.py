@@ -14,9 +14,9 @@ from evoclaims.core.errors import UserError
 from evoclaims.core.packages import agree, recorded
 from evoclaims.judging.assertion import Assertion
 from evoclaims.judging.baseline import DriftReport
+from evoclaims.judging.design import Design, Look
 from evoclaims.judging.fingerprint import fingerprint
 from evoclaims.judging.judge import judge
-from evoclaims.judging.protocol import Look, Protocol
 from evoclaims.judging.tripwire import DigestCheck
 from evoclaims.judging.verdict import Outcome, Verdict
 from evoclaims.paper import references
@@ -51,7 +51,7 @@ class Session:
         reproduction: the paper under test.
         store: where trials are kept.
         fetch: runs trials, or reads them.
-        trials: a fixed number of trials in place of the tier's looks; None keeps the tier's protocol.
+        trials: a fixed number of trials in place of the tier's looks; None keeps the tier's design.
         variant: name of a variant of the protocol; empty for the protocol itself.
         again: seeds that were run again, since stored trials were made with other versions, by the condition's id.
     """
@@ -77,25 +77,25 @@ class Session:
         condition = self.reproduction.tier(tier, self.variant).condition(method, on)
         return self.reproduction.trials(method, on, condition, self.fetch)
 
-    def protocol(self, tier: str) -> Protocol:
-        """Return a tier's protocol; with a fixed number of trials, it has one look with the whole α."""
-        protocol = self.reproduction.tier(tier).protocol
+    def design(self, tier: str) -> Design:
+        """Return a tier's design; with a fixed number of trials, it has one look with the whole α."""
+        design = self.reproduction.tier(tier).design
         if self.trials is None:
-            return protocol
-        return replace(protocol, looks=(Look(self.trials, protocol.alpha),))
+            return design
+        return replace(design, looks=(Look(self.trials, design.alpha),))
 
     def settle(self, claim: Claim, case: str, tier: str, assertion: Assertion) -> ClaimReport:
         """Judge an assertion; trials that may not be run make the verdict "not run"."""
-        protocol = self.protocol(tier)
+        design = self.design(tier)
         name = named(claim.id, case)
         try:
             if self.variant and self._untouched(tier, assertion):
                 raise NotStoredError(f"the variant {self.variant} changes none of its trials")
-            verdict = judge(assertion, protocol, claim=name, tier=tier)
+            verdict = judge(assertion, design, claim=name, tier=tier)
         except NotStoredError as error:
-            mark = fingerprint(assertion, protocol, claim=name, tier=tier)
+            mark = fingerprint(assertion, design, claim=name, tier=tier)
             verdict = Verdict(Outcome.NOT_RUN, str(error), assertion.describe(), mark)
-        return judged(claim, case, tier, assertion, protocol, verdict, self.again)
+        return judged(claim, case, tier, assertion, design, verdict, self.again)
 
     def complete(self, report: ClaimReport, expectation: Expectation | None) -> ClaimReport:
         """Return a report with the variant, an accepted outcome, what mutants showed, and the file that holds it.
@@ -138,8 +138,8 @@ class Session:
             condition, trials = used.condition, self._trials(used)
             here = condition.versions
             now = tuple(trial for trial in trials if agree(trial.provenance, here))
-            protocol = self.reproduction.tier(used.tier).protocol
-            seeds = {*protocol.seeds(protocol.last.n), *(trial.seed for trial in now)}
+            design = self.reproduction.tier(used.tier).design
+            seeds = {*design.seeds(design.last.n), *(trial.seed for trial in now)}
             others = (self.store.others(TrialSpec(condition, seed).id, here) for seed in seeds)
             before = predecessors([record for several in others for record in several], condition.packages)
             if now and before and len(now) == len(trials):

@@ -96,7 +96,7 @@ def _run(
 ) -> frozenset[Job]:
     """Run conditions that lack trials, and return those that still do."""
     tier, limit = project.reproduction.tier(options.tier), project.config.seconds(None)
-    seeds = tier.protocol.seeds(tier.protocol.last.n)
+    seeds = tier.design.seeds(tier.design.last.n)
     line = LiveLine(*terminal())
     fetch = RunMissing(project.store, options.device, line, limit)
     fetch.check()

@@ -53,9 +53,9 @@ def main(options: argparse.Namespace) -> int:
     where = f"as they took on one {kind}" if options.like else f"on {len(chosen)} × {kind}"
     console.print(escape(f"Conditions of the {options.tier} tier, {where}"))
     console.print(_conditions(tier, store, used, paces, costs, project.config.seconds(None)))
-    for sentence in _about(costs, tier.protocol.last.n):
+    for sentence in _about(costs, tier.design.last.n):
         console.print(escape(sentence))
-    console.print(f"\nClaims: the smallest p that the protocol allows (n trials a side, α {tier.protocol.alpha:g})")
+    console.print(f"\nClaims: the smallest p that the design allows (n trials a side, α {tier.design.alpha:g})")
     console.print(_claims(reports, costs))
     if any(pace is None for pace in paces.values()):
         console.print("\nTimes are unknown where no trial has run on such a device; --measure times a few steps.")
@@ -80,7 +80,7 @@ def _conditions(
     measured = [f"took on one {kind}" for kind in kinds] + ["CPU core hours"] * cores
     for heading in ("condition", "cached", "missing", "environment steps", "time, at most", *measured):
         table.add_column(heading, justify="left" if heading == "condition" else "right")
-    seeds = tier.protocol.seeds(tier.protocol.last.n)
+    seeds = tier.design.seeds(tier.design.last.n)
     steps, seconds, unknown = 0, 0.0, False
     needed = {names: costs[names].core_seconds(tier.condition(*names).environment_steps * len(seeds)) for names in used}
     for names in used:

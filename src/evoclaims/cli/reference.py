@@ -28,12 +28,12 @@ def main(options: argparse.Namespace) -> int:
         changes = reproduction.variants[options.variant].conditions.get(options.tier, {})
         used = [names for names in used if names in changes]
     # A claim is judged after each look; the drift check needs MIN_REFERENCES trials.
-    looks = [look.n for look in tier.protocol.looks[:-1]]
-    sizes = [*looks, max(tier.protocol.last.n, MIN_REFERENCES)]
+    looks = [look.n for look in tier.design.looks[:-1]]
+    sizes = [*looks, max(tier.design.last.n, MIN_REFERENCES)]
     written = 0
     for method, task in used:
         condition = tier.condition(method, task)
-        seeds = range(tier.protocol.first_seed, tier.protocol.first_seed + sizes[-1])
+        seeds = range(tier.design.first_seed, tier.design.first_seed + sizes[-1])
         path = references.path_of(reproduction.references_of(options.variant), options.tier, method, task)
         committed = [trial for trial in references.load(path) if trial.condition == condition.id]
         stored = [record for seed in seeds for record in store.records(TrialSpec(condition, seed).id)]

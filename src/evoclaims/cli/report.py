@@ -72,7 +72,7 @@ def main(options: argparse.Namespace) -> int:
 
 def _tried(project: Project, tier: str) -> list[str]:
     """Return the variants that have run at a tier."""
-    seeds = project.reproduction.tier(tier).protocol.seeds(1)
+    seeds = project.reproduction.tier(tier).design.seeds(1)
     return [
         name
         for name, variant in project.reproduction.variants.items()

@@ -37,7 +37,7 @@ def main(options: argparse.Namespace) -> int:
                 f"The variant {options.variant} changes none of these conditions at the {options.tier} tier; it "
                 f"changes: {', '.join(sorted(' on '.join(names) for names in touched)) or 'none'}."
             )
-    n = options.trials if options.trials is not None else tier.protocol.last.n
+    n = options.trials if options.trials is not None else tier.design.last.n
     if not 1 <= n <= MAX_TRIALS:
         raise UserError(
             f"--trials takes 1 to {MAX_TRIALS} trials a condition (no verdict looks at more), not {n}. Further seeds "

@@ -48,7 +48,7 @@ def main() -> int:
             line = LiveLine(lambda text: None, None)  # the command tells the progress of all workers
             fetch = RunMissing(project.store, order.device, line, project.config.seconds(None))
             named = [(one.label, known[one]) for one in order.conditions]
-            for _ in run_each(named, tier.protocol.seeds(tier.protocol.last.n), fetch, line, project.config.root):
+            for _ in run_each(named, tier.design.seeds(tier.design.last.n), fetch, line, project.config.root):
                 pass
         except UserError as error:
             print(f"evoclaims: {error}", file=sys.stderr)

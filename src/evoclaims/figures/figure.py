@@ -43,8 +43,8 @@ class Scope:
     @property
     def seeds(self) -> tuple[int, ...]:
         """The seeds of the trials that the tier judges."""
-        protocol = self.tier.protocol
-        return protocol.seeds(protocol.last.n)
+        design = self.tier.design
+        return design.seeds(design.last.n)
 
     def group(self, method: str, task: str) -> TrialGroup:
         """Return a condition's available trials, with the measures that claims use."""

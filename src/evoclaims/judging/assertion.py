@@ -8,9 +8,9 @@ from dataclasses import dataclass, fields
 from typing import Any, ClassVar, NoReturn
 
 from evoclaims.core.errors import UserError
+from evoclaims.judging.design import Design, Look
 from evoclaims.judging.effect import a12, a12_interval, cliffs_delta
 from evoclaims.judging.multiplicity import holm
-from evoclaims.judging.protocol import Look, Protocol
 from evoclaims.judging.reading import TrialReading
 from evoclaims.judging.sample import Sample, Source, Trials
 from evoclaims.judging.verdict import Bound, Direction, Evidence, Interval, PValues
@@ -57,28 +57,28 @@ class Assertion(ABC):
         return {"kind": self.kind, **{field.name: _plain(getattr(self, field.name)) for field in fields(self)}}
 
     @abstractmethod
-    def attainable(self, n: int, protocol: Protocol) -> PValues:
+    def attainable(self, n: int, design: Design) -> PValues:
         """Return the smallest p, for and against, that `n` trials per side can give, without looking at values."""
 
     @abstractmethod
-    def find(self, trials: Trials, protocol: Protocol, alpha: float) -> Finding:
+    def find(self, trials: Trials, design: Design, alpha: float) -> Finding:
         """Judge the trials at `alpha`.
 
         Raises:
             UnreadableTrialError: when a finished trial has no number that can be judged.
         """
 
-    def looks(self, protocol: Protocol) -> tuple[Look, ...]:
-        """Return this kind's looks: all of the protocol's, unless it needs every trial at once."""
-        return protocol.looks
+    def looks(self, design: Design) -> tuple[Look, ...]:
+        """Return this kind's looks: all of the design's, unless it needs every trial at once."""
+        return design.looks
 
-    def bounds(self, trials: Trials, n: int, protocol: Protocol) -> tuple[PValues, PValues]:
+    def bounds(self, trials: Trials, n: int, design: Design) -> tuple[PValues, PValues]:
         """Bound p over all completions of `trials` to `n` per side: the lowest and the highest, for and against.
 
         The default bounds hold for every kind. The rank tests use them: with ties, no single completion is extreme (a
         tie among new values can give a lower p than distinct ones), so nothing tighter is safe for them.
         """
-        return self.attainable(n, protocol), PValues(1.0, 1.0)
+        return self.attainable(n, design), PValues(1.0, 1.0)
 
     def found(
         self,
@@ -200,22 +200,22 @@ class Compound(Assertion):
         """Return the kind and the parts."""
         return {"kind": self.kind, "parts": [part.plain() for part in self.parts]}
 
-    def looks(self, protocol: Protocol) -> tuple[Look, ...]:
+    def looks(self, design: Design) -> tuple[Look, ...]:
         """Return the looks that every part takes."""
-        return min((part.looks(protocol) for part in self.parts), key=len)
+        return min((part.looks(design) for part in self.parts), key=len)
 
-    def attainable(self, n: int, protocol: Protocol) -> PValues:
+    def attainable(self, n: int, design: Design) -> PValues:
         """Combine the parts' attainable p."""
-        return self.combine([part.attainable(n, protocol) for part in self.parts])
+        return self.combine([part.attainable(n, design) for part in self.parts])
 
-    def bounds(self, trials: Trials, n: int, protocol: Protocol) -> tuple[PValues, PValues]:
+    def bounds(self, trials: Trials, n: int, design: Design) -> tuple[PValues, PValues]:
         """Combine the parts' bounds."""
-        bounds = [part.bounds(trials, n, protocol) for part in self.parts]
+        bounds = [part.bounds(trials, n, design) for part in self.parts]
         return self.combine([low for low, _ in bounds]), self.combine([high for _, high in bounds])
 
-    def find(self, trials: Trials, protocol: Protocol, alpha: float) -> Finding:
+    def find(self, trials: Trials, design: Design, alpha: float) -> Finding:
         """Judge every part."""
-        findings = [part.find(trials, protocol, alpha) for part in self.parts]
+        findings = [part.find(trials, design, alpha) for part in self.parts]
         return Finding(
             p=self.combine([finding.p for finding in findings]),
             attainable=self.combine([finding.attainable for finding in findings]),

@@ -4,18 +4,18 @@ from __future__ import annotations
 
 from evoclaims.core.canonical import content_hash
 from evoclaims.judging.assertion import Assertion
-from evoclaims.judging.protocol import Protocol
+from evoclaims.judging.design import Design
 
 JUDGING_REVISION = 1
 """Raised when a kind's tests change, so that old verdicts do not count as new ones."""
 
 
-def fingerprint(assertion: Assertion, protocol: Protocol, *, claim: str = "", tier: str = "") -> str:
+def fingerprint(assertion: Assertion, design: Design, *, claim: str = "", tier: str = "") -> str:
     """Return the fingerprint of a claim, 64 hexadecimal digits.
 
     Args:
         assertion: its kind, measures and margins, with the ids of its conditions.
-        protocol: looks with their alpha, margins, p0 and seeds.
+        design: looks with their alpha, margins, p0 and seeds.
         claim: the claim's id, such as "G1".
         tier: "smoke" or "full".
     """
@@ -25,6 +25,6 @@ def fingerprint(assertion: Assertion, protocol: Protocol, *, claim: str = "", ti
             "claim": claim,
             "tier": tier,
             "assertion": assertion.plain(),
-            "protocol": protocol,
+            "protocol": design,  # the key of every fingerprint committed so far
         }
     )

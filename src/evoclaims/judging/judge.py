@@ -1,4 +1,4 @@
-"""The judge: follows the protocol's looks, checks attainable p first, and gives exactly one outcome."""
+"""The judge: follows the design's looks, checks attainable p first, and gives exactly one outcome."""
 
 from __future__ import annotations
 
@@ -6,14 +6,14 @@ from bisect import bisect_left
 
 from evoclaims.judging.assertion import Assertion, Finding
 from evoclaims.judging.counting import MAX_TRIALS
+from evoclaims.judging.design import Design, Look
 from evoclaims.judging.fingerprint import fingerprint
-from evoclaims.judging.protocol import Look, Protocol
 from evoclaims.judging.sample import Source, Trials, UnreadableTrialError
 from evoclaims.judging.verdict import Outcome, PValues, Verdict
 from evoclaims.trials.result import TrialResult
 
 
-def judge(assertion: Assertion, protocol: Protocol, *, claim: str = "", tier: str = "") -> Verdict:
+def judge(assertion: Assertion, design: Design, *, claim: str = "", tier: str = "") -> Verdict:
     """Judge an assertion.
 
     Each look first checks the smallest attainable p: if neither direction can be decided, no trial is fetched.
@@ -22,34 +22,34 @@ def judge(assertion: Assertion, protocol: Protocol, *, claim: str = "", tier: st
 
     Args:
         assertion: the claim.
-        protocol: looks, margins and seeds, fixed beforehand.
+        design: looks, margins and seeds, fixed beforehand.
         claim: the claim's id, for the fingerprint.
         tier: the claim's tier, for the fingerprint.
 
     Raises:
         Exception: whatever a source raises when it is asked for trials.
     """
-    mark = fingerprint(assertion, protocol, claim=claim, tier=tier)
-    looks = assertion.looks(protocol)
-    verdict = _underpowered(assertion, protocol, mark)
+    mark = fingerprint(assertion, design, claim=claim, tier=tier)
+    looks = assertion.looks(design)
+    verdict = _underpowered(assertion, design, mark)
     for index, look in enumerate(looks):
-        if not _decidable(assertion.attainable(look.n, protocol), look.alpha):
+        if not _decidable(assertion.attainable(look.n, design), look.alpha):
             continue
-        trials = {source.fingerprint: _fetch(source, protocol.seeds(look.n)) for source in assertion.sources()}
+        trials = {source.fingerprint: _fetch(source, design.seeds(look.n)) for source in assertion.sources()}
         crashed = _crashed(assertion, trials)
         if crashed:
             return Verdict(Outcome.ERROR, crashed, assertion.describe(), mark, n=look.n)
         try:
-            finding = assertion.find(trials, protocol, look.alpha)
+            finding = assertion.find(trials, design, look.alpha)
         except UnreadableTrialError as error:
             return Verdict(Outcome.ERROR, str(error), assertion.describe(), mark, n=look.n)
         outcome, note = finding.p.outcome(look.alpha), ""
         if outcome is Outcome.INCONCLUSIVE:
-            outcome, note = _settled(assertion, trials, looks[index + 1 :], protocol) or (outcome, note)
+            outcome, note = _settled(assertion, trials, looks[index + 1 :], design) or (outcome, note)
         tested = any(entry.p is not None for entry in finding.evidence)  # a fact has no p
         verdict = Verdict(
             outcome=outcome,
-            reason=note + _reason(finding, look, assertion, protocol),
+            reason=note + _reason(finding, look, assertion, design),
             describe=assertion.describe(),
             fingerprint=mark,
             n=look.n,
@@ -67,17 +67,17 @@ def judge(assertion: Assertion, protocol: Protocol, *, claim: str = "", tier: st
     return verdict
 
 
-def attainability(assertion: Assertion, protocol: Protocol) -> tuple[tuple[Look, PValues], ...]:
+def attainability(assertion: Assertion, design: Design) -> tuple[tuple[Look, PValues], ...]:
     """Return the smallest p, for and against, that each look can give; needs no trial."""
-    return tuple((look, assertion.attainable(look.n, protocol)) for look in assertion.looks(protocol))
+    return tuple((look, assertion.attainable(look.n, design)) for look in assertion.looks(design))
 
 
-def needed_trials(assertion: Assertion, protocol: Protocol) -> int | None:
+def needed_trials(assertion: Assertion, design: Design) -> int | None:
     """Return the fewest trials per side with which the last look could support the assertion, or None."""
-    alpha = protocol.last.alpha
+    alpha = design.last.alpha
     # Attainable p never rises with n, so bisection finds the smallest n that suffices.
     below = bisect_left(
-        range(1, MAX_TRIALS + 1), True, key=lambda n: assertion.attainable(n, protocol).supported <= alpha
+        range(1, MAX_TRIALS + 1), True, key=lambda n: assertion.attainable(n, design).supported <= alpha
     )
     return below + 1 if below < MAX_TRIALS else None
 
@@ -119,11 +119,11 @@ def _without_result(assertion: Assertion, trials: Trials) -> str:
 
 
 def _settled(
-    assertion: Assertion, trials: Trials, later: tuple[Look, ...], protocol: Protocol
+    assertion: Assertion, trials: Trials, later: tuple[Look, ...], design: Design
 ) -> tuple[Outcome, str] | None:
     """Return the verdict that every completion of the trials would give, or None while it is open."""
     for look in later:
-        low, high = assertion.bounds(trials, look.n, protocol)
+        low, high = assertion.bounds(trials, look.n, design)
         for_open, against_open = low.supported <= look.alpha, low.refuted <= look.alpha
         if high.supported <= look.alpha and not against_open:
             return Outcome.SUPPORTED, _stopped(look)
@@ -139,7 +139,7 @@ def _stopped(look: Look) -> str:
     return f"stopped early: no outcome of the trials up to n = {look.n} could change the verdict; "
 
 
-def _reason(finding: Finding, look: Look, assertion: Assertion, protocol: Protocol) -> str:
+def _reason(finding: Finding, look: Look, assertion: Assertion, design: Design) -> str:
     """Say why a look came out as it did."""
     p, attainable, at = finding.p, finding.attainable, f"alpha = {look.alpha:g} at n = {look.n}"
     outcome = p.outcome(look.alpha)
@@ -156,27 +156,27 @@ def _reason(finding: Finding, look: Look, assertion: Assertion, protocol: Protoc
         smallest = min(attainable.supported, attainable.refuted)
         return f"underpowered: with these ties the smallest attainable p is {smallest:.3g} > {at}"
     evidence = f"the evidence: p = {p.supported:.3g} for and {p.refuted:.3g} against, {at}"
-    if assertion.attainable(look.n, protocol).supported > look.alpha:
-        return f"{evidence}; underpowered for support: {_needs(assertion, protocol)}"
+    if assertion.attainable(look.n, design).supported > look.alpha:
+        return f"{evidence}; underpowered for support: {_needs(assertion, design)}"
     if attainable.supported > look.alpha:
         return f"{evidence}; with these ties support is out of reach"
     return evidence
 
 
-def _needs(assertion: Assertion, protocol: Protocol) -> str:
+def _needs(assertion: Assertion, design: Design) -> str:
     """Say how many trials support would take."""
-    needed = needed_trials(assertion, protocol)
+    needed = needed_trials(assertion, design)
     if needed is None:
-        return f"no n up to {MAX_TRIALS} suffices at alpha = {protocol.last.alpha:g}"
-    return f"needs n = {needed} at alpha = {protocol.last.alpha:g}"
+        return f"no n up to {MAX_TRIALS} suffices at alpha = {design.last.alpha:g}"
+    return f"needs n = {needed} at alpha = {design.last.alpha:g}"
 
 
-def _underpowered(assertion: Assertion, protocol: Protocol, mark: str) -> Verdict:
-    """Return the verdict of a protocol in which no look can decide."""
-    look, attainable = attainability(assertion, protocol)[-1]
+def _underpowered(assertion: Assertion, design: Design, mark: str) -> Verdict:
+    """Return the verdict of a design in which no look can decide."""
+    look, attainable = attainability(assertion, design)[-1]
     return Verdict(
         outcome=Outcome.INCONCLUSIVE,
-        reason=f"underpowered: {_needs(assertion, protocol)}",
+        reason=f"underpowered: {_needs(assertion, design)}",
         describe=assertion.describe(),
         fingerprint=mark,
         alpha=look.alpha,

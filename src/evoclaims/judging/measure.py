@@ -66,11 +66,11 @@ class Event(EventReading):
     """Something that holds in a trial or does not, and assertions about it."""
 
     def in_most_trials(self, p0: float | None = None) -> Solves:
-        """Assert that it holds with probability at least p0 (default: the protocol's): "solves"."""
+        """Assert that it holds with probability at least p0 (default: the design's): "solves"."""
         return Solves(self, p0)
 
     def stays(self, p0: float | None = None) -> Stays:
-        """Assert that a bound is kept with probability at least p0 (default: the protocol's): "stays"."""
+        """Assert that a bound is kept with probability at least p0 (default: the design's): "stays"."""
         return Stays(self, p0)
 
     def in_every_trial(self) -> EveryTrial:

@@ -68,8 +68,8 @@ class Comparison:
 
     def _trials(self, condition: Condition) -> tuple[TrialResult | None, ...]:
         """Return the trials of the last look."""
-        protocol = self.reproduction.tier(self.tier).protocol
-        return self.archive.trials(condition, protocol.seeds(protocol.last.n))
+        design = self.reproduction.tier(self.tier).design
+        return self.archive.trials(condition, design.seeds(design.last.n))
 
 
 def noticed(

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from evoclaims.core.errors import UnknownNameError, UserError
-from evoclaims.judging.protocol import Protocol
+from evoclaims.judging.design import Design
 from evoclaims.paper.reported import FILE, Published, load_published
 from evoclaims.paper.trial_group import TrialGroup
 from evoclaims.paper.variant import Variant
@@ -20,11 +20,11 @@ class Tier:
 
     Attributes:
         conditions: by method and task, as claims name them: `{("ppo", "n_parity"): Condition(...)}`.
-        protocol: how many trials are judged, with which error rates.
+        design: how many trials are judged, with which error rates.
     """
 
     conditions: Mapping[tuple[str, str], Condition]
-    protocol: Protocol
+    design: Design
 
     def condition(self, method: str, task: str) -> Condition:
         """Return the condition of a method on a task; an `UnknownNameError` lists the known ones."""

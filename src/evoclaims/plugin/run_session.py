@@ -54,7 +54,7 @@ def make_session(config: pytest.Config) -> Session:
     trials, variant = config.getoption("claims_trials"), config.getoption("claims_variant")
     made = Session(reproduction, store, fetch, trials, variant, run.again)
     reproduction.tier("smoke", made.variant)
-    made.protocol("smoke")
+    made.design("smoke")
     _ = made.mutants  # a damaged file is told before the first trial
     fetch.check()
     config.stash[SESSION] = made

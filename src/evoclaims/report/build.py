@@ -8,7 +8,7 @@ from typing import Any
 
 from evoclaims.core.errors import UserError
 from evoclaims.figures.replication import Replication
-from evoclaims.judging.protocol import Protocol
+from evoclaims.judging.design import Design
 from evoclaims.judging.verdict import Outcome
 from evoclaims.paper.archive import Archive
 from evoclaims.paper.reproduction import Reproduction
@@ -143,7 +143,7 @@ class _Gathering:
             methods=tuple(dict.fromkeys(clean(source.method) for source in report.sources)),
             places=places(report.where),
             paper=sentence if sentence != report.statement else "",
-            protocol="" if tier is None else _in_words(tier.protocol),
+            design="" if tier is None else _in_words(tier.design),
             parts=_parts(report, read),
             conditions=tuple(self._condition(report.tier, source) for source in report.sources if source.trials),
             made=made,
@@ -218,12 +218,12 @@ def _broken(trials: Sequence[TrialSummary]) -> tuple[str, ...]:
     return tuple(found)
 
 
-def _in_words(protocol: Protocol) -> str:
-    """Return a protocol in a sentence."""
-    looks = ", then ".join(f"{look.n} trials a side at α = {look.alpha:g}" for look in protocol.looks)
+def _in_words(design: Design) -> str:
+    """Return a design in a sentence."""
+    looks = ", then ".join(f"{look.n} trials a side at α = {look.alpha:g}" for look in design.looks)
     return (
-        f"Looks at {looks}; seeds from {protocol.first_seed} up; p0 = {protocol.p0:g} for “most trials”; "
-        f"A12 margin {protocol.a12_margin:g}."
+        f"Looks at {looks}; seeds from {design.first_seed} up; p0 = {design.p0:g} for “most trials”; "
+        f"A12 margin {design.a12_margin:g}."
     )
 
 

@@ -134,8 +134,8 @@ def _section(section: Section, page: Page) -> Iterator[str]:
             + " **This part decided.**" * part.decided
             for part in parts
         )
-    if section.protocol:
-        yield literal(section.protocol)
+    if section.design:
+        yield literal(section.design)
     for key in section.conditions:
         condition = page.conditions[key]
         yield f"{literal(condition.label)}: {literal(condition.says)}"

@@ -61,7 +61,7 @@ class Section:
         methods: those that it names.
         places: the sections of the paper that it names.
         paper: the paper's own sentence, where another one was judged; else empty.
-        protocol: how it was judged, in words.
+        design: how it was judged, in words.
         parts: its evidence.
         conditions: keys of `Page.conditions`.
         made: where its trials were made.
@@ -76,7 +76,7 @@ class Section:
     methods: tuple[str, ...]
     places: tuple[str, ...]
     paper: str = ""
-    protocol: str = ""
+    design: str = ""
     parts: tuple[Part, ...] = ()
     conditions: tuple[str, ...] = ()
     made: tuple[Made, ...] = ()

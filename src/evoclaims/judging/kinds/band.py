@@ -9,9 +9,9 @@ from typing import ClassVar
 
 from evoclaims.core.errors import UserError
 from evoclaims.judging.assertion import Assertion, Finding
+from evoclaims.judging.design import Design
 from evoclaims.judging.effect import median_interval
 from evoclaims.judging.exact import sign_test
-from evoclaims.judging.protocol import Protocol
 from evoclaims.judging.reading import NumberReading
 from evoclaims.judging.sample import Trials
 from evoclaims.judging.verdict import Bound, Interval, PValues
@@ -42,11 +42,11 @@ class Band(Assertion):
         """Return "the median of A lies in [lo, hi]"."""
         return f"the median of {self.measure.describe()} lies in [{self.lo:g}, {self.hi:g}]"
 
-    def attainable(self, n: int, protocol: Protocol) -> PValues:
+    def attainable(self, n: int, design: Design) -> PValues:
         """Return the p of all trials inside, and of all trials beyond one end."""
         return PValues(_p(0, 0, n).supported, _p(n, 0, n).refuted)
 
-    def bounds(self, trials: Trials, n: int, protocol: Protocol) -> tuple[PValues, PValues]:
+    def bounds(self, trials: Trials, n: int, design: Design) -> tuple[PValues, PValues]:
         """Bound p by new trials that are all inside, all below or all above."""
         values = self.measure.sample(trials).values
         below, above = self._outside(values)
@@ -57,12 +57,12 @@ class Band(Assertion):
             PValues(max(lower.supported, higher.supported), inside.refuted),
         )
 
-    def find(self, trials: Trials, protocol: Protocol, alpha: float) -> Finding:
+    def find(self, trials: Trials, design: Design, alpha: float) -> Finding:
         """Run the sign tests."""
         sample = self.measure.sample(trials)
         below, above = self._outside(sample.values)
         n = len(sample.values)
-        p, attainable = _p(below, above, n), self.attainable(n, protocol)
+        p, attainable = _p(below, above, n), self.attainable(n, design)
         return self.found(
             p,
             attainable,

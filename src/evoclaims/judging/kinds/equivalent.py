@@ -8,9 +8,9 @@ from typing import ClassVar
 
 from evoclaims.core.errors import UserError
 from evoclaims.judging.assertion import Assertion, Finding
+from evoclaims.judging.design import Design
 from evoclaims.judging.exact import rank_attainable, rank_test
 from evoclaims.judging.kinds.greater import require_independent
-from evoclaims.judging.protocol import Protocol
 from evoclaims.judging.reading import NumberReading
 from evoclaims.judging.sample import Trials
 from evoclaims.judging.verdict import Bound, PValues
@@ -39,12 +39,12 @@ class Equivalent(Assertion):
         """Return "A is within m of B"."""
         return f"{self.left.describe()} is within {self.margin:g} of {self.right.describe()}"
 
-    def attainable(self, n: int, protocol: Protocol) -> PValues:
+    def attainable(self, n: int, design: Design) -> PValues:
         """Return the p of complete separations; against, doubled for two tests."""
         separated = rank_attainable(n, n)
         return PValues(separated, min(1.0, 2 * separated))
 
-    def find(self, trials: Trials, protocol: Protocol, alpha: float) -> Finding:
+    def find(self, trials: Trials, design: Design, alpha: float) -> Finding:
         """Run the two tests for it and the two against it."""
         left, right = self.left.sample(trials), self.right.sample(trials)
         a, b = left.values, right.values

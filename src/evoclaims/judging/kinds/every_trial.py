@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from evoclaims.judging.assertion import Assertion, Finding
-from evoclaims.judging.protocol import Look, Protocol
+from evoclaims.judging.design import Design, Look
 from evoclaims.judging.reading import EventReading
 from evoclaims.judging.sample import Trials
 from evoclaims.judging.verdict import PValues
@@ -14,7 +14,7 @@ from evoclaims.judging.verdict import PValues
 
 @dataclass(frozen=True)
 class EveryTrial(Assertion):
-    """Supported when the event holds in every trial of the protocol's last look, refuted otherwise."""
+    """Supported when the event holds in every trial of the design's last look, refuted otherwise."""
 
     event: EventReading
     kind: ClassVar[str] = "exact"
@@ -23,15 +23,15 @@ class EveryTrial(Assertion):
         """Return "E in every trial"."""
         return f"{self.event.describe()} in every trial"
 
-    def looks(self, protocol: Protocol) -> tuple[Look, ...]:
+    def looks(self, design: Design) -> tuple[Look, ...]:
         """Return only the last look: "every" needs every trial."""
-        return (protocol.last,)
+        return (design.last,)
 
-    def attainable(self, n: int, protocol: Protocol) -> PValues:
+    def attainable(self, n: int, design: Design) -> PValues:
         """Return zeros: a fact can be true or false at any n."""
         return PValues(0.0, 0.0)
 
-    def find(self, trials: Trials, protocol: Protocol, alpha: float) -> Finding:
+    def find(self, trials: Trials, design: Design, alpha: float) -> Finding:
         """Check whether it holds."""
         sample = self.event.sample(trials)
         missed = [seed for seed, value in zip(sample.seeds, sample.values, strict=True) if not value]

@@ -9,8 +9,8 @@ from typing import ClassVar
 
 from evoclaims.core.errors import UserError
 from evoclaims.judging.assertion import Assertion, Finding
+from evoclaims.judging.design import Design
 from evoclaims.judging.exact import ExactTest, binomial_test, rank_attainable, rank_test
-from evoclaims.judging.protocol import Protocol
 from evoclaims.judging.reading import NumberReading
 from evoclaims.judging.sample import Trials
 from evoclaims.judging.verdict import Bound, PValues
@@ -88,7 +88,7 @@ class Greater(Assertion):
     """`above` is above `below`: supported by the rank test.
 
     Refuted by the reverse rank test, or when a binomial test on disjoint seed pairs rejects the declared effect (the
-    protocol's A12 margin), ties counted as wins.
+    design's A12 margin), ties counted as wins.
     """
 
     above: NumberReading
@@ -103,19 +103,19 @@ class Greater(Assertion):
         """Return "A > B"."""
         return f"{self.above.describe()} > {self.below.describe()}"
 
-    def attainable(self, n: int, protocol: Protocol) -> PValues:
+    def attainable(self, n: int, design: Design) -> PValues:
         """Return the p of complete separation; against, also of no win in any pair."""
         separated = rank_attainable(n, n)
-        return PValues(separated, min(separated, binomial_test(0, n, protocol.a12_margin, "less").p))
+        return PValues(separated, min(separated, binomial_test(0, n, design.a12_margin, "less").p))
 
-    def find(self, trials: Trials, protocol: Protocol, alpha: float) -> Finding:
+    def find(self, trials: Trials, design: Design, alpha: float) -> Finding:
         """Run the three exact tests."""
         above, below = self.above.sample(trials), self.below.sample(trials)
-        tests = compare(above.values, below.values, protocol.a12_margin)
+        tests = compare(above.values, below.values, design.a12_margin)
         detail = (
             f"at least as high in {tests.wins} of {tests.pairs} seed pairs "
-            f"(p = {tests.margin.p:.3g} against A12 >= {protocol.a12_margin:g})"
+            f"(p = {tests.margin.p:.3g} against A12 >= {design.a12_margin:g})"
         )
-        bounds = (Bound("A12 margin", protocol.a12_margin, on_axis=False),)
+        bounds = (Bound("A12 margin", design.a12_margin, on_axis=False),)
         samples = (above, below)
         return self.found(tests.p, tests.attainable, alpha, samples, detail=detail, bounds=bounds, effect=True)

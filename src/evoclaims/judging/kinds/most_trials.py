@@ -7,8 +7,8 @@ from typing import ClassVar
 
 from evoclaims.core.errors import UserError
 from evoclaims.judging.assertion import Assertion, Finding
+from evoclaims.judging.design import Design
 from evoclaims.judging.exact import binomial_test, clopper_pearson
-from evoclaims.judging.protocol import Protocol
 from evoclaims.judging.reading import EventReading
 from evoclaims.judging.sample import Trials
 from evoclaims.judging.verdict import Bound, Interval, PValues
@@ -20,7 +20,7 @@ class MostTrials(Assertion):
 
     Attributes:
         event: what must hold; it does not hold in a failed trial.
-        p0: overrides the protocol's p0 unless it is None.
+        p0: overrides the design's p0 unless it is None.
     """
 
     event: EventReading
@@ -35,40 +35,40 @@ class MostTrials(Assertion):
         """Return "E in most trials"."""
         return f"{self.event.describe()} in most trials"
 
-    def attainable(self, n: int, protocol: Protocol) -> PValues:
+    def attainable(self, n: int, design: Design) -> PValues:
         """Return the p of n successes, and of none."""
-        return PValues(self._p(n, n, protocol).supported, self._p(0, n, protocol).refuted)
+        return PValues(self._p(n, n, design).supported, self._p(0, n, design).refuted)
 
-    def bounds(self, trials: Trials, n: int, protocol: Protocol) -> tuple[PValues, PValues]:
+    def bounds(self, trials: Trials, n: int, design: Design) -> tuple[PValues, PValues]:
         """Bound p by new trials in which the event always or never holds."""
         values = self.event.sample(trials).values
         fewest = round(sum(values))
-        never, always = self._p(fewest, n, protocol), self._p(fewest + n - len(values), n, protocol)
+        never, always = self._p(fewest, n, design), self._p(fewest + n - len(values), n, design)
         return PValues(always.supported, never.refuted), PValues(never.supported, always.refuted)
 
-    def find(self, trials: Trials, protocol: Protocol, alpha: float) -> Finding:
+    def find(self, trials: Trials, design: Design, alpha: float) -> Finding:
         """Run both binomial tests."""
         sample = self.event.sample(trials)
         n, k = len(sample.values), round(sum(sample.values))
-        p, attainable = self._p(k, n, protocol), self.attainable(n, protocol)
+        p, attainable = self._p(k, n, design), self.attainable(n, design)
         return self.found(
             p,
             attainable,
             alpha,
             (sample,),
-            detail=f"holds in {k} of {n} trials, against p0 = {self._null(protocol):g}",
-            bounds=(Bound("p0", self._null(protocol)),),
+            detail=f"holds in {k} of {n} trials, against p0 = {self._null(design):g}",
+            bounds=(Bound("p0", self._null(design)),),
             intervals=(Interval("P(event), Clopper-Pearson, each end at 0.05", *clopper_pearson(k, n), on_axis=True),),
             events=True,
         )
 
-    def _null(self, protocol: Protocol) -> float:
+    def _null(self, design: Design) -> float:
         """Return the p0 to use."""
-        return protocol.p0 if self.p0 is None else self.p0
+        return design.p0 if self.p0 is None else self.p0
 
-    def _p(self, k: int, n: int, protocol: Protocol) -> PValues:
+    def _p(self, k: int, n: int, design: Design) -> PValues:
         """Return the binomial p of `k` successes in `n`, for and against."""
-        p0 = self._null(protocol)
+        p0 = self._null(design)
         return PValues(binomial_test(k, n, p0, "greater").p, binomial_test(k, n, p0, "less").p)
 
 

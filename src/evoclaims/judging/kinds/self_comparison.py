@@ -11,9 +11,9 @@ from typing import ClassVar
 import numpy as np
 
 from evoclaims.judging.assertion import Assertion, Finding
+from evoclaims.judging.design import Design, Look
 from evoclaims.judging.exact import binomial_test, rank_attainable
 from evoclaims.judging.kinds.greater import compare
-from evoclaims.judging.protocol import Look, Protocol
 from evoclaims.judging.reading import NumberReading
 from evoclaims.judging.sample import Trials
 from evoclaims.judging.verdict import Outcome, PValues
@@ -39,16 +39,16 @@ class SelfComparison(Assertion):
         """Return "A is never judged above itself"."""
         return f"{self.measure.describe()} is never judged above itself"
 
-    def looks(self, protocol: Protocol) -> tuple[Look, ...]:
+    def looks(self, design: Design) -> tuple[Look, ...]:
         """Return only the last look: stopping early would save nothing."""
-        return (protocol.last,)
+        return (design.last,)
 
-    def attainable(self, n: int, protocol: Protocol) -> PValues:
+    def attainable(self, n: int, design: Design) -> PValues:
         """Return the smallest p of one split, for both: if no split can be supported, the control shows nothing."""
         smallest = rank_attainable(n // 2, n - n // 2) if n > 1 else 1.0
         return PValues(smallest, smallest)
 
-    def find(self, trials: Trials, protocol: Protocol, alpha: float) -> Finding:
+    def find(self, trials: Trials, design: Design, alpha: float) -> Finding:
         """Judge the splits and compare the share of supported ones with alpha."""
         sample = self.measure.sample(trials)
         n = len(sample.values)
@@ -56,7 +56,7 @@ class SelfComparison(Assertion):
         for half in _halves(n):
             chosen = set(half)
             rest = [value for index, value in enumerate(sample.values) if index not in chosen]
-            comparison = compare([sample.values[index] for index in half], rest, protocol.a12_margin)
+            comparison = compare([sample.values[index] for index in half], rest, design.a12_margin)
             above += comparison.p.outcome(alpha) is Outcome.SUPPORTED
             judged += 1
         excessive = above / judged > alpha

@@ -7,8 +7,8 @@ from typing import ClassVar
 
 from evoclaims.core.errors import UnknownNameError
 from evoclaims.judging.assertion import Assertion, Finding
+from evoclaims.judging.design import Design
 from evoclaims.judging.kendall import Slope, trend_attainable, trend_test
-from evoclaims.judging.protocol import Protocol
 from evoclaims.judging.reading import LevelsReading
 from evoclaims.judging.sample import Trials
 from evoclaims.judging.verdict import PValues
@@ -36,12 +36,12 @@ class Trend(Assertion):
         """Return "P falls with the level"."""
         return f"{self.profile.describe()} {self.direction} with the level"
 
-    def attainable(self, n: int, protocol: Protocol) -> PValues:
+    def attainable(self, n: int, design: Design) -> PValues:
         """Return the p of a strict trend in every trial, for and against."""
         strict = trend_attainable(n, self.profile.size)
         return PValues(strict, strict)
 
-    def bounds(self, trials: Trials, n: int, protocol: Protocol) -> tuple[PValues, PValues]:
+    def bounds(self, trials: Trials, n: int, design: Design) -> tuple[PValues, PValues]:
         """Bound p from below by new trials that follow the trend strictly.
 
         A strict row adds the most inversions; ties in a new row would only remove possible inversions from the null.
@@ -55,7 +55,7 @@ class Trend(Assertion):
         rise = trend_test(rows + (rising,) * new, "rises").p
         return PValues(*((fall, rise) if self.direction == "falls" else (rise, fall))), PValues(1.0, 1.0)
 
-    def find(self, trials: Trials, protocol: Protocol, alpha: float) -> Finding:
+    def find(self, trials: Trials, design: Design, alpha: float) -> Finding:
         """Run the trend test in both directions."""
         rows = self.profile.rows(trials)
         test, reverse = trend_test(rows, self.direction), trend_test(rows, _OPPOSITE[self.direction])

@@ -1,4 +1,4 @@
-"""What is fixed before any trial runs: looks, significance levels, margins and seeds."""
+"""A claim's (group-sequential) design, fixed before any trial runs: looks, significance levels, margins and seeds."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ class Look:
 
 
 @dataclass(frozen=True)
-class Protocol:
-    """How a claim is judged.
+class Design:
+    """The statistical design that a claim is judged by.
 
     Attributes:
         looks: sorted by rising n; their alphas add up to the false-positive rate (a union bound).
@@ -41,9 +41,9 @@ class Protocol:
     first_seed: int = 0
 
     def __post_init__(self) -> None:
-        """Reject impossible protocols."""
+        """Reject impossible designs."""
         if not self.looks:
-            raise UserError("A protocol needs at least one look, such as Look(n=10, alpha=0.05).")
+            raise UserError("A design needs at least one look, such as Look(n=10, alpha=0.05).")
         if any(later.n <= earlier.n for earlier, later in pairwise(self.looks)):
             sizes = ", ".join(str(look.n) for look in self.looks)
             raise UserError(f"Each look takes more trials than the one before, unlike {sizes}.")
@@ -71,13 +71,13 @@ class Protocol:
         return tuple(range(self.first_seed, self.first_seed + n))
 
     @staticmethod
-    def fixed(n: int, alpha: float = 0.05) -> Protocol:
-        """Return the protocol with a single look at `n` trials."""
-        return Protocol(looks=(Look(n, alpha),))
+    def fixed(n: int, alpha: float = 0.05) -> Design:
+        """Return the design with a single look at `n` trials."""
+        return Design(looks=(Look(n, alpha),))
 
 
-FIXED_10 = Protocol.fixed(10)
+FIXED_10 = Design.fixed(10)
 """The paper's ten trials in a single look."""
 
-SEQUENTIAL = Protocol(looks=(Look(5, 0.01), Look(10, 0.04)))
+SEQUENTIAL = Design(looks=(Look(5, 0.01), Look(10, 0.04)))
 """Five trials, and five more if those leave the claim open."""
