@@ -12,7 +12,7 @@ from scipy.stats import binom, norm
 
 from evoclaims.judging.exact import binomial_test, rank_test, sign_test
 from evoclaims.judging.kendall import trend_test
-from evoclaims.judging.kinds.greater import compare
+from evoclaims.judging.kinds.greater import GreaterTests
 from evoclaims.judging.verdict import Outcome
 
 DRAWS = 10_000
@@ -52,7 +52,7 @@ def test_an_effect_as_declared_is_refuted_no_more_often_than_alpha(n: int) -> No
     rng = np.random.default_rng(n)
     # P(N(d, 1) > N(0, 1)) = 0.71 at d = 0.7826: the edge of the declared margin.
     above, below = rng.normal(0.7826, 1, (DRAWS, n)).tolist(), rng.normal(0, 1, (DRAWS, n)).tolist()
-    outcomes = [compare(a, b, 0.71).p.outcome(0.05) for a, b in zip(above, below, strict=True)]
+    outcomes = [GreaterTests(a, b, 0.71).p.outcome(0.05) for a, b in zip(above, below, strict=True)]
     assert_rate_at_most(0.05, outcomes.count(Outcome.REFUTED))
 
 

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
+from functools import cached_property
 from typing import Any, ClassVar, NoReturn
 
 from evoclaims.core.errors import UserError
@@ -23,14 +24,19 @@ class Finding:
     Attributes:
         p: for and against the assertion.
         attainable: the smallest of each that n and the ties allow.
-        evidence: one entry for each part.
-        deciding: for each direction, the index in `evidence` of the part that gives the p value.
+        describe: makes the evidence, which takes many times as long as the tests.
+        deciding: returns, for a direction, the index in `evidence` of the part that gives the p value.
     """
 
     p: PValues
     attainable: PValues
-    evidence: tuple[Evidence, ...]
-    deciding: Mapping[Direction, int]
+    describe: Callable[[], tuple[Evidence, ...]]
+    deciding: Callable[[Direction], int]
+
+    @cached_property
+    def evidence(self) -> tuple[Evidence, ...]:
+        """One entry for each part, made when it is asked for."""
+        return self.describe()
 
 
 @dataclass(frozen=True)
@@ -49,8 +55,12 @@ class Assertion(ABC):
 
     def sources(self) -> tuple[Source, ...]:
         """Return the conditions it needs, without duplicates."""
+        return tuple({reading.source.fingerprint: reading.source for reading in self.readings()}.values())
+
+    def readings(self) -> tuple[TrialReading, ...]:
+        """Return what it reads from trials."""
         values = (getattr(self, field.name) for field in fields(self))
-        return _unique(value.source for value in values if isinstance(value, TrialReading))
+        return tuple(value for value in values if isinstance(value, TrialReading))
 
     def plain(self) -> dict[str, Any]:
         """Return the canonical description that the claim's fingerprint hashes, with the conditions' ids."""
@@ -89,7 +99,7 @@ class Assertion(ABC):
         *,
         detail: str = "",
         bounds: tuple[Bound, ...] = (),
-        intervals: tuple[Interval, ...] = (),
+        intervals: Callable[[], tuple[Interval, ...]] = tuple,
         events: bool = False,
         effect: bool = False,
         tested: bool = True,
@@ -103,31 +113,36 @@ class Assertion(ABC):
             samples: what was read from the trials.
             detail: further information for the reader.
             bounds: what the trials are compared with.
-            intervals: description only.
+            intervals: makes those of the evidence; description only.
             events: whether values say that something held.
             effect: whether to report the effect size between the two samples.
             tested: whether p comes from a test; the p of a fact (0 for true, 1 for false) is not reported.
         """
         first, last = samples[0].values, samples[-1].values
-        evidence = Evidence(
-            kind=self.kind,
-            describe=self.describe(),
-            outcome=p.outcome(alpha),
-            samples=samples,
-            n=len(first),
-            alpha=alpha,
-            p=p.supported if tested else None,
-            attainable_p=attainable.supported if tested else None,
-            p_refuted=p.refuted if tested else None,
-            attainable_p_refuted=attainable.refuted if tested else None,
-            a12=a12(first, last) if effect else None,
-            cliffs_delta=cliffs_delta(first, last) if effect else None,
-            intervals=(Interval("A12, 95% percentile bootstrap", *a12_interval(first, last)),) if effect else intervals,
-            detail=detail,
-            bounds=bounds,
-            events=events,
-        )
-        return Finding(p, attainable, (evidence,), dict.fromkeys(Direction, 0))
+
+        def evidence() -> tuple[Evidence, ...]:
+            of_effect = (Interval("A12, 95% percentile bootstrap", *a12_interval(first, last)),) if effect else None
+            entry = Evidence(
+                kind=self.kind,
+                describe=self.describe(),
+                outcome=p.outcome(alpha),
+                samples=samples,
+                n=len(first),
+                alpha=alpha,
+                p=p.supported if tested else None,
+                attainable_p=attainable.supported if tested else None,
+                p_refuted=p.refuted if tested else None,
+                attainable_p_refuted=attainable.refuted if tested else None,
+                a12=a12(first, last) if effect else None,
+                cliffs_delta=cliffs_delta(first, last) if effect else None,
+                intervals=of_effect or intervals(),
+                detail=detail,
+                bounds=bounds,
+                events=events,
+            )
+            return (entry,)
+
+        return Finding(p, attainable, evidence, lambda direction: 0)
 
     def fact(self, holds: bool, alpha: float, sample: Sample, detail: str, *, events: bool = False) -> Finding:
         """Return the finding of an assertion that is true or false without a test."""
@@ -156,11 +171,6 @@ def _parts(value: object, joined_by: type[Compound]) -> tuple[Assertion, ...]:
     if not isinstance(value, Assertion):
         raise UserError(f"Only assertions are joined with & and |, not {value!r}: put each in parentheses.")
     return value.parts if isinstance(value, joined_by) else (value,)
-
-
-def _unique(sources: Iterable[Source]) -> tuple[Source, ...]:
-    """Return the sources without repeated fingerprints, in order."""
-    return tuple({source.fingerprint: source for source in sources}.values())
 
 
 def _plain(value: object) -> object:
@@ -192,9 +202,9 @@ class Compound(Assertion):
         """Join the parts' sentences."""
         return f" {self.joint} ".join(f"({part.describe()})" for part in self.parts)
 
-    def sources(self) -> tuple[Source, ...]:
-        """Return the parts' conditions."""
-        return _unique(source for part in self.parts for source in part.sources())
+    def readings(self) -> tuple[TrialReading, ...]:
+        """Return what the parts read."""
+        return tuple(reading for part in self.parts for reading in part.readings())
 
     def plain(self) -> dict[str, Any]:
         """Return the kind and the parts."""
@@ -219,8 +229,8 @@ class Compound(Assertion):
         return Finding(
             p=self.combine([finding.p for finding in findings]),
             attainable=self.combine([finding.attainable for finding in findings]),
-            evidence=tuple(entry for finding in findings for entry in finding.evidence),
-            deciding={direction: self._deciding(findings, direction) for direction in Direction},
+            describe=lambda: tuple(entry for finding in findings for entry in finding.evidence),
+            deciding=lambda direction: self._deciding(findings, direction),
         )
 
     def _deciding(self, findings: Sequence[Finding], direction: Direction) -> int:
@@ -228,7 +238,7 @@ class Compound(Assertion):
         choose = max if direction is self.weakest else min
         chosen = choose(range(len(findings)), key=lambda index: findings[index].p.toward(direction))
         before = sum(len(finding.evidence) for finding in findings[:chosen])
-        return before + findings[chosen].deciding[direction]
+        return before + findings[chosen].deciding(direction)
 
 
 @dataclass(frozen=True)

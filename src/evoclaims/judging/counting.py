@@ -6,26 +6,39 @@ With a base above every coefficient, adding and multiplying the packed integers 
 
 from __future__ import annotations
 
-from itertools import accumulate
+from dataclasses import dataclass
 
 MAX_TRIALS = 100
 """Maximum trials per side for the exact counts (about a second at 100 against 100)."""
 
 
 def digit_width(total: int) -> int:
-    """Return the bits per digit for counts up to `total`, rounded up to whole bytes."""
-    return 8 * (total.bit_length() // 8 + 1)
+    """Return the bits per digit for counts that add up to `total`."""
+    return total.bit_length() + 1
 
 
-def unpack(packed: int, width: int, length: int) -> list[int]:
-    """Return the `length` lowest coefficients of a polynomial packed with `width` bits per digit (whole bytes)."""
-    size = width // 8
-    data = packed.to_bytes(size * length, "little")
-    return [int.from_bytes(data[start : start + size], "little") for start in range(0, size * length, size)]
+@dataclass(frozen=True)
+class Counts:
+    """How many of equally likely cases have X = 0, 1, 2, ...
 
+    Attributes:
+        packed: the counts, `width` bits each.
+        width: see `digit_width`.
+        total: number of cases.
+    """
 
-def upper_tails(counts: list[int]) -> tuple[float, ...]:
-    """Return P(X >= k) for every k, where X = k in `counts[k]` of equally likely cases."""
-    total = sum(counts)
-    # Division of Python integers rounds correctly, so 1 in 20 is the float 0.05 and compares equal to it.
-    return tuple(tail / total for tail in reversed(list(accumulate(reversed(counts)))))
+    packed: int
+    width: int
+    total: int
+
+    @property
+    def largest(self) -> int:
+        """The largest possible X."""
+        return (self.packed.bit_length() - 1) // self.width
+
+    def tail(self, least: int) -> float:
+        """Return P(X >= least), for `least` from 0 to `largest`."""
+        # A number's remainder modulo its base minus one is the sum of its digits (here below the base minus one).
+        cases = (self.packed >> (self.width * least)) % ((1 << self.width) - 1)
+        # Division of Python integers rounds correctly, so 1 in 20 is the float 0.05 and compares equal to it.
+        return cases / self.total

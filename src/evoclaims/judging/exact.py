@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from itertools import groupby
 from typing import Literal, get_args
 
 from scipy.stats import binomtest
 
-from evoclaims.judging.counting import digit_width, unpack, upper_tails
+from evoclaims.judging.counting import Counts, digit_width
 
 Alternative = Literal["greater", "less"]
 
@@ -45,32 +45,31 @@ def rank_test(a: Sequence[float], b: Sequence[float]) -> ExactTest:
     """
     if not len(a) or not len(b):
         raise ValueError("A rank test needs at least one value on each side.")
-    if any(math.isnan(value) for value in (*a, *b)):
+    if any(map(math.isnan, (*a, *b))):
         raise ValueError("A rank test cannot rank NaN.")
-    pooled = sorted([(float(value), 1) for value in a] + [(float(value), 0) for value in b])
+    of_a, of_b = Counter(a), Counter(b)
     ties: list[int] = []
     doubled_u = b_below = 0
-    for _, group in groupby(pooled, key=lambda entry: entry[0]):
-        sides = [side for _, side in group]
-        from_a = sum(sides)
-        from_b = len(sides) - from_a
+    for value in sorted({*of_a, *of_b}):
+        from_a, from_b = of_a.get(value, 0), of_b.get(value, 0)
         doubled_u += from_a * (2 * b_below + from_b)
         b_below += from_b
-        ties.append(len(sides))
-    tails = _doubled_u_tails(len(a), tuple(ties))
-    return ExactTest(p=tails[doubled_u], attainable_p=tails[-1])
+        ties.append(from_a + from_b)
+    splits = _splits_by_doubled_u(len(a), tuple(ties))
+    return ExactTest(p=splits.tail(doubled_u), attainable_p=splits.tail(splits.largest))
 
 
 @lru_cache(maxsize=512)
-def _doubled_u_tails(n: int, ties: tuple[int, ...]) -> tuple[float, ...]:
-    """Return P(2U >= u) for u = 0 .. the largest attainable 2U.
+def _splits_by_doubled_u(n: int, ties: tuple[int, ...]) -> Counts:
+    """Count the splits of pooled values by their 2U.
 
     Args:
         n: number of values of A; the others belong to B.
         ties: sizes of the groups of equal pooled values, in rising order of value.
     """
     m = sum(ties) - n
-    width = digit_width(math.comb(n + m, n))
+    total = math.comb(n + m, n)
+    width = digit_width(total)
     # Digit u of ways[i]: the number of ways to give A i of the values so far, with 2U = u.
     ways = {0: 1}
     below = 0
@@ -79,14 +78,13 @@ def _doubled_u_tails(n: int, ties: tuple[int, ...]) -> tuple[float, ...]:
         for i, packed in ways.items():
             b_below = below - i
             for j in range(max(0, size - (m - b_below)), min(size, n - i) + 1):
-                shift = width * j * (2 * b_below + size - j)
-                grown[i + j] = grown.get(i + j, 0) + ((packed * math.comb(size, j)) << shift)
+                # Numbers of thousands of digits: a product with 1, a shift by 0 and a sum with 0 would copy them.
+                chosen = packed if j in (0, size) else packed * math.comb(size, j)
+                shifted = chosen << (width * j * (2 * b_below + size - j)) if j else chosen
+                grown[i + j] = grown[i + j] + shifted if i + j in grown else shifted
         ways = grown
         below += size
-    counts = unpack(ways[n], width, 2 * n * m + 1)
-    while not counts[-1]:
-        counts.pop()
-    return upper_tails(counts)
+    return Counts(ways[n], width, total)
 
 
 def rank_attainable(n: int, m: int) -> float:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from bisect import bisect_left
+from collections.abc import Callable
+from dataclasses import dataclass
 
 from evoclaims.judging.assertion import Assertion, Finding
 from evoclaims.judging.counting import MAX_TRIALS
@@ -13,12 +15,27 @@ from evoclaims.judging.verdict import Outcome, PValues, Verdict
 from evoclaims.trials.result import TrialResult
 
 
-def judge(assertion: Assertion, design: Design, *, claim: str = "", tier: str = "") -> Verdict:
-    """Judge an assertion.
+@dataclass(frozen=True)
+class Ending:
+    """The look at which judging ends, and what it has found.
 
-    Each look first checks the smallest attainable p: if neither direction can be decided, no trial is fetched.
-    Judging ends at the first decisive look, or when no outcome of the remaining trials could change the verdict
-    (curtailment).
+    Attributes:
+        outcome: of the assertion.
+        look: the look.
+        trials: what was looked at.
+        finding: what they say; None where trials crashed or cannot be read.
+        note: why judging ended without a decision or before it, if it did; without a finding, the reason.
+    """
+
+    outcome: Outcome
+    look: Look
+    trials: Trials
+    finding: Finding | None
+    note: str = ""
+
+
+def judge(assertion: Assertion, design: Design, *, claim: str = "", tier: str = "") -> Verdict:
+    """Judge an assertion by the trials of its sources; see `decide`.
 
     Args:
         assertion: the claim.
@@ -30,41 +47,79 @@ def judge(assertion: Assertion, design: Design, *, claim: str = "", tier: str = 
         Exception: whatever a source raises when it is asked for trials.
     """
     mark = fingerprint(assertion, design, claim=claim, tier=tier)
-    looks = assertion.looks(design)
-    verdict = _underpowered(assertion, design, mark)
+    ending = decide(assertion, design)
+    if ending is None:
+        return _underpowered(assertion, design, mark)
+    outcome, look, finding = ending.outcome, ending.look, ending.finding
+    if finding is None:
+        return Verdict(outcome, ending.note, assertion.describe(), mark, n=look.n)
+    tested = any(entry.p is not None for entry in finding.evidence)  # a fact has no p
+    return Verdict(
+        outcome=outcome,
+        reason=ending.note + _reason(finding, look, assertion, design),
+        describe=assertion.describe(),
+        fingerprint=mark,
+        n=look.n,
+        alpha=look.alpha,
+        p=finding.p.supported if tested else None,
+        attainable_p=finding.attainable.supported if tested else None,
+        p_refuted=finding.p.refuted if tested else None,
+        attainable_p_refuted=finding.attainable.refuted if tested else None,
+        evidence=finding.evidence,
+        without_result=_without_result(assertion, ending.trials),
+        deciding=finding.deciding(outcome.direction),
+    )
+
+
+def fetch_from(source: Source, seeds: tuple[int, ...]) -> tuple[TrialResult, ...]:
+    """Return a source's trials in the order of `seeds`; the source may return them in any order."""
+    by_seed = {trial.seed: trial for trial in source.fetch(seeds)}
+    if sorted(by_seed) != sorted(seeds):
+        raise ValueError(f"{source.label} returned the seeds {sorted(by_seed)} when asked for {list(seeds)}.")
+    return tuple(by_seed[seed] for seed in seeds)
+
+
+def decide(
+    assertion: Assertion,
+    design: Design,
+    fetch: Callable[[Source, tuple[int, ...]], tuple[TrialResult, ...]] = fetch_from,
+) -> Ending | None:
+    """Follow the looks of a design to their end.
+
+    Each look first checks the smallest attainable p: if neither direction can be decided, no trial is fetched.
+    Judging ends at the first decisive look, or when no outcome of the remaining trials could change the verdict
+    (curtailment).
+
+    Args:
+        assertion: the claim.
+        design: looks, margins and seeds, fixed beforehand.
+        fetch: gets the trials of a source for some seeds, in their order.
+
+    Returns:
+        The end; None if no look can decide.
+
+    Raises:
+        Exception: whatever a source raises when it is asked for trials.
+    """
+    looks, ending = assertion.looks(design), None
     for index, look in enumerate(looks):
         if not _decidable(assertion.attainable(look.n, design), look.alpha):
             continue
-        trials = {source.fingerprint: _fetch(source, design.seeds(look.n)) for source in assertion.sources()}
+        trials = {source.fingerprint: fetch(source, design.seeds(look.n)) for source in assertion.sources()}
         crashed = _crashed(assertion, trials)
         if crashed:
-            return Verdict(Outcome.ERROR, crashed, assertion.describe(), mark, n=look.n)
+            return Ending(Outcome.ERROR, look, trials, None, crashed)
         try:
             finding = assertion.find(trials, design, look.alpha)
         except UnreadableTrialError as error:
-            return Verdict(Outcome.ERROR, str(error), assertion.describe(), mark, n=look.n)
+            return Ending(Outcome.ERROR, look, trials, None, str(error))
         outcome, note = finding.p.outcome(look.alpha), ""
         if outcome is Outcome.INCONCLUSIVE:
             outcome, note = _settled(assertion, trials, looks[index + 1 :], design) or (outcome, note)
-        tested = any(entry.p is not None for entry in finding.evidence)  # a fact has no p
-        verdict = Verdict(
-            outcome=outcome,
-            reason=note + _reason(finding, look, assertion, design),
-            describe=assertion.describe(),
-            fingerprint=mark,
-            n=look.n,
-            alpha=look.alpha,
-            p=finding.p.supported if tested else None,
-            attainable_p=finding.attainable.supported if tested else None,
-            p_refuted=finding.p.refuted if tested else None,
-            attainable_p_refuted=finding.attainable.refuted if tested else None,
-            evidence=finding.evidence,
-            without_result=_without_result(assertion, trials),
-            deciding=finding.deciding[outcome.direction],
-        )
+        ending = Ending(outcome, look, trials, finding, note)
         if outcome is not Outcome.INCONCLUSIVE or note:
-            return verdict
-    return verdict
+            return ending
+    return ending
 
 
 def attainability(assertion: Assertion, design: Design) -> tuple[tuple[Look, PValues], ...]:
@@ -85,14 +140,6 @@ def needed_trials(assertion: Assertion, design: Design) -> int | None:
 def _decidable(attainable: PValues, alpha: float) -> bool:
     """Whether at least one direction can be decided."""
     return attainable.supported <= alpha or attainable.refuted <= alpha
-
-
-def _fetch(source: Source, seeds: tuple[int, ...]) -> tuple[TrialResult, ...]:
-    """Return the trials in the order of `seeds`; the source may return them in any order."""
-    by_seed = {trial.seed: trial for trial in source.fetch(seeds)}
-    if sorted(by_seed) != sorted(seeds):
-        raise ValueError(f"{source.label} returned the seeds {sorted(by_seed)} when asked for {list(seeds)}.")
-    return tuple(by_seed[seed] for seed in seeds)
 
 
 def _crashed(assertion: Assertion, trials: Trials) -> str:

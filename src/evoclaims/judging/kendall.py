@@ -9,7 +9,7 @@ from functools import lru_cache
 from itertools import combinations
 from typing import Literal, get_args
 
-from evoclaims.judging.counting import digit_width, unpack, upper_tails
+from evoclaims.judging.counting import Counts, digit_width
 from evoclaims.judging.exact import ExactTest
 
 Slope = Literal["falls", "rises"]
@@ -39,9 +39,9 @@ def trend_test(profiles: Sequence[Sequence[float]], direction: Slope) -> ExactTe
     rows = [tuple(row) if direction == "falls" else tuple(reversed(row)) for row in profiles]
     # The order of the tie groups does not change the coefficient: sort them for more cache hits.
     patterns = tuple(sorted(tuple(sorted(Counter(row).values())) for row in rows))
-    tails = _inversion_tails(patterns)
+    inversions = _inversions(patterns)
     observed = sum(earlier > later for row in rows for earlier, later in combinations(row, 2))
-    return ExactTest(p=tails[observed], attainable_p=tails[-1])
+    return ExactTest(p=inversions.tail(observed), attainable_p=inversions.tail(inversions.largest))
 
 
 def trend_attainable(n: int, levels: int) -> float:
@@ -50,17 +50,17 @@ def trend_attainable(n: int, levels: int) -> float:
 
 
 @lru_cache(maxsize=256)
-def _inversion_tails(patterns: tuple[tuple[int, ...], ...]) -> tuple[float, ...]:
-    """Return P(inversions in all trials >= d) for d = 0 .. the largest, given each trial's tie group sizes."""
+def _inversions(patterns: tuple[tuple[int, ...], ...]) -> Counts:
+    """Count the arrangements by their inversions in all trials, given each trial's tie group sizes."""
     arrangements = {
         sizes: math.factorial(sum(sizes)) // math.prod(map(math.factorial, sizes)) for sizes in set(patterns)
     }
-    width = digit_width(math.prod(arrangements[sizes] for sizes in patterns))
+    total = math.prod(arrangements[sizes] for sizes in patterns)
+    width = digit_width(total)
     packed = 1
     for sizes, trials in Counter(patterns).items():
         packed *= _gaussian_multinomial(sizes, width) ** trials
-    most = sum(math.comb(sum(sizes), 2) - sum(math.comb(size, 2) for size in sizes) for sizes in patterns)
-    return upper_tails(unpack(packed, width, most + 1))
+    return Counts(packed, width, total)
 
 
 def _gaussian_multinomial(sizes: tuple[int, ...], width: int) -> int:

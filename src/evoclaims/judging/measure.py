@@ -89,7 +89,7 @@ class Profile(LevelsReading):
         """
         if not 0 <= level < self.size:
             raise UserError(f"{self.describe()!r} has levels 0 to {self.size - 1}, not {level}.")
-        return Measure(self.source, f"{self.name} at level {level}", lambda t: self.row(t)[level], self.better)
+        return Measure(self.source, f"{self.name} at level {level}", lambda t: self.of(t)[level], self.better)
 
     def above(self, other: Profile, *, beyond: int) -> Assertion:
         """Assert that this profile is above `other` at every level beyond `beyond`, counted from 0.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Literal, get_args
@@ -25,7 +26,7 @@ Better = Literal["higher", "lower"]
 
 
 @dataclass(frozen=True, eq=False)
-class TrialReading:
+class TrialReading(ABC):
     """Something that can be read from every trial of a condition.
 
     Attributes:
@@ -43,6 +44,14 @@ class TrialReading:
     def plain(self) -> dict[str, Any]:
         """Return what the fingerprint hashes."""
         return {"condition": self.source.fingerprint, "name": self.name}
+
+    @abstractmethod
+    def of(self, trial: TrialResult) -> float | tuple[float, ...]:
+        """Return what is read from one trial, of any status.
+
+        Raises:
+            UnreadableTrialError: when a finished trial lacks it, or when it is NaN.
+        """
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,8 +80,12 @@ class NumberReading(TrialReading):
         Raises:
             UnreadableTrialError: when a NaN is read from a finished trial.
         """
-        mine, worst = trials[self.source.fingerprint], _worst(self.better)
-        return sample(self.describe(), mine, [read_number(t, self.describe(), self.read, worst) for t in mine])
+        mine = trials[self.source.fingerprint]
+        return sample(self.describe(), mine, list(map(self.of, mine)))
+
+    def of(self, trial: TrialResult) -> float:
+        """Return the number of one trial; the worst value for a failed one."""
+        return read_number(trial, self.describe(), self.read, _worst(self.better))
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,7 +105,11 @@ class EventReading(TrialReading):
             UnreadableTrialError: when a NaN is read from a finished trial.
         """
         mine = trials[self.source.fingerprint]
-        return sample(self.describe(), mine, [float(not is_failed(t) and bool(self.holds(checked(t)))) for t in mine])
+        return sample(self.describe(), mine, list(map(self.of, mine)))
+
+    def of(self, trial: TrialResult) -> float:
+        """Return 1.0 if the event holds in a trial, else 0.0."""
+        return float(not is_failed(trial) and bool(self.holds(checked(trial))))
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,14 +142,14 @@ class LevelsReading(TrialReading):
         Raises:
             UnreadableTrialError: when a finished trial's vector has NaN or another length.
         """
-        return tuple(self.row(trial) for trial in trials[self.source.fingerprint])
+        return tuple(map(self.of, trials[self.source.fingerprint]))
 
     def samples(self, trials: Trials) -> tuple[Sample, ...]:
         """Return one sample per level."""
         mine, columns = trials[self.source.fingerprint], zip(*self.rows(trials), strict=True)
         return tuple(sample(f"{self.describe()} at level {at}", mine, column) for at, column in enumerate(columns))
 
-    def row(self, trial: TrialResult) -> tuple[float, ...]:
+    def of(self, trial: TrialResult) -> tuple[float, ...]:
         """Return the vector of one trial; the worst values for a failed trial."""
         if is_failed(trial):
             return (_worst(self.better),) * self.size

@@ -70,7 +70,9 @@ class Band(Assertion):
             (sample,),
             detail=f"{below} below, {n - below - above} inside, {above} above",
             bounds=(Bound("lowest", float(self.lo)), Bound("highest", float(self.hi))),
-            intervals=(Interval("median, 95% percentile bootstrap", *median_interval(sample.values), on_axis=True),),
+            intervals=lambda: (
+                Interval("median, 95% percentile bootstrap", *median_interval(sample.values), on_axis=True),
+            ),
         )
 
     def _outside(self, values: Sequence[float]) -> tuple[int, int]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import ClassVar
 
 from evoclaims.core.errors import UserError
@@ -13,26 +14,53 @@ from evoclaims.judging.design import Design
 from evoclaims.judging.exact import ExactTest, binomial_test, rank_attainable, rank_test
 from evoclaims.judging.reading import NumberReading
 from evoclaims.judging.sample import Trials
-from evoclaims.judging.verdict import Bound, PValues
+from evoclaims.judging.verdict import Bound, Outcome, PValues
 
 
 @dataclass(frozen=True)
 class GreaterTests:
-    """The three exact tests that decide whether A is above B.
+    """The three exact tests that decide whether A is above B, each made when it is asked for.
 
     Attributes:
-        above: rank test, A above B.
-        below: rank test, B above A.
-        margin: binomial test that the declared effect is absent.
-        wins: disjoint pairs in which A is at least B.
-        pairs: disjoint pairs (trial i of A against trial i of B).
+        a: values of A in the order of their seeds, shape [n].
+        b: values of B in the order of their seeds, shape [m].
+        effect: the declared effect P(A >= B), ties counted as wins.
     """
 
-    above: ExactTest
-    below: ExactTest
-    margin: ExactTest
-    wins: int
-    pairs: int
+    a: Sequence[float]
+    b: Sequence[float]
+    effect: float
+
+    @cached_property
+    def above(self) -> ExactTest:
+        """Rank test, A above B."""
+        return rank_test(self.a, self.b)
+
+    @cached_property
+    def below(self) -> ExactTest:
+        """Rank test, B above A."""
+        return rank_test(self.b, self.a)
+
+    @cached_property
+    def margin(self) -> ExactTest:
+        """Binomial test that the declared effect is absent."""
+        # In any pairing of the pooled values, equal values make a win: so ties bound the losses.
+        commonest = Counter((*self.a, *self.b)).most_common(1)[0][1]
+        most_losses = min(self.pairs, len(self.a) + len(self.b) - commonest)
+        return ExactTest(
+            p=binomial_test(self.wins, self.pairs, self.effect, "less").p,
+            attainable_p=binomial_test(self.pairs - most_losses, self.pairs, self.effect, "less").p,
+        )
+
+    @property
+    def wins(self) -> int:
+        """Disjoint pairs (trial i of A against trial i of B) in which A is at least B."""
+        return sum(x >= y for x, y in zip(self.a, self.b, strict=False))
+
+    @property
+    def pairs(self) -> int:
+        """Number of disjoint pairs."""
+        return min(len(self.a), len(self.b))
 
     @property
     def p(self) -> PValues:
@@ -44,30 +72,9 @@ class GreaterTests:
         """The smallest p that n and the ties allow."""
         return PValues(self.above.attainable_p, min(self.below.attainable_p, self.margin.attainable_p))
 
-
-def compare(a: Sequence[float], b: Sequence[float], margin: float) -> GreaterTests:
-    """Compare A with B exactly.
-
-    Args:
-        a: values of A in the order of their seeds, shape [n].
-        b: values of B in the order of their seeds, shape [m].
-        margin: the declared effect P(A >= B), ties counted as wins.
-    """
-    pairs = list(zip(a, b, strict=False))
-    wins = sum(x >= y for x, y in pairs)
-    # In any pairing of the pooled values, equal values make a win: so ties bound the losses.
-    commonest = Counter((*a, *b)).most_common(1)[0][1]
-    most_losses = min(len(pairs), len(a) + len(b) - commonest)
-    return GreaterTests(
-        above=rank_test(a, b),
-        below=rank_test(b, a),
-        margin=ExactTest(
-            p=binomial_test(wins, len(pairs), margin, "less").p,
-            attainable_p=binomial_test(len(pairs) - most_losses, len(pairs), margin, "less").p,
-        ),
-        wins=wins,
-        pairs=len(pairs),
-    )
+    def support(self, alpha: float) -> bool:
+        """Whether A is found above B at `alpha`; mostly the first test alone says that it is not."""
+        return self.above.p <= alpha and self.p.outcome(alpha) is Outcome.SUPPORTED
 
 
 def require_independent(left: NumberReading, right: NumberReading) -> None:
@@ -111,7 +118,7 @@ class Greater(Assertion):
     def find(self, trials: Trials, design: Design, alpha: float) -> Finding:
         """Run the three exact tests."""
         above, below = self.above.sample(trials), self.below.sample(trials)
-        tests = compare(above.values, below.values, design.a12_margin)
+        tests = GreaterTests(above.values, below.values, design.a12_margin)
         detail = (
             f"at least as high in {tests.wins} of {tests.pairs} seed pairs "
             f"(p = {tests.margin.p:.3g} against A12 >= {design.a12_margin:g})"

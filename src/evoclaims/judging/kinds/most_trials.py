@@ -58,7 +58,9 @@ class MostTrials(Assertion):
             (sample,),
             detail=f"holds in {k} of {n} trials, against p0 = {self._null(design):g}",
             bounds=(Bound("p0", self._null(design)),),
-            intervals=(Interval("P(event), Clopper-Pearson, each end at 0.05", *clopper_pearson(k, n), on_axis=True),),
+            intervals=lambda: (
+                Interval("P(event), Clopper-Pearson, each end at 0.05", *clopper_pearson(k, n), on_axis=True),
+            ),
             events=True,
         )
 

@@ -13,10 +13,10 @@ import numpy as np
 from evoclaims.judging.assertion import Assertion, Finding
 from evoclaims.judging.design import Design, Look
 from evoclaims.judging.exact import binomial_test, rank_attainable
-from evoclaims.judging.kinds.greater import compare
+from evoclaims.judging.kinds.greater import GreaterTests
 from evoclaims.judging.reading import NumberReading
 from evoclaims.judging.sample import Trials
-from evoclaims.judging.verdict import Outcome, PValues
+from evoclaims.judging.verdict import PValues
 
 MOST_SPLITS = math.comb(10, 5)
 SPLIT_SEED = 20250714
@@ -56,8 +56,8 @@ class SelfComparison(Assertion):
         for half in _halves(n):
             chosen = set(half)
             rest = [value for index, value in enumerate(sample.values) if index not in chosen]
-            comparison = compare([sample.values[index] for index in half], rest, design.a12_margin)
-            above += comparison.p.outcome(alpha) is Outcome.SUPPORTED
+            tests = GreaterTests([sample.values[index] for index in half], rest, design.a12_margin)
+            above += tests.support(alpha)
             judged += 1
         excessive = above / judged > alpha
         if math.comb(n, n // 2) > MOST_SPLITS:
