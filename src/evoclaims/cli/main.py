@@ -110,6 +110,26 @@ def _parser() -> argparse.ArgumentParser:
     )
     mutants.add_argument("--stored", action="store_true", help="run nothing: judge the trials that have run")
 
+    power = add("power", "say from a pilot how often each claim ends as expected; 1 when one does less than 0.95")
+    tier(power)
+    device(power)
+    power.add_argument("--only", metavar="CLAIMS", help="only these claims, by id or name, such as G1,S2[cma_es]")
+    power.add_argument(
+        "--run",
+        action="store_true",
+        help="first run the trials of missing pilots, and write them; commit what it writes",
+    )
+    power.add_argument("--stored", action="store_true", help="first write missing pilots from trials that have run")
+    power.add_argument("--trials", type=int, default=50, metavar="N", help="trials per condition of a new pilot (50)")
+    power.add_argument(
+        "--first-seed",
+        type=int,
+        default=100,
+        metavar="SEED",
+        help="first seed of a new pilot, not one of the tier's (100)",
+    )
+    power.add_argument("--draws", type=int, default=1000, metavar="N", help="draws from the pilot (1000)")
+
     status = add("status", "show the verdicts that the stored trials give; run nothing")
     tier(status)
 

@@ -39,7 +39,7 @@ def main(options: argparse.Namespace) -> int:
         stored = [record for seed in seeds for record in store.records(TrialSpec(condition, seed).id)]
         if not stored:
             continue
-        results = _of_one_environment([*committed, *filter(is_final, stored)], condition, seeds, sizes[0])
+        results = of_one_environment([*committed, *filter(is_final, stored)], condition, seeds, sizes[0])
         size = max((size for size in sizes if size <= len(results)), default=0)
         needed = max(len(committed), sizes[0])
         if size < needed:
@@ -63,7 +63,7 @@ def main(options: argparse.Namespace) -> int:
     return 0
 
 
-def _of_one_environment(
+def of_one_environment(
     records: Sequence[TrialResult], condition: Condition, seeds: Sequence[int], needed: int
 ) -> list[TrialResult]:
     """Return trials of the first seeds, made by one environment: this one if it has enough, else the newest.

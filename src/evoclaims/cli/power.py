@@ -1,0 +1,145 @@
+"""`evoclaims power`: with which probability each claim of a tier ends as it is expected to, from a pilot."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Mapping, Sequence
+
+from rich.markup import escape
+from rich.table import Table
+
+from evoclaims.claims.fetching import RunMissing, StoredOnly
+from evoclaims.claims.power import Asserted, ClaimPower, Listening, Names, Pilots, asserted, only
+from evoclaims.cli.project import Project, open_project
+from evoclaims.cli.reference import of_one_environment
+from evoclaims.cli.run import run_each
+from evoclaims.cli.terminal import styled, terminal
+from evoclaims.core.errors import UserError
+from evoclaims.core.packages import recorded
+from evoclaims.judging.counting import MAX_TRIALS
+from evoclaims.judging.design import Design
+from evoclaims.report import power_cells
+from evoclaims.report.console import PlainSpokenConsole
+from evoclaims.report.live_line import LiveLine
+from evoclaims.trials.spec import Condition, TrialSpec
+from evoclaims.trials.time_limit import is_final
+from evoclaims.verdicts.versions import change
+
+
+def main(options: argparse.Namespace) -> int:
+    """Print the power of each claim; 1 when one is below 0.95 or cannot be told, or a condition failed."""
+    project = open_project(options.storage)
+    design = project.reproduction.tier(options.tier).design
+    if options.draws < 1:
+        raise UserError(f"--draws takes a number from 1 up, not {options.draws}.")
+    every = _claims(project, options.tier)
+    chosen = only(every, options.only)
+    pilots = Pilots(project.reproduction, options.tier, every)
+    wanted = {names: group.condition for one in chosen for names, group in one.groups.items()}
+    if options.run or options.stored:
+        _make(project, pilots, {names: one for names, one in wanted.items() if pilots.unfit(names)}, design, options)
+    powers = pilots.powers(chosen, options.draws)
+    if not any(one.power for one in powers):
+        told = "; ".join(power_cells.troubles(powers)[:1]) or "no claim has a test"
+        raise UserError(f"No power can be told at the {options.tier} tier: {told}. {_advice(options)}")
+    _print(powers, design.last.n)
+    for sentence in _versions(pilots, wanted):
+        print(sentence)
+    if power_cells.troubles(powers):
+        print(_advice(options), file=sys.stderr)
+    return int(not all(one.suffices for one in powers))
+
+
+def _claims(project: Project, tier: str) -> tuple[Asserted, ...]:
+    """Return the claims that have a test at a tier."""
+    store = project.archive.store
+    listening = Listening(project.reproduction, store, StoredOnly(project.archive))
+    (reports,) = project.judge_sessions([(listening, tier)])
+    return asserted(reports, listening.assertions)
+
+
+def _make(
+    project: Project,
+    pilots: Pilots,
+    wanted: Mapping[Names, Condition],
+    design: Design,
+    options: argparse.Namespace,
+) -> None:
+    """Make the pilots that are missing: run their trials unless they are stored, and write each that is complete."""
+    seeds = range(options.first_seed, options.first_seed + options.trials)
+    if not design.last.n <= options.trials <= MAX_TRIALS:
+        raise UserError(
+            f"--trials takes {design.last.n} (as many as a verdict looks at) to {MAX_TRIALS} trials a condition, not "
+            f"{options.trials}."
+        )
+    if set(seeds) & set(design.seeds(design.last.n)):
+        raise UserError(
+            f"The seeds {seeds[0]} to {seeds[-1]} are partly the {options.tier} tier's own ({design.first_seed} to "
+            f"{design.seeds(design.last.n)[-1]}), whose verdicts a pilot must not know: name others by --first-seed."
+        )
+    for condition in list(wanted.values())[:1]:  # an invalid seed is so for every condition: it is reported at once
+        _ = [TrialSpec(condition, seed) for seed in seeds]
+    if options.stored:
+        for names, condition in wanted.items():
+            _write(project, pilots, names, condition, seeds)
+        return
+    line = LiveLine(*terminal())
+    fetch = RunMissing(project.store, options.device, line, project.config.seconds(None))
+    if wanted:
+        fetch.check()
+    for names, condition in wanted.items():
+        named = [(f"{' on '.join(names)} ({options.tier})", condition)]
+        for _, _, results in run_each(named, seeds, fetch, line, project.config.root):
+            if results is not None:
+                _write(project, pilots, names, condition, seeds)
+
+
+def _write(project: Project, pilots: Pilots, names: Names, condition: Condition, seeds: Sequence[int]) -> None:
+    """Write a pilot from stored trials of one environment, if all of them are there."""
+    stored = [record for seed in seeds for record in project.store.records(TrialSpec(condition, seed).id)]
+    trials = of_one_environment([*filter(is_final, stored)], condition, seeds, len(seeds))
+    if not trials:
+        return
+    if len(trials) < len(seeds):
+        print(
+            f"left alone: {' on '.join(names)}: {len(trials)} of {len(seeds)} trials are stored, counted from seed "
+            f"{seeds[0]}, of one environment and not out of time"
+        )
+        return
+    print(f"wrote {pilots.write(names, trials)}: {len(trials)} trials")
+
+
+def _print(powers: Sequence[ClaimPower], n: int) -> None:
+    """Print the table, and what it means."""
+    console = PlainSpokenConsole(file=styled())
+    table = Table(box=None, pad_edge=False)
+    for heading in power_cells.HEADINGS:
+        name = heading == power_cells.HEADINGS[0]  # it alone is broken where the terminal is narrow
+        table.add_column(heading, justify="left" if name else "right", no_wrap=not name, overflow="fold")
+    for one in powers:
+        table.add_row(*map(escape, power_cells.cells(one)))
+    console.print(table)
+    for sentence in (*power_cells.about(powers, n), *power_cells.troubles(powers)):
+        console.print(escape(sentence), highlight=False)
+
+
+def _versions(pilots: Pilots, wanted: Mapping[Names, Condition]) -> list[str]:
+    """Say which pilots were made with other versions than are installed."""
+    by_change: dict[str, list[str]] = {}
+    for names, condition in wanted.items():
+        made = {} if pilots.unfit(names) else recorded(pilots.trials[names][0].provenance, condition.packages)
+        moved = change(made, condition.versions) if made else ""
+        if moved:
+            by_change.setdefault(moved, []).append(" on ".join(names))
+    return [
+        f"Made with other versions than are installed ({moved}): {', '.join(by_change[moved])}" for moved in by_change
+    ]
+
+
+def _advice(options: argparse.Namespace) -> str:
+    """Return the sentence that says how pilots are made."""
+    chosen = f" --tier {options.tier}" * (options.tier != "smoke") + f" --only {options.only}" * (
+        options.only is not None
+    )
+    return f"`evoclaims power{chosen} --run` runs and writes the pilots that are missing."

@@ -1,0 +1,172 @@
+"""Committed pilots: trials with other seeds than a tier's, in pilot/<tier>/<method>-<task>.jsonl of a reproduction.
+
+Only the numbers that claims read are kept. The first line has what all trials share, each other line is a trial.
+"""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, Final, NoReturn
+
+from msgspec import Struct, convert, json
+
+from evoclaims.core.canonical import canonical_json, content_hash
+from evoclaims.core.errors import UserError
+from evoclaims.core.files import read_file, write_atomically
+from evoclaims.core.printable import printable
+from evoclaims.judging.design import Design
+from evoclaims.judging.reading import TrialReading
+from evoclaims.judging.sample import UnreadableTrialError
+from evoclaims.trials.result import Status, TrialResult
+from evoclaims.trials.result_schema import Number, Vector
+from evoclaims.trials.spec import Condition
+
+SCHEMA: Final = 1
+
+_MEND: Final = "Restore the file from version control, or remove it and make it anew with `evoclaims power --run`."
+
+
+class _Shared(Struct):
+    """What the first line has: `provenances` are those of the trials, each of which has the number of its own."""
+
+    schema: int
+    seal: str
+    condition: str
+    spec: dict[str, Any]
+    provenances: list[dict[str, Any]]
+
+
+class _Trial(Struct):
+    """What the line of a trial has."""
+
+    seed: int
+    status: Status
+    provenance: int
+    metrics: dict[str, Number]
+    levels: dict[str, Vector]
+    curves: dict[str, Vector]
+
+
+def path_of(folder: Path, tier: str, method: str, task: str) -> Path:
+    """Return the path of the pilot of a method on a task, in the folder of a reproduction."""
+    return folder / "pilot" / tier / f"{method}-{task}.jsonl"
+
+
+def write(path: Path, trials: Collection[TrialResult], readings: Sequence[TrialReading]) -> None:
+    """Write what some readings read of the trials of a condition, in the order of seeds."""
+    kept = sorted((_kept(trial, readings) for trial in trials), key=lambda trial: trial.seed)
+    provenances = list({canonical_json(trial.provenance): dict(trial.provenance) for trial in kept}.values())
+    lines = [
+        {
+            "seed": trial.seed,
+            "status": trial.status,
+            "provenance": provenances.index(dict(trial.provenance)),
+            "metrics": trial.metrics,
+            "levels": trial.levels,
+            "curves": trial.curves,
+        }
+        for trial in kept
+    ]
+    spec = {name: value for name, value in kept[0].spec.items() if name != "seed"}
+    shared = {"schema": SCHEMA, "condition": kept[0].condition, "spec": spec, "provenances": provenances}
+    written = [canonical_json(line) for line in ({**shared, "seal": content_hash([shared, *lines])}, *lines)]
+    write_atomically(path, "".join(f"{line}\n" for line in written).encode("ascii"))
+
+
+def load(path: Path) -> tuple[TrialResult, ...]:
+    """Read a pilot as trials that have only the kept numbers; empty if there is no such file.
+
+    Raises:
+        UserError: when the file cannot be read, or is damaged or edited.
+    """
+    try:
+        first, *rest = map(json.decode, read_file(path).splitlines())
+        shared, trials = convert(first, _Shared), convert(rest, list[_Trial])
+        sealed = {name: value for name, value in first.items() if name != "seal"}
+        if shared.schema != SCHEMA:
+            _fail(path, f"its schema is {shared.schema} and this version of evoclaims reads schema {SCHEMA}")
+        if content_hash([sealed, *rest]) != shared.seal or content_hash(shared.spec) != shared.condition:
+            _fail(path, "its contents do not match its seal, so it was torn or edited")
+        return tuple(_result(shared, trial) for trial in trials)
+    except FileNotFoundError:
+        return ()
+    except OSError as error:
+        _fail(path, error.strerror or str(error))
+    except (ValueError, RecursionError, IndexError) as error:
+        _fail(path, str(error))
+
+
+def unfit(trials: Sequence[TrialResult], condition: Condition, design: Design, readings: Iterable[TrialReading]) -> str:
+    """Return a clause that says why trials are no pilot of a condition for some readings; empty if they are."""
+    if not trials:
+        return "it has not been made"
+    if trials[0].condition != condition.id:
+        return "it is of another condition, since method, task or budget have changed"
+    shared = {trial.seed for trial in trials} & set(design.seeds(design.last.n))
+    if shared:
+        return f"it has seeds of the tier's own trials ({', '.join(map(str, sorted(shared)))})"
+    if len(trials) < design.last.n:
+        return f"it has {len(trials)} trials and a verdict looks at {design.last.n}"
+    crashed = [str(trial.seed) for trial in trials if trial.status == "crashed"]
+    if crashed:
+        return f"its trials of the seeds {', '.join(crashed)} crashed"
+    try:
+        for reading in readings:
+            for trial in trials:
+                reading.of(trial)
+    except UnreadableTrialError as error:
+        return f"a claim reads what it lacks: {str(error).removesuffix('.')}"
+    return ""
+
+
+class _Noting(Mapping[str, Any]):
+    """Numbers by name that keeps those which are asked for."""
+
+    def __init__(self, numbers: Mapping[str, Any]) -> None:
+        self.asked: dict[str, Any] = {}
+        self._numbers = numbers
+
+    def __getitem__(self, name: str) -> Any:
+        self.asked[name] = self._numbers[name]
+        return self.asked[name]
+
+    def __iter__(self) -> Any:
+        return iter(self._numbers)
+
+    def __len__(self) -> int:
+        return len(self._numbers)
+
+
+def _kept(trial: TrialResult, readings: Iterable[TrialReading]) -> TrialResult:
+    """Return a trial with only those numbers that are read."""
+    metrics, levels, curves = map(_Noting, (trial.metrics, trial.levels, trial.curves))
+    for reading in readings:
+        with contextlib.suppress(UnreadableTrialError):  # `unfit` says so
+            reading.of(replace(trial, metrics=metrics, levels=levels, curves=curves))
+    return replace(trial, metrics=metrics.asked, levels=levels.asked, curves=curves.asked)
+
+
+def _result(shared: _Shared, trial: _Trial) -> TrialResult:
+    """Return a line as a trial."""
+    spec = {**shared.spec, "seed": trial.seed}
+    return TrialResult(
+        id=content_hash(spec),
+        condition=shared.condition,
+        spec=spec,
+        seed=trial.seed,
+        status=trial.status,
+        metrics={name: float(value) for name, value in trial.metrics.items()},
+        levels={name: tuple(map(float, values)) for name, values in trial.levels.items()},
+        curves={name: tuple(map(float, values)) for name, values in trial.curves.items()},
+        digest="",
+        timing={},
+        provenance=shared.provenances[trial.provenance],
+    )
+
+
+def _fail(path: Path, why: str) -> NoReturn:
+    """Raise the error of a file that is no pilot."""
+    raise UserError(f"{path} is no pilot: {printable(why).removesuffix('.')}. {_MEND}")
