@@ -89,7 +89,7 @@ class Session:
         design = self.design(tier)
         name = named(claim.id, case)
         try:
-            if self.variant and self._untouched(tier, assertion):
+            if self.leaves(tier, assertion):
                 raise NotStoredError(f"the variant {self.variant} changes none of its trials")
             verdict = judge(assertion, design, claim=name, tier=tier)
         except NotStoredError as error:
@@ -112,8 +112,10 @@ class Session:
             return located(complete, root)
         return save(succeeding(complete, root), root)
 
-    def _untouched(self, tier: str, assertion: Assertion) -> bool:
-        """Whether the protocol itself has all conditions that an assertion is about."""
+    def leaves(self, tier: str, assertion: Assertion) -> bool:
+        """Whether there is a variant, and the protocol itself has all conditions that an assertion is about."""
+        if not self.variant:
+            return False
         plain = self.reproduction.tier(tier)
         groups = [source for source in assertion.sources() if isinstance(source, TrialGroup)]
         return all(plain.condition(group.method, group.task).id == group.fingerprint for group in groups)

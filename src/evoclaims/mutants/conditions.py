@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 from evoclaims.mutants.mutant import Mutant
 from evoclaims.paper.variant import Conditions
@@ -88,11 +87,7 @@ def sharing_programs(asked: Iterable[Job], sound: Conditions) -> list[list[Job]]
 
     One process runs a group, so that no two compile the same program at the same time.
     """
-    groups: dict[Any, list[Job]] = defaultdict(list)
+    groups: dict[tuple[str, str], list[Job]] = defaultdict(list)
     for one in asked:
-        condition = sound[one.names]
-        method, task = condition.plain["method"], condition.task
-        kind = type(task).__qualname__, task.action_size, task.levels, task.horizon
-        mutant = one.fault.rpartition(": ")[2]
-        groups[mutant, str(method), condition.progression, condition.budget, kind].append(one)
+        groups[one.fault.rpartition(": ")[2], sound[one.names].programs].append(one)
     return list(groups.values())

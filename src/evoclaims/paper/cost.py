@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import time
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import jax
 import numpy as np
@@ -56,18 +57,58 @@ def known_pace(
     trials = [trial for trial in stored if trial is not None and is_final(trial)]
     committed = references.load(references.path_of(folder, tier, method, task))
     trials += [trial for trial in committed if trial.condition == condition.id]
+    batch = _largest_batch(trial for trial in trials if _device(trial).get("kind") == kind)
+    if not batch:
+        return None
+    took, steps = Took.of(batch), [trial.metrics["steps"] for trial in batch]
+    work = sum(steps) if took.layout == "alone" else max(steps)
+    return Pace(took.run / max(work, 1), took.compile, took.layout)
+
+
+@dataclass(frozen=True)
+class Took:
+    """How long a batch of trials took, as its records say.
+
+    Attributes:
+        compile, run: seconds.
+        trials: how many there were.
+        layout: see `program.over_trials`.
+    """
+
+    compile: float
+    run: float
+    trials: int
+    layout: str
+
+    @staticmethod
+    def of(batch: Sequence[TrialResult]) -> Took:
+        """Read the records of a batch, at least one."""
+        compiling, running = (max(float(trial.timing[name]) for trial in batch) for name in ("compile", "run"))
+        return Took(compiling, running, len(batch), layout_on(str(_device(batch[0])["platform"])))
+
+    def seconds(self, trials: int) -> float:
+        """Return about how long so many trials of the same condition take."""
+        return self.compile + self.run * (trials / self.trials if self.layout == "alone" else 1)
+
+
+def took(trials: Iterable[TrialResult], platform: str) -> Took | None:
+    """Return how long the largest batch among trials of one condition took on a platform; None if there is none."""
+    batch = _largest_batch(trial for trial in trials if _device(trial).get("platform") == platform)
+    return Took.of(batch) if batch else None
+
+
+def _largest_batch(trials: Iterable[TrialResult]) -> list[TrialResult]:
+    """Return the trials of the largest batch that came to an end; none if there is none."""
     batches: dict[str, list[TrialResult]] = defaultdict(list)
     for trial in trials:
-        if trial.status in COMPLETE and (trial.provenance.get("device") or {}).get("kind") == kind:
+        if trial.status in COMPLETE:
             batches[str(trial.timing["started"])].append(trial)
-    if not batches:
-        return None
-    batch = max(batches.values(), key=len)
-    layout = layout_on(str(batch[0].provenance["device"]["platform"]))
-    steps = [trial.metrics["steps"] for trial in batch]
-    seconds = max(float(trial.timing["run"]) for trial in batch)
-    work = sum(steps) if layout == "alone" else max(steps)
-    return Pace(seconds / max(work, 1), max(float(trial.timing["compile"]) for trial in batch), layout)
+    return max(batches.values(), key=len, default=[])
+
+
+def _device(trial: TrialResult) -> Mapping[str, Any]:
+    """Return what a record says about its device; nothing for old records."""
+    return trial.provenance.get("device") or {}
 
 
 def measured_pace(condition: Condition, devices: Sequence[jax.Device]) -> Pace:

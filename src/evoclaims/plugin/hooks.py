@@ -14,8 +14,10 @@ import pytest
 from evoclaims.core.errors import UnknownNameError, UserError
 from evoclaims.core.printable import shown
 from evoclaims.plugin import options
+from evoclaims.plugin.distribution import Distribution, prepare
 from evoclaims.plugin.options import TIERS
-from evoclaims.plugin.run_session import LINE, make_session
+from evoclaims.plugin.progress import QUIET, ProgressLine, progress_of
+from evoclaims.plugin.run_session import make_session
 from evoclaims.plugin.summary import ATTRIBUTE, TROUBLE, Summary
 from evoclaims.trials.allowance import end_without
 
@@ -46,6 +48,9 @@ def pytest_configure(config: pytest.Config) -> None:
         config.addinivalue_line("markers", line)
     if not hasattr(config, "workerinput"):  # an xdist worker leaves the summary to its controller
         config.pluginmanager.register(Summary(config), "claims-summary")
+        config.pluginmanager.register(Distribution(config), "claims-distribution")
+        if config.pluginmanager.has_plugin("terminalreporter") and config.get_verbosity() > QUIET:
+            config.pluginmanager.register(ProgressLine(config), "claims-progress")
     options.check(config)
 
 
@@ -112,12 +117,14 @@ def _refuse(config: pytest.Config, items: list[pytest.Item], error: UserError) -
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_finish(session: pytest.Session) -> None:
-    """Check before the first trial that claims can be judged."""
+    """Check before the first trial that claims can be judged, and put them in order."""
     config = session.config
     if not any(item.get_closest_marker("claim") for item in session.items) or config.option.collectonly:
         return
+    from evoclaims.claims.collected import claim_tests
+
     try:
-        make_session(config)
+        prepare(session, make_session(config), claim_tests(session.items))
     except UserError as error:
         _refuse(config, session.items, error)
 
@@ -177,7 +184,7 @@ def verdict(request: pytest.FixtureRequest, claim_tier: str) -> Verdicts:
     from evoclaims.claims.session import Verdicts
 
     session, test = make_session(request.config), ClaimTest.of(request.node)
-    line = request.config.stash.get(LINE, None)
+    line = progress_of(request.config)
 
     def settle(assertion: Any) -> ClaimReport:
         try:

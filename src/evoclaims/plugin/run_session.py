@@ -12,16 +12,13 @@ from typing import TYPE_CHECKING
 import pytest
 
 from evoclaims.core.errors import UserError
+from evoclaims.plugin.progress import progress_of
 
 if TYPE_CHECKING:
     from evoclaims.claims.session import Session
-    from evoclaims.report.live_line import LiveLine
 
 SESSION: pytest.StashKey[Session] = pytest.StashKey()
 """Where a run keeps its session; if another one is put there, it judges the claims that follow."""
-
-LINE: pytest.StashKey[LiveLine] = pytest.StashKey()
-"""Where a run that writes to a terminal keeps its progress line."""
 
 
 def make_session(config: pytest.Config) -> Session:
@@ -36,18 +33,15 @@ def make_session(config: pytest.Config) -> Session:
     from evoclaims.claims.session import Session
     from evoclaims.paper.archive import Archive
     from evoclaims.paper.config import load_config, load_reproduction
-    from evoclaims.plugin.terminal import uncaptured
-    from evoclaims.report.live_line import LiveLine
     from evoclaims.trials import devices
     from evoclaims.trials.progress import ignore
     from evoclaims.trials.store import Store
 
     devices.configure()
     store = Store(_storage(config))
-    line = LiveLine(*uncaptured(config)) if config.pluginmanager.has_plugin("terminalreporter") else None
     project = load_config(config.rootpath)
     limit, any_version = project.seconds(config.getoption("claims_time_limit")), config.getoption("claims_any_version")
-    run = RunMissing(store, config.getoption("claims_device"), line or ignore, limit, any_version)
+    run = RunMissing(store, config.getoption("claims_device"), progress_of(config) or ignore, limit, any_version)
     reproduction = load_reproduction(project)
     read = StoredOnly(Archive(store, reproduction.references if config.getoption("claims_committed") else None))
     fetch = read if config.getoption("claims_stored") else run
@@ -58,8 +52,6 @@ def make_session(config: pytest.Config) -> Session:
     _ = made.mutants  # a damaged file is told before the first trial
     fetch.check()
     config.stash[SESSION] = made
-    if line is not None:
-        config.stash[LINE] = line
     return made
 
 

@@ -78,6 +78,10 @@ class Summary:
         (for example, all are skipped), so that nothing was measured.
         """
         refused = bool(self._troubles)
+        if self.reports:  # they come in the order in which they were judged
+            from evoclaims.report import table_cells
+
+            self.reports = table_cells.ordered(self.reports)
         for finish in (
             self._compare,
             self._compare_with_predecessors,

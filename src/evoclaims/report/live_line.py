@@ -1,4 +1,4 @@
-"""A progress line of a run: rewritten in place on a terminal, printed now and then in a log.
+"""A progress line of a run: rewritten in place on a terminal, printed once a minute in a log.
 
 Rich's live displays write nothing to a log before they end, and hide the cursor, which a killed process leaves hidden.
 """
@@ -9,15 +9,19 @@ import time
 from collections.abc import Callable
 from typing import Final
 
+from evoclaims.claims.overview import Overview
 from evoclaims.core.printable import printable
 from evoclaims.trials.progress import RunProgress
 
-LOG_SECONDS: Final = 10.0
-"""Least time between two lines of a log about the same condition."""
+LOG_SECONDS: Final = 60.0
+"""Least time between two lines of a log."""
+
+REWRITE_SECONDS: Final = 0.5
+"""Least time between two states of the line on a terminal."""
 
 
 class LiveLine:
-    """A watcher of runs that draws the progress line."""
+    """Draws the progress line; as a watcher of runs, it describes the one that it is told of."""
 
     def __init__(
         self, write: Callable[[str], None], columns: int | None, clock: Callable[[], float] = time.monotonic
@@ -25,28 +29,29 @@ class LiveLine:
         """Draw with `write`: in place on a terminal of `columns` columns, or as a log if None."""
         self._write = write
         self._width = None if columns is None else max(columns - 1, 20)
+        self._seconds = LOG_SECONDS if columns is None else REWRITE_SECONDS
         self._clock = clock
-        self._shown = ("", "")
-        self._at = -LOG_SECONDS
+        self._at = -self._seconds
         self._open = False
 
     def __call__(self, progress: RunProgress) -> None:
-        """Show the newest state."""
-        if self._width is not None:
-            start = "\r" if self._open else "\n"
-            self._write(start + describe(progress)[: self._width].ljust(self._width))
-            self._open = True
+        """Show the newest state of a run."""
+        self.show(lambda: describe(progress), progress.remark)
+
+    def show(self, text: Callable[[], str], at_once: bool = False) -> None:
+        """Show what `text` returns, unless the line was rewritten just now; `at_once` shows it even so."""
+        if not at_once and self._clock() - self._at < self._seconds:
             return
-        step = (progress.condition, progress.phase)
-        finished = progress.trials > 0 and progress.ended == progress.trials
-        if step != self._shown or finished or self._clock() - self._at >= LOG_SECONDS:
-            self._write(("" if self._open else "\n") + f"  {describe(progress)}\n")
-            self._shown, self._at, self._open = step, self._clock(), True
+        said, self._at = text(), self._clock()
+        start = "" if self._open and self._width is None else "\r" if self._open else "\n"
+        self._write(start + (f"  {said}\n" if self._width is None else said[: self._width].ljust(self._width)))
+        self._open = True
 
     def close(self) -> None:
         """Leave the line, so that other output starts on a fresh one."""
         if self._open and self._width is not None:
             self._write("\r" + " " * self._width + "\r")
+            self._at = -self._seconds  # what is gone is drawn again as soon as there is something to tell
         self._open = False
 
 
@@ -61,6 +66,26 @@ def describe(progress: RunProgress) -> str:
         f"step {progress.steps:,}/{progress.total_steps:,}, "
         f"level {progress.level} of {progress.levels - 1}, best {progress.best:.3f}{left}"
     )
+
+
+def describe_all(overview: Overview) -> str:
+    """Return the line of a run of claims: claims, trials, time left, and what is running.
+
+    Several batches are told in few words each, so that all have room.
+    """
+    left = "" if overview.seconds_left is None else f", about {duration(overview.seconds_left)} left"
+    now = [one.progress for one in overview.running]
+    said = [describe(now[0])] if len(now) == 1 else [_briefly(one) for one in now]
+    count = f"{overview.judged}/{overview.claims} claims, {overview.done:,}/{overview.trials:,} trials{left}"
+    return "; ".join([count, *said])
+
+
+def _briefly(progress: RunProgress) -> str:
+    """Return condition, trials and step."""
+    if progress.best is None:
+        return printable(f"{progress.condition}: {progress.phase}")
+    done = f"{progress.ended}/{progress.trials}, step {progress.steps:,}/{progress.total_steps:,}"
+    return printable(f"{progress.condition}: {done}")
 
 
 def duration(seconds: float) -> str:

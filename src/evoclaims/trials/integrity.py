@@ -153,7 +153,8 @@ def _leftovers(store: Store) -> Iterator[Problem]:
         if _quarantine(store) not in path.parents and _settled(path):
             yield Problem(path, "leftover", "its writer was stopped before the file was whole")
     for path in sorted((store.root / "running").glob("*")):
-        if not path.name.startswith(".") and _settled(path):  # a running process refreshes its notice
+        beside = (path, path.with_suffix(".lock"))  # a running process refreshes its notice
+        if not path.name.startswith(".") and all(_settled(one) for one in beside if one.exists()):
             yield Problem(path, "leftover", "the process that it announces is no longer at work")
 
 

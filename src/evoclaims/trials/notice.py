@@ -38,6 +38,17 @@ def notice_path(store_root: Path, condition_id: str) -> Path:
     return store_root / "running" / f"{condition_id}.lock"
 
 
+def progress_path(store_root: Path, condition_id: str) -> Path:
+    """Return the path of the progress beside a condition's notice (see `running`)."""
+    return notice_path(store_root, condition_id).with_suffix(".progress")
+
+
+def is_announced(store_root: Path, condition_id: str) -> bool:
+    """Whether a process says that it runs a condition, and has not ended as far as is known here."""
+    path = notice_path(store_root, condition_id)
+    return path.exists() and not _has_ended(_lease(path).owner)
+
+
 @contextlib.contextmanager
 def announced(
     store_root: Path,
@@ -83,11 +94,15 @@ def announced(
 
 
 def sweep(store_root: Path) -> None:
-    """Remove the notices of this machine's ended processes: no other process might ever look at them."""
+    """Remove the notices of this machine's ended processes, and what they told: nobody might ever look at them."""
     for path in sorted((store_root / "running").glob("*.lock")):
         lease = _lease(path)
         if _has_ended(lease.owner):
             lease.force_break()
+    for path in sorted((store_root / "running").glob("*.progress")):
+        with contextlib.suppress(OSError):
+            if not path.with_suffix(".lock").exists():
+                path.unlink(missing_ok=True)
 
 
 def _lease(path: Path) -> filelock.SoftFileLease:

@@ -18,6 +18,7 @@ class RunProgress:
         best: highest success on `level`; None before the first report.
         level: highest current level of any trial, of `levels`.
         seconds_left: estimate for the batch; None while unknown.
+        remark: whether the phase is a remark of its own, which is told once and not passed over.
     """
 
     condition: str
@@ -30,6 +31,7 @@ class RunProgress:
     level: int = 0
     levels: int = 0
     seconds_left: float | None = None
+    remark: bool = False
 
 
 Watcher = Callable[[RunProgress], None]

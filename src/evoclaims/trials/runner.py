@@ -8,6 +8,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
+from functools import partial
 from typing import Any, Final
 
 import jax
@@ -26,6 +27,7 @@ from evoclaims.trials.program import Report
 from evoclaims.trials.progress import RunProgress, Watcher, ignore
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.result_making import curve_point, make_result, make_timeout
+from evoclaims.trials.running import shared
 from evoclaims.trials.spec import Condition, TrialSpec
 from evoclaims.trials.store import Store
 from evoclaims.trials.time_limit import is_final
@@ -65,14 +67,20 @@ def run(
     wanted = list(dict.fromkeys(seeds))
     while not stored.answer(found := [stored.get(seed) for seed in wanted]):
         store.check_writable()
-        with announced(store.root, condition.id, lambda text: watch(RunProgress(condition.label, text, len(seeds)))):
+        waits = partial(_tell_of_waiting, condition, len(seeds), watch)
+        with announced(store.root, condition.id, waits), shared(store.root, condition.id, watch) as tell:
             owed = [seed for seed in wanted if stored.lacks(seed)]  # another process may have stored some meanwhile
-            one = Run(Lanes(condition, devices), stored, watch, checkpoint_seconds, time_limit)
+            one = Run(Lanes(condition, devices), stored, tell, checkpoint_seconds, time_limit)
             with single_threaded_linear_algebra(), _memory_told(condition, len(owed)):
                 for header, begin in batches(one, owed):
                     _finish(one, header, begin)
     drop_finished_checkpoints(stored)
     return [result for result in found if result is not None]
+
+
+def _tell_of_waiting(condition: Condition, trials: int, watch: Watcher, text: str) -> None:
+    """Report that another process runs the condition."""
+    watch(RunProgress(condition.label, text, trials))
 
 
 @contextmanager
@@ -188,7 +196,7 @@ def _give_up(run: Run, header: Header) -> None:
     ]
     for spec in owed:
         run.store.put(make_timeout(spec, header.curves[str(spec.seed)], timing, run.lanes.devices), {})
-    run.watch(RunProgress(run.condition.label, f"out of time after {run.time_limit:g} s", len(owed)))
+    run.watch(RunProgress(run.condition.label, f"out of time after {run.time_limit:g} s", len(owed), remark=True))
 
 
 def _timing(run: Run, header: Header) -> dict[str, Any]:
@@ -204,7 +212,7 @@ def _timing(run: Run, header: Header) -> dict[str, Any]:
 def _tell_of_difference(run: Run, seed: int) -> None:
     """Report that another process has stored the trial meanwhile, with other bits than here."""
     text = f"seed {seed} is stored already and came out differently here: the first record stays"
-    run.watch(RunProgress(run.condition.label, text, 1))
+    run.watch(RunProgress(run.condition.label, text, 1, remark=True))
     _log.warning("%s: %s.", run.condition.label, text)
 
 

@@ -76,6 +76,13 @@ class Condition:
         return installed(self.packages)
 
     @property
+    def programs(self) -> str:
+        """What conditions have in common that probably share compiled programs: all but the numbers of the task."""
+        task = self.task
+        kind = type(task).__qualname__, task.action_size, task.levels, task.horizon
+        return str((self.plain["method"], self.progression, self.budget, kind))
+
+    @property
     def label(self) -> str:
         """A short name for progress lines and tables, such as "cma_es on n_parity"."""
         suffix = {"curriculum": "", "direct": " (direct)", "whole_budget": ""}[self.progression]

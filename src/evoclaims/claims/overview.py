@@ -1,0 +1,103 @@
+"""How far a run of claims is: read from the store, whichever processes run its trials."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterable, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+from evoclaims.claims.workload import Workload, scale_of
+from evoclaims.trials.running import Running, running
+from evoclaims.trials.store import DamagedFileError, Store
+
+
+@dataclass(frozen=True)
+class Overview:
+    """How far a run of claims is.
+
+    Attributes:
+        judged: claims, of `claims`.
+        done: trials in the store, of the `trials` that the claims need at most.
+        running: the batches under way.
+        seconds_left: about how long the run will still take; None where no timing on this machine tells.
+    """
+
+    judged: int
+    claims: int
+    done: int
+    trials: int
+    running: Sequence[Running]
+    seconds_left: float | None
+
+
+class Watching:
+    """Looks now and then how far a run is."""
+
+    def __init__(self, load: Workload, workers: int) -> None:
+        """Begin with what was known before the run."""
+        self._load = load
+        self._workers = workers
+        self._store = Store(Path(load.storage))
+        self._waiting = set(load.claims)
+        self._missing = {name: list(work.missing) for name, work in load.conditions.items()}
+        self._took = {name: (work.here, work.elsewhere) for name, work in load.conditions.items()}
+
+    def judged(self, claim: str) -> None:
+        """Note that a claim has been judged."""
+        self._waiting.discard(claim)
+
+    def look(self) -> Overview:
+        """Look into the store."""
+        conditions = self._load.conditions
+        for name, files in self._missing.items():
+            left = [file for file in files if not (self._store.root / file).exists()]
+            if files and not left:
+                self._learn(name)
+            self._missing[name] = left
+        owed = {name for claim in self._waiting for name in self._load.claims[claim] if self._missing[name]}
+        done = sum(work.stored + len(work.missing) - len(self._missing[name]) for name, work in conditions.items())
+        now = running(self._store.root)
+        return Overview(
+            judged=len(self._load.claims) - len(self._waiting),
+            claims=len(self._load.claims),
+            done=done,
+            trials=done + sum(len(self._missing[name]) for name in owed),
+            running=now,
+            seconds_left=self._seconds_left(owed, {one.condition: one for one in now}),
+        )
+
+    def _learn(self, name: str) -> None:
+        """Note how long a condition took, whose last trial has been stored."""
+        with suppress(DamagedFileError):
+            record = self._store.read(self._store.root / self._load.conditions[name].missing[-1])
+            if record is not None:
+                spent = float(record.timing["compile"]) + float(record.timing["run"])
+                self._took[name] = spent, self._took[name][1]
+
+    def _seconds_left(self, owed: Iterable[str], now: dict[str, Running]) -> float | None:
+        """Return how long the workers will still take; None where nothing tells it of a condition that is owed."""
+        scale = scale_of(self._took.values())
+        left = [remaining(self._took[name], scale, now.get(name)) for name in owed]
+        known = [one for one in left if one is not None]
+        if not known or len(known) < len(left):
+            return None
+        return max(sum(known) / min(self._workers, len(known)), *known)
+
+
+def remaining(took: tuple[float | None, float | None], scale: float | None, now: Running | None) -> float | None:
+    """Return about how many seconds a condition will still take; None where no timing on this machine tells.
+
+    Args:
+        took: the condition's seconds here and elsewhere, as far as they are known.
+        scale: how many times as long conditions take here as elsewhere; None while unknown.
+        now: the batch, if it is running: its own speed tells most.
+    """
+    if now is not None and now.progress.seconds_left is not None:
+        return now.progress.seconds_left
+    here, elsewhere = took
+    if here is None and (scale is None or elsewhere is None):
+        return None
+    whole = here if here is not None else (elsewhere or 0.0) * (scale or 0.0)
+    return whole if now is None else max(whole - (time.time() - now.since), 0.0)

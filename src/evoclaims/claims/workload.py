@@ -1,0 +1,169 @@
+"""What a run of claims has to do: the conditions that each claim needs, and what is known of how long they take."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from statistics import median
+
+import pytest
+
+from evoclaims.claims.claim import gap_of
+from evoclaims.claims.collected import ClaimTest
+from evoclaims.claims.fetching import NotStoredError, RunMissing
+from evoclaims.claims.needs import asked_for
+from evoclaims.claims.session import Session
+from evoclaims.core.errors import UserError
+from evoclaims.core.provenance import machine_class
+from evoclaims.paper import references
+from evoclaims.paper.cost import took
+from evoclaims.paper.trial_group import TrialGroup
+from evoclaims.trials import devices
+from evoclaims.trials.batches import StoredTrials
+from evoclaims.trials.result import TrialResult
+from evoclaims.trials.spec import Condition, TrialSpec
+from evoclaims.trials.store import DamagedFileError, Store
+
+
+@dataclass(frozen=True)
+class Work:
+    """A condition that claims of a run need.
+
+    Attributes:
+        label: its short name.
+        programs: what it has in common with conditions that probably share its compiled programs.
+        environment_steps: of the missing trials, at most.
+        stored: how many of its trials need not be run.
+        missing: files of the records of those that must be run, below the store's folder.
+        here: seconds that the missing trials will take, by stored trials of this machine; None where there are none.
+        elsewhere: the same by the committed reference trials, whatever machine they were made on.
+    """
+
+    label: str
+    programs: str
+    environment_steps: int
+    stored: int
+    missing: tuple[str, ...]
+    here: float | None
+    elsewhere: float | None
+
+
+@dataclass(frozen=True)
+class Workload:
+    """The claims of a run, and the conditions that they need.
+
+    Attributes:
+        storage: the store's folder.
+        claims: ids of the conditions that each claim needs, by the name of its test; empty where nothing is known.
+        conditions: by id.
+    """
+
+    storage: str
+    claims: Mapping[str, tuple[str, ...]]
+    conditions: Mapping[str, Work]
+
+
+def workload(session: Session, tests: Mapping[pytest.Item, ClaimTest]) -> Workload | None:
+    """Return what a run of these claim tests has to do; None for a session that runs nothing."""
+    if not isinstance(session.fetch, RunMissing):
+        return None
+    platform = devices.choose(session.fetch.device)[0].platform
+    claims, works = dict[str, tuple[str, ...]](), dict[str, Work]()
+    for item, test in tests.items():
+        claims[item.nodeid] = ()
+        with suppress(Exception):  # what is wrong with a method or a task is told when the claim is judged
+            groups = {group.fingerprint: group for group in _needed(session, item, test)}
+            for condition_id in groups.keys() - works.keys():
+                works[condition_id] = _work(session, session.fetch, test.tier, groups[condition_id], platform)
+            claims[item.nodeid] = tuple(groups)
+    return Workload(str(session.store.root.resolve()), claims, works)
+
+
+def weights(works: Iterable[Work]) -> dict[Work, float]:
+    """Return about how many seconds each condition takes, as far as it can be guessed, to tell long from short ones.
+
+    Where no trial tells, its environment steps do, at the middle pace of the others.
+    """
+    works = list(works)
+    scale = scale_of((work.here, work.elsewhere) for work in works) or 1.0
+    known = {work: _known(work, scale) for work in works if work.missing}
+    paces = [took / work.environment_steps for work, took in known.items() if took and work.environment_steps]
+    pace = median(paces) if paces else 1e-6
+    return dict.fromkeys(works, 0.0) | {
+        work: work.environment_steps * pace if took is None else took for work, took in known.items()
+    }
+
+
+def scale_of(pairs: Iterable[tuple[float | None, float | None]]) -> float | None:
+    """Return how many times as long conditions take here as elsewhere, from those known for both; None without any."""
+    both = [(here, elsewhere) for here, elsewhere in pairs if here and elsewhere]
+    return sum(here for here, _ in both) / sum(elsewhere for _, elsewhere in both) if both else None
+
+
+def _known(work: Work, scale: float) -> float | None:
+    """Return the seconds that trials of a condition tell."""
+    if work.here is not None:
+        return work.here
+    return None if work.elsewhere is None else work.elsewhere * scale
+
+
+def _needed(session: Session, item: pytest.Item, test: ClaimTest) -> Sequence[TrialGroup]:
+    """Return the trials that a claim needs."""
+    if gap_of(item, test.tier):
+        return ()
+
+    def group(method: str, task: str) -> TrialGroup:
+        known = session.group(method, task, test.tier)
+        return type(known)(method, task, known.condition, _never)
+
+    groups, assertion = asked_for(item, test.tier, group)
+    return () if assertion is not None and session.leaves(test.tier, assertion) else groups
+
+
+def _never(condition: Condition, seeds: Sequence[int]) -> Sequence[TrialResult]:
+    """Have no trials."""
+    raise NotStoredError(f"{condition.label} is not run yet")
+
+
+def _work(session: Session, fetch: RunMissing, tier: str, group: TrialGroup, platform: str) -> Work:
+    """Look up what is known of a condition."""
+    condition, versions, design = group.condition, group.condition.versions, session.design(tier)
+    seeds = design.seeds(design.last.n)
+    stored = StoredTrials(session.store, condition, fetch.any_version, fetch.time_limit)
+    missing = [seed for seed in seeds if _lacks(stored, seed)]
+    here = elsewhere = None
+    if missing:
+        here = took(_made_here(session.store, condition, seeds), platform)
+        with suppress(UserError):  # what is wrong with the reference trials is told at the end of the run
+            folder = session.reproduction.references_of(session.variant)
+            trials = references.load(references.path_of(folder, tier, group.method, group.task))
+            elsewhere = took((one for one in trials if one.condition == condition.id), platform)
+    files = (session.store.record_path(TrialSpec(condition, seed).id, versions) for seed in missing)
+    return Work(
+        label=condition.label,
+        programs=condition.programs,
+        environment_steps=condition.environment_steps * len(missing),
+        stored=len(seeds) - len(missing),
+        missing=tuple(str(path.relative_to(session.store.root)) for path in files),
+        here=None if here is None else here.seconds(len(missing)),
+        elsewhere=None if elsewhere is None else elsewhere.seconds(len(missing)),
+    )
+
+
+def _lacks(stored: StoredTrials, seed: int) -> bool:
+    """Whether a trial must be run; one whose record is damaged is not."""
+    try:
+        return stored.lacks(seed)
+    except DamagedFileError:
+        return False
+
+
+def _made_here(store: Store, condition: Condition, seeds: Sequence[int]) -> Iterator[TrialResult]:
+    """Return a condition's stored trials of this kind of machine, made with any versions."""
+    machine = machine_class()
+    for seed in seeds:
+        with suppress(DamagedFileError):
+            for record in store.records(TrialSpec(condition, seed).id):
+                if record.provenance.get("machine") == machine:
+                    yield record

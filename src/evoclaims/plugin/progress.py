@@ -1,0 +1,124 @@
+"""The progress line of a run, in the process that writes the output: xdist's controller, or the only process.
+
+Nothing heavy is imported here at the top: pytest loads this file in every run of an environment that has evoclaims.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Generator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any, Final
+
+import pytest
+
+if TYPE_CHECKING:
+    from evoclaims.claims.overview import Watching
+    from evoclaims.claims.workload import Workload
+    from evoclaims.report.live_line import LiveLine
+    from evoclaims.trials.progress import RunProgress
+
+TICK_SECONDS: Final = 0.5
+"""Time between two looks at what xdist's workers do."""
+
+QUIET: Final = -2
+"""From this verbosity on (-qq), nothing is told of the progress."""
+
+
+def progress_of(config: pytest.Config) -> ProgressLine | None:
+    """Return the progress line of a run; None if the run shows none, or this process does not write its output."""
+    return config.pluginmanager.get_plugin("claims-progress")
+
+
+class ProgressLine:
+    """Shows how far the claims of a run are, between the results of its tests."""
+
+    def __init__(self, config: pytest.Config) -> None:
+        """Show nothing yet."""
+        self._config = config
+        self._line: LiveLine | None = None
+        self._watching: Watching | None = None
+        self._lock = threading.RLock()
+        self._stopped = threading.Event()
+        self._ticking: threading.Thread | None = None
+
+    def begin(self, load: Workload, workers: int, tick: bool) -> None:
+        """Begin to show how far a run is; with `tick`, now and then by itself, else whenever a run tells something."""
+        from evoclaims.claims.overview import Watching
+
+        self._watching = Watching(load, workers)
+        if tick and self._ticking is None:
+            self._ticking = threading.Thread(target=self._tick, daemon=True)
+            self._ticking.start()
+
+    def __call__(self, progress: RunProgress) -> None:
+        """Show the newest state of a run in this process: a watcher of it."""
+        from evoclaims.report.live_line import describe, describe_all
+
+        def text() -> str:
+            seen = self._watching.look() if self._watching else None
+            return describe_all(seen) if seen and seen.running and not progress.remark else describe(progress)
+
+        with self._lock:
+            self._made().show(text, progress.remark)
+
+    def close(self) -> None:
+        """Leave the line, so that other output starts on a fresh one."""
+        with self._lock:
+            if self._line is not None:
+                self._line.close()
+
+    def _made(self) -> LiveLine:
+        """Return the line, made when it is first needed."""
+        if self._line is None:
+            from evoclaims.plugin.terminal import uncaptured
+            from evoclaims.report.live_line import LiveLine
+
+            self._line = LiveLine(*uncaptured(self._config))
+        return self._line
+
+    def _tick(self) -> None:
+        """Show what the workers do, until the run ends."""
+        from evoclaims.report.live_line import describe_all
+
+        while not self._stopped.wait(TICK_SECONDS):
+            with self._lock:
+                if self._watching is not None and not self._stopped.is_set():
+                    seen = self._watching.look()
+                    if seen.running:
+                        self._made().show(lambda seen=seen: describe_all(seen))
+
+    @contextmanager
+    def _aside(self) -> Generator[None]:
+        """Keep the line away while pytest writes."""
+        with self._lock:
+            self.close()
+            yield
+
+    @pytest.hookimpl(wrapper=True, tryfirst=True)
+    def pytest_runtest_logstart(self) -> Generator[None, Any, Any]:
+        """Make room for what pytest writes."""
+        with self._aside():
+            return (yield)
+
+    @pytest.hookimpl(wrapper=True, tryfirst=True)
+    def pytest_runtest_logreport(self, report: pytest.TestReport) -> Generator[None, Any, Any]:
+        """Make room for what pytest writes, and count a claim that has been judged."""
+        with self._aside():
+            if self._watching is not None and (report.when == "call" or not report.passed):
+                self._watching.judged(report.nodeid)
+            return (yield)
+
+    @pytest.hookimpl(wrapper=True, tryfirst=True)
+    def pytest_runtest_logfinish(self) -> Generator[None, Any, Any]:
+        """Make room for what pytest writes."""
+        with self._aside():
+            return (yield)
+
+    @pytest.hookimpl(tryfirst=True)
+    def pytest_sessionfinish(self) -> None:
+        """Show nothing more."""
+        self._stopped.set()
+        self.close()
+        if self._ticking is not None:
+            self._ticking.join()

@@ -1,0 +1,74 @@
+"""What a running batch tells other processes: its progress, in a file beside its notice.
+
+These files are hints, as notices are: one that cannot be written or read costs a line of progress, and nothing else.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+import msgspec
+
+from evoclaims.trials.notice import is_announced, progress_path
+from evoclaims.trials.progress import RunProgress, Watcher
+
+WRITE_SECONDS: Final = 0.5
+"""Least time between two writings, unless the phase changes."""
+
+
+@dataclass(frozen=True)
+class Running:
+    """A batch that some process is running.
+
+    Attributes:
+        condition: id of its condition.
+        since: when that process began with the condition, in seconds of the epoch by its own clock.
+        progress: the newest.
+    """
+
+    condition: str
+    since: float
+    progress: RunProgress
+
+
+@contextlib.contextmanager
+def shared(store_root: Path, condition_id: str, watch: Watcher) -> Iterator[Watcher]:
+    """Give a watcher that passes on to `watch`, and tells other processes until the `with` block ends.
+
+    Args:
+        store_root: the store's folder.
+        condition_id: the condition that this process has announced.
+        watch: is told everything, too.
+    """
+    path, since = progress_path(store_root, condition_id), time.time()
+    written, phase = -WRITE_SECONDS, ""
+
+    def tell(progress: RunProgress) -> None:
+        nonlocal written, phase
+        if progress.phase != phase or time.monotonic() - written >= WRITE_SECONDS:
+            written, phase = time.monotonic(), progress.phase
+            with contextlib.suppress(OSError):
+                path.write_bytes(msgspec.json.encode(Running(condition_id, since, progress)))
+        watch(progress)
+
+    try:
+        yield tell
+    finally:
+        with contextlib.suppress(OSError):
+            path.unlink(missing_ok=True)
+
+
+def running(store_root: Path) -> list[Running]:
+    """Return what processes that share a store are running, those that began first in front."""
+    found = []
+    for path in (store_root / "running").glob("*.progress"):
+        with contextlib.suppress(OSError, msgspec.DecodeError):  # it is being written, or gone by now
+            one = msgspec.json.decode(path.read_bytes(), type=Running)
+            if one.condition == path.stem and is_announced(store_root, one.condition):
+                found.append(one)
+    return sorted(found, key=lambda one: (one.since, one.condition))
