@@ -1,4 +1,4 @@
-"""The progress line: rewritten in place on a terminal, now and then in a log."""
+"""The progress line: rewritten in place on a terminal, once a minute in a log."""
 
 from __future__ import annotations
 
@@ -8,8 +8,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from evoclaims.report.live_line import LOG_SECONDS, LiveLine, describe, duration
+from evoclaims.claims.overview import Overview
+from evoclaims.report.live_line import LOG_SECONDS, REWRITE_SECONDS, LiveLine, describe, describe_all, duration
 from evoclaims.trials.progress import RunProgress
+from evoclaims.trials.running import Running
 
 WAITING = RunProgress("ppo on n_parity", "compiling", trials=3)
 TRAINING = RunProgress("ppo on n_parity", "training", 3, 1, 2000, 4000, 0.75, 1, 5, 200.0)
@@ -42,7 +44,9 @@ def test_the_line_says_condition_trials_step_level_best_and_time_left() -> None:
 
 def test_a_terminal_shows_one_line_of_its_own_that_is_rewritten_and_wiped_at_the_end() -> None:
     screen = Screen()
-    screen.shown(WAITING, TRAINING)
+    screen.shown(WAITING)
+    screen.now = REWRITE_SECONDS
+    screen.shown(TRAINING)
     assert screen.text[0] == "\n"
     assert "\n" not in screen.text[1:]
     frames = screen.text[1:].split("\r")
@@ -72,31 +76,61 @@ def test_closing_a_line_twice_or_before_it_opened_writes_nothing() -> None:
         assert screen.text == before
 
 
-def test_a_log_gets_a_line_for_each_step_of_a_run_and_then_one_every_few_seconds() -> None:
+def test_a_terminal_is_not_written_to_more_often_than_anyone_reads_nor_for_nothing() -> None:
+    screen = Screen()
+    screen.shown(TRAINING)
+    before = screen.text
+    screen.shown(WAITING)
+    assert screen.text == before
+    screen.now = REWRITE_SECONDS
+    screen.shown(TRAINING)
+    assert screen.text == before
+    screen.now *= 2
+    screen.shown(WAITING)
+    assert screen.text != before
+
+
+def test_a_line_that_made_room_for_other_output_comes_back_at_once() -> None:
+    screen = Screen()
+    screen.shown(TRAINING)
+    screen.line.close()
+    assert screen.shown(TRAINING).count(describe(TRAINING)) == 2
+
+
+def test_a_log_gets_a_line_a_minute_and_remarks_at_once() -> None:
     screen = Screen(None)
+    remark = replace(WAITING, phase="out of time after 3 s", remark=True)
     for now, report, lines in (
         (0.0, WAITING, 1),
-        (0.0, TRAINING, 2),
-        (1.0, TRAINING, 2),
-        (LOG_SECONDS - 0.1, TRAINING, 2),
-        (LOG_SECONDS, TRAINING, 3),
-        (LOG_SECONDS + 1, replace(TRAINING, ended=3), 4),
-        (LOG_SECONDS + 1, replace(TRAINING, condition="another"), 5),
+        (0.0, TRAINING, 1),
+        (LOG_SECONDS - 0.1, TRAINING, 1),
+        (LOG_SECONDS, TRAINING, 2),
+        (LOG_SECONDS + 1, remark, 3),
+        (LOG_SECONDS + 2, replace(TRAINING, condition="another"), 3),
+        (3 * LOG_SECONDS, TRAINING, 4),
     ):
         screen.now = now
         screen.line(report)
-        assert screen.text.strip().count("\n") == lines - 1
+        assert screen.text.count("\n  ") == lines
+        screen.line.close()  # a verdict was written meanwhile
     assert "\r" not in screen.text
     assert screen.text.endswith("\n")
 
 
 def test_a_log_begins_on_a_line_of_its_own() -> None:
-    assert Screen(None).shown(WAITING, TRAINING).split("\n") == [
-        "",
-        f"  {describe(WAITING)}",
-        f"  {describe(TRAINING)}",
-        "",
-    ]
+    screen = Screen(None)
+    screen.shown(WAITING)
+    screen.now = LOG_SECONDS
+    assert screen.shown(TRAINING).split("\n") == ["", f"  {describe(WAITING)}", f"  {describe(TRAINING)}", ""]
+
+
+def test_the_line_of_claims_says_what_runs_how_much_is_done_and_when_it_will_end() -> None:
+    one = Overview(3, 63, 120, 1040, [Running("a" * 64, 0.0, TRAINING)], 700.0)
+    assert describe_all(one) == f"3/63 claims, 120/1,040 trials, about 11 min 40 s left; {describe(TRAINING)}"
+    two = replace(one, running=[*one.running, Running("b" * 64, 1.0, replace(WAITING, condition="neat"))])
+    assert describe_all(replace(two, seconds_left=None)) == (
+        "3/63 claims, 120/1,040 trials; ppo on n_parity: 1/3, step 2,000/4,000; neat: compiling"
+    )
 
 
 @pytest.mark.parametrize(

@@ -14,9 +14,9 @@ class Order(Generic[W]):
     """Chooses the next claim for a worker.
 
     The first claim is the one with trials that is judged soonest, so that a verdict is there early. Then come those
-    whose trials are there; then those that take longest, so that the workers end together, or, for one worker alone,
-    those that take the least. A worker that has begun with a condition keeps the claims on it, and on conditions that
-    share its compiled programs, while others have anything else to do.
+    whose trials are there; then those with the longest condition, and nothing besides it if possible, so that the
+    workers end together; or, for one worker alone, those that take the least. A worker that has begun with a condition
+    keeps the claims on it, and on conditions that share its compiled programs, while others have anything else to do.
     """
 
     def __init__(self, load: Workload, workers: int) -> None:
@@ -54,7 +54,7 @@ class Order(Generic[W]):
         """Note that a worker has died: another one may run what it had begun."""
         self._begun = {name: one for name, one in self._begun.items() if one != worker or name in self._ended}
 
-    def _rank(self, worker: W, claim: str) -> tuple[int, bool, float]:
+    def _rank(self, worker: W, claim: str) -> tuple[int, float, float]:
         """Return the place of a claim among those that a worker could judge next; the lowest comes first."""
         needs = self._needs[claim]
         new = self._new_seconds(needs)
@@ -64,7 +64,8 @@ class Order(Generic[W]):
             conflict = 1  # another one has the programs
         else:
             conflict = 0
-        return conflict, new > 0, new if self._alone else -new
+        longest = max((self._seconds[name] for name in needs if name not in self._begun), default=0.0)
+        return conflict, 0.0 if self._alone or not new else 1 / longest, new
 
     def _new_seconds(self, needs: Sequence[str]) -> float:
         """Return the seconds of what nobody has begun with."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from evoclaims.claims.workload import Workload, scale_of
@@ -58,7 +58,7 @@ class Watching:
             self._missing[name] = left
         owed = {name for claim in self._waiting for name in self._load.claims[claim] if self._missing[name]}
         done = sum(work.stored + len(work.missing) - len(self._missing[name]) for name, work in conditions.items())
-        now = running(self._store.root)
+        now = [self._named(one) for one in running(self._store.root)]
         return Overview(
             judged=len(self._load.claims) - len(self._waiting),
             claims=len(self._load.claims),
@@ -67,6 +67,11 @@ class Watching:
             running=now,
             seconds_left=self._seconds_left(owed, {one.condition: one for one in now}),
         )
+
+    def _named(self, one: Running) -> Running:
+        """Return a batch under the name that claims have for its condition."""
+        work = self._load.conditions.get(one.condition)
+        return one if work is None else replace(one, progress=replace(one.progress, condition=work.label))
 
     def _learn(self, name: str) -> None:
         """Note how long a condition took, whose last trial has been stored."""

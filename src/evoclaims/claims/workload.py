@@ -31,7 +31,7 @@ class Work:
     """A condition that claims of a run need.
 
     Attributes:
-        label: its short name.
+        label: its name in claims, such as "cma_es on n_parity".
         programs: what it has in common with conditions that probably share its compiled programs.
         environment_steps: of the missing trials, at most.
         stored: how many of its trials need not be run.
@@ -141,7 +141,7 @@ def _work(session: Session, fetch: RunMissing, tier: str, group: TrialGroup, pla
             elsewhere = took((one for one in trials if one.condition == condition.id), platform)
     files = (session.store.record_path(TrialSpec(condition, seed).id, versions) for seed in missing)
     return Work(
-        label=condition.label,
+        label=group.label,
         programs=condition.programs,
         environment_steps=condition.environment_steps * len(missing),
         stored=len(seeds) - len(missing),

@@ -49,7 +49,7 @@ def pytest_configure(config: pytest.Config) -> None:
     if not hasattr(config, "workerinput"):  # an xdist worker leaves the summary to its controller
         config.pluginmanager.register(Summary(config), "claims-summary")
         config.pluginmanager.register(Distribution(config), "claims-distribution")
-        if config.pluginmanager.has_plugin("terminalreporter") and config.get_verbosity() > QUIET:
+        if config.pluginmanager.has_plugin("terminal") and config.get_verbosity() > QUIET:
             config.pluginmanager.register(ProgressLine(config), "claims-progress")
     options.check(config)
 

@@ -33,6 +33,7 @@ class LiveLine:
         self._clock = clock
         self._at = -self._seconds
         self._open = False
+        self._said = ""
 
     def __call__(self, progress: RunProgress) -> None:
         """Show the newest state of a run."""
@@ -43,9 +44,11 @@ class LiveLine:
         if not at_once and self._clock() - self._at < self._seconds:
             return
         said, self._at = text(), self._clock()
+        if said == self._said and self._open and self._width is not None:
+            return
         start = "" if self._open and self._width is None else "\r" if self._open else "\n"
         self._write(start + (f"  {said}\n" if self._width is None else said[: self._width].ljust(self._width)))
-        self._open = True
+        self._open, self._said = True, said
 
     def close(self) -> None:
         """Leave the line, so that other output starts on a fresh one."""

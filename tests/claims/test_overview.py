@@ -1,0 +1,121 @@
+"""How far a run is: counted in the store, with an estimate of its end from timings of this machine, or none."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from made_trials import trial_of
+
+from evoclaims.claims.overview import Watching, remaining
+from evoclaims.claims.workload import Work, Workload, scale_of, weights
+from evoclaims.envs.gates.parity import NParity
+from evoclaims.methods.hand_built import HandBuilt
+from evoclaims.trials.budget import Budget
+from evoclaims.trials.notice import announced
+from evoclaims.trials.progress import RunProgress
+from evoclaims.trials.running import Running, shared
+from evoclaims.trials.spec import Condition
+from evoclaims.trials.store import Store
+
+X, Y, Z = "a" * 64, "b" * 64, "c" * 64
+
+
+def running(ago: float, seconds_left: float | None) -> Running:
+    """Return a batch that began some seconds ago."""
+    return Running(X, time.time() - ago, RunProgress("x", "compiling", 10, seconds_left=seconds_left))
+
+
+@pytest.mark.parametrize(
+    ("took", "scale", "now", "left"),
+    [
+        ((30.0, None), None, None, 30.0),
+        ((30.0, 10.0), 9.0, None, 30.0),  # this machine itself knows best
+        ((None, 10.0), 3.0, None, 30.0),
+        ((None, 10.0), None, None, None),  # other machines alone tell nothing about this one
+        ((None, None), 3.0, None, None),
+        ((30.0, None), None, running(10.0, None), 20.0),
+        ((30.0, None), None, running(40.0, None), 0.0),
+        ((30.0, None), None, running(10.0, 77.0), 77.0),  # what runs tells itself how fast it is
+        ((None, None), None, running(10.0, 77.0), 77.0),
+        ((None, None), None, running(10.0, None), None),
+    ],
+)
+def test_what_is_left_of_a_condition(
+    took: tuple[float | None, float | None], scale: float | None, now: Running | None, left: float | None
+) -> None:
+    found = remaining(took, scale, now)
+    assert found == (None if left is None else pytest.approx(left, abs=1.0))
+
+
+def test_machines_are_compared_by_what_both_have_run() -> None:
+    assert scale_of([(30.0, 10.0), (None, 100.0), (7.0, None), (10.0, 10.0)]) == 2.0
+    assert scale_of([(None, 100.0), (7.0, None)]) is None
+
+
+def test_conditions_that_nothing_is_known_of_are_ordered_by_the_pace_of_the_others() -> None:
+    known, slow = Work("k", "", 100, 0, ("f",), 10.0, 5.0), Work("s", "", 100, 0, ("f",), None, 20.0)
+    unknown, stored = Work("u", "", 1000, 0, ("f",), None, None), Work("t", "", 0, 10, (), None, None)
+    assert weights([known, slow, unknown, stored]) == {known: 10.0, slow: 40.0, unknown: 250.0, stored: 0.0}
+
+
+@pytest.fixture
+def store(tmp_path: Path) -> Store:
+    """An empty store."""
+    return Store(tmp_path / "store")
+
+
+def watching(store: Store, workers: int = 2) -> Watching:
+    """Watch three claims: on x, of which two trials are stored, on x and y, and on z."""
+    works = {
+        X: Work("x", "", 100, 2, ("x1", "x2"), 40.0, 10.0),
+        Y: Work("y", "", 100, 0, ("y1", "y2", "y3"), None, 20.0),
+        Z: Work("z", "", 100, 0, ("z1",), 10.0, None),
+    }
+    return Watching(Workload(str(store.root), {"one": (X,), "two": (X, Y), "three": (Z,)}, works), workers)
+
+
+def test_trials_are_counted_as_they_are_stored_and_those_of_judged_claims_are_not_waited_for(store: Store) -> None:
+    watched = watching(store)
+    seen = watched.look()
+    assert (seen.judged, seen.claims, seen.done, seen.trials, seen.running) == (0, 3, 2, 8, [])
+    store.root.mkdir()
+    (store.root / "x1").touch()
+    watched.judged("three")
+    seen = watched.look()
+    assert (seen.judged, seen.claims, seen.done, seen.trials) == (1, 3, 3, 7)
+
+
+def test_the_end_is_estimated_from_timings_here_shared_among_the_workers(store: Store) -> None:
+    assert watching(store, 1).look().seconds_left == pytest.approx(40 + 80 + 10)
+    assert watching(store, 2).look().seconds_left == pytest.approx(80)  # no batch is divided among workers
+    watched = watching(store, 2)
+    for claim in ("one", "two", "three"):
+        watched.judged(claim)
+    assert watched.look().seconds_left is None
+
+
+def test_a_condition_that_ends_tells_how_fast_the_others_will_be_here(store: Store) -> None:
+    record = trial_of(Condition(HandBuilt(), NParity(2), "curriculum", Budget(generations=1, reports=1)), 0, 1.0)
+    record = replace(record, timing={**record.timing, "compile": 20.0, "run": 40.0})
+    assert store.put(record, {}) == "stored"
+    (path,) = store.record_paths()
+    works = {
+        X: Work("x", "", 100, 0, (str(path.relative_to(store.root)),), None, 10.0),
+        Y: Work("y", "", 100, 0, ("y1",), None, 20.0),
+    }
+    path.rename(store.root / "aside")
+    watched = Watching(Workload(str(store.root), {"one": (X,), "two": (Y,)}, works), 1)
+    assert watched.look().seconds_left is None
+    (store.root / "aside").rename(path)
+    assert watched.look().seconds_left == pytest.approx(6 * 20)
+
+
+def test_what_any_process_runs_is_shown_under_the_name_that_claims_have_for_it(store: Store) -> None:
+    with announced(store.root, X), shared(store.root, X, lambda progress: None) as tell:
+        tell(RunProgress("hand_built on n_parity", "training", 4, seconds_left=123.0))
+        seen = watching(store).look()
+        assert [one.progress.condition for one in seen.running] == ["x"]
+        assert seen.seconds_left == pytest.approx(123)

@@ -1,0 +1,96 @@
+"""Claims change places among themselves in a run, other tests keep theirs, and one line tells how far the run is."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+CLAIMS = """
+@says('coin')
+def test_coin(trials, verdict):
+    verdict(trials('coin', on='parity').mean_success.greater(trials('wrong', on='parity').mean_success))
+
+def test_plain():
+    pass
+
+@says('own')
+def test_own(trials, verdict, tmp_path):
+    verdict(trials('right', on='parity').solves_every_level.in_most_trials())
+
+@says('wrong')
+def test_wrong(trials, verdict):
+    verdict(trials('wrong', on='parity').solves_no_level_beyond(-1).in_most_trials())
+
+def test_last():
+    pass
+
+class TestRight:
+    @says('right')
+    @pytest.mark.parametrize('name', ['right'])
+    def test_right(self, trials, verdict, name):
+        assert not hasattr(self, 'seen'), 'an object of its own'
+        self.seen = True
+        verdict(trials(name, on='parity').solves_every_level.in_most_trials())
+"""
+
+
+def order(result: pytest.RunResult) -> list[str]:
+    """Return the names of the tests in the order of their outcomes, from the output of -v."""
+    lines = [line.split() for line in result.outlines if "::test_" in line and not line.startswith("FAILED")]
+    names = [next(word for word in words if "::test_" in word) for words in lines]
+    return [name.rpartition("::test_")[2].partition("[")[0] for name in dict.fromkeys(names)]
+
+
+def test_claims_whose_trials_are_there_come_first_and_other_tests_keep_their_places(project: Any, stored: Any) -> None:
+    """`coin` needs trials, so it is last; nothing is known of `own`, which has a fixture of its own."""
+    project.write(CLAIMS.replace(".greater(", ".__gt__("))
+    result = project.run("-v", own_store=True)
+    assert order(result) == ["wrong", "plain", "own", "right", "last", "coin"]
+    result = project.run("-v", "-k", "not own", own_store=True)
+    assert order(result) == ["coin", "plain", "wrong", "last", "right"]  # as written: all are stored by now
+
+
+def test_an_option_that_asks_for_another_order_of_tests_has_it(project: Any, stored: Any) -> None:
+    project.write(CLAIMS.replace(".greater(", ".__gt__("))
+    for option in ("--failed-first", "--new-first", "--stepwise"):
+        assert order(project.run("-v", option, "--collect-only", own_store=True)) == []
+        assert order(project.run("-v", option, own_store=True))[0] == "coin", option
+
+
+def test_a_claim_that_stops_a_run_with_x_and_last_failed_are_what_they_are(project: Any, stored: Any) -> None:
+    project.write(a="undecided", b="refuted", c="supported")
+    result = project.run("-v", "-x", own_store=True)
+    assert order(result) == ["b"]
+    result = project.run("-v", "--lf", own_store=True)
+    assert order(result) == ["b"]
+
+
+def test_a_log_without_a_terminal_has_one_line_about_the_progress_and_none_when_quiet(project: Any) -> None:
+    project.write(a="undecided", b="supported", c="refuted")
+    shown = project.run(own_store=True).stdout.str()
+    assert shown.count(" claims, ") == 1
+    assert "  0/3 claims, 0/30 trials; coin on parity: compiling (10 trials)\n" in shown
+    (project.path / ".evoclaims").rename(project.path / "gone")
+    assert " claims, " not in project.run("-qq", own_store=True).stdout.str()
+
+
+def test_xdists_workers_get_claims_in_an_order_of_their_own_and_the_controller_tells_how_far_they_are(
+    project: Any, stored: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    project.write(CLAIMS.replace(".greater(", ".__gt__("))
+    (project.path / "conftest.py").write_text(
+        "import evoclaims.plugin.progress as progress\nprogress.TICK_SECONDS = 0.01\n"
+    )
+    result = project.run_apart("-n2", "--claims-json=out.json", "-v")
+    assert result.ret == 0
+    plain = json.loads(Path("out.json").read_text())
+    assert [claim["claim"] for claim in plain["claims"]] == ["coin", "own", "right", "wrong"]
+    names = order(result)
+    assert sorted(names) == ["coin", "last", "own", "plain", "right", "wrong"]
+    assert names.index("right") < names.index("coin")
+    (line,) = [line for line in result.outlines if " claims, " in line]
+    assert re.match(r"  [0-3]/4 claims, 20/30 trials; coin on parity: ", line)
