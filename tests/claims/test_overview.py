@@ -23,11 +23,6 @@ from evoclaims.trials.store import Store
 X, Y, Z = "a" * 64, "b" * 64, "c" * 64
 
 
-def running(ago: float, seconds_left: float | None) -> Running:
-    """Return a batch that began some seconds ago."""
-    return Running(X, time.time() - ago, RunProgress("x", "compiling", 10, seconds_left=seconds_left))
-
-
 @pytest.mark.parametrize(
     ("took", "scale", "now", "left"),
     [
@@ -36,17 +31,22 @@ def running(ago: float, seconds_left: float | None) -> Running:
         ((None, 10.0), 3.0, None, 30.0),
         ((None, 10.0), None, None, None),  # other machines alone tell nothing about this one
         ((None, None), 3.0, None, None),
-        ((30.0, None), None, running(10.0, None), 20.0),
-        ((30.0, None), None, running(40.0, None), 0.0),
-        ((30.0, None), None, running(10.0, 77.0), 77.0),  # what runs tells itself how fast it is
-        ((None, None), None, running(10.0, 77.0), 77.0),
-        ((None, None), None, running(10.0, None), None),
+        ((30.0, None), None, (10.0, None), 20.0),
+        ((30.0, None), None, (40.0, None), 0.0),
+        ((30.0, None), None, (10.0, 77.0), 77.0),  # what runs tells itself how fast it is
+        ((None, None), None, (10.0, 77.0), 77.0),
+        ((None, None), None, (10.0, None), None),
     ],
 )
 def test_what_is_left_of_a_condition(
-    took: tuple[float | None, float | None], scale: float | None, now: Running | None, left: float | None
+    took: tuple[float | None, float | None],
+    scale: float | None,
+    now: tuple[float, float | None] | None,
+    left: float | None,
 ) -> None:
-    found = remaining(took, scale, now)
+    """`now` is for how long a batch has been running, and what it says itself."""
+    batch = now and Running(X, time.time() - now[0], RunProgress("x", "compiling", 10, seconds_left=now[1]))
+    found = remaining(took, scale, batch)
     assert found == (None if left is None else pytest.approx(left, abs=1.0))
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from statistics import median
 
 import pytest
@@ -36,7 +36,8 @@ class Work:
         environment_steps: of the missing trials, at most.
         stored: how many of its trials need not be run.
         missing: files of the records of those that must be run, below the store's folder.
-        here: seconds that the missing trials will take, by stored trials of this machine; None where there are none.
+        here: seconds that the missing trials will take, or all if none is missing, by stored trials of this machine;
+            None where there are none.
         elsewhere: the same by the committed reference trials, whatever machine they were made on.
     """
 
@@ -114,8 +115,7 @@ def _needed(session: Session, item: pytest.Item, test: ClaimTest) -> Sequence[Tr
         return ()
 
     def group(method: str, task: str) -> TrialGroup:
-        known = session.group(method, task, test.tier)
-        return type(known)(method, task, known.condition, _never)
+        return replace(session.group(method, task, test.tier), get=_never)
 
     groups, assertion = asked_for(item, test.tier, group)
     return () if assertion is not None and session.leaves(test.tier, assertion) else groups
@@ -132,13 +132,12 @@ def _work(session: Session, fetch: RunMissing, tier: str, group: TrialGroup, pla
     seeds = design.seeds(design.last.n)
     stored = StoredTrials(session.store, condition, fetch.any_version, fetch.time_limit)
     missing = [seed for seed in seeds if _lacks(stored, seed)]
-    here = elsewhere = None
-    if missing:
-        here = took(_made_here(session.store, condition, seeds), platform)
-        with suppress(UserError):  # what is wrong with the reference trials is told at the end of the run
-            folder = session.reproduction.references_of(session.variant)
-            trials = references.load(references.path_of(folder, tier, group.method, group.task))
-            elsewhere = took((one for one in trials if one.condition == condition.id), platform)
+    timed = len(missing) or len(seeds)
+    here, elsewhere = took(_made_here(session.store, condition, seeds), platform), None
+    with suppress(UserError):  # what is wrong with the reference trials is told at the end of the run
+        folder = session.reproduction.references_of(session.variant)
+        trials = references.load(references.path_of(folder, tier, group.method, group.task))
+        elsewhere = took((one for one in trials if one.condition == condition.id), platform)
     files = (session.store.record_path(TrialSpec(condition, seed).id, versions) for seed in missing)
     return Work(
         label=group.label,
@@ -146,8 +145,8 @@ def _work(session: Session, fetch: RunMissing, tier: str, group: TrialGroup, pla
         environment_steps=condition.environment_steps * len(missing),
         stored=len(seeds) - len(missing),
         missing=tuple(str(path.relative_to(session.store.root)) for path in files),
-        here=None if here is None else here.seconds(len(missing)),
-        elsewhere=None if elsewhere is None else elsewhere.seconds(len(missing)),
+        here=None if here is None else here.seconds(timed),
+        elsewhere=None if elsewhere is None else elsewhere.seconds(timed),
     )
 
 

@@ -81,12 +81,14 @@ class ProgressLine:
         """Show what the workers do, until the run ends."""
         from evoclaims.report.live_line import describe_all
 
+        def text() -> str:
+            seen = self._watching.look() if self._watching else None
+            return describe_all(seen) if seen and seen.running else ""
+
         while not self._stopped.wait(TICK_SECONDS):
             with self._lock:
-                if self._watching is not None and not self._stopped.is_set():
-                    seen = self._watching.look()
-                    if seen.running:
-                        self._made().show(lambda seen=seen: describe_all(seen))
+                if not self._stopped.is_set():
+                    self._made().show(text)
 
     @contextmanager
     def _aside(self) -> Generator[None]:

@@ -40,12 +40,13 @@ class LiveLine:
         self.show(lambda: describe(progress), progress.remark)
 
     def show(self, text: Callable[[], str], at_once: bool = False) -> None:
-        """Show what `text` returns, unless the line was rewritten just now; `at_once` shows it even so."""
+        """Show what `text` returns, if anything, unless the line was rewritten just now; `at_once` shows it even so."""
         if not at_once and self._clock() - self._at < self._seconds:
             return
-        said, self._at = text(), self._clock()
-        if said == self._said and self._open and self._width is not None:
+        said = text()
+        if not said or (said == self._said and self._open and self._width is not None):
             return
+        self._at = self._clock()
         start = "" if self._open and self._width is None else "\r" if self._open else "\n"
         self._write(start + (f"  {said}\n" if self._width is None else said[: self._width].ljust(self._width)))
         self._open, self._said = True, said
