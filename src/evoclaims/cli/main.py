@@ -208,6 +208,35 @@ def _parser() -> argparse.ArgumentParser:
         "--timeline", metavar="CLAIM", nargs="?", const="", help="list accepted verdicts by date, of CLAIM or of all"
     )
 
+    across = add(
+        "across",
+        "judge claims in an environment for each release of a package, file of pins or Python, and compare with the "
+        "first; 1 when a verdict changed or trials drifted",
+    )
+    across.add_argument(
+        "--package",
+        nargs="+",
+        metavar=("NAME", "VERSION"),
+        help="a package and its versions on trial; all else stays as it is here; installed and newest are versions too",
+    )
+    across.add_argument("--constraints", nargs="+", metavar="FILE", help="an environment with the pins of each file")
+    across.add_argument("--python", nargs="+", metavar="VERSION", help="an environment with each Python, such as 3.13")
+    across.add_argument("--only", metavar="IDS", help="judge only these claims, such as G1,G7 or G6[neat-ppo]")
+    tier(across)
+    device(across)
+    across.add_argument("--as", dest="form", metavar="FORM", help="also write the table: markdown, csv or json")
+    across.add_argument("--out", metavar="FILE", help="where to (across.FORM; .md for markdown)")
+
+    bisect = add("bisect", "find the release of a package in which a claim's verdict, or what its trials do, changed")
+    bisect.add_argument("claim", help="the claim, such as G9, or one case of it, such as 'G1[n_parity]'")
+    bisect.add_argument("--package", metavar="NAME", required=True, help="the package")
+    bisect.add_argument("--good", metavar="VERSION", required=True, help="a release before the change")
+    bisect.add_argument("--bad", metavar="VERSION", required=True, help="a later release, after it")
+    bisect.add_argument("--releases", nargs="+", metavar="VERSION", help="those between (default: as pip lists them)")
+    bisect.add_argument("--by", metavar="WHAT", help="verdict, drift or bits (default: the first of them that changed)")
+    tier(bisect)
+    device(bisect)
+
     export = add("export", "write the trials at hand, or the verdicts that they give, as a table")
     export.add_argument("--tier", default="all", help="smoke, full or all (default)")
     export.add_argument("--verdicts", action="store_true", help="one row per claim instead of one per trial")

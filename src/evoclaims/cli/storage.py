@@ -10,8 +10,11 @@ from evoclaims.core.errors import UserError
 from evoclaims.paper.config import find_root
 from evoclaims.trials.store_files import DEFAULT_ROOT
 
-BEGINNING: Final = frozenset({"run", "mutants"})
+BEGINNING: Final = frozenset({"run", "mutants", "across", "bisect"})
 """Commands that create a missing store; the others read one."""
+
+APART: Final = {"across": ".evoclaims-releases", "bisect": ".evoclaims-releases"}
+"""Stores of a project for commands that would fill its usual one with trials and verdicts of other environments."""
 
 
 def storage_of(named: str | None, command: str) -> str:
@@ -26,7 +29,7 @@ def storage_of(named: str | None, command: str) -> str:
         UserError: for an empty name, and when a command that only reads finds no folder there.
     """
     if named is None:
-        return os.path.relpath(_project() / DEFAULT_ROOT)
+        return os.path.relpath(_project() / APART.get(command, DEFAULT_ROOT))
     if not named:
         raise UserError("--storage names no folder; leave it out for the project's own store.")
     if command not in BEGINNING and not os.path.lexists(named):

@@ -6,7 +6,7 @@ Nothing heavy is imported here at the top: pytest loads this file in every run o
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Iterable
 from typing import TYPE_CHECKING, Any
 
 import pytest
@@ -75,12 +75,16 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
             from evoclaims.claims.collected import claim_tests
 
             tests = claim_tests(items)
-        wanted = _wanted_claims(config, {test.claim.id for test in tests.values()})
+        wanted = _wanted_claims(config, tests.values())
     except UserError as error:
         _refuse(config, items, error)
         return
     tiers = _wanted_tiers(config)
-    dropped = [item for item, test in tests.items() if test.claim.id not in wanted or test.tier not in tiers]
+    dropped = [
+        item
+        for item, test in tests.items()
+        if wanted.isdisjoint((test.claim.id, test.key[1])) or test.tier not in tiers
+    ]
     if dropped:
         config.hook.pytest_deselected(items=dropped)
         items[:] = [item for item in items if item not in set(dropped)]
@@ -95,14 +99,15 @@ def _wanted_tiers(config: pytest.Config) -> set[str]:
     return set(TIERS) if re.search(r"\bfull\b", named) else {"smoke"}
 
 
-def _wanted_claims(config: pytest.Config, known: set[str]) -> set[str]:
-    """Return the ids that --claims-only selects."""
-    option = config.getoption("claims_only")
+def _wanted_claims(config: pytest.Config, tests: Iterable[ClaimTest]) -> set[str]:
+    """Return the ids, and the names with a case such as G1[n_parity], that --claims-only selects."""
+    option, ids = config.getoption("claims_only"), {test.claim.id for test in tests}
     if option is None:
-        return known
+        return ids
     wanted = {name.strip() for name in option.split(",") if name.strip()}
-    for name in sorted(wanted - known):
-        raise UnknownNameError("claim", name, known or {"(none collected)"})
+    names = {test.key[1] for test in tests}
+    for name in sorted(wanted - ids - names):
+        raise UnknownNameError("claim", name, (names if "[" in name else ids) or {"(none collected)"})
     return wanted
 
 

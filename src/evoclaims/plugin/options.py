@@ -17,7 +17,7 @@ def add(parser: pytest.Parser) -> None:
     group.addoption("--claims-storage", metavar="DIR", help="folder of trials (.evoclaims in the project's root)")
     group.addoption("--claims-tier", metavar="TIER", help="judge this tier's claims: smoke or full; as -m TIER")
     group.addoption("--claims-trials", metavar="N", type=int, help="judge by one look at N trials a condition")
-    group.addoption("--claims-only", metavar="IDS", help="judge only these claims, such as G1,G7")
+    group.addoption("--claims-only", metavar="IDS", help="judge only these claims, such as G1,G7 or G6[neat-ppo]")
     group.addoption("--claims-device", metavar="DEVICE", default="auto", help="auto (default), cpu or gpu")
     group.addoption(
         "--claims-time-limit",

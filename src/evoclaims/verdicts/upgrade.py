@@ -49,6 +49,11 @@ class Succession:
         both = [(old, now[old.seed]) for old in self.before if old.seed in now]
         return [(old, new) for old, new in both if _same_machine(old, new)]
 
+    @property
+    def changed(self) -> int:
+        """How many of these pairs differ in their digests."""
+        return sum(old.digest != new.digest for old, new in self.pairs)
+
 
 @dataclass(frozen=True)
 class Upgrade:
@@ -97,7 +102,7 @@ class Upgrade:
                 "new": dict(one.new),
                 "again": one.again,
                 "compared": len(one.pairs),
-                "changed": _changed(one),
+                "changed": one.changed,
             }
             for one in self.successions
         ]
@@ -152,12 +157,7 @@ def _told(one: Succession) -> str:
     pairs = one.pairs
     if not pairs:
         return f"{one.label}: {ran}, none of which can be compared to the bit (another machine or device)"
-    return f"{one.label}: {ran}, {_changed(one)} of {len(pairs)} not the same to the bit as before"
-
-
-def _changed(one: Succession) -> int:
-    """Count the trials whose digest has changed."""
-    return sum(old.digest != new.digest for old, new in one.pairs)
+    return f"{one.label}: {ran}, {one.changed} of {len(pairs)} not the same to the bit as before"
 
 
 def _same_machine(old: TrialResult, new: TrialResult) -> bool:

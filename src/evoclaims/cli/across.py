@@ -1,0 +1,105 @@
+"""`evoclaims across`: the same claims with several releases of a package, files of pins, or Pythons."""
+
+from __future__ import annotations
+
+import argparse
+import itertools
+import shlex
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Final
+
+from evoclaims.cli.elsewhere import Elsewhere
+from evoclaims.cli.project import open_store
+from evoclaims.cli.stored import write
+from evoclaims.cli.terminal import styled
+from evoclaims.core.environments import Recipe, checked, installed_here
+from evoclaims.core.errors import UnknownNameError, UserError
+from evoclaims.core.releases import released
+from evoclaims.paper.config import find_root, load_config
+from evoclaims.plugin.options import TIERS
+from evoclaims.report import across_table
+from evoclaims.report.console import PlainSpokenConsole
+from evoclaims.verdicts import export
+from evoclaims.verdicts.across import Across, across
+
+FORMS: Final[Mapping[str, Callable[[Across], bytes]]] = {
+    "markdown": lambda found: across_table.markdown(found, shlex.join(["evoclaims", *sys.argv[1:]])).encode(),
+    "csv": lambda found: export.as_csv(across_table.rows(found)),
+    "json": lambda found: export.as_json(across_table.rows(found)),
+}
+"""Writers by the names of their forms."""
+
+
+def main(options: argparse.Namespace) -> int:
+    """Judge in every environment and print the table; 1 when something changed against the first."""
+    if options.form is not None and options.form not in FORMS:
+        raise UnknownNameError("form", options.form, FORMS)
+    recipes = _recipes(options)
+    elsewhere = opened(options, options.only)
+    found = across([elsewhere.judge(recipe) for recipe in recipes])
+    if not found.claims:
+        raise UserError("No claim was judged in any of these environments; the reasons are above.")
+    console = PlainSpokenConsole(file=styled())
+    for part in across_table.terminal(found, console.width):
+        console.print()
+        console.print(part, highlight=False)
+    print(f"\n{across_table.LEGEND}")
+    for line in (*found.lines, *_unused(found, options.package), across_table.headline(found)):
+        print(line)
+    if options.form is not None:
+        out = Path(options.out or f"across.{'md' if options.form == 'markdown' else options.form}")
+        write(out, FORMS[options.form](found))
+        print(f"wrote {out}")
+    return int(bool(found.changed))
+
+
+def opened(options: argparse.Namespace, only: str | None) -> Elsewhere:
+    """Return what judges the claims of the project around the current folder.
+
+    Raises:
+        UserError: for an unknown tier, without a project, or when the store cannot be written.
+    """
+    if options.tier not in TIERS:
+        raise UnknownNameError("tier", options.tier, TIERS)
+    config = load_config(find_root(Path.cwd()))
+    store = open_store(options.storage)
+    store.check_writable()
+    return Elsewhere(config.root, config.root / config.claims, store, options.tier, only, options.device)
+
+
+def _recipes(options: argparse.Namespace) -> list[Recipe]:
+    """Return every combination of releases, Pythons and files of pins, each once.
+
+    Raises:
+        UserError: when none is named, or one cannot be.
+    """
+    package, *named = options.package or [""]
+    if package and not named:
+        raise UserError(f"--package {package} names no version: write such as --package {package} installed newest.")
+    if not (named or options.constraints or options.python):
+        raise UserError("Name what is to differ: --package NAME VERSION ..., --constraints FILE ... or --python 3.13.")
+    versions = [_version(package, word) for word in named] or [""]
+    pins = [Path(name) for name in options.constraints or ()] or [None]
+    found = itertools.product(versions, options.python or [""], pins)
+    return list(dict.fromkeys(Recipe(package, version, python, file) for version, python, file in found))
+
+
+def _version(package: str, word: str) -> str:
+    """Return the version that a word names: installed, newest, or one itself."""
+    if word == "newest":
+        return released(package)[-1]
+    if word != "installed":
+        return checked(word)
+    here = installed_here()
+    if package not in here:
+        raise UserError(f"{package} is not installed here: name a version.")
+    return here[package]
+
+
+def _unused(found: Across, package: Sequence[str] | None) -> list[str]:
+    """Return a line when no trial depends on the package, so that its releases could change no trial."""
+    if not package or any(one.depends_on(package[0]) for one in found.environments):
+        return []
+    return [f"No trial of these claims depends on {package[0]}: its releases can only change how they are judged."]

@@ -1,0 +1,82 @@
+"""`evoclaims bisect`: the release in which a claim's verdict, its trials' distribution, or their bits changed."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable, Mapping
+from typing import Final
+
+from evoclaims.cli.across import opened
+from evoclaims.core.environments import Recipe, checked
+from evoclaims.core.errors import UnknownNameError, UserError
+from evoclaims.core.releases import between, released
+from evoclaims.judging.verdict import Outcome
+from evoclaims.verdicts.across import Cell, Judged, across
+from evoclaims.verdicts.bisection import Change, bisect
+
+KINDS: Final[Mapping[str, Callable[[Cell], bool]]] = {
+    "verdict": lambda cell: cell.verdict_changed,
+    "drift": lambda cell: cell.drifted,
+    "bits": lambda cell: cell.changed > 0,
+}
+"""What can have changed against the first release, the weightiest first."""
+
+BROKEN: Final = (Outcome.ERROR, Outcome.NOT_RUN)
+"""Outcomes that say nothing about a release unless the last release has them, too."""
+
+
+def main(options: argparse.Namespace) -> int:
+    """Find the release and print it; 1 when nothing changed between the two that are named."""
+    if options.by not in (None, *KINDS):
+        raise UnknownNameError("kind of change", options.by, KINDS)
+    package, good, bad = options.package, checked(options.good), checked(options.bad)
+    releases = between(good, bad, [checked(one) for one in options.releases or released(package)])
+    elsewhere, tried = opened(options, options.claim), dict[int, Judged]()
+
+    def judge(index: int) -> Judged:
+        tried[index] = elsewhere.judge(Recipe(package, releases[index]))
+        return tried[index]
+
+    last = len(releases) - 1
+    for index, option in ((0, "--good"), (last, "--bad")):
+        if judge(index).trouble:
+            raise UserError(
+                f"{tried[index].label}, named by {option}, cannot be judged ({tried[index].trouble}): name another one."
+            )
+    kinds = [kind for kind in KINDS if options.by in (None, kind) and _differs(tried[0], tried[last], kind)]
+    if not kinds:
+        print(f"{options.by or 'Nothing'} of {options.claim} changed between {package} {good} and {bad}.")
+        return 1
+    print(
+        f"Between {package} {good} and {bad} the {kinds[0]} of {options.claim} changed; releases between: {last - 1}."
+    )
+    broken_at_last = {name for name, report in tried[last].reports.items() if report.outcome in BROKEN}
+
+    def has_changed(index: int) -> bool | None:
+        reports = judge(index).reports
+        broken = {name for name, report in reports.items() if report.outcome in BROKEN}
+        if not reports or broken - broken_at_last:
+            return None
+        return _differs(tried[0], tried[index], kinds[0])
+
+    _tell(bisect(len(releases), has_changed), releases, tried, package, what)
+    return 0
+
+
+def _differs(first: Judged, now: Judged, kind: str) -> bool:
+    """Whether a claim, or one of its cases, has changed against the first release."""
+    return any(KINDS[kind](cell) for (_, label), cell in across([first, now]).cells.items() if label == now.label)
+
+
+def _tell(change: Change, releases: list[str], tried: Mapping[int, Judged], package: str, what: str) -> None:
+    """Print where it changed, what is known about it, and how many environments that took."""
+    before, after = releases[change.before], releases[change.after]
+    for line in across([tried[change.before], tried[change.after]]).lines:
+        print(f"  {line}")
+    if change.unknown:
+        print(f"{what} changed after {package} {before} and not later than {after}; unknown, since not judged:")
+        for index in change.unknown:
+            print(f"  {tried[index].label}: {tried[index].trouble or 'the claim is broken or not run there'}")
+    else:
+        print(f"{what} changed in {package} {after}; {before} was still as {releases[0]}.")
+    print(f"environments: {len(tried)}, for {len(releases)} releases")

@@ -1,0 +1,134 @@
+"""Claims judged in other environments: each is made, runs pytest in a process of its own, and gives its verdicts."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from evoclaims.cli.terminal import terminal
+from evoclaims.core.environments import Environment, NotInstallableError, Recipe, make, reason
+from evoclaims.core.printable import printable
+from evoclaims.report.live_line import duration
+from evoclaims.report.table_cells import totals
+from evoclaims.trials.store import Store
+from evoclaims.verdicts.across import Judged, judged
+from evoclaims.verdicts.claim_report import ClaimReport
+
+KEPT = "environments"
+"""Folder of the environments, in the store."""
+
+VERDICTS, LOG = "verdicts.json", "pytest.log"
+"""What the last run in an environment has left in its folder."""
+
+
+class NotJudgedError(Exception):
+    """The claims could not be judged in an environment; the message is the reason, in one line."""
+
+
+@dataclass(frozen=True)
+class Elsewhere:
+    """What is judged in every environment.
+
+    Attributes:
+        root: folder of the project.
+        claims: folder of its claims.
+        store: where trials and environments are kept.
+        tier: "smoke" or "full".
+        only: ids or names of claims, joined by commas; None for all.
+        device: auto, cpu or gpu.
+    """
+
+    root: Path
+    claims: Path
+    store: Store
+    tier: str
+    only: str | None
+    device: str
+
+    def judge(self, recipe: Recipe) -> Judged:
+        """Make an environment, or take the kept one, and judge the claims in it; say what is done meanwhile."""
+        began, label = time.monotonic(), printable(recipe.label)
+        # A trial's record says nothing of Python's version, so that another Python needs a store of its own.
+        store = Store(self.store.root / f"python{recipe.python}") if recipe.python else self.store
+        try:
+            print(f"{label}: making its environment", flush=True)
+            environment = make(recipe, self.store.root / KEPT, self.root)
+            log = os.path.relpath(environment.folder / LOG)
+            print(f"{label}: judging claims; what pytest says is in {log}", flush=True)
+            reports = self._run(environment, store)
+        except (NotInstallableError, NotJudgedError) as error:
+            print(f"{label}: {error}", flush=True)
+            return Judged(recipe.label, {}, {}, trouble=str(error))
+        print(f"{label}: {totals(reports)} in {duration(time.monotonic() - began)}", flush=True)
+        moved = environment.moved(recipe.package) if recipe.is_layer else {}
+        also = ", ".join(f"{name} {was or 'none'} -> {now}" for name, (was, now) in moved.items())
+        return judged(recipe.label, reports, store, f"its installation changed {also}, too" if also else "")
+
+    def _run(self, environment: Environment, store: Store) -> list[ClaimReport]:
+        """Run the claims in an environment and return their reports.
+
+        Raises:
+            NotJudgedError: when it has judged none.
+        """
+        verdicts = environment.folder / VERDICTS
+        verdicts.unlink(missing_ok=True)
+        status, said = _watched(self._command(environment, store, verdicts), self.root, environment.folder / LOG)
+        try:
+            reports = [ClaimReport.from_json(plain) for plain in json.loads(verdicts.read_bytes())["claims"]]
+        except (OSError, ValueError, KeyError, TypeError):
+            reports = []
+        if not reports or status not in (0, 1, 5):  # pytest's: all well, failures, and nothing measured
+            raise NotJudgedError(f"pytest ended with {status}: {printable(reason(said))}")
+        return reports
+
+    def _command(self, environment: Environment, store: Store, verdicts: Path) -> list[str]:
+        """Return the command that judges."""
+        return [
+            *(str(environment.python), "-m", "pytest", str(self.claims), f"--rootdir={self.root}"),
+            *("-p", "no:cacheprovider", "-W", "default"),  # releases warn of different things
+            *(f"-m{self.tier}", f"--claims-device={self.device}"),
+            *(f"--claims-storage={store.root.absolute()}", f"--claims-json={verdicts}"),
+            *([] if self.only is None else [f"--claims-only={self.only}"]),
+        ]
+
+
+def _watched(command: list[str], folder: Path, log: Path) -> tuple[int, str]:
+    """Run a command, write what it says to a file, and show the newest line on a terminal.
+
+    Returns:
+        Its status and all that it said.
+    """
+    show = _newest_line()
+    lines = []
+    with subprocess.Popen(
+        command, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, errors="replace"
+    ) as process:
+        try:
+            assert process.stdout is not None
+            with open(log, "w", encoding="utf-8", errors="backslashreplace") as file:
+                for line in process.stdout:
+                    lines.append(line)
+                    file.write(line)
+                    file.flush()
+                    show(printable(line.strip()))
+        except BaseException:  # what it has stored stays, and checkpoints let the next call go on
+            process.terminate()
+            process.wait()
+            raise
+        finally:
+            show("")
+    return process.returncode, "".join(lines)
+
+
+def _newest_line() -> Callable[[str], None]:
+    """Return a function that shows a text in place of the last one; it shows nothing where there is no terminal."""
+    write, columns = terminal()
+    if columns is None:
+        return lambda _: None
+    width = columns - 1
+    return lambda text: write(f"\r{text[:width].ljust(width)}\r" if text else f"\r{' ' * width}\r")

@@ -1,0 +1,266 @@
+"""Python environments that differ from this one in one package, in Python or in pins: made once, kept and used again.
+
+An environment of this Python without other pins is a layer over this one: it holds the release on trial and what that
+release needs otherwise, and finds all else here, so that nothing else changes and jax is not installed again.
+"""
+
+from __future__ import annotations
+
+import importlib.metadata
+import importlib.util
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+import sysconfig
+import tomllib
+import venv
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+from filelock import FileLock
+from packaging.utils import canonicalize_name
+from packaging.version import InvalidVersion, Version
+
+from evoclaims.core.canonical import content_hash
+from evoclaims.core.errors import UserError
+from evoclaims.core.file_names import file_name
+from evoclaims.core.files import write_atomically
+
+COMPLETE: Final = "complete.json"
+"""Written last into an environment: the versions of all that it finds. A folder without it is made again."""
+
+PIP: Final = ("-m", "pip", "--disable-pip-version-check", "--no-input")
+
+_LIST: Final = (
+    "import importlib.metadata as m, json; "
+    "print(json.dumps({d.name: d.version for d in [*m.distributions()][::-1] if d.name}))"
+)
+"""Prints the versions of all distributions; of several of one name, that which Python imports."""
+
+_ERROR: Final = re.compile(r"(?i:error)\s*:\s+|E\s{2,}")
+"""How pip, uv and pytest begin a line that says what was wrong."""
+
+
+class NotInstallableError(UserError):
+    """An environment cannot be made; the message is the reason, in one line."""
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """What an environment is to hold.
+
+    Attributes:
+        package, version: the release on trial; both empty for none.
+        python: version of Python, such as "3.13"; empty for this one.
+        constraints: a file of pins, as pip takes it; None for the versions that are installed here.
+    """
+
+    package: str = ""
+    version: str = ""
+    python: str = ""
+    constraints: Path | None = None
+
+    @property
+    def label(self) -> str:
+        """A short name, such as "evosax 0.3.2, Python 3.13"."""
+        release = f"{self.package} {self.version}".strip()
+        python = f"Python {self.python}" if self.python else ""
+        pins = self.constraints.stem if self.constraints else ""
+        return ", ".join(filter(None, [release, python, pins]))
+
+    @property
+    def is_layer(self) -> bool:
+        """Whether all but the release on trial is as it is here."""
+        return not self.python and self.constraints is None
+
+    @property
+    def release(self) -> list[str]:
+        """The release on trial as installers take it."""
+        return [f"{self.package}=={self.version}"] if self.package else []
+
+
+@dataclass(frozen=True)
+class Environment:
+    """An environment that has been made.
+
+    Attributes:
+        folder: where it is.
+        versions: of everything in it, by package.
+    """
+
+    folder: Path
+    versions: Mapping[str, str]
+
+    @property
+    def python(self) -> Path:
+        """Its interpreter."""
+        return _place(self.folder, "scripts") / ("python.exe" if os.name == "nt" else "python")
+
+    def moved(self, package: str) -> dict[str, tuple[str | None, str]]:
+        """Return what else than a package has another version here, by name: ours and its own."""
+        ours = installed_here()
+        left_out = {canonicalize_name(package), "pip", "setuptools"}
+        return {
+            name: (ours.get(name), version)
+            for name, version in sorted(self.versions.items())
+            if name not in left_out and ours.get(name) != version
+        }
+
+
+def make(recipe: Recipe, kept: Path, project: Path) -> Environment:
+    """Return the environment of a recipe: the one that an earlier call has made, or a new one.
+
+    Args:
+        recipe: what it is to hold.
+        kept: the folder of all environments.
+        project: the project whose claims it is for, which is installed too where it can be.
+
+    Raises:
+        NotInstallableError: when it cannot be made; nothing of it is left.
+    """
+    basis = installed_here() if recipe.is_layer else _requirements(project)
+    pins = _pins(recipe)
+    key = content_hash([recipe.package, recipe.version, recipe.python, sys.prefix, sys.version, basis, pins])[:12]
+    folder = (kept / f"{file_name(recipe.label.replace(' ', '_').replace(',', ''))}.{key}").absolute()
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    with FileLock(f"{folder}.lock"):
+        try:
+            return Environment(folder, json.loads((folder / COMPLETE).read_bytes()))
+        except (OSError, ValueError):
+            shutil.rmtree(folder, ignore_errors=True)
+        try:
+            return _made(recipe, Environment(folder, {}), project, pins)
+        except BaseException:
+            shutil.rmtree(folder, ignore_errors=True)
+            raise
+
+
+def checked(version: str) -> str:
+    """Return a version as it was written.
+
+    Raises:
+        UserError: when it is none.
+    """
+    try:
+        Version(version)
+    except InvalidVersion as error:
+        raise UserError(f"{version!r} is no version of a package: write such as 0.3.2.") from error
+    return version
+
+
+def installed_here() -> dict[str, str]:
+    """Return the versions of all that this Python finds, by normalized name."""
+    found = [(one.name, one.version) for one in importlib.metadata.distributions()]
+    return _normalized({name: version for name, version in reversed(found) if name})
+
+
+def _made(recipe: Recipe, empty: Environment, project: Path, pins: str) -> Environment:
+    """Make an environment in a folder that is not there yet."""
+    if recipe.is_layer:
+        _begin_layer(empty.folder)
+        _run([str(empty.python), *PIP, "install", *recipe.release])
+    else:
+        install = _begin_apart(recipe, empty)
+        constraints = empty.folder / "constraints.txt"
+        constraints.write_text(pins, encoding="utf-8")
+        constrained = ["--constraint", str(constraints)] if pins else []
+        _run([*install, *constrained, *_requirements(project)])
+        if recipe.package:  # apart from the rest, whose metadata may ask for another release
+            _run([*install, *constrained, *recipe.release])
+    versions = _normalized(json.loads(_run([str(empty.python), "-c", _LIST])))
+    found = versions.get(canonicalize_name(recipe.package))
+    if recipe.package and Version(found or "0") != Version(recipe.version):
+        raise NotInstallableError(f"Python finds {recipe.package} {found or 'nowhere'} before the installed release")
+    write_atomically(empty.folder / COMPLETE, json.dumps(versions, indent=1).encode())
+    return Environment(empty.folder, versions)
+
+
+def _begin_layer(folder: Path) -> None:
+    """Make an environment that finds first what is installed in it, and then what is installed here."""
+    venv.EnvBuilder(symlinks=os.name != "nt", with_pip=importlib.util.find_spec("pip") is None).create(folder)
+    bases = [path for path in sys.path if Path(path).name in ("site-packages", "dist-packages")]
+    lines = [f"import site; site.addsitedir({base!r})\n" for base in bases]
+    (_place(folder, "purelib") / "layer.pth").write_text("".join(lines), encoding="utf-8")
+
+
+def _begin_apart(recipe: Recipe, empty: Environment) -> list[str]:
+    """Make an empty environment, by uv where there is one, and return the command that installs into it."""
+    uv = shutil.which("uv")
+    if uv is not None:
+        _run([uv, "venv", "--python", recipe.python or sys.executable, str(empty.folder)])
+        return [uv, "pip", "install", "--python", str(empty.python)]
+    python = shutil.which(f"python{recipe.python}") if recipe.python else sys.executable
+    if python is None:
+        raise NotInstallableError(f"there is no python{recipe.python} on the path, and no uv that would fetch one")
+    _run([python, "-m", "venv", str(empty.folder)])
+    return [str(empty.python), *PIP, "install"]
+
+
+def _requirements(project: Path) -> list[str]:
+    """Return what an environment apart from this one needs: this program, and the project where it can be installed."""
+    own = _this_program()
+    try:
+        described = "project" in tomllib.loads((project / "pyproject.toml").read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        described = False
+    return own if not described or str(project.resolve()) in own else [*own, "--editable", str(project.resolve())]
+
+
+def _this_program() -> list[str]:
+    """Return evoclaims as it was installed here: from a folder, from a repository, or as a release."""
+    distribution = importlib.metadata.distribution("evoclaims")
+    origin: dict[str, Any] = json.loads(distribution.read_text("direct_url.json") or "{}")
+    url, repository = str(origin.get("url", "")), origin.get("vcs_info")
+    if repository:
+        return [f"evoclaims @ {repository['vcs']}+{url}@{repository['commit_id']}"]
+    if url.startswith("file://"):
+        return [*["--editable"] * bool(origin.get("dir_info", {}).get("editable")), url.removeprefix("file://")]
+    return [f"evoclaims=={distribution.version}"]
+
+
+def _pins(recipe: Recipe) -> str:
+    """Return the pins of a recipe's file, without that of the release on trial."""
+    if recipe.constraints is None:
+        return ""
+    try:
+        lines = recipe.constraints.read_text(encoding="utf-8").splitlines(keepends=True)
+    except (OSError, UnicodeError) as error:
+        raise UserError(f"Cannot read the constraints {recipe.constraints}: {error}.") from error
+    names = ((re.match(r"\s*[\w.-]+", line), line) for line in lines)
+    own = canonicalize_name(recipe.package)
+    return "".join(line for name, line in names if not name or canonicalize_name(name[0].strip()) != own)
+
+
+def _run(command: Sequence[str]) -> str:
+    """Run a command and return what it printed.
+
+    Raises:
+        NotInstallableError: with the last thing that it said, when it fails.
+    """
+    environment = {name: value for name, value in os.environ.items() if name != "PYTHONHOME"}
+    done = subprocess.run(command, capture_output=True, text=True, errors="replace", env=environment, check=False)
+    if done.returncode:
+        raise NotInstallableError(reason(done.stdout + done.stderr) or f"{command[0]} ended with {done.returncode}")
+    return done.stdout
+
+
+def reason(said: str) -> str:
+    """Return the line that says why a command has failed: its last error, or else its last line."""
+    lines = [line.strip() for line in said.splitlines() if line.strip(" =\t")]
+    errors = [line for line in lines if _ERROR.match(line)]
+    return _ERROR.sub("", (errors or lines or [""])[-1]).removesuffix(".")
+
+
+def _normalized(versions: Mapping[str, str]) -> dict[str, str]:
+    """Return versions by normalized name, in order."""
+    return dict(sorted((str(canonicalize_name(name)), version) for name, version in versions.items()))
+
+
+def _place(folder: Path, name: str) -> Path:
+    """Return a folder of an environment in `folder`: its "scripts", or its "purelib" (site-packages)."""
+    return Path(sysconfig.get_path(name, "venv", {"base": str(folder)}))

@@ -1,0 +1,116 @@
+"""Claims by environments as a table: for the terminal, as Markdown (the text of an issue), and as rows for programs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Final
+
+from rich.markup import escape
+from rich.table import Table
+
+from evoclaims.report.formatting import p_value, plural
+from evoclaims.report.markdown_text import literal, table
+from evoclaims.report.table_cells import NONE
+from evoclaims.verdicts.across import Across, Cell
+from evoclaims.verdicts.export import Row
+from evoclaims.verdicts.source_trials import versions_of
+
+COLUMN: Final = 22
+"""Characters that an environment takes in the terminal, with the space before it."""
+
+
+LEGEND: Final = (
+    "Against the first environment: A12 is the chance that a trial is higher than there, and p the drift check's "
+    "(exact rank test, Holm), both of the metric that differs most; then how many trials differ in a bit."
+)
+
+
+def terminal(found: Across, width: int) -> list[Table]:
+    """Return the table for a terminal of `width` columns, in parts where the environments do not fit side by side."""
+    names = max((len(name) for name in found.claims), default=0) + 1
+    labels = [one.label for one in found.environments]
+    beside = max(1, (width - names) // COLUMN)
+    return [_part(found, labels[start : start + beside]) for start in range(0, len(labels), beside)]
+
+
+def _part(found: Across, labels: Sequence[str]) -> Table:
+    """Return the columns of some environments."""
+    shown = Table(pad_edge=False, box=None)
+    shown.add_column("claim", no_wrap=True)
+    for label in labels:
+        shown.add_column(escape(label), max_width=COLUMN - 1)
+    for claim in found.claims:
+        cells = (found.cells.get((claim, label)) for label in labels)
+        shown.add_row(escape(claim), *(escape("\n".join(said(cell))) for cell in cells))
+    return shown
+
+
+def markdown(found: Across, command: str) -> str:
+    """Return a page: what changed, the table, the lines that belong to it, and the command that makes it."""
+    labels = [one.label for one in found.environments]
+    rows = [
+        [literal(claim), *("<br>".join(map(literal, said(found.cells.get((claim, label))))) for label in labels)]
+        for claim in found.claims
+    ]
+    parts = [
+        f"# {literal(headline(found))}",
+        table(["claim", *map(literal, labels)], rows),
+        LEGEND,
+        "\n".join(f"* {literal(line)}" for line in found.lines),
+        f"```sh\n{command}\n```",
+    ]
+    return "\n\n".join(filter(None, parts)) + "\n"
+
+
+def headline(found: Across) -> str:
+    """Return in a sentence what changed against the first environment."""
+    changed = found.changed
+    if changed:
+        listed = "; ".join(f"{label} changes {', '.join(claims)}" for label, claims in changed.items())
+        return f"{listed}."
+    compared = [one.label for one in found.environments if one.reports][1:]
+    return f"No verdict changed and no trial drifted in {plural(len(compared), 'environment')} after the first."
+
+
+def rows(found: Across) -> list[Row]:
+    """Return one row per claim and environment."""
+    return [
+        {
+            "environment": one.label,
+            "claim": claim,
+            "outcome": cell.outcome,
+            "n": cell.n,
+            "verdict_changed": cell.verdict_changed,
+            "repeated": cell.repeated,
+            "compared_to_the_bit": cell.compared,
+            "bits_changed": cell.changed,
+            "drifted": cell.drifted,
+            **{
+                f"drift_{name}": getattr(cell.drift, name, None)
+                for name in ("metric", "a12", "p_holm", "median_ref", "median_new")
+            },
+            "versions": {name: list(those) for name, those in versions_of(one.reports[claim].sources).items()},
+            "trouble": "",
+        }
+        for one in found.environments
+        for claim in found.claims
+        if (cell := found.cells.get((claim, one.label))) is not None
+    ] + [{"environment": one.label, "trouble": one.trouble} for one in found.environments if one.trouble]
+
+
+def said(cell: Cell | None) -> tuple[str, ...]:
+    """Return the lines of a cell: the verdict, and how its trials compare with the first environment's."""
+    if cell is None:
+        return (NONE,)
+    verdict = f"{cell.outcome.symbol} {cell.outcome}{', CHANGED' * cell.verdict_changed}"
+    if cell.was is None:
+        return (verdict,)
+    if not cell.repeated:
+        return verdict, "the same trials" if cell.n else NONE
+    if cell.compared and not cell.changed:
+        return verdict, "same to the bit"
+    bits = f"{cell.changed} of {cell.compared} differ" if cell.compared else "other machine"
+    if cell.drift is None:
+        return verdict, bits
+    drift = f"A12 {cell.drift.a12:.2f}, p {p_value(cell.drift.p_holm)}{', DRIFT' * cell.drifted}"
+    return verdict, drift, bits

@@ -1,0 +1,187 @@
+"""The same claims in several environments: each verdict, and each claim's trials against those of the first."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+from evoclaims.judging.baseline import DriftReport, DriftRow
+from evoclaims.judging.verdict import Outcome
+from evoclaims.trials.result import TrialResult
+from evoclaims.trials.store import Store
+from evoclaims.verdicts.claim_report import ClaimReport
+from evoclaims.verdicts.history import in_order, key_of
+from evoclaims.verdicts.source_trials import SourceTrials
+from evoclaims.verdicts.upgrade import Succession, Upgrade, upgrade
+
+
+@dataclass(frozen=True)
+class Judged:
+    """What came of one environment.
+
+    Attributes:
+        label: names it, such as "evosax 0.3.2".
+        reports: the claims as they were judged there.
+        trials: of each claim's conditions, by label of the condition.
+        trouble: why there are no reports, in a line; else empty.
+        notes: what else than the release on trial differs, in words.
+    """
+
+    label: str
+    reports: Mapping[str, ClaimReport]
+    trials: Mapping[str, tuple[TrialResult, ...]]
+    trouble: str = ""
+    notes: str = ""
+
+    def depends_on(self, package: str) -> bool:
+        """Whether a judged trial depends on a package, whose other releases would else change nothing."""
+        return any(package in source.versions for report in self.reports.values() for source in report.sources)
+
+
+@dataclass(frozen=True)
+class Cell:
+    """One claim in one environment.
+
+    Attributes:
+        outcome: of its verdict there.
+        n: judged trials per side.
+        was: its outcome in the first environment; None in that one itself.
+        repeated: whether some of its trials were made anew, since they depend on what differs.
+        compared: those of them that can be compared to the bit, by seed.
+        changed: how many of these differ.
+        drift: of what the drift check tested, the metric with the smallest p; None if it tested nothing.
+    """
+
+    outcome: Outcome
+    n: int
+    was: Outcome | None = None
+    repeated: bool = False
+    compared: int = 0
+    changed: int = 0
+    drift: DriftRow | None = None
+
+    @property
+    def drifted(self) -> bool:
+        """Whether its trials have drifted from those of the first environment."""
+        return self.drift is not None and self.drift.drifted
+
+    @property
+    def verdict_changed(self) -> bool:
+        """Whether its verdict is another one than in the first environment."""
+        return self.was is not None and self.outcome is not self.was
+
+
+@dataclass(frozen=True)
+class Across:
+    """Claims by environments.
+
+    Attributes:
+        environments: in the order in which they were asked for, also those without reports.
+        claims: names, in natural order.
+        cells: by claim and label of the environment.
+        upgrades: the comparison with the first environment, by label.
+    """
+
+    environments: tuple[Judged, ...]
+    claims: tuple[str, ...]
+    cells: Mapping[tuple[str, str], Cell]
+    upgrades: Mapping[str, Upgrade]
+
+    @property
+    def changed(self) -> dict[str, list[str]]:
+        """Claims whose verdict changed or whose trials drifted, by label of the environment."""
+        found: dict[str, list[str]] = {}
+        for (claim, label), cell in self.cells.items():
+            if cell.verdict_changed or cell.drifted:
+                found.setdefault(label, []).append(claim)
+        return found
+
+    @property
+    def lines(self) -> list[str]:
+        """What the table has no room for: troubles, what else differs, changed verdicts, and drift."""
+        said = []
+        for one in self.environments:
+            notes = filter(None, [one.trouble and f"no verdicts: {one.trouble}", one.notes])
+            said += [f"{one.label}: {note}" for note in notes]
+            for claim in self.claims:
+                cell = self.cells.get((claim, one.label))
+                if cell is not None and cell.verdict_changed:
+                    said.append(f"{one.label}: {claim}: {cell.was} -> {cell.outcome}")
+            drift = self.upgrades[one.label].drift if one.label in self.upgrades else DriftReport((), 0)
+            said += [f"{one.label}: {line}" for line in drift.lines]
+        return said
+
+
+def judged(label: str, reports: Iterable[ClaimReport], store: Store, notes: str = "") -> Judged:
+    """Return what came of an environment, with the trials that it judged.
+
+    Args:
+        label: names the environment.
+        reports: its claims.
+        store: the store that it used.
+        notes: what else than the release on trial differs there.
+    """
+    by_name = {report.name: report for report in sorted(reports, key=lambda report: in_order(key_of(report)))}
+    trials: dict[str, dict[str, TrialResult]] = {}
+    for source in (source for report in by_name.values() for source in report.sources):
+        for trial in _trials(source, store):
+            trials.setdefault(source.label, {})[trial.id] = trial
+    in_order_of_ids = {name: tuple(those[trial] for trial in sorted(those)) for name, those in trials.items()}
+    return Judged(label, by_name, in_order_of_ids, notes=notes)
+
+
+def across(environments: Sequence[Judged]) -> Across:
+    """Compare every environment with the first that has verdicts; each is one family of tests for Holm's correction."""
+    with_reports = [one for one in environments if one.reports]
+    claims = dict.fromkeys(name for one in with_reports for name in one.reports)
+    cells: dict[tuple[str, str], Cell] = {}
+    upgrades: dict[str, Upgrade] = {}
+    first = with_reports[0] if with_reports else None
+    for one in with_reports:
+        if first is not None and one is not first:
+            upgrades[one.label] = upgrade(list(_successions(first, one)))
+        for name, report in one.reports.items():
+            before = first.reports.get(name) if first is not None and one is not first else None
+            cells[name, one.label] = _cell(report, before, upgrades.get(one.label))
+    return Across(tuple(environments), tuple(claims), cells, upgrades)
+
+
+def _trials(source: SourceTrials, store: Store) -> list[TrialResult]:
+    """Return the trials of a condition that were made with the versions of the environment that judged it."""
+    versions = {name: those[0] for name, those in source.versions.items() if those}
+    made = (store.made_with(trial, versions) for trial in source.trials)
+    return [trial for trial in made if trial is not None]
+
+
+def _successions(first: Judged, now: Judged) -> Iterable[Succession]:
+    """Yield the conditions that both environments have trials of, unless these are the same records."""
+    versions = {
+        judged.label: {source.label: source for report in judged.reports.values() for source in report.sources}
+        for judged in (first, now)
+    }
+    for label, trials in now.trials.items():
+        before, source = first.trials.get(label, ()), versions[now.label][label]
+        old = versions[first.label].get(label)
+        if not before or old is None or before == trials:
+            continue
+        was, is_now = ({name: those[0] for name, those in one.versions.items()} for one in (old, source))
+        yield Succession(label, was, is_now, before, trials, len(trials))
+
+
+def _cell(report: ClaimReport, before: ClaimReport | None, found: Upgrade | None) -> Cell:
+    """Return the cell of one claim."""
+    cell = Cell(report.outcome, report.n, before.outcome if before else None)
+    if found is None:
+        return cell
+    labels = {source.label for source in report.sources}
+    own = [one for one in found.successions if one.label in labels]
+    rows = [row for row in found.drift.rows if row.label in labels and row.p_holm is not None]
+    return Cell(
+        cell.outcome,
+        cell.n,
+        cell.was,
+        repeated=bool(own),
+        compared=sum(len(one.pairs) for one in own),
+        changed=sum(one.changed for one in own),
+        drift=min(rows, key=lambda row: row.p_holm or 0.0, default=None),
+    )
