@@ -22,7 +22,7 @@ KINDS: Final[Mapping[str, Callable[[Cell], bool]]] = {
 """What can have changed against the first release, the weightiest first."""
 
 BROKEN: Final = (Outcome.ERROR, Outcome.NOT_RUN)
-"""Outcomes that say nothing about a release unless the last release has them, too."""
+"""Outcomes of claims that no trial decided."""
 
 
 def main(options: argparse.Namespace) -> int:
@@ -45,19 +45,16 @@ def main(options: argparse.Namespace) -> int:
             )
     kinds = [kind for kind in KINDS if options.by in (None, kind) and _differs(tried[0], tried[last], kind)]
     if not kinds:
-        print(f"{options.by or 'Nothing'} of {options.claim} changed between {package} {good} and {bad}.")
+        sought = options.by or "verdict, the distribution and the bits"
+        print(f"The {sought} of {options.claim} did not change between {package} {good} and {bad}.")
         return 1
-    print(
-        f"Between {package} {good} and {bad} the {kinds[0]} of {options.claim} changed; releases between: {last - 1}."
-    )
-    broken_at_last = {name for name, report in tried[last].reports.items() if report.outcome in BROKEN}
+    what = f"The {kinds[0]} of {options.claim}"
+    print(f"{what} changed from {package} {good} to {bad}, with {last - 1} releases between them.", flush=True)
+    at_the_ends = _broken(tried[0]) | _broken(tried[last])
 
     def has_changed(index: int) -> bool | None:
-        reports = judge(index).reports
-        broken = {name for name, report in reports.items() if report.outcome in BROKEN}
-        if not reports or broken - broken_at_last:
-            return None
-        return _differs(tried[0], tried[index], kinds[0])
+        now = judge(index)
+        return None if now.trouble or _broken(now) - at_the_ends else _differs(tried[0], now, kinds[0])
 
     _tell(bisect(len(releases), has_changed), releases, tried, package, what)
     return 0
@@ -66,6 +63,11 @@ def main(options: argparse.Namespace) -> int:
 def _differs(first: Judged, now: Judged, kind: str) -> bool:
     """Whether a claim, or one of its cases, has changed against the first release."""
     return any(KINDS[kind](cell) for (_, label), cell in across([first, now]).cells.items() if label == now.label)
+
+
+def _broken(judged: Judged) -> set[tuple[str, Outcome]]:
+    """Return the claims that broke or did not run: no sign of the change, unless they do so at one of the ends."""
+    return {(name, report.outcome) for name, report in judged.reports.items() if report.outcome in BROKEN}
 
 
 def _tell(change: Change, releases: list[str], tried: Mapping[int, Judged], package: str, what: str) -> None:

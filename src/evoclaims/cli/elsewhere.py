@@ -8,6 +8,7 @@ import subprocess
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 from evoclaims.cli.terminal import terminal
@@ -56,8 +57,8 @@ class Elsewhere:
         # A trial's record says nothing of Python's version, so that another Python needs a store of its own.
         store = Store(self.store.root / f"python{recipe.python}") if recipe.python else self.store
         try:
-            print(f"{label}: making its environment", flush=True)
-            environment = make(recipe, self.store.root / KEPT, self.root)
+            begins = partial(print, f"{label}: making its environment", flush=True)
+            environment = make(recipe, self.store.root / KEPT, self.root, begins)
             log = os.path.relpath(environment.folder / LOG)
             print(f"{label}: judging claims; what pytest says is in {log}", flush=True)
             reports = self._run(environment, store)

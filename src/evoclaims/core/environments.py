@@ -17,7 +17,7 @@ import sys
 import sysconfig
 import tomllib
 import venv
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -30,6 +30,8 @@ from evoclaims.core.canonical import content_hash
 from evoclaims.core.errors import UserError
 from evoclaims.core.file_names import file_name
 from evoclaims.core.files import write_atomically
+
+PROGRAM: Final = "evoclaims"
 
 COMPLETE: Final = "complete.json"
 """Written last into an environment: the versions of all that it finds. A folder without it is made again."""
@@ -112,13 +114,14 @@ class Environment:
         }
 
 
-def make(recipe: Recipe, kept: Path, project: Path) -> Environment:
+def make(recipe: Recipe, kept: Path, project: Path, begins: Callable[[], None]) -> Environment:
     """Return the environment of a recipe: the one that an earlier call has made, or a new one.
 
     Args:
         recipe: what it is to hold.
         kept: the folder of all environments.
         project: the project whose claims it is for, which is installed too where it can be.
+        begins: called before a new one is made.
 
     Raises:
         NotInstallableError: when it cannot be made; nothing of it is left.
@@ -133,6 +136,7 @@ def make(recipe: Recipe, kept: Path, project: Path) -> Environment:
             return Environment(folder, json.loads((folder / COMPLETE).read_bytes()))
         except (OSError, ValueError):
             shutil.rmtree(folder, ignore_errors=True)
+        begins()
         try:
             return _made(recipe, Environment(folder, {}), project, pins)
         except BaseException:
@@ -203,24 +207,24 @@ def _begin_apart(recipe: Recipe, empty: Environment) -> list[str]:
 
 def _requirements(project: Path) -> list[str]:
     """Return what an environment apart from this one needs: this program, and the project where it can be installed."""
-    own = _this_program()
     try:
-        described = "project" in tomllib.loads((project / "pyproject.toml").read_text(encoding="utf-8"))
+        described = tomllib.loads((project / "pyproject.toml").read_text(encoding="utf-8")).get("project", {})
     except (OSError, ValueError):
-        described = False
-    return own if not described or str(project.resolve()) in own else [*own, "--editable", str(project.resolve())]
+        described = {}
+    own = [] if described.get("name") == PROGRAM else _this_program()
+    return [*own, "--editable", str(project.resolve())] if described else own
 
 
 def _this_program() -> list[str]:
     """Return evoclaims as it was installed here: from a folder, from a repository, or as a release."""
-    distribution = importlib.metadata.distribution("evoclaims")
+    distribution = importlib.metadata.distribution(PROGRAM)
     origin: dict[str, Any] = json.loads(distribution.read_text("direct_url.json") or "{}")
     url, repository = str(origin.get("url", "")), origin.get("vcs_info")
     if repository:
-        return [f"evoclaims @ {repository['vcs']}+{url}@{repository['commit_id']}"]
+        return [f"{PROGRAM} @ {repository['vcs']}+{url}@{repository['commit_id']}"]
     if url.startswith("file://"):
         return [*["--editable"] * bool(origin.get("dir_info", {}).get("editable")), url.removeprefix("file://")]
-    return [f"evoclaims=={distribution.version}"]
+    return [f"{PROGRAM}=={distribution.version}"]
 
 
 def _pins(recipe: Recipe) -> str:
