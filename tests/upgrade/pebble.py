@@ -6,9 +6,10 @@ that it solves nothing. 1.5 asks for what nobody has, so that it cannot be insta
 
 from __future__ import annotations
 
-import zipfile
 from pathlib import Path
 from typing import Final
+
+from wheels import write_wheel
 
 RELEASES: Final = tuple(f"1.{minor}" for minor in range(10))
 LARGER, UNINSTALLABLE, NEGATED = "1.3", "1.5", "1.6"
@@ -82,20 +83,6 @@ def write_wheels(folder: Path) -> None:
         factor = -1.0 if _comes(version, NEGATED) else 2.0 if _comes(version, LARGER) else 1.0
         needs = "Requires-Dist: gravel-that-nobody-has\n" if version == UNINSTALLABLE else ""
         write_wheel(folder, "pebble", version, f"FACTOR = {factor}\n", needs)
-
-
-def write_wheel(folder: Path, name: str, version: str, code: str, needs: str = "") -> None:
-    """Write a wheel of one module; `needs` are lines of its metadata."""
-    information = f"{name}-{version}.dist-info"
-    files = {
-        f"{name}.py": code,
-        f"{information}/METADATA": f"Metadata-Version: 2.1\nName: {name}\nVersion: {version}\n{needs}",
-        f"{information}/WHEEL": "Wheel-Version: 1.0\nGenerator: t\nRoot-Is-Purelib: true\nTag: py3-none-any\n",
-    }
-    record = "".join(f"{file},,\n" for file in (*files, f"{information}/RECORD"))
-    with zipfile.ZipFile(folder / f"{name}-{version}-py3-none-any.whl", "w") as wheel:
-        for file, text in {**files, f"{information}/RECORD": record}.items():
-            wheel.writestr(file, text)
 
 
 def _comes(version: str, since: str) -> bool:

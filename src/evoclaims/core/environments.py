@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import importlib.metadata
 import importlib.util
+import itertools
 import json
 import os
 import re
@@ -44,7 +45,10 @@ _LIST: Final = (
 )
 """Prints the versions of all distributions; of several of one name, that which Python imports."""
 
-_ERROR: Final = re.compile(r"(?i:error)\s*:\s+|E\s{2,}")
+LONGEST: Final = 300
+"""Most characters of a reason."""
+
+_ERROR: Final = re.compile(r"^((?i:error)\s*:\s+|E\s{2,}|\s*×\s+)")
 """How pip, uv and pytest begin a line that says what was wrong."""
 
 
@@ -254,10 +258,13 @@ def _run(command: Sequence[str]) -> str:
 
 
 def reason(said: str) -> str:
-    """Return the line that says why a command has failed: its last error, or else its last line."""
-    lines = [line.strip() for line in said.splitlines() if line.strip(" =\t")]
-    errors = [line for line in lines if _ERROR.match(line)]
-    return _ERROR.sub("", (errors or lines or [""])[-1]).removesuffix(".")
+    """Return in a line why a command has failed: its last error with what belongs to it, or else its last line."""
+    lines = [line.rstrip() for line in said.splitlines() if line.strip(" =\t")]
+    errors = [index for index, line in enumerate(lines) if _ERROR.match(line)]
+    first = errors[-1] if errors else len(lines) - 1
+    more = itertools.takewhile(lambda line: line.startswith((" ", "╰", "│")), lines[first + 1 :])
+    whole = " ".join(_ERROR.sub("", " ".join([*lines[first : first + 1], *more])).split())
+    return (whole if len(whole) <= LONGEST else f"{whole[:LONGEST]}…").removesuffix(".")
 
 
 def _normalized(versions: Mapping[str, str]) -> dict[str, str]:

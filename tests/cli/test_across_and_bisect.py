@@ -1,0 +1,118 @@
+"""`evoclaims across` and `bisect`: what they are asked, and how they search; environments are stood in for by hand."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from hand_made_verdicts import report
+from tiny_project import Evoclaims
+
+from evoclaims.cli.elsewhere import Elsewhere
+from evoclaims.core.environments import Recipe
+from evoclaims.verdicts.across import Judged
+
+RELEASES = [f"1.{minor}" for minor in range(1, 8)]
+BISECT = ("bisect", "a", "--package", "pebble", "--good", "1.0", "--bad", "1.8", "--releases", *RELEASES)
+
+
+@pytest.fixture
+def outcomes(monkeypatch: pytest.MonkeyPatch) -> dict[str, str]:
+    """How the claim ends in each release, for tests to change; what is none of the outcomes is a trouble.
+
+    Under "asked" are the releases in the order in which they were judged.
+    """
+    known = dict.fromkeys(("1.0", *RELEASES, "1.8"), "supported") | {"asked": ""}
+
+    def judge(self: Elsewhere, recipe: Recipe) -> Judged:
+        known["asked"] += f"{recipe.version} "
+        outcome = known[recipe.version]
+        if outcome not in ("supported", "refuted", "inconclusive", "error"):
+            return Judged(recipe.label, {}, {}, trouble=outcome)
+        return Judged(recipe.label, {"a": report("a", outcome)}, {})
+
+    monkeypatch.setattr(Elsewhere, "judge", judge)
+    return known
+
+
+def _from(outcomes: dict[str, str], since: str, outcome: str) -> None:
+    """Let a claim end otherwise from a release on."""
+    outcomes.update({version: outcome for version in (*RELEASES, "1.8") if version >= since})
+
+
+def test_the_release_is_found_by_a_handful_of_environments(evoclaims: Evoclaims, outcomes: dict[str, str]) -> None:
+    _from(outcomes, "1.3", "refuted")
+    status, out, _ = evoclaims(*BISECT)
+    assert status == 0
+    assert "The verdict of a changed in pebble 1.3; 1.2 was still as 1.0." in out
+    assert "  pebble 1.3: a: supported -> refuted\n" in out
+    assert outcomes["asked"] == "1.0 1.8 1.4 1.2 1.3 "
+
+
+@pytest.mark.parametrize("instead", ["it cannot be installed", "error"])
+def test_a_release_that_cannot_be_judged_is_gone_round_and_told(
+    evoclaims: Evoclaims, outcomes: dict[str, str], instead: str
+) -> None:
+    _from(outcomes, "1.4", "inconclusive")
+    outcomes["1.4"] = instead
+    status, out, _ = evoclaims(*BISECT)
+    assert status == 0
+    assert "changed after pebble 1.3 and not later than 1.5; unknown, since not judged:\n  pebble 1.4: " in out
+    assert ("it cannot be installed" in out) == (instead != "error")
+
+
+def test_a_claim_that_breaks_is_searched_for_as_well(evoclaims: Evoclaims, outcomes: dict[str, str]) -> None:
+    _from(outcomes, "1.6", "error")
+    assert "changed in pebble 1.6; 1.5 was still as 1.0." in evoclaims(*BISECT)[1]
+
+
+def test_where_nothing_changed_the_status_says_so(evoclaims: Evoclaims, outcomes: dict[str, str]) -> None:
+    status, out, _ = evoclaims(*BISECT)
+    assert (status, outcomes["asked"]) == (1, "1.0 1.8 ")
+    assert "The verdict, the distribution and the bits of a did not change between pebble 1.0 and 1.8." in out
+
+
+def test_an_end_that_cannot_be_judged_is_an_error(evoclaims: Evoclaims, outcomes: dict[str, str]) -> None:
+    outcomes["1.8"] = "no wheel"
+    status, _, err = evoclaims(*BISECT)
+    assert status == 2
+    assert "pebble 1.8, named by --bad, cannot be judged (no wheel): name another one." in err
+
+
+def test_the_table_is_printed_and_written_and_the_status_says_that_something_changed(
+    evoclaims: Evoclaims, outcomes: dict[str, str]
+) -> None:
+    outcomes["1.2"] = "refuted"
+    status, out, _ = evoclaims("across", "--package", "pebble", "1.0", "1.1", "1.0", "--as", "markdown")
+    assert (status, outcomes["asked"]) == (0, "1.0 1.1 ")
+    assert "No verdict changed and no trial drifted in 1 environment after the first." in out
+    assert "No trial of these claims depends on pebble" in out
+    assert Path("across.md").read_text().startswith("# No verdict changed")
+    status, out, _ = evoclaims("across", "--package", "pebble", "1.0", "1.2", "--as", "csv", "--out", "t.csv")
+    assert status == 1
+    assert "pebble 1.2 changes a." in out
+    assert Path("t.csv").read_text().startswith("environment,claim,outcome,n,")
+    assert Path(".evoclaims-releases/.gitignore").read_text() == "*\n"
+    assert not Path(".evoclaims").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "text"),
+    [
+        (("across",), "Name what is to differ: --package NAME VERSION"),
+        (("across", "--package", "pebble"), "--package pebble names no version"),
+        (("across", "--package", "pebble", "latest"), "'latest' is no version of a package: write such as 0.3.2."),
+        (("across", "--package", "pebble", "installed"), "pebble is not installed here: name a version."),
+        (("across", "--package", "pebble", "1.0", "--as", "xml"), "There is no form named 'xml'."),
+        (("across", "--package", "pebble", "1.0", "--tier", "tiny"), "There is no tier named 'tiny'."),
+        (("across", "--constraints", "none.txt"), "Cannot read the constraints none.txt"),
+        ((*BISECT, "--by", "luck"), "There is no kind of change named 'luck'. Known: bits, drift, verdict."),
+        (("bisect", "a", "--package", "p", "--good", "2", "--bad", "1", "--releases", "1"), "2 does not come before 1"),
+    ],
+)
+def test_what_cannot_be_asked_is_a_sentence_before_any_environment(
+    evoclaims: Evoclaims, arguments: tuple[str, ...], text: str
+) -> None:
+    status, _, err = evoclaims(*arguments)
+    assert status == 2
+    assert text in err

@@ -1,0 +1,166 @@
+"""Environments with another release of one package: made once, by real installers, whole or not at all."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from wheels import write_wheel
+
+from evoclaims.core.environments import Environment, NotInstallableError, Recipe, checked, make, reason
+from evoclaims.core.errors import UserError
+from evoclaims.core.releases import between, released
+
+Make = Callable[..., Environment]
+
+
+@pytest.fixture
+def wheels(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder of wheels, the only ones that pip knows."""
+    folder = tmp_path / "wheels"
+    folder.mkdir()
+    monkeypatch.setenv("PIP_NO_INDEX", "1")
+    monkeypatch.setenv("PIP_FIND_LINKS", str(folder))
+    return folder
+
+
+@pytest.fixture
+def made(tmp_path: Path) -> list[str]:
+    """The environments that were made, and not found."""
+    return []
+
+
+@pytest.fixture
+def make_one(tmp_path: Path, made: list[str]) -> Make:
+    """A function that returns the environment of a release."""
+
+    def of(package: str, version: str, **others: object) -> Environment:
+        recipe = Recipe(package, version, **others)  # type: ignore[arg-type]
+        return make(recipe, tmp_path / "kept", tmp_path, lambda: made.append(recipe.label))
+
+    return of
+
+
+def _python(environment: Environment, code: str) -> str:
+    """Return what some code prints in an environment."""
+    return subprocess.run([environment.python, "-c", code], capture_output=True, text=True, check=True).stdout.strip()
+
+
+def test_an_environment_has_the_release_on_trial_and_all_else_from_here_and_is_made_once_if_whole(
+    wheels: Path, make_one: Make, made: list[str]
+) -> None:
+    write_wheel(wheels, "pebble", "1.1", "import grain, pytest\nsize = grain.size", "Requires-Dist: grain==2.0\n")
+    write_wheel(wheels, "grain", "2.0", "size = 7")
+    environment = make_one("pebble", "1.1")
+    assert (
+        _python(environment, "import pebble; print(pebble.size, pebble.pytest.__version__)")
+        == f"7 {pytest.__version__}"
+    )
+    assert environment.moved("pebble") == {"grain": (None, "2.0")}
+    assert make_one("pebble", "1.1") == environment
+    assert made == ["pebble 1.1"]
+    (environment.folder / "complete.json").unlink()  # as after a kill
+    (environment.folder / "pyvenv.cfg").unlink()
+    assert make_one("pebble", "1.1") == environment
+    assert _python(environment, "import pebble; print(pebble.size)") == "7"
+    assert len(made) == 2
+
+
+def test_a_release_that_nobody_has_is_told_in_a_line_and_leaves_nothing(
+    wheels: Path, make_one: Make, tmp_path: Path
+) -> None:
+    with pytest.raises(NotInstallableError, match=r"^No matching distribution found for pebble==9\.9$"):
+        make_one("pebble", "9.9")
+    assert [path.suffix for path in (tmp_path / "kept").iterdir()] == [".lock"]
+
+
+def test_a_release_that_python_would_not_find_first_is_refused(
+    wheels: Path, make_one: Make, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    write_wheel(wheels, "pebble", "1.1", "size = 7")
+    write_wheel(wheels, "pebble", "1.2", "size = 7")
+    shutil.unpack_archive(wheels / "pebble-1.2-py3-none-any.whl", tmp_path / "before", "zip")
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path / "before"))
+    with pytest.raises(NotInstallableError, match=r"^Python finds pebble 1\.2 before the installed release$"):
+        make_one("pebble", "1.1")
+
+
+def test_another_python_with_pins_gets_this_program_first_and_then_the_release_on_trial_whatever_is_pinned(
+    make_one: Make, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    uv = tmp_path / "bin" / "uv"
+    uv.parent.mkdir()
+    uv.write_text(
+        f"#!{sys.executable}\n"
+        "import pathlib, subprocess, sys\n"
+        f"with open({str(tmp_path / 'said')!r}, 'a') as said:\n"
+        "    print(*sys.argv[1:], file=said)\n"
+        "if sys.argv[1] == 'venv':\n"
+        "    subprocess.run([sys.executable, '-m', 'venv', '--without-pip', sys.argv[-1]], check=True)\n"
+        "elif sys.argv[-1] == 'pebble==1.1':\n"
+        "    (site,) = pathlib.Path(sys.argv[4]).parents[1].glob('lib/*/site-packages')\n"
+        "    (site / 'pebble-1.1.dist-info').mkdir()\n"
+        "    (site / 'pebble-1.1.dist-info' / 'METADATA').write_text('Name: pebble\\nVersion: 1.1\\n')\n"
+    )
+    uv.chmod(0o755)
+    monkeypatch.setenv("PATH", f"{uv.parent}{os.pathsep}{os.environ['PATH']}")
+    monkeypatch.setenv("PYTHONPATH", "")
+    pins = tmp_path / "pins.txt"
+    pins.write_text("# what we had\njax==0.10.2\nPebble == 1.0\npebble-stone==3\n")
+    (tmp_path / "pyproject.toml").write_text('[project]\nname = "ours"\n')
+
+    environment = make_one("pebble", "1.1", python="3.13", constraints=pins)
+
+    begun, first, second = (tmp_path / "said").read_text().splitlines()
+    constraints = environment.folder / "constraints.txt"
+    assert begun == f"venv --python 3.13 {environment.folder}"
+    assert first.startswith(f"pip install --python {environment.python} --constraint {constraints} ")
+    assert "evoclaims" in first or "--editable" in first
+    assert first.endswith(f"--editable {tmp_path}")
+    assert second == f"pip install --python {environment.python} --constraint {constraints} pebble==1.1"
+    assert constraints.read_text() == "# what we had\njax==0.10.2\npebble-stone==3\n"
+
+
+def test_without_such_a_python_that_is_said(make_one: Make, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PATH", str(tmp_path))
+    with pytest.raises(NotInstallableError, match=r"there is no python3\.99 on the path, and no uv"):
+        make_one("", "", python="3.99")
+
+
+@pytest.mark.parametrize(
+    ("said", "why"),
+    [
+        (
+            "Collecting x\nERROR: Could not find it\nERROR: No matching distribution found for x\n\n",
+            "No matching distribution found for x",
+        ),
+        ("error: subprocess-exited-with-error\nhint: See above.\n", "subprocess-exited-with-error"),
+        ("E   ImportError: no x\n==== 1 error in 2s ====\n", "ImportError: no x"),
+        (
+            "  × No solution found:\n  ╰─▶ Because there is\n      no x, no.\n",
+            "No solution found: ╰─▶ Because there is no x, no",
+        ),
+        ("Traceback\nValueError: bad\n", "ValueError: bad"),
+        ("", ""),
+    ],
+)
+def test_the_reason_is_the_last_error_or_the_last_line(said: str, why: str) -> None:
+    assert reason(said) == why
+
+
+def test_releases_are_listed_oldest_first_and_final_ones_alone(wheels: Path) -> None:
+    for version in ("1.10", "1.9", "2.0rc1", "1.9.1"):
+        write_wheel(wheels, "pebble", version, "")
+    assert released("pebble") == ["1.9", "1.9.1", "1.10"]
+    assert between("1.9", "2.0rc1", released("pebble")) == ["1.9", "1.9.1", "1.10", "2.0rc1"]
+    with pytest.raises(UserError, match="pip lists no releases of gravel .*: name them on the command line"):
+        released("gravel")
+    with pytest.raises(UserError, match=r"1\.10 does not come before 1\.9"):
+        between("1.10", "1.9", [])
+    with pytest.raises(UserError, match="'new' is no version"):
+        checked("new")

@@ -1,0 +1,133 @@
+"""Claims by environments: what changed against the first is told, and only that."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from hand_made_verdicts import report
+from made_trials import trial_of
+from rich.console import Console
+
+from evoclaims.core.packages import recorded
+from evoclaims.envs.gates.parity import NParity
+from evoclaims.methods.hand_built import HandBuilt
+from evoclaims.report import across_table
+from evoclaims.trials.budget import Budget
+from evoclaims.trials.result import TrialResult
+from evoclaims.trials.spec import Condition
+from evoclaims.trials.store import Store
+from evoclaims.verdicts.across import Across, Judged, across, judged
+from evoclaims.verdicts.source_trials import SourceTrials
+
+CONDITION = Condition(HandBuilt(), NParity(2), "direct", Budget(generations=1, reports=1))
+HERE = {"device": {"platform": "cpu", "kind": "cpu"}, "machine": "Linux", "depends_on": ["jax"]}
+BY_VERSION: Mapping[str, float] = {"1": 0.5, "2": 0.5, "3": 0.25, "4": 0.5}
+"""Success of trials by the version of jax that they were made with; 4 changes their digests alone."""
+
+
+def _trial(seed: int, version: str) -> TrialResult:
+    """Return a trial of a version."""
+    made = trial_of(
+        CONDITION, seed, BY_VERSION[version] + seed / 100, provenance={**HERE, "versions": {"jax": version}}
+    )
+    return replace(made, digest="4" * 64) if version == "4" else made
+
+
+@pytest.fixture
+def store(monkeypatch: pytest.MonkeyPatch) -> Store:
+    """A store that has every trial in every version."""
+
+    def made_with(self: Store, trial_id: str, versions: Mapping[str, str]) -> TrialResult:
+        (found,) = (one for seed in range(10) if (one := _trial(seed, versions["jax"])).id == trial_id)
+        assert recorded(found.provenance, ("jax",)) == versions
+        return found
+
+    monkeypatch.setattr(Store, "made_with", made_with)
+    return Store(Path("nowhere"))
+
+
+def _environment(store: Store, version: str, outcome: str = "supported") -> Judged:
+    """Return what came of an environment with a version of jax; the claim `plain` has no trials."""
+    ids = tuple(_trial(seed, "1").id for seed in range(10))
+    source = SourceTrials("hand_built", "parity", CONDITION.id, ids, {"jax": (version,)}, ())
+    reports = [report("ours", outcome, sources=(source,)), report("plain", "not run", verdict=None)]
+    return judged(f"jax {version}", reports, store)
+
+
+@pytest.fixture
+def found(store: Store) -> Across:
+    """Four versions of jax, and one that cannot be installed."""
+    fifth = Judged("jax 5", {}, {}, trouble="no such release")
+    one, two, three, four = (
+        _environment(store, version, outcome)
+        for version, outcome in (("1", "supported"), ("2", "supported"), ("3", "refuted"), ("4", "supported"))
+    )
+    return across([one, two, fifth, three, four])
+
+
+def test_each_cell_tells_verdict_drift_and_bits_against_the_first_environment(found: Across) -> None:
+    told = {
+        label.removeprefix("jax "): across_table.said(cell)
+        for (claim, label), cell in found.cells.items()
+        if claim == "ours"
+    }
+    assert told["1"] == ("✓ supported",)
+    assert told["2"] == ("✓ supported", "same to the bit")
+    assert told["3"] == ("✗ refuted, CHANGED", "A12 0.00, p 3.2e-05, DRIFT", "10 of 10 differ")
+    assert told["4"] == ("✓ supported", "A12 0.50, p 1", "10 of 10 differ")
+    assert across_table.said(found.cells["plain", "jax 3"]) == ("- not run", "–")
+    assert found.changed == {"jax 3": ["ours"]}
+
+
+def test_lines_say_why_one_has_no_verdicts_which_changed_and_what_drifted_how_far(found: Across) -> None:
+    numbers = "is lower now: median 0.545 -> 0.295, A12 = 0.00, p = 3.2e-05 (Holm)"
+    assert found.lines == [
+        "jax 5: no verdicts: no such release",
+        "jax 3: ours: supported -> refuted",
+        f"jax 3: DRIFT in hand_built on parity: mean_success {numbers}",
+        f"jax 3: DRIFT in hand_built on parity: last_fitness {numbers}",
+    ]
+
+
+def test_trials_that_are_the_same_records_are_not_compared(store: Store) -> None:
+    again = replace(_environment(store, "1"), label="again")
+    cell = across([_environment(store, "1"), again]).cells["ours", "again"]
+    assert across_table.said(cell) == ("✓ supported", "the same trials")
+
+
+def test_the_first_environment_is_the_first_that_has_verdicts(store: Store) -> None:
+    broken = Judged("jax 0", {}, {}, trouble="no such release")
+    found = across([broken, _environment(store, "3"), _environment(store, "1")])
+    assert found.cells["ours", "jax 3"].was is None
+    assert found.cells["ours", "jax 1"].drifted
+
+
+@pytest.mark.parametrize("width", [40, 80, 200])
+def test_the_table_shows_every_environment_at_any_width(found: Across, width: int) -> None:
+    console = Console(width=width, record=True, file=io.StringIO())
+    for part in across_table.terminal(found, width):
+        console.print(part)
+    text = console.export_text()
+    assert all(f"jax {version}" in text for version in "12345")
+    assert max(map(len, text.splitlines())) <= width
+    assert text.count("same to the bit") == 1
+
+
+def test_the_text_of_an_issue_begins_with_what_changed_and_ends_with_the_command(found: Across) -> None:
+    text = across_table.markdown(found, "evoclaims across --package jax 1 2")
+    assert text.startswith("# jax 3 changes ours.\n\n| claim | jax 1 | jax 2 | jax 5 | jax 3 | jax 4 |\n")
+    assert "| ✗ refuted, CHANGED<br>A12 0.00, p 3.2e-05, DRIFT<br>10 of 10 differ |" in text
+    assert text.endswith("```sh\nevoclaims across --package jax 1 2\n```\n")
+
+
+def test_rows_for_programs_have_numbers_and_one_for_each_environment_without_verdicts(found: Across) -> None:
+    rows = across_table.rows(found)
+    (three,) = (row for row in rows if row["environment"] == "jax 3" and row["claim"] == "ours")
+    assert (three["drift_median_ref"], three["drift_median_new"]) == pytest.approx((0.545, 0.295))
+    assert (three["versions"], three["verdict_changed"], three["bits_changed"]) == ({"jax": ["3"]}, True, 10)
+    assert rows[-1] == {"environment": "jax 5", "trouble": "no such release"}
+    assert len(rows) == 4 * 2 + 1
