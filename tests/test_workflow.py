@@ -1,9 +1,10 @@
-"""The workflow file: every command in it is one that this version knows, and it can change nothing."""
+"""The workflow files: every command in them is one that this version knows, and they can change nothing."""
 
 from __future__ import annotations
 
 import re
 import shlex
+import tomllib
 from configparser import ConfigParser
 from pathlib import Path
 
@@ -13,8 +14,11 @@ from evoclaims.cli.main import _parser
 from evoclaims.verdicts.transitions import parse_patterns
 
 ROOT = Path(__file__).parents[1]
-TEXT = (ROOT / ".github" / "workflows" / "claims.yml").read_text(encoding="utf-8")
+TEXT, WEEKLY = (
+    (ROOT / ".github" / "workflows" / name).read_text(encoding="utf-8") for name in ("claims.yml", "releases.yml")
+)
 COMMANDS = [shlex.split(line)[1:] for line in re.findall(r"\.tox/smoke/bin/(evoclaims .*)", TEXT)]
+(ACROSS,) = (line.replace("${{ matrix.package }}", "jax") for line in re.findall(r"run: evoclaims (.*)", WEEKLY))
 (TOX,) = (shlex.split(" ".join(block.split())) for block in re.findall(r"run: >-\n(.*?)\n\n", TEXT, re.DOTALL))
 
 
@@ -41,24 +45,48 @@ def test_the_claims_are_run_by_tox_on_two_cores_with_options_that_the_plugin_tak
     assert known.xmlpath == "report/junit.xml"
 
 
-def test_the_workflow_reads_and_changes_nothing_and_knows_no_secret() -> None:
-    assert re.search(r"\npermissions:\n  contents: read\n\n", TEXT)
-    assert TEXT.count("permissions:") == 1
-    assert "secrets." not in TEXT
-    assert "pull_request_target" not in TEXT
-    assert "evoclaims accept" not in TEXT
+def test_every_week_the_newest_release_of_each_library_is_compared_with_the_pinned_one() -> None:
+    options = _parser().parse_args(shlex.split(ACROSS))
+    assert (options.command, options.package, options.form) == ("across", ["jax", "installed", "newest"], "markdown")
+    assert re.search(r'\n  schedule:\n    - cron: "\d+ \d+ \* \* [0-6]"\n', WEEKLY)
+    (packages,) = re.findall(r"package: \[(.*)\]", WEEKLY)
+    needed = {re.split("[<>=]", line)[0] for line in _project()["dependencies"]}
+    assert needed.issuperset(packages.split(", "))
+    assert {"jax", "brax", "evosax", "qdax"}.issubset(packages.split(", "))
 
 
-def test_every_action_is_held_to_a_major_version() -> None:
-    actions = re.findall(r"uses: (\S+)", TEXT)
-    assert len(actions) == 5
+def test_the_text_of_an_issue_is_kept_where_something_changed_and_only_there() -> None:
+    options = _parser().parse_args(shlex.split(ACROSS))
+    kept = re.findall(r"if: (.*)\n +uses: actions/upload-artifact@v4\n +with:\n.*\n +path: (\S+)\n", WEEKLY)
+    assert kept == [("${{ failure() && hashFiles('issue.md') != '' }}", options.out)]
+
+
+@pytest.mark.parametrize("text", [TEXT, WEEKLY], ids=["claims", "releases"])
+def test_the_workflow_reads_and_changes_nothing_and_knows_no_secret(text: str) -> None:
+    assert re.search(r"\npermissions:\n  contents: read\n\n", text)
+    assert text.count("permissions:") == 1
+    assert "secrets." not in text
+    assert "pull_request_target" not in text
+    assert "evoclaims accept" not in text
+
+
+@pytest.mark.parametrize(("text", "count"), [(TEXT, 5), (WEEKLY, 3)], ids=["claims", "releases"])
+def test_every_action_is_held_to_a_major_version(text: str, count: int) -> None:
+    actions = re.findall(r"uses: (\S+)", text)
+    assert len(actions) == count
     assert all(re.fullmatch(r"actions/[a-z-]+@v\d+", action) for action in actions)
 
 
 def test_every_supported_python_is_run_with_constraints_of_its_own() -> None:
-    project = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
-    supported = re.findall(r"Python :: (3\.\d+)", project)
+    supported = re.findall(r"Python :: (3\.\d+)", " ".join(_project()["classifiers"]))
     (matrix,) = re.findall(r"python: \[(.*)\]", TEXT)
     assert re.findall(r'"(3\.\d+)"', matrix) == supported
     constraints = (path.stem for path in (ROOT / "constraints").glob("python?.??.txt"))
     assert sorted(stem.removeprefix("python") for stem in constraints) == supported
+    assert f'python-version: "{supported[-1]}"' in WEEKLY
+    assert WEEKLY.count(f"constraints/python{supported[-1]}.txt") == 2
+
+
+def _project() -> dict[str, list[str]]:
+    """Return what pyproject.toml says of the package."""
+    return tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]

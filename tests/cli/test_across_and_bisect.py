@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from importlib.metadata import version
 from pathlib import Path
 
 import pytest
@@ -37,7 +38,7 @@ def outcomes(monkeypatch: pytest.MonkeyPatch) -> dict[str, str]:
 
 def _from(outcomes: dict[str, str], since: str, outcome: str) -> None:
     """Let a claim end otherwise from a release on."""
-    outcomes.update({version: outcome for version in (*RELEASES, "1.8") if version >= since})
+    outcomes.update({one: outcome for one in (*RELEASES, "1.8") if one >= since})
 
 
 def test_the_release_is_found_by_a_handful_of_environments(evoclaims: Evoclaims, outcomes: dict[str, str]) -> None:
@@ -94,6 +95,15 @@ def test_the_table_is_printed_and_written_and_the_status_says_that_something_cha
     assert Path("t.csv").read_text().startswith("environment,claim,outcome,n,")
     assert Path(".evoclaims-releases/.gitignore").read_text() == "*\n"
     assert not Path(".evoclaims").exists()
+
+
+def test_nothing_is_judged_where_the_newest_release_is_installed(
+    evoclaims: Evoclaims, outcomes: dict[str, str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    here = version("pytest")
+    monkeypatch.setattr("evoclaims.cli.across.released", lambda package: ["0.1", here])
+    status, out, _ = evoclaims("across", "--package", "pytest", "installed", "newest")
+    assert (status, out) == (0, f"All of these are pytest {here}: there is nothing to compare.\n")
 
 
 @pytest.mark.parametrize(

@@ -122,6 +122,18 @@ def test_new_trials_that_drifted_from_the_references_are_said(evoclaims: Evoclai
     assert "trials of the new side alone: smoke/wrong-parity" in out
 
 
+def test_versions_behind_both_sides_are_said_where_a_condition_depends_on_them(evoclaims: Evoclaims) -> None:
+    path = references.path_of(Path("reference"), "smoke", "right", "parity")
+    own = trials_of(Store(OWN), "hand_built")
+    older = {**own[0].provenance["versions"], "jax": "0.0.9", "qdax": "0.0.9"}  # of which it uses the first alone
+    references.write(path, [replace(one, provenance={**one.provenance, "versions": older}) for one in own])
+    evoclaims("accept", "--tier=smoke")
+    _, out, _ = evoclaims("compare", "--tier=smoke")
+    now = own[0].provenance["versions"]["jax"]
+    assert f"versions changed: jax 0.0.9 -> {now}: smoke/right-parity\n" in out
+    assert "qdax" not in out
+
+
 def test_verdicts_of_now_come_from_reference_trials_where_the_store_has_none(accepted: Evoclaims) -> None:
     for name, method in (("right", "hand_built"), ("wrong", "hand_built_negated")):
         references.write(references.path_of(Path("reference"), "smoke", name, "parity"), trials_of(Store(OWN), method))

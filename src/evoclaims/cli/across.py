@@ -37,6 +37,9 @@ def main(options: argparse.Namespace) -> int:
     if options.form is not None and options.form not in FORMS:
         raise UnknownNameError("form", options.form, FORMS)
     recipes = _recipes(options)
+    if len(recipes) == 1 and len((options.package or ())[1:]) > 1:
+        print(f"All of these are {recipes[0].label}: there is nothing to compare.")
+        return 0
     elsewhere = opened(options, options.only)
     found = across([elsewhere.judge(recipe) for recipe in recipes])
     if not found.claims:

@@ -17,14 +17,12 @@ from evoclaims.trials.store import Store
 from evoclaims.verdicts import comparison, history, transitions
 from evoclaims.verdicts.comparison import Side
 from evoclaims.verdicts.git_revision import GitRevision, find_revision
+from evoclaims.verdicts.mixed_versions import listed
 from evoclaims.verdicts.timeline import timeline
 from evoclaims.verdicts.transitions import Kind
 
 UNSAID = (Kind.SAME, Kind.NOT_RUN)
 """Kinds that are counted but not listed."""
-
-MOST_NAMES = 6
-"""Most names of conditions that a line lists."""
 
 
 def main(options: argparse.Namespace) -> int:
@@ -48,6 +46,7 @@ def main(options: argparse.Namespace) -> int:
         f"new: {new.name}",
         f"verdicts: {transitions.counts(found)}",
         *(f"  {transitions.describe(one)}" for one in found if one.kind not in UNSAID),
+        *comparison.version_changes(old, new),
         *_drift_lines(drift, digests, new),
         *_one_sided(old, new),
         *(trouble for side in (old, new) for trouble in side.troubles),
@@ -141,7 +140,5 @@ def _drift_lines(drift: DriftReport, digests: DigestCheck, new: Side) -> Iterato
 def _one_sided(old: Side, new: Side) -> Iterator[str]:
     """Yield a line for the conditions that only one side has trials of."""
     for word, names in (("old", old.trials.keys() - new.trials.keys()), ("new", new.trials.keys() - old.trials.keys())):
-        rest = len(names) - MOST_NAMES
-        listed = ", ".join(sorted(names)[:MOST_NAMES]) + (f" and {rest} more" if rest > 0 else "")
         if names:
-            yield f"trials of the {word} side alone: {listed}"
+            yield f"trials of the {word} side alone: {listed(sorted(names))}"

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath
 
 from evoclaims.core.errors import UserError
-from evoclaims.core.packages import Versions, agree
+from evoclaims.core.packages import Versions, agree, depends_on
 from evoclaims.judging.baseline import DriftCase, DriftReport
 from evoclaims.judging.tripwire import DigestCheck
 from evoclaims.judging.verdict import Outcome
@@ -22,7 +22,9 @@ from evoclaims.trials.store import DamagedFileError, Store, newest
 from evoclaims.verdicts import history, transitions
 from evoclaims.verdicts.claim_report import ClaimReport
 from evoclaims.verdicts.git_revision import GitRevision
+from evoclaims.verdicts.mixed_versions import listed
 from evoclaims.verdicts.transitions import Standings
+from evoclaims.verdicts.versions import found_in, in_words
 
 Trials = Mapping[str, Sequence[TrialResult]]
 """Trials by condition, named like its file of reference trials: "smoke/cma_es-n_parity"."""
@@ -148,6 +150,25 @@ def compare_trials(old: Side, new: Side) -> tuple[DriftReport, DigestCheck]:
             for name in both
         ]
     )
+
+
+def version_changes(old: Side, new: Side) -> list[str]:
+    """Return which packages' versions differ between the trials of both sides, with the conditions, one line a change.
+
+    Only packages that a condition depends on are looked at.
+    """
+    found: dict[str, list[str]] = defaultdict(list)
+    for name in sorted(old.trials.keys() & new.trials.keys()):
+        packages = tuple(sorted({one for trial in new.trials[name] for one in depends_on(trial.provenance) or ()}))
+        was, now = (found_in(side.trials[name], packages) for side in (old, new))
+        moved = [
+            f"{package} {in_words(was[package])} -> {in_words(now[package])}"
+            for package in packages
+            if was[package] != now[package]
+        ]
+        if moved:
+            found[", ".join(moved)].append(name)
+    return [f"versions changed: {moved}: {listed(names)}" for moved, names in found.items()]
 
 
 def _named(path: PurePosixPath | Path) -> str:

@@ -16,7 +16,7 @@ MARK: Final = "†"
 """Marks a verdict whose trials were made with mixed versions."""
 
 MOST_NAMES: Final = 6
-"""Most names of claims that a line lists."""
+"""Most names that a line lists."""
 
 
 def is_mixed(report: ClaimReport) -> bool:
@@ -41,18 +41,18 @@ def lines(reports: Sequence[ClaimReport]) -> list[str]:
             elsewhere.append(f"{report.name} ({report.tier})")
         for name, those in other.items():
             foreign[name] += those
-    said = [f"{MARK} versions are mixed: {what}: {_listed(names)}" for what, names in mixed.items()]
+    said = [f"{MARK} versions are mixed: {what}: {listed(names)}" for what, names in mixed.items()]
     if elsewhere:
         here = installed(tuple(foreign))
         packages = (
             f"{name} {in_words(different(those))} (here {here[name] or 'none'})"
             for name, those in sorted(foreign.items())
         )
-        said.append(f"not made with the installed versions: {', '.join(packages)}: {_listed(elsewhere)}")
+        said.append(f"not made with the installed versions: {', '.join(packages)}: {listed(elsewhere)}")
     return [printable(line) for line in said]
 
 
-def _listed(names: Sequence[str]) -> str:
+def listed(names: Sequence[str]) -> str:
     """Return the first names, and how many more there are."""
     rest = len(names) - MOST_NAMES
     return ", ".join(names[:MOST_NAMES]) + (f" and {rest} more" if rest > 0 else "")
