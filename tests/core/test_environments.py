@@ -140,6 +140,7 @@ def test_without_such_a_python_that_is_said(make_one: Make, tmp_path: Path, monk
             "No matching distribution found for x",
         ),
         ("error: subprocess-exited-with-error\nhint: See above.\n", "subprocess-exited-with-error"),
+        ("usage: pytest\npytest: error: unrecognized arguments: -x\n  file: y\n", "unrecognized arguments: -x file: y"),
         ("E   ImportError: no x\n==== 1 error in 2s ====\n", "ImportError: no x"),
         (
             "  × No solution found:\n  ╰─▶ Because there is\n      no x, no.\n",

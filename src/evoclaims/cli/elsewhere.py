@@ -91,7 +91,8 @@ class Elsewhere:
         """Return the command that judges."""
         return [
             *(str(environment.python), "-m", "pytest", str(self.claims), f"--rootdir={self.root}"),
-            *("-p", "no:cacheprovider", "-W", "default"),  # releases warn of different things
+            # Releases warn of different things, and the project's own options may need plugins that are not there.
+            *("-pno:cacheprovider", "-Wdefault", "-oaddopts=", "-orequired_plugins="),
             *(f"-m{self.tier}", f"--claims-device={self.device}"),
             *(f"--claims-storage={store.root.absolute()}", f"--claims-json={verdicts}"),
             *([] if self.only is None else [f"--claims-only={self.only}"]),

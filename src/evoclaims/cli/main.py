@@ -224,7 +224,9 @@ def _parser() -> argparse.ArgumentParser:
     across.add_argument("--only", metavar="IDS", help="judge only these claims, such as G1,G7 or G6[neat-ppo]")
     tier(across)
     device(across)
-    across.add_argument("--as", dest="form", metavar="FORM", help="also write the table: markdown, csv or json")
+    across.add_argument(
+        "--as", dest="form", metavar="FORM", help="also write it: markdown, csv, json, or a chart as svg"
+    )
     across.add_argument("--out", metavar="FILE", help="where to (across.FORM; .md for markdown)")
 
     bisect = add("bisect", "find the release of a package in which a claim's verdict, or what its trials do, changed")

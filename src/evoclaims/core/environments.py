@@ -48,7 +48,7 @@ _LIST: Final = (
 LONGEST: Final = 300
 """Most characters of a reason."""
 
-_ERROR: Final = re.compile(r"^((?i:error)\s*:\s+|E\s{2,}|\s*×\s+)")
+_ERROR: Final = re.compile(r"^((\S+: )?(?i:error)\s*:\s+|E\s{2,}|\s*×\s+)")
 """How pip, uv and pytest begin a line that says what was wrong."""
 
 

@@ -69,6 +69,8 @@ def headline(found: Across) -> str:
         listed = "; ".join(f"{label} changes {', '.join(claims)}" for label, claims in changed.items())
         return f"{listed}."
     compared = [one.label for one in found.environments if one.reports][1:]
+    if not compared:
+        return "Only one environment has verdicts, so that nothing is compared."
     return f"No verdict changed and no trial drifted in {plural(len(compared), 'environment')} after the first."
 
 
