@@ -222,7 +222,8 @@ def test_a_timeline_shows_the_versions_that_differ(accepted: Evoclaims) -> None:
     assert (status, first) == (0, "a (smoke)")
     assert second.startswith("  2020-01-01  supported (n = 10, p = 0.028)  ")
     assert f"jax 0.4.0 -> {now.versions['jax']}" in third
-    assert len(accepted("compare", "--timeline")[1].splitlines()) == 5
+    assert len(accepted("compare", "--timeline", "--out=it.svg")[1].splitlines()) == 5
+    assert Path("it.svg").read_text().count("<path") == 0 < Path("it.svg").read_text().count("supported (n = 10")
 
 
 @pytest.mark.parametrize(
@@ -233,6 +234,7 @@ def test_a_timeline_shows_the_versions_that_differ(accepted: Evoclaims) -> None:
         (("a", "b", "c"), "Two stores or two revisions can be compared, not 3."),
         (("--tier=ful",), "There is no tier named 'ful'."),
         (("--timeline", "x"), "There is no accepted claim named 'x'. Known: a, b."),
+        (("--out=it.svg",), "--out draws what --timeline lists: add --timeline."),
         (("HEAD", "--timeline"), "--timeline shows the accepted verdicts alone"),
         (("--timeline", "--fail=*->*"), "--timeline shows the accepted verdicts alone"),
         (("nothing",), "There is neither a git revision nor a folder called nothing."),

@@ -88,10 +88,6 @@ def test_a_table_tells_verdicts_drift_and_bits_against_the_first_release(evoclai
     ]
 
 
-def test_a_change_of_bits_alone_is_found_too_and_none_where_there_is_none(evoclaims: Run) -> None:
-    arguments = ("bisect", "P1", "--package", "pebble", "--good", "1.0", "--releases", "1.3", "--bad", "1.4")
-    ran = evoclaims(*arguments)
-    assert f"The bits of P1 changed in pebble {LARGER}; 1.0 was still as 1.0." in ran.stdout, ran.stdout + ran.stderr
-    ran = evoclaims(*arguments, "--by", "verdict")
-    assert ran.returncode == 1
-    assert "The verdict of P1 did not change between pebble 1.0 and 1.4." in ran.stdout
+def test_a_change_of_bits_alone_is_found_too(evoclaims: Run) -> None:
+    ran = evoclaims("bisect", "P1", "--package", "pebble", "--good", "1.0", "--releases", "1.2", "--bad", LARGER)
+    assert f"The bits of P1 changed in pebble {LARGER}; 1.2 was still as 1.0." in ran.stdout, ran.stdout + ran.stderr

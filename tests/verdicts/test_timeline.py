@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from xml.etree import ElementTree
 
 import pytest
 
 from evoclaims.core.errors import UnknownNameError, UserError
 from evoclaims.judging.verdict import Outcome
+from evoclaims.report.charts_of_verdicts import timeline_chart
 from evoclaims.verdicts.history import Entry
 from evoclaims.verdicts.timeline import timeline
 
+SVG = "{http://www.w3.org/2000/svg}"
 VERSIONS = {"jax": "0.10.2", "python": "3.11.7", "numpy": "2.4"}
 FIRST = Entry(Outcome.SUPPORTED, "so", 10, 0.0282, "f" * 64, "2025-01-02", VERSIONS, "cpu", "a" * 40, "d" * 64)
 
@@ -59,3 +62,16 @@ def test_nothing_in_the_file_can_steer_the_terminal() -> None:
     lines = timeline({("smoke", f"G1{nasty}"): (entry, replace(entry, revision="-, -", versions={nasty: "1"}))})
     assert len(lines.splitlines()) == 3
     assert all(line.isprintable() for line in lines.splitlines())
+
+
+def test_a_chart_has_a_column_for_each_date_and_set_of_versions_and_a_ring_where_the_rules_changed() -> None:
+    second = replace(FIRST, outcome=Outcome.REFUTED, versions={**VERSIONS, "numpy": "2.5"})
+    third = replace(second, accepted="2025-05-06", fingerprint="e" * 64)
+    drawing = ElementTree.fromstring(timeline_chart({("full", "G1"): (FIRST, second, third), ("full", "G2"): (FIRST,)}))
+    texts = [text.text for text in drawing.iter(f"{SVG}text")]
+    headings = ["2025-01-02, jax 0.10.2"] * 2 + ["2025-05-06, jax 0.10.2"]
+    assert [text for text in texts if text and text.startswith("2025")] == headings
+    marks = [mark for mark in drawing.iter(f"{SVG}circle") if mark.find(f"{SVG}title") is not None]
+    assert len({mark.attrib["cx"] for mark in marks}) == 3
+    assert [mark.attrib["cx"] for mark in marks].count(marks[0].attrib["cx"]) == 2  # both claims' first verdicts
+    assert len([mark for mark in drawing.iter(f"{SVG}circle") if mark.attrib["fill"] == "none"]) == 1

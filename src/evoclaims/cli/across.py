@@ -19,7 +19,8 @@ from evoclaims.core.errors import UnknownNameError, UserError
 from evoclaims.core.releases import released
 from evoclaims.paper.config import find_root, load_config
 from evoclaims.plugin.options import TIERS
-from evoclaims.report import across_chart, across_table
+from evoclaims.report import across_table
+from evoclaims.report.charts_of_verdicts import across_chart
 from evoclaims.report.console import PlainSpokenConsole
 from evoclaims.verdicts import export
 from evoclaims.verdicts.across import Across, across
@@ -28,7 +29,7 @@ FORMS: Final[Mapping[str, Callable[[Across], bytes]]] = {
     "markdown": lambda found: across_table.markdown(found, shlex.join(["evoclaims", *sys.argv[1:]])).encode(),
     "csv": lambda found: export.as_csv(across_table.rows(found)),
     "json": lambda found: export.as_json(across_table.rows(found)),
-    "svg": lambda found: across_chart.svg(found).encode(),
+    "svg": lambda found: across_chart(found).encode(),
 }
 """Writers by the names of their forms."""
 

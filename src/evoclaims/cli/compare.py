@@ -10,9 +10,11 @@ from pathlib import Path
 
 from evoclaims.cli.judging import judge
 from evoclaims.cli.project import Project, open_project, open_store
+from evoclaims.cli.stored import write
 from evoclaims.core.errors import UserError
 from evoclaims.judging.baseline import DriftReport
 from evoclaims.judging.tripwire import DigestCheck
+from evoclaims.report.charts_of_verdicts import timeline_chart
 from evoclaims.trials.store import Store
 from evoclaims.verdicts import comparison, history, transitions
 from evoclaims.verdicts.comparison import Side
@@ -36,8 +38,13 @@ def main(options: argparse.Namespace) -> int:
         if options.places or patterns:
             raise UserError("--timeline shows the accepted verdicts alone; leave out what else is to be compared.")
         kept = history.load(project.reproduction.folder / history.FILE)
-        print(timeline({key: entries for key, entries in kept.items() if key[0] in tiers}, options.timeline))
+        asked = {key: entries for key, entries in kept.items() if key[0] in tiers}
+        print(timeline(asked, options.timeline))
+        if options.out is not None:
+            write(Path(options.out), timeline_chart(asked, options.timeline).encode())
         return 0
+    if options.out is not None:
+        raise UserError("--out draws what --timeline lists: add --timeline.")
     old, new = (side.of(tiers) for side in _Places(project, tiers).sides(options.places))
     found = transitions.compare(old.verdicts, new.verdicts)
     drift, digests = comparison.compare_trials(old, new)

@@ -208,6 +208,8 @@ def _parser() -> argparse.ArgumentParser:
         "--timeline", metavar="CLAIM", nargs="?", const="", help="list accepted verdicts by date, of CLAIM or of all"
     )
 
+    compare.add_argument("--out", metavar="FILE", help="with --timeline: also draw it over dates and versions, as SVG")
+
     across = add(
         "across",
         "judge claims in an environment for each release of a package, file of pins or Python, and compare with the "

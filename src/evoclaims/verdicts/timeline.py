@@ -20,12 +20,17 @@ def timeline(history: History, claim: str = "") -> str:
         UserError: when nothing has been accepted yet.
         UnknownNameError: when the claim has no accepted verdict.
     """
+    return "\n".join(line for key in chosen(history, claim) for line in _claim(*key, history[key]))
+
+
+def chosen(history: History, claim: str) -> list[tuple[str, str]]:
+    """Return the keys of a claim, or of one case of it, or of all claims, in order; raises as `timeline` does."""
     if not history:
         raise UserError("No verdict has been accepted yet: `evoclaims accept` accepts those of now.")
-    chosen = [key for key in sorted(history, key=in_order) if claim in ("", key[1], key[1].partition("[")[0])]
-    if not chosen:
+    found = [key for key in sorted(history, key=in_order) if claim in ("", key[1], key[1].partition("[")[0])]
+    if not found:
         raise UnknownNameError("accepted claim", claim, {name for _, name in history})
-    return "\n".join(line for key in chosen for line in _claim(*key, history[key]))
+    return found
 
 
 def _claim(tier: str, claim: str, entries: Sequence[Entry]) -> Iterator[str]:
@@ -39,10 +44,15 @@ def _claim(tier: str, claim: str, entries: Sequence[Entry]) -> Iterator[str]:
                 f"(fingerprint {before.fingerprint[:SHORT]} -> {era[0].fingerprint[:SHORT]})"
             )
         for entry in era:
-            p = "" if entry.p is None else f", p = {entry.p:.2g}"
-            behind = _first(entry) if before is None else _changes(before, entry)
-            yield printable(f"  {entry.accepted}  {entry.outcome} (n = {entry.n}{p}){behind and '  '}{behind}")
+            yield f"  {described(before, entry)}"
             before = entry
+
+
+def described(before: Entry | None, entry: Entry) -> str:
+    """Return an entry in one line, with what has changed since the entry before."""
+    p = "" if entry.p is None else f", p = {entry.p:.2g}"
+    behind = _first(entry) if before is None else _changes(before, entry)
+    return printable(f"{entry.accepted}  {entry.outcome} (n = {entry.n}{p}){behind and '  '}{behind}")
 
 
 def _first(entry: Entry) -> str:

@@ -1,0 +1,95 @@
+"""Verdicts as a chart: a row a claim, a column an environment or a date, and a mark in the colour of each verdict."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from html import escape
+from typing import Final
+
+from evoclaims.core.printable import printable
+from evoclaims.judging.verdict import Outcome
+from evoclaims.report.badge import BLUE, GREEN, GREY, RED
+
+ROW, COLUMN, LEFT, TOP, KEY = 56, 150, 220, 58, 95
+"""Sizes in units: height of a row, width of a column, room left of and above the marks, width of a part of the key."""
+
+_COLOURS: Final = {
+    Outcome.SUPPORTED: GREEN,
+    Outcome.REFUTED: RED,
+    Outcome.INCONCLUSIVE: BLUE,
+    Outcome.ERROR: "#000000",
+    Outcome.NOT_RUN: GREY,
+}
+
+
+@dataclass(frozen=True)
+class Mark:
+    """One verdict, or the lack of one.
+
+    Attributes:
+        outcome: of the verdict; None for a cross.
+        said: what the mark tells to whom points at it.
+        height: from 0 to 1; 0.5 is on the line.
+        ringed: whether there is a ring around it.
+    """
+
+    outcome: Outcome | None
+    said: str
+    height: float = 0.5
+    ringed: bool = False
+
+
+def svg(title: str, note: str, columns: Mapping[str, str], rows: Mapping[str, Mapping[str, Mark]]) -> str:
+    """Return the chart.
+
+    Args:
+        title: of the picture.
+        note: what heights and rings mean, on top.
+        columns: headings by the names of columns, which are told to whom points at them.
+        rows: by claim, the mark in each column that has one.
+    """
+    width = LEFT + max(COLUMN * len(columns), KEY * len(Outcome))
+    height = TOP + ROW * len(rows) + 10
+    drawn = "\n".join(_pieces(note, columns, rows, width))
+    return (
+        f'<svg xmlns="http://www.w3.org/2000/svg" width="{width}" height="{height}" role="img" '
+        f'font-family="Verdana,DejaVu Sans,sans-serif" font-size="11">\n<title>{_text(title)}</title>\n'
+        f'<rect width="{width}" height="{height}" fill="#fff"/>\n{drawn}\n</svg>\n'
+    )
+
+
+def _pieces(note: str, columns: Mapping[str, str], rows: Mapping[str, Mapping[str, Mark]], width: int) -> Iterator[str]:
+    """Yield key, headings and rows."""
+    for place, outcome in enumerate(Outcome):
+        at = LEFT + KEY * place + 10
+        yield f'<circle cx="{at}" cy="14" r="5" fill="{_COLOURS[outcome]}"/><text x="{at + 9}" y="18">{outcome}</text>'
+    yield f'<text x="8" y="18">{_text(note)}</text>'
+    for column, (name, heading) in enumerate(columns.items()):
+        title = f"<title>{_text(name)}</title>"
+        yield f'<text x="{_x(column)}" y="{TOP - 8}" text-anchor="middle">{_text(heading)}{title}</text>'
+    for row, (claim, marks) in enumerate(rows.items()):
+        middle = TOP + ROW * row + ROW / 2
+        yield f'<line x1="{LEFT}" x2="{width}" y1="{middle:g}" y2="{middle:g}" stroke="#bdbdbd"/>'
+        yield f'<text x="8" y="{middle + 4:g}">{_text(claim)}</text>'
+        yield from (_drawn(marks[name], _x(column), middle) for column, name in enumerate(columns) if name in marks)
+
+
+def _drawn(mark: Mark, x: float, middle: float) -> str:
+    """Return a mark in the column around `x` and the row around `middle`."""
+    title = f"<title>{_text(mark.said)}</title>"
+    if mark.outcome is None:
+        return f'<path d="M{x - 4:g} {middle - 4:g}l8 8m0-8l-8 8" stroke="{GREY}">{title}</path>'
+    y = middle + (0.5 - mark.height) * (ROW - 16)
+    ring = f'<circle cx="{x:g}" cy="{y:g}" r="8" fill="none" stroke="#000"/>' if mark.ringed else ""
+    return f'{ring}<circle cx="{x:g}" cy="{y:g}" r="5" fill="{_COLOURS[mark.outcome]}">{title}</circle>'
+
+
+def _x(column: int) -> float:
+    """Return the middle of a column."""
+    return LEFT + COLUMN * (column + 0.5)
+
+
+def _text(text: str) -> str:
+    """Return a text for SVG, on one line."""
+    return escape(printable(" ".join(text.split())))
