@@ -31,7 +31,7 @@ def test_the_report_and_the_badge_are_written_where_they_are_uploaded_from() -> 
     written = {arguments[0]: _parser().parse_args(arguments) for arguments in COMMANDS}
     assert {"report", "badge", "export", "compare"} <= written.keys()
     assert re.findall(r"\n          path: (\S+/)\n", TEXT) == ["report/", ".evoclaims/"]
-    assert {Path(options.out).parts[0] for options in written.values() if hasattr(options, "out")} == {"report"}
+    assert {Path(options.out).parts[0] for options in written.values() if getattr(options, "out", None)} == {"report"}
 
 
 def test_the_claims_are_run_by_tox_on_two_cores_with_options_that_the_plugin_takes(pytestconfig: pytest.Config) -> None:

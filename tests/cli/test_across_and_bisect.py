@@ -92,6 +92,10 @@ def test_the_table_is_printed_and_written_and_the_status_says_that_something_cha
     status, out, _ = evoclaims("across", "--package", "pebble", "1.0", "1.2", "--as", "csv", "--out", "t.csv")
     assert status == 1
     assert "pebble 1.2 changes a." in out
+    outcomes["1.3"] = "it cannot be installed"
+    status, out, _ = evoclaims("across", "--package", "Pebble", "1.0", "1.3")
+    assert status == 1
+    assert "pebble 1.3: no verdicts: it cannot be installed\n" in out
     assert Path("t.csv").read_text().startswith("environment,claim,outcome,n,")
     assert Path(".evoclaims-releases/.gitignore").read_text() == "*\n"
     assert not Path(".evoclaims").exists()

@@ -122,7 +122,9 @@ def test_the_table_shows_every_environment_at_any_width(found: Across, width: in
 
 def test_the_text_of_an_issue_begins_with_what_changed_and_ends_with_the_command(found: Across) -> None:
     text = across_table.markdown(found, "evoclaims across --package jax 1 2")
-    assert text.startswith("# jax 3 changes ours.\n\n| claim | jax 1 | jax 2 | jax 5 | jax 3 | jax 4 |\n")
+    assert text.startswith(
+        "# jax 3 changes ours; jax 5 has no verdicts.\n\n| claim | jax 1 | jax 2 | jax 5 | jax 3 | jax 4 |\n"
+    )
     assert "| ✗ refuted, CHANGED<br>A12 0.00, p 3.2e-05, DRIFT<br>10 of 10 differ |" in text
     assert text.endswith("```sh\nevoclaims across --package jax 1 2\n```\n")
 

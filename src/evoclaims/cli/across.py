@@ -10,6 +10,8 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Final
 
+from packaging.utils import canonicalize_name
+
 from evoclaims.cli.elsewhere import Elsewhere
 from evoclaims.cli.project import open_store
 from evoclaims.cli.stored import write
@@ -35,7 +37,7 @@ FORMS: Final[Mapping[str, Callable[[Across], bytes]]] = {
 
 
 def main(options: argparse.Namespace) -> int:
-    """Judge in every environment and print the table; 1 when something changed against the first."""
+    """Judge in every environment and print the table; 1 when something changed, or one has no verdicts."""
     if options.form is not None and options.form not in FORMS:
         raise UnknownNameError("form", options.form, FORMS)
     recipes = _recipes(options)
@@ -57,7 +59,7 @@ def main(options: argparse.Namespace) -> int:
         out = Path(options.out or f"across.{'md' if options.form == 'markdown' else options.form}")
         write(out, FORMS[options.form](found))
         print(f"wrote {out}")
-    return int(bool(found.changed))
+    return int(bool(found.changed or found.without_verdicts))
 
 
 def opened(options: argparse.Namespace, only: str | None) -> Elsewhere:
@@ -81,6 +83,7 @@ def _recipes(options: argparse.Namespace) -> list[Recipe]:
         UserError: when none is named, or one cannot be.
     """
     package, *named = options.package or [""]
+    package = canonicalize_name(package)
     if package and not named:
         raise UserError(f"--package {package} names no version: write such as --package {package} installed newest.")
     if not (named or options.constraints or options.python):
@@ -105,6 +108,6 @@ def _version(package: str, word: str) -> str:
 
 def _unused(found: Across, package: Sequence[str] | None) -> list[str]:
     """Return a line when no trial depends on the package, so that its releases could change no trial."""
-    if not package or any(one.depends_on(package[0]) for one in found.environments):
+    if not package or any(one.depends_on(canonicalize_name(package[0])) for one in found.environments):
         return []
     return [f"No trial of these claims depends on {package[0]}: its releases can only change how they are judged."]

@@ -107,8 +107,16 @@ def _watched(command: list[str], folder: Path, log: Path) -> tuple[int, str]:
     """
     show = _newest_line()
     lines = []
+    # Lines are wanted when they are written; the page of a step on GitHub is for the table, not for every environment.
+    environment = {name: value for name, value in os.environ.items() if name != "GITHUB_STEP_SUMMARY"}
     with subprocess.Popen(
-        command, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, errors="replace"
+        command,
+        cwd=folder,
+        env={**environment, "PYTHONUNBUFFERED": "1"},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        errors="replace",
     ) as process:
         try:
             assert process.stdout is not None

@@ -213,7 +213,7 @@ def _parser() -> argparse.ArgumentParser:
     across = add(
         "across",
         "judge claims in an environment for each release of a package, file of pins or Python, and compare with the "
-        "first; 1 when a verdict changed or trials drifted",
+        "first; 1 when a verdict changed, trials drifted, or an environment has no verdicts",
     )
     across.add_argument(
         "--package",

@@ -143,8 +143,10 @@ def make(recipe: Recipe, kept: Path, project: Path, begins: Callable[[], None]) 
         begins()
         try:
             return _made(recipe, Environment(folder, {}), project, pins)
-        except BaseException:
+        except BaseException as error:
             shutil.rmtree(folder, ignore_errors=True)
+            if isinstance(error, OSError | subprocess.CalledProcessError):  # a full disk, or a Python without ensurepip
+                raise NotInstallableError(f"its folder cannot be made ({' '.join(str(error).split())})") from error
             raise
 
 

@@ -63,15 +63,15 @@ def markdown(found: Across, command: str) -> str:
 
 
 def headline(found: Across) -> str:
-    """Return in a sentence what changed against the first environment."""
-    changed = found.changed
-    if changed:
-        listed = "; ".join(f"{label} changes {', '.join(claims)}" for label, claims in changed.items())
-        return f"{listed}."
-    compared = [one.label for one in found.environments if one.reports][1:]
+    """Return in a sentence what changed against the first environment, and which have no verdicts."""
+    said = [f"{label} changes {', '.join(claims)}" for label, claims in found.changed.items()]
+    said += [f"{label} has no verdicts" for label in found.without_verdicts]
+    if said:
+        return f"{'; '.join(said)}."
+    compared = len(found.environments) - 1
     if not compared:
-        return "Only one environment has verdicts, so that nothing is compared."
-    return f"No verdict changed and no trial drifted in {plural(len(compared), 'environment')} after the first."
+        return "There is one environment alone, so that nothing is compared."
+    return f"No verdict changed and no trial drifted in {plural(compared, 'environment')} after the first."
 
 
 def rows(found: Across) -> list[Row]:

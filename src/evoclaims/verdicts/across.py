@@ -97,6 +97,11 @@ class Across:
         return found
 
     @property
+    def without_verdicts(self) -> list[str]:
+        """Labels of the environments that could not be made, or in which no claim could be judged."""
+        return [one.label for one in self.environments if one.trouble]
+
+    @property
     def lines(self) -> list[str]:
         """What the table has no room for: troubles, what else differs, changed verdicts, and drift."""
         said = []
