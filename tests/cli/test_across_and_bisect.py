@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from importlib.metadata import version
 from pathlib import Path
 
@@ -10,7 +11,7 @@ from hand_made_verdicts import report
 from tiny_project import Evoclaims
 
 from evoclaims.cli.elsewhere import Elsewhere
-from evoclaims.core.environments import Recipe
+from evoclaims.core.environments import Environment, Recipe
 from evoclaims.verdicts.across import Judged
 
 RELEASES = [f"1.{minor}" for minor in range(1, 8)]
@@ -130,3 +131,38 @@ def test_what_cannot_be_asked_is_a_sentence_before_any_environment(
     status, _, err = evoclaims(*arguments)
     assert status == 2
     assert text in err
+
+
+@pytest.fixture
+def commands(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> list[list[str]]:
+    """The commands that would have run in environments; each judges one claim, and breaks at the full tier."""
+    ran: list[list[str]] = []
+
+    def watched(command: list[str], folder: Path, log: Path) -> tuple[int, str]:
+        ran.append(command)
+        (told,) = (option.partition("=")[2] for option in command if option.startswith("--claims-json="))
+        Path(told).write_text(json.dumps({"claims": [report("a").to_json()]}))
+        return (4, "ERROR: no such thing\n") if "-mfull" in command else (0, "")
+
+    monkeypatch.setattr("evoclaims.cli.elsewhere._watched", watched)
+    monkeypatch.setattr("evoclaims.cli.elsewhere.make", lambda *_: Environment(tmp_path / "made", {}))
+    return ran
+
+
+def test_each_python_has_a_store_of_its_own_as_records_do_not_name_it(
+    evoclaims: Evoclaims, commands: list[list[str]]
+) -> None:
+    assert evoclaims("across", "--python", "3.12", "3.13", "--only", "a")[0] == 0
+    stores = [option for command in commands for option in command if option.startswith("--claims-storage=")]
+    root = Path(".evoclaims-releases").absolute()
+    assert stores == [f"--claims-storage={root / f'python{version}'}" for version in ("3.12", "3.13")]
+    assert all({"-msmoke", "--claims-only=a", "--claims-device=auto"}.issubset(command) for command in commands)
+
+
+def test_a_run_that_ends_before_its_claims_has_no_verdicts_whatever_file_it_left(
+    evoclaims: Evoclaims, commands: list[list[str]]
+) -> None:
+    status, out, err = evoclaims("across", "--package", "pebble", "1.0", "--tier", "full")
+    assert (status, len(commands)) == (2, 1)
+    assert "pebble 1.0: pytest ended with 4: no such thing\n" in out
+    assert "No claim was judged in any of these environments" in err

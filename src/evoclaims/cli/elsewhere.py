@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import subprocess
+import tempfile
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -23,8 +24,8 @@ from evoclaims.verdicts.claim_report import ClaimReport
 KEPT = "environments"
 """Folder of the environments, in the store."""
 
-VERDICTS, LOG = "verdicts.json", "pytest.log"
-"""What the last run in an environment has left in its folder."""
+LOG = "pytest.log"
+"""What the last run in an environment has said, in its folder."""
 
 
 class NotJudgedError(Exception):
@@ -76,13 +77,13 @@ class Elsewhere:
         Raises:
             NotJudgedError: when it has judged none.
         """
-        verdicts = environment.folder / VERDICTS
-        verdicts.unlink(missing_ok=True)
-        status, said = _watched(self._command(environment, store, verdicts), self.root, environment.folder / LOG)
-        try:
-            reports = [ClaimReport.from_json(plain) for plain in json.loads(verdicts.read_bytes())["claims"]]
-        except (OSError, ValueError, KeyError, TypeError):
-            reports = []
+        with tempfile.TemporaryDirectory() as folder:  # another command may use the environment at the same time
+            verdicts = Path(folder) / "verdicts.json"
+            status, said = _watched(self._command(environment, store, verdicts), self.root, environment.folder / LOG)
+            try:
+                reports = [ClaimReport.from_json(plain) for plain in json.loads(verdicts.read_bytes())["claims"]]
+            except (OSError, ValueError, KeyError, TypeError):  # none, or those of another evoclaims
+                reports = []
         if not reports or status not in (0, 1, 5):  # pytest's: all well, failures, and nothing measured
             raise NotJudgedError(f"pytest ended with {status}: {printable(reason(said))}")
         return reports
