@@ -51,6 +51,17 @@ def test_a_selection_leaves_the_claims_of_the_tiers_it_names(
     assert collected(*arguments) == left
 
 
+def test_one_case_of_a_claim_is_selected_by_its_name(project: Any, sentence: Sentence) -> None:
+    project.write(
+        "@says('a')\n@pytest.mark.parametrize('case', ['x', 'y'])\ndef test_a(case, trials, verdict):\n    pass\n"
+    )
+    chosen = project.run("--collect-only", "-q", "--claims-only=a[y]")
+    assert [line for line in chosen.outlines if "::" in line] == ["claims/test_claims.py::test_a[smoke-y]"]
+    sentence(
+        project.run("--claims-only=a[z]"), "There is no claim named 'a[z]'. Did you mean 'a[y]'? Known: a[x], a[y]."
+    )
+
+
 def test_naming_the_test_itself_does_not_start_the_full_tier(project: Any) -> None:
     project.write(a="supported")
     result = project.run("--collect-only", "-q", "claims/test_claims.py::test_a[full]")

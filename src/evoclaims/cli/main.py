@@ -68,9 +68,9 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="evoclaims", description="Claims of a paper, judged by real trials.")
     commands = parser.add_subparsers(dest="command", required=True, metavar="command")
 
-    def add(name: str, text: str) -> argparse.ArgumentParser:
+    def add(name: str, text: str, kept: str = ".evoclaims") -> argparse.ArgumentParser:
         command = commands.add_parser(name, help=text, description=text)
-        command.add_argument("--storage", metavar="DIR", help="folder of trials (.evoclaims in the project's root)")
+        command.add_argument("--storage", metavar="DIR", help=f"folder of trials ({kept} in the project's root)")
         return command
 
     def tier(command: argparse.ArgumentParser) -> None:
@@ -214,6 +214,7 @@ def _parser() -> argparse.ArgumentParser:
         "across",
         "judge claims in an environment for each release of a package, file of pins or Python, and compare with the "
         "first; 1 when a verdict changed, trials drifted, or an environment has no verdicts",
+        ".evoclaims-releases",
     )
     across.add_argument(
         "--package",
@@ -231,7 +232,11 @@ def _parser() -> argparse.ArgumentParser:
     )
     across.add_argument("--out", metavar="FILE", help="where to (across.FORM; .md for markdown)")
 
-    bisect = add("bisect", "find the release of a package in which a claim's verdict, or what its trials do, changed")
+    bisect = add(
+        "bisect",
+        "find the release of a package in which a claim's verdict, or what its trials do, changed",
+        ".evoclaims-releases",
+    )
     bisect.add_argument("claim", help="the claim, such as G9, or one case of it, such as 'G1[n_parity]'")
     bisect.add_argument("--package", metavar="NAME", required=True, help="the package")
     bisect.add_argument("--good", metavar="VERSION", required=True, help="a release before the change")
