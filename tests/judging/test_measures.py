@@ -55,6 +55,14 @@ def test_nan_in_a_finished_trial_is_an_error_for_every_kind_of_reading(source) -
         computed.rows(fetched(row, 1))
 
 
+def test_a_misspelled_number_of_a_trial_is_an_error_that_lists_the_known_ones(source) -> None:
+    ppo = source("ppo", [1.0])
+    with pytest.raises(UnreadableTrialError, match="There is no 'scor' in the finished trial of seed 0") as error:
+        Measure(ppo, "misspelled", lambda trial: trial.metrics["scor"]).sample(fetched(ppo, 1))
+    assert str(error.value).endswith(". Did you mean 'score'? Known: score.")
+    assert Event(ppo, "optional", lambda trial: "scor" in trial.metrics).sample(fetched(ppo, 1)).values == (0.0,)
+
+
 def test_a_profile_of_another_length_is_an_error(source) -> None:
     ppo = source("ppo", [(1.0, 0.5, 0.2)])
     with pytest.raises(UnreadableTrialError, match="3 levels instead of 2"):

@@ -90,8 +90,8 @@ class StoredOnly:
     archive: Archive
 
     def check(self) -> None:
-        """Check that the store can be read."""
-        self.archive.store.check()
+        """Check that the store and the committed reference trials can be read."""
+        self.archive.check()
 
     def __call__(self, condition: Condition, seeds: Sequence[int]) -> Sequence[TrialResult]:
         """Return one trial per seed, or raise `NotStoredError`."""

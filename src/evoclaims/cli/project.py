@@ -86,7 +86,9 @@ class Project:
 
     def session(self, variant: str = "") -> Session:
         """Return what claims are judged with: the trials at hand, under the protocol or a variant of it."""
-        return Session(self.reproduction, self.archive.store, StoredOnly(self.archive), variant=variant)
+        fetch = StoredOnly(self.archive)
+        fetch.check()
+        return Session(self.reproduction, self.archive.store, fetch, variant=variant)
 
 
 def open_project(storage: str) -> Project:

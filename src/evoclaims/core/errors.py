@@ -21,7 +21,12 @@ class UnknownNameError(UserError):
 
     def __init__(self, kind: str, name: object, known: Iterable[str]) -> None:
         """Build the message from `kind` (such as "method"), the wrong `name` and the `known` ones."""
-        names = sorted(known)
-        near = difflib.get_close_matches(str(name), names, n=1)
-        guess = f" Did you mean {near[0]!r}?" if near else ""
-        super().__init__(f"There is no {kind} named {name!r}.{guess} Known: {', '.join(names)}.")
+        super().__init__(f"There is no {kind} named {name!r}.{guess(name, known)}")
+
+
+def guess(name: object, known: Iterable[str]) -> str:
+    """Return what follows on an unknown name: the known one that it resembles, if any, and all known ones."""
+    names = sorted(known)
+    near = difflib.get_close_matches(str(name), names, n=1)
+    meant = f" Did you mean {near[0]!r}?" if near else ""
+    return f"{meant} Known: {', '.join(names) or 'none'}."

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
+from evoclaims.core.errors import guess
 from evoclaims.judging.effect import median
 from evoclaims.trials.result import TrialResult
 
@@ -81,7 +82,7 @@ class _Named(Mapping[str, Any]):
     def __getitem__(self, name: str) -> Any:
         value = self._numbers.get(name, ())
         if value == ():
-            raise MissingNumberError(f"There is no {name!r} in {self._where}.")
+            raise MissingNumberError(f"There is no {name!r} in {self._where}.{guess(name, self._numbers)}")
         return value
 
     def __iter__(self) -> Iterator[str]:

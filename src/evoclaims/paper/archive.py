@@ -31,6 +31,15 @@ class Archive:
     store: Store
     references: Path | None = None
 
+    def check(self) -> None:
+        """Check before anything is judged that the store can be read, and every file of reference trials.
+
+        Raises:
+            UserError: when something else is in the store's place, or a file of reference trials is damaged or edited.
+        """
+        self.store.check()
+        _ = self._committed
+
     def get(self, trial: str, versions: Versions | None = None) -> TrialResult | None:
         """Return the record of the trial with this id, or None.
 
