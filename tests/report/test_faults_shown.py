@@ -54,10 +54,8 @@ def test_what_was_not_tried_is_called_so() -> None:
 @pytest.mark.parametrize("width", [60, 80, 160])
 def test_the_table_says_insensitive_beside_the_verdict(width: int) -> None:
     lines = verdict_table(REPORTS, width, False).splitlines()
-    for name, symbol in (("G2", "✓ supported,"), ("G3", "✗ refuted,")):
-        (at,) = (number for number, line in enumerate(lines) if line.startswith(name))
-        assert symbol in lines[at]
-        assert "insensitive" in lines[at + 1]
+    for name, said in (("G2", "✓ supported, insensitive"), ("G3", "✗ refuted, insensitive")):
+        assert [said in line for line in lines if line.startswith(name)] == [True]
     assert sum("insensitive" in line for line in lines) == 3
     assert lines[-1].startswith("insensitive: no fault planted")
     assert "insensitive" not in verdict_table([REPORTS[0], REPORTS[3]], width, False)

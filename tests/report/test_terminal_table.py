@@ -9,6 +9,7 @@ import pytest
 from hand_made_verdicts import evidence, report, verdict
 from hypothesis import given
 from hypothesis import strategies as st
+from rich.cells import cell_len
 
 from evoclaims.judging.baseline import DriftReport, DriftRow
 from evoclaims.judging.verdict import Outcome
@@ -38,9 +39,8 @@ def test_a_row_shows_claim_sentence_verdict_n_effect_p_and_evidence() -> None:
 def test_a_refuted_claim_shows_the_p_against_it_and_the_effect_of_the_part_that_decided() -> None:
     parts = (evidence(0.5), evidence(0.0625), evidence(None))
     refuted = report(outcome="refuted", verdict=verdict("refuted", evidence=parts, deciding=1))
-    _, row, second = verdict_table([refuted], 160, False).splitlines()
-    assert re.split(r" {2,}", row.strip())[2:] == ["✗ refuted", "10", "0.06", "against 0.0043"]
-    assert second.strip() == "(0.0042)"
+    _, row = verdict_table([refuted], 160, False).splitlines()
+    assert re.split(r" {2,}", row.strip())[2:] == ["✗ refuted", "10", "0.06", "against 0.0043 (0.0042)"]
     without = replace(refuted, verdict=verdict("refuted", evidence=parts, deciding=2))
     assert re.split(r" {2,}", verdict_table([without], 160, False).splitlines()[1].strip())[4] == "–"
 
@@ -147,6 +147,38 @@ def test_eighty_columns_leave_out_the_files_and_nothing_else() -> None:
     assert all(len(line) <= 80 for line in lines)
     assert "evidence: a/verdicts/smoke/<claim>.json" in lines
     assert re.search(r"✗ refuted\* +10 +– +against 0.0043", "\n".join(lines))
+
+
+LONG = "NEAT climbs every level of every task that was ever posed, 和 never falls back"
+
+
+@pytest.mark.parametrize("width", [20, 60, 80, 100, 120, 200])
+def test_a_claim_is_one_line_at_any_width_and_its_id_is_whole(width: int) -> None:
+    cases = [
+        "",
+        "cma_es-hyperneat-simple_alu",
+        "in_a_case_of_so_many_parameters_that_no_terminal_is_wide_enough_for_it" * 2,
+    ]
+    reports = [report("G1", case=case, statement=LONG, evidence="a/verdicts/G1.json") for case in cases]
+    heading, *rows, caption = verdict_table(reports, width, False).splitlines()
+    assert caption.startswith("evidence: ")
+    assert [row.split()[0] for row in rows] == [one.name for one in reports]
+    assert all("✓ supported" in row for row in rows)
+    if width >= 80:
+        assert [cell_len(row) <= width for row in (heading, *rows)] == [True, True, True, False]
+        assert all("NEAT climbs" in row and "…" in row for row in rows)
+
+
+def test_columns_make_room_for_the_sentence_the_least_important_first() -> None:
+    reports = [report(case="cma_es-hyperneat-simple_alu", statement=LONG, evidence="G1.json")]
+    headings = {width: verdict_table(reports, width, False).splitlines()[0].split() for width in (60, 75, 80, 95, 120)}
+    assert {width: " ".join(words[5:]) for width, words in headings.items()} == {
+        60: "",
+        75: "n A12",
+        80: "n A12 p",
+        95: "n A12 p (attainable)",
+        120: "n A12 p (attainable) evidence",
+    }
 
 
 def test_trials_without_a_result_are_told_of_whatever_the_verdict() -> None:

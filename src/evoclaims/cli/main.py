@@ -130,8 +130,11 @@ def _parser() -> argparse.ArgumentParser:
     )
     power.add_argument("--draws", type=int, default=1000, metavar="N", help="draws from the pilot (1000)")
 
-    status = add("status", "show the verdicts that the stored trials give; run nothing")
+    status = add("status", "show the verdicts that the stored trials give, one line for each claim; run nothing")
     tier(status)
+    status.add_argument("--only", metavar="IDS", help="only these claims, such as G1,G7; G: all of G1, G2, …")
+    status.add_argument("--why", action="store_true", help="also say why verdicts are accepted, or inconclusive")
+    status.add_argument("--as", dest="form", metavar="FORM", help="print csv, json or markdown instead of a table")
 
     report = add("report", "write a web page and a Markdown file about all claims from the trials at hand; run nothing")
     report.add_argument("--tier", default="all", help="smoke, full or all (default)")

@@ -79,7 +79,8 @@ def _conditions(
     kinds, cores = _kinds(costs), any(cost.core_pace for cost in costs.values())
     measured = [f"took on one {kind}" for kind in kinds] + ["CPU core hours"] * cores
     for heading in ("condition", "cached", "missing", "environment steps", "time, at most", *measured):
-        table.add_column(heading, justify="left" if heading == "condition" else "right")
+        names = heading == "condition"
+        table.add_column(heading, justify="left" if names else "right", no_wrap=names)
     seeds = tier.design.seeds(tier.design.last.n)
     steps, seconds, unknown = 0, 0.0, False
     needed = {names: costs[names].core_seconds(tier.condition(*names).environment_steps * len(seeds)) for names in used}
@@ -154,7 +155,8 @@ def _claims(reports: Sequence[ClaimReport], costs: Costs) -> Table:
     table = Table(box=None, pad_edge=False)
     kinds = _kinds(costs)
     for heading in ("claim", "n", "α", "p for", "p against", "can be decided", *(f"took on one {k}" for k in kinds)):
-        table.add_column(heading, justify="left" if heading == "claim" else "right")
+        names = heading == "claim"
+        table.add_column(heading, justify="left" if names else "right", no_wrap=names)
     for report in reports:
         used = [(source.method, source.task) for source in report.sources]
         for look in report.attainable:

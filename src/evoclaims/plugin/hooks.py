@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from evoclaims.core.errors import UnknownNameError, UserError
+from evoclaims.core.errors import UserError
 from evoclaims.core.printable import shown
 from evoclaims.plugin import options
 from evoclaims.plugin.distribution import Distribution, prepare
@@ -104,11 +104,9 @@ def _wanted_claims(config: pytest.Config, tests: Iterable[ClaimTest]) -> set[str
     option, ids = config.getoption("claims_only"), {test.claim.id for test in tests}
     if option is None:
         return ids
-    wanted = {name.strip() for name in option.split(",") if name.strip()}
-    names = {test.key[1] for test in tests}
-    for name in sorted(wanted - ids - names):
-        raise UnknownNameError("claim", name, (names if "[" in name else ids) or {"(none collected)"})
-    return wanted
+    from evoclaims.claims.selection import selected
+
+    return selected(option, ids | {test.key[1] for test in tests})
 
 
 def _refuse(config: pytest.Config, items: list[pytest.Item], error: UserError) -> None:

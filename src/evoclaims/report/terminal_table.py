@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import io
 import os
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Final, Literal
 
+from rich.cells import cell_len, set_cell_size
 from rich.markup import escape
-from rich.table import Table
+from rich.text import Text
 
 from evoclaims.core.printable import printable
 from evoclaims.judging.baseline import DriftReport
@@ -20,8 +22,11 @@ from evoclaims.verdicts import mixed_versions
 from evoclaims.verdicts.claim_report import ClaimReport
 from evoclaims.verdicts.sensitivity import Tried
 
-WIDE = 120
-"""Columns from which each claim's file of evidence is shown too."""
+SENTENCE: Final = 16
+"""Columns of the terminal that other columns leave to the sentence, if they can."""
+
+_CLAIMED: Final = "what is claimed"
+_GAP: Final = "  "
 
 _COLOURS = {
     Outcome.SUPPORTED: "green",
@@ -33,37 +38,87 @@ _COLOURS = {
 
 
 def verdict_table(reports: Sequence[ClaimReport], width: int, colour: bool) -> str:
-    """Return the table: claim, sentence, verdict, n, effect, p beside the attainable p, evidence."""
-    table = Table(expand=True, show_lines=False, pad_edge=False, box=None)
-    wide = width >= WIDE
-    # On a narrow terminal a long list of parameters must not squeeze the sentence.
-    table.add_column("claim", no_wrap=wide, overflow="fold", max_width=None if wide else 16)
-    table.add_column("what is claimed", ratio=1, min_width=16)
-    for heading in ("verdict", "n", "A12"):
-        table.add_column(heading, no_wrap=True, justify="left" if heading == "verdict" else "right")
-    # "against 5.4e-06 (5.4e-06)" wraps to a second line, as most sentences do, and leaves them room.
-    table.add_column("p (attainable)", max_width=17)
-    if wide:
-        table.add_column("evidence", no_wrap=True, style="dim")
-    for report in table_cells.ordered(reports):
-        cells = (
-            _literal(report.name),
-            _literal(f"{report.statement} ({report.where})"),
-            f"[{_COLOURS[report.outcome]}]{table_cells.verdict_of_versions(report)}[/]".replace(", ", ",\n"),
-            table_cells.trials(report),
-            table_cells.effect(report),
-            table_cells.p(report),
-            _literal(Path(report.evidence).name),
-        )
-        table.add_row(*(cells if wide else cells[:-1]))
+    """Return a table, one line for each claim: id, sentence, verdict, n, effect, p beside the attainable p, evidence.
+
+    The sentence is shortened to the terminal's width, never the id. Where that leaves it little room, columns are left
+    out, the evidence first.
+    """
+    ordered = table_cells.ordered(reports)
+    names = Column("claim", [printable(report.name) for report in ordered], most=width // 2)
+    verdicts = Column("verdict", [table_cells.verdict_of_versions(report) for report in ordered])
+    columns = next((found for found in _choices(ordered) if _room(width, names, verdicts, *found) >= SENTENCE), ())
+    room = max(_room(width, names, verdicts, *columns), len(_CLAIMED))
+    sentences = Column(_CLAIMED, [_shortened(f"{one.statement} ({one.where})", room) for one in ordered], width=room)
+    shown = (names, sentences, verdicts, *columns)
+    lines = [Text(_GAP.join(column.padded(column.heading) for column in shown), style="bold")]
+    for row, report in enumerate(ordered):
+        line = Text(_GAP.join(column.padded(column.cells[row]) for column in shown[:2]) + _GAP)
+        line.append(verdicts.padded(verdicts.cells[row]), style=_COLOURS[report.outcome])
+        line.append("".join(_GAP + column.padded(column.cells[row]) for column in columns))
+        lines.append(line)
     folders = sorted({os.path.relpath(Path(report.evidence).parent) for report in reports if report.evidence})
     captions = [f"evidence: {printable(folder)}/<claim>.json" for folder in folders]
     if any(report.as_expected for report in reports):
-        captions.append("* looked into and accepted, see below")
+        captions.append("* looked into and accepted")
     if any(report.tried is Tried.INSENSITIVE for report in reports):
         captions.append("insensitive: no fault planted in the claim's methods changes its verdict, so it is no support")
     captions += mixed_versions.lines(reports)
-    return "\n".join([_rendered(table, width, colour), *captions])
+    return "\n".join([*(_rendered(line, width, colour).rstrip() for line in lines), *captions])
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column of the table.
+
+    Attributes:
+        heading: its name.
+        cells: one for each claim.
+        right: whether they end at the right.
+        most: greatest width in columns of a terminal; a longer cell pushes the rest of its line to the right.
+        width: fixed width; 0 for that of the longest cell.
+    """
+
+    heading: str
+    cells: Sequence[str]
+    right: bool = False
+    most: int = 10_000
+    width: int = 0
+
+    @property
+    def wide(self) -> int:
+        """The column's width."""
+        return self.width or min(max(map(cell_len, (self.heading, *self.cells))), max(self.most, len(self.heading)))
+
+    def padded(self, text: str) -> str:
+        """Return a text with spaces up to the column's width."""
+        spaces = " " * (self.wide - cell_len(text))
+        return spaces + text if self.right else text + spaces
+
+
+def _choices(reports: Sequence[ClaimReport]) -> Iterator[tuple[Column, ...]]:
+    """Yield the columns that may follow the verdict, all of them first, then fewer and shorter ones."""
+    n = Column("n", [table_cells.trials(report) for report in reports], right=True)
+    effect = Column("A12", [table_cells.effect(report) for report in reports], right=True)
+    attainable = Column("p (attainable)", [table_cells.p(report) for report in reports])
+    p = Column("p", [table_cells.p(report, attainable=False) for report in reports])
+    evidence = Column("evidence", [printable(Path(report.evidence).name) for report in reports])
+    if any(report.evidence for report in reports):
+        yield n, effect, attainable, evidence
+    yield n, effect, attainable
+    yield n, effect, p
+    yield n, effect
+    yield (n,)
+
+
+def _room(width: int, *columns: Column) -> int:
+    """Return how many columns of a terminal are left for the sentence."""
+    return width - sum(column.wide + len(_GAP) for column in columns)
+
+
+def _shortened(text: str, room: int) -> str:
+    """Return a text on one line that is no wider than `room`."""
+    plain = printable(" ".join(text.split()))
+    return plain if cell_len(plain) <= room else set_cell_size(plain, room - 1).rstrip() + "…"
 
 
 def explanations(reports: Sequence[ClaimReport], width: int, colour: bool) -> str:
@@ -101,10 +156,13 @@ def _literal(text: str) -> str:
     return escape(" ".join(text.split()))
 
 
-def _rendered(content: Table | str, width: int, colour: bool) -> str:
-    """Return rich content as text."""
+def _rendered(content: Text | str, width: int, colour: bool) -> str:
+    """Return rich content as text; a `Text` stays on one line, whatever the width."""
     file = io.StringIO()
     system: Literal["standard"] | None = "standard" if colour else None
     console = PlainSpokenConsole(file=file, width=max(width, 60), force_terminal=colour, color_system=system)
-    console.print(content, highlight=False)
+    if isinstance(content, Text):
+        console.print(content, highlight=False, crop=False, no_wrap=True, overflow="ignore")
+    else:
+        console.print(content, highlight=False)
     return file.getvalue().rstrip("\n")

@@ -1,0 +1,29 @@
+"""Claims as a user names them: by id, by a claim test's whole name, or by the letters that ids begin with."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection
+
+from evoclaims.core.errors import UnknownNameError
+
+
+def selected(option: str, known: Collection[str]) -> set[str]:
+    """Return the known names that an option such as "G1,S" selects: G1 and all of S1, S2, ….
+
+    Args:
+        option: names, separated by commas.
+        known: ids of claims, and perhaps whole names such as "G1[n_parity]".
+
+    Raises:
+        UnknownNameError: for a name that selects nothing.
+    """
+    chosen: set[str] = set()
+    for name in filter(None, map(str.strip, option.split(","))):
+        begun = {one for one in known if name.isalpha() and re.match(rf"{name}\d", one)}
+        found = {name} & set(known) or begun
+        if not found:
+            alike = {one for one in known if ("[" in one) == ("[" in name)}
+            raise UnknownNameError("claim", name, alike or {"(none collected)"})
+        chosen |= found
+    return chosen

@@ -1,0 +1,98 @@
+"""`evoclaims status`: one line for each claim, those that are asked for, and in forms for other programs."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from pathlib import Path
+
+import pytest
+from tiny_project import Evoclaims, Project
+
+from evoclaims.paper import references
+from evoclaims.trials.store import Store
+
+CASES = """
+@pytest.mark.parametrize("method", ["right", "wrong"])
+@says("G1")
+def test_first(trials, verdict, method):
+    verdict(trials(method, on="parity").solves_every_level.in_most_trials())
+
+@expected(Outcome.REFUTED, because="the paper errs")
+@says("G10")
+def test_second(trials, verdict):
+    verdict(trials("wrong", on="parity").solves_every_level.in_most_trials())
+
+@says("S1")
+def test_third(trials, verdict):
+    verdict(trials("right", on="parity").solves_every_level.in_most_trials())
+"""
+
+
+@pytest.fixture
+def status(evoclaims: Evoclaims, project: Project, stored: Store) -> Evoclaims:
+    """`evoclaims status` of four claims, with their trials."""
+    project.write(CASES)
+    return lambda *arguments: evoclaims("status", *arguments)
+
+
+@pytest.mark.parametrize(
+    ("only", "ended", "shown"),
+    [
+        ("G1", 1, ["G1[right]", "G1[wrong]"]),
+        ("G1[right]", 0, ["G1[right]"]),
+        ("G", 1, ["G1[right]", "G1[wrong]", "G10"]),
+        ("S, G10", 0, ["G10", "S1"]),
+    ],
+)
+def test_claims_are_chosen_by_id_by_whole_name_and_by_the_letters_of_ids(
+    status: Evoclaims, only: str, ended: int, shown: list[str]
+) -> None:
+    code, out, _ = status("--only", only)
+    assert code == ended
+    assert [line.split()[0] for line in out.splitlines() if "in small" in line] == shown
+
+
+def test_a_claim_that_does_not_exist_is_a_sentence(status: Evoclaims) -> None:
+    code, _, err = status("--only=G11")
+    assert code == 2
+    assert "There is no claim named 'G11'. Did you mean 'G1" in err
+
+
+def test_why_a_verdict_failed_is_said_in_any_case_and_the_rest_where_it_is_asked_for(status: Evoclaims) -> None:
+    brief, whole = status()[1], status("--why")[1]
+    for out, accepted in ((brief, False), (whole, True)):
+        assert "✗ G1[wrong]: p = " in out
+        assert ("[accepted: the paper errs]" in out) == accepted
+        assert ("--why says why" in out) != accepted
+        assert out.splitlines()[-1] == "claims (smoke): 2 supported, 2 refuted"
+
+
+def test_other_programs_read_the_same_verdicts(status: Evoclaims) -> None:
+    code, out, _ = status("--as=json")
+    assert code == 1
+    told = json.loads(out)["rows"]
+    assert [(row["claim"], row["case"], row["outcome"]) for row in told] == [
+        ("G1", "right", "supported"),
+        ("G1", "wrong", "refuted"),
+        ("G10", "", "refuted"),
+        ("S1", "", "supported"),
+    ]
+    rows = csv.DictReader(io.StringIO(status("--as=csv")[1]))
+    assert [row["outcome"] for row in rows] == [row["outcome"] for row in told]
+    assert "| S1 (smoke) | S1 in small (§1) | ✓ supported | 10 |" in status("--as=markdown")[1]
+    assert "There is no form of a table named 'jsn'. Did you mean 'json'?" in status("--as=jsn")[2]
+
+
+@pytest.mark.parametrize("command", ["status", "badge", "accept", "report"])
+def test_a_torn_line_among_the_reference_trials_is_found_before_anything_is_judged(
+    evoclaims: Evoclaims, monkeypatch: pytest.MonkeyPatch, command: str
+) -> None:
+    path = references.path_of(Path("reference"), "smoke", "right", "parity")
+    path.parent.mkdir(parents=True)
+    path.write_text("torn\n")
+    monkeypatch.setattr("evoclaims.cli.project.judge", None)
+    code, _, err = evoclaims(command)
+    assert (code, err.count("\n")) == (2, 1)
+    assert "reference/smoke/right-parity.jsonl is no reference trial" in err
