@@ -137,7 +137,7 @@ def test_the_closest_acceptance_holds_and_beside_it_the_one_for_the_tier_alone(p
 def test_without_an_acceptance_for_its_tier_a_test_has_none(pytester: pytest.Pytester) -> None:
     text = CLAIMS.replace('pytestmark = expected("error", because="module")', "")
     items, _ = pytester.inline_genitems(pytester.makepyfile(text), "-pno:cacheprovider")
-    (item,) = (item for item in items if item.name == "test_fine[full-plain]")
+    (item,) = (item for item in items if item.name == "test_fine[plain-fine-full]")
     assert expectation_of(item, "smoke") is None
     assert expectation_of(item, "full") == Expectation(Outcome.INCONCLUSIVE, "claim, full", "full")
 

@@ -86,9 +86,9 @@ def test_second(trials, verdict, letter):
 @pytest.mark.parametrize(
     ("text", "name", "tests"),
     [
-        (SAME.format("right") + SAME.format("wrong"), "G1", ("test_right[smoke]", "test_wrong[smoke]")),
-        (PARTS, "G1[a-b-c]", ("test_parts[smoke-a-b-c]",)),
-        (IN_THE_ID, "G1[a]", ("test_first[smoke]", "test_second[smoke-a]")),
+        (SAME.format("right") + SAME.format("wrong"), "G1", ("test_right[G1-smoke]", "test_wrong[G1-smoke]")),
+        (PARTS, "G1[a-b-c]", ("test_parts[a-b-c-G1-smoke]",)),
+        (IN_THE_ID, "G1[a]", ("test_first[G1_a_-smoke]", "test_second[a-G1-smoke]")),
     ],
 )
 def test_two_claim_tests_of_one_name_are_a_sentence_that_names_both(
@@ -137,7 +137,7 @@ def test_a_claim_that_would_never_be_judged_is_a_sentence(
     sentence(result, said)
 
 
-def test_the_tier_comes_first_whoever_else_gives_parameters(project: Any) -> None:
+def test_the_tier_comes_last_whoever_else_gives_parameters(project: Any) -> None:
     project.write("@says('G1')\ndef test_it(trials, verdict, method):\n    pass\n")
     (project.path / "conftest.py").write_text(
         "import pytest\n@pytest.hookimpl(tryfirst=True)\ndef pytest_generate_tests(metafunc):\n"

@@ -50,7 +50,7 @@ def test_the_words_of_a_verbose_run_are_the_outcomes(project: Any) -> None:
     project.write(a="supported", b="undecided")
     project.run()  # of trials that are stored there is no progress to tell between a test's name and its outcome
     result = project.run("-v")
-    result.stdout.fnmatch_lines(["*::test_a?smoke? SUPPORTED*", "*::test_b?smoke? INCONCLUSIVE*"])
+    result.stdout.fnmatch_lines(["*::test_a?a-smoke? SUPPORTED*", "*::test_b?b-smoke? INCONCLUSIVE*"])
 
 
 @pytest.mark.parametrize(

@@ -19,8 +19,8 @@ def collected(project: Any) -> Callable[..., list[str]]:
 
     def run(*arguments: str) -> list[str]:
         result = project.run("--collect-only", "-q", *arguments)
-        names = [line.partition("::test_")[2] for line in result.outlines if "::" in line]
-        return sorted(name.replace("[", " ").replace("]", "") for name in names)
+        names = [line.partition("::test_")[2].removesuffix("]") for line in result.outlines if "::" in line]
+        return sorted(name.replace(f"[{name[0]}-", " ") for name in names)
 
     return run
 
@@ -64,8 +64,47 @@ def test_one_case_of_a_claim_is_selected_by_its_name(project: Any, sentence: Sen
 
 def test_naming_the_test_itself_does_not_start_the_full_tier(project: Any) -> None:
     project.write(a="supported")
-    result = project.run("--collect-only", "-q", "claims/test_claims.py::test_a[full]")
+    result = project.run("--collect-only", "-q", "claims/test_claims.py::test_a[a-full]")
     assert result.ret == pytest.ExitCode.NO_TESTS_COLLECTED
+
+
+BY_ID = """
+@pytest.mark.parametrize("method", ["right", "wrong"])
+@says("G9")
+def test_progress(trials, verdict, method):
+    verdict(trials(method, on="parity").solves_every_level.in_most_trials())
+
+@says("G10/ü [b]")
+def test_size(trials, verdict):
+    verdict(trials("right", on="parity").solves_every_level.in_most_trials())
+"""
+
+
+def test_tests_are_chosen_by_the_ids_of_claims_which_are_parts_of_their_names(project: Any) -> None:
+    project.write(BY_ID)
+    shown = project.run("--collect-only", "-q", "-k", "G9").outlines
+    names = [f"claims/test_claims.py::test_progress[{case}-G9-smoke]" for case in ("right", "wrong")]
+    assert [line for line in shown if "::" in line] == names
+    (odd,) = (line for line in project.run("--collect-only", "-q", "-k", "G10").outlines if "::" in line)
+    assert odd == "claims/test_claims.py::test_size[G10_b_-smoke]"
+    reports = project.json("-k", "G9 and right or G10")["claims"]
+    assert [(report["claim"], report["case"]) for report in reports] == [("G9", "right"), ("G10/ü [b]", "")]
+    assert project.run(odd).ret == 0
+
+
+@pytest.mark.parametrize("arguments", [("-k", "G11"), ("-m", "full and smoke"), ("--claims-tier=full", "-m", "smoke")])
+def test_a_selection_that_finds_nothing_says_how_claims_are_selected(project: Any, arguments: tuple[str, ...]) -> None:
+    project.write(a="supported", G10="supported", G9="supported")
+    result = project.run(*arguments)
+    assert result.ret == pytest.ExitCode.NO_TESTS_COLLECTED
+    result.stdout.fnmatch_lines(
+        [
+            "No claim was selected: --claims-only=G9 selects claims by their ids, -m smoke and -m full their tier. "
+            "Claims here: G9, G10, a."
+        ]
+    )
+    project.write("def test_it():\n    pass\n")
+    assert "--claims-only" not in project.run("-k", "nothing").stdout.str()
 
 
 def test_the_full_tier_judges_the_papers_own_sentence(project: Any) -> None:

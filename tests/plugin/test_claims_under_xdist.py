@@ -73,7 +73,7 @@ def test_a_claim_whose_process_dies_is_not_missing_without_a_word(project: Any) 
     apart = project.run_apart("-n1", "--claims-json=out.json")
     assert apart.ret == pytest.ExitCode.TESTS_FAILED
     shown = " ".join(apart.stdout.str().split())
-    assert "error: The process that judged claims/test_claims.py::test_killed[smoke] died" in shown
+    assert "error: The process that judged claims/test_claims.py::test_killed[killed-smoke] died" in shown
     assert "claims: 1 supported" in shown
 
 
@@ -83,10 +83,12 @@ def test_a_process_that_dies_over_the_only_claim_is_an_error_too(project: Any) -
     (project.path / "conftest.py").write_text(
         "def pytest_sessionfinish(session):\n"
         "    summary = session.config.pluginmanager.get_plugin('claims-summary')\n"
-        "    summary.pytest_handlecrashitem('claims/test_claims.py::test_killed[smoke]')\n"
+        "    summary.pytest_handlecrashitem('claims/test_claims.py::test_dead[killed-smoke]')\n"
     )
     result = project.run()
-    result.stdout.fnmatch_lines(["ERROR: The process that judged claims/test_claims.py::test_killed[[]smoke] died*"])
+    result.stdout.fnmatch_lines(
+        ["ERROR: The process that judged claims/test_claims.py::test_dead[[]killed-smoke] died*"]
+    )
 
 
 @pytest.mark.parametrize(

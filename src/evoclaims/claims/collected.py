@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Final
@@ -14,7 +15,13 @@ from evoclaims.core.printable import printable
 from evoclaims.verdicts.claim_report import named
 
 TIER: Final = "claim_tier"
-"""The parameter that makes a claim test run once per tier; the plugin makes it the first one."""
+"""The parameter that makes a claim test run once per tier; the plugin makes it the last one."""
+
+
+def tier_id(claim: object, tier: str) -> str:
+    """Return how a test's id ends, such as "G9-smoke": in characters that pytest never escapes."""
+    named = claim.id if isinstance(claim, Claim) else ""
+    return "-".join(filter(None, (re.sub(r"[^A-Za-z0-9_.-]+", "_", named), tier)))
 
 
 @dataclass(frozen=True)
@@ -47,7 +54,7 @@ class ClaimTest:
         if not isinstance(claim, Claim):
             raise UserError(f"{item.nodeid} has the mark pytest.mark.claim but no claim: use @claim(...) of evoclaims.")
         tier: str = callspec.params[TIER]
-        return ClaimTest(claim, tier, callspec.id.removeprefix(tier).removeprefix("-"))
+        return ClaimTest(claim, tier, callspec.id.removesuffix(tier_id(claim, tier)).removesuffix("-"))
 
     @property
     def key(self) -> tuple[str, str]:

@@ -8,8 +8,8 @@ from typing import Final
 
 from evoclaims.claims.claim import Claim
 from evoclaims.claims.reporting import judged
+from evoclaims.claims.selection import selected
 from evoclaims.claims.session import Session
-from evoclaims.core.errors import UnknownNameError
 from evoclaims.judging.assertion import Assertion
 from evoclaims.judging.fingerprint import fingerprint
 from evoclaims.judging.power import Draws, Power, power
@@ -113,10 +113,7 @@ def only(claims: Sequence[Asserted], wanted: str | None) -> tuple[Asserted, ...]
     """
     if wanted is None:
         return tuple(claims)
-    names = {name.strip() for name in wanted.split(",") if name.strip()}
-    known = {name for one in claims for name in (one.report.claim, one.report.name)}
-    for name in sorted(names - known):
-        raise UnknownNameError("claim", name, known or {"(none collected)"})
+    names = selected(wanted, {name for one in claims for name in (one.report.claim, one.report.name)})
     return tuple(one for one in claims if names & {one.report.claim, one.report.name})
 
 

@@ -18,7 +18,7 @@ from evoclaims.plugin.distribution import Distribution, prepare
 from evoclaims.plugin.options import TIERS
 from evoclaims.plugin.progress import QUIET, ProgressLine, progress_of
 from evoclaims.plugin.run_session import make_session
-from evoclaims.plugin.summary import ATTRIBUTE, TROUBLE, Summary
+from evoclaims.plugin.summary import ATTRIBUTE, KNOWN, TROUBLE, Summary
 from evoclaims.trials.allowance import end_without
 
 if TYPE_CHECKING:
@@ -56,14 +56,22 @@ def pytest_configure(config: pytest.Config) -> None:
 
 @pytest.hookimpl(wrapper=True, tryfirst=True)
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> Generator[None, object, object]:
-    """Run each claim once per tier, which comes before all other parameters in a test's id."""
+    """Run each claim once per tier; a test ends with both, after all other parameters: test_x[n_parity-G1-smoke]."""
+    made = yield
     if metafunc.definition.get_closest_marker("claim") is not None:
         if "claim_tier" not in metafunc.fixturenames:
             raise pytest.UsageError(
                 f"{metafunc.definition.nodeid} is a claim but takes neither the fixture `trials` nor `verdict`."
             )
-        metafunc.parametrize("claim_tier", [pytest.param(tier, marks=getattr(pytest.mark, tier)) for tier in TIERS])
-    return (yield)
+        from evoclaims.claims.claim import claim_of
+        from evoclaims.claims.collected import tier_id
+
+        claim = claim_of(metafunc.definition)
+        metafunc.parametrize(
+            "claim_tier",
+            [pytest.param(tier, marks=getattr(pytest.mark, tier), id=tier_id(claim, tier)) for tier in TIERS],
+        )
+    return made
 
 
 @pytest.hookimpl(tryfirst=True)
@@ -75,6 +83,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
             from evoclaims.claims.collected import claim_tests
 
             tests = claim_tests(items)
+        config.stash[KNOWN] = {test.claim.id for test in tests.values()}
         wanted = _wanted_claims(config, tests.values())
     except UserError as error:
         _refuse(config, items, error)

@@ -29,6 +29,10 @@ TROUBLE: Final = "claims_trouble"
 """Name under which an xdist worker tells its controller why it runs nothing."""
 
 
+KNOWN: Final[pytest.StashKey[set[str]]] = pytest.StashKey()
+"""Where a run keeps the ids of the claims that it has collected, selected or not."""
+
+
 class Summary:
     """Gathers the claims' reports of a run in the process that writes the output, and ends the run with them."""
 
@@ -60,8 +64,7 @@ class Summary:
     @pytest.hookimpl(optionalhook=True)
     def pytest_handlecrashitem(self, crashitem: str) -> None:
         """Note that an xdist worker died on a claim, which has no report then but must be mentioned."""
-        parameters = crashitem.rpartition("[")[2].removesuffix("]").split("-")
-        if not set(TIERS).isdisjoint(parameters):  # pytest's own summary has all other tests
+        if crashitem.endswith(tuple(f"-{tier}]" for tier in TIERS)):  # pytest's own summary has all other tests
             self._died.append(
                 f"The process that judged {crashitem} died (it was killed, crashed, or found no memory), so that this "
                 "claim has no verdict here. Its trials are kept as far as they are, and the same command goes on from "
@@ -135,11 +138,13 @@ class Summary:
         """Whether any claim has a verdict, even an undecided or broken one."""
         return any(report.outcome != "not run" for report in self.reports)
 
-    def pytest_terminal_summary(self, terminalreporter: Any) -> None:
+    def pytest_terminal_summary(self, terminalreporter: Any, exitstatus: int) -> None:
         """Print the verdict table and its details."""
         if not self.reports:
             for trouble in [*self._troubles, *self._died]:
                 terminalreporter.write_line(self._said(f"ERROR: {trouble}"), red=True)
+            if exitstatus == pytest.ExitCode.NO_TESTS_COLLECTED and self._config.stash.get(KNOWN, ()):
+                terminalreporter.write_line(self._said(self._choices()), yellow=True)
             return
         from evoclaims.report import table_cells, terminal_table
 
@@ -168,6 +173,16 @@ class Summary:
         if not any(report.n for report in self.reports):
             what = "No trial was looked at" if self._judged else "No claim was judged"
             terminalreporter.write_line(f"{what}: nothing was measured.", red=True)
+
+    def _choices(self) -> str:
+        """Say how claims are selected, where none was."""
+        from evoclaims.verdicts.history import in_order
+
+        names = sorted(self._config.stash[KNOWN], key=lambda name: in_order(("", name)))
+        return (
+            f"No claim was selected: --claims-only={names[0]} selects claims by their ids, -m smoke and -m full their "
+            f"tier. Claims here: {', '.join(names)}."
+        )
 
     def _said(self, text: str) -> str:
         """Return a line that is safe for the terminal."""
