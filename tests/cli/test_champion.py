@@ -92,7 +92,7 @@ def test_a_record_that_is_not_its_champions_gives_status_1_and_a_sentence(traine
     assert re.search(r"^ +0 +[0-9.]+ +0.875 ", out, re.MULTILINE)
     assert "The replay differs from the stored record, which was made with the same versions" in out
     assert "equals" not in out
-    assert Path("neat-parity-4.json").exists()
+    assert Path("figures/neat-parity-4.json").exists()
     _change_record(result, provenance={**result.provenance, "machine": "a mainframe"})
     status, out, _ = trained(*arguments)
     assert status == 1
@@ -109,8 +109,8 @@ def test_a_changed_champion_is_told(trained: Evoclaims) -> None:
 
 def test_the_json_is_the_champions_genome(trained: Evoclaims) -> None:
     status, out, _ = trained("champion", "neat", "--on=parity", "--seed=4", "--as=json")
-    assert (status, out.splitlines()[-1]) == (0, "wrote neat-parity-4.json")
-    plain = json.loads(Path("neat-parity-4.json").read_text())
+    assert (status, out.splitlines()[-1]) == (0, "wrote figures/neat-parity-4.json")
+    plain = json.loads(Path("figures/neat-parity-4.json").read_text())
     assert (plain["inputs"], plain["outputs"], plain["activations"]) == (2, 1, ["tanh", "sin"])
     assert plain["capacity"]["nodes"] == 8
     assert trained("champion", "hyperneat", "--on=parity", "--seed=4", "--as=json", "--out=a/cppn.json")[0] == 0
@@ -119,7 +119,7 @@ def test_the_json_is_the_champions_genome(trained: Evoclaims) -> None:
 
 def test_a_picture_shows_the_trial_and_the_network(trained: Evoclaims) -> None:
     assert trained("champion", "neat", "--on=parity", "--seed=4", "--as=svg")[0] == 0
-    text = Path("neat-parity-4.svg").read_text()
+    text = Path("figures/neat-parity-4.svg").read_text()
     for word in ("neat on parity (smoke), seed 4", "the network that evolved", "x1", "y0"):
         assert f">{word}<" in text
     assert trained("champion", "neat", "--on=parity", "--seed=4", "--as=png", "--out=it")[0] == 0
@@ -128,13 +128,14 @@ def test_a_picture_shows_the_trial_and_the_network(trained: Evoclaims) -> None:
 
 def test_hyperneats_picture_has_the_cppn_and_the_network_that_it_draws(trained: Evoclaims) -> None:
     assert trained("champion", "hyperneat", "--on=parity", "--seed=4", "--as=svg")[0] == 0
-    text = Path("hyperneat-parity-4.svg").read_text()
+    text = Path("figures/hyperneat-parity-4.svg").read_text()
     for word in ("the CPPN that evolved", "x₂", "q", "the network that it draws", "bias", "y0"):
         assert f">{word}<" in text
 
 
 def test_the_same_command_writes_the_same_file_over_the_old_one(trained: Evoclaims) -> None:
-    path = Path("neat-parity-4.svg")
+    path = Path("figures/neat-parity-4.svg")
+    path.parent.mkdir()
     path.write_text("old")
     trained("champion", "neat", "--on=parity", "--seed=4", "--as=svg")
     first = path.read_bytes()

@@ -5,7 +5,13 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from importlib import metadata
 from pathlib import Path
+
+import pytest
+from tiny_project import Project
+
+from evoclaims.trials.store import Store
 
 COMMAND = "from evoclaims.cli import main; raise SystemExit(main())"
 
@@ -32,7 +38,7 @@ def test_a_mistake_is_one_sentence_on_standard_error(tmp_path: Path) -> None:
 HELP = """
 import sys
 from evoclaims.cli import main
-for arguments in (["--help"], ["run", "--help"], ["runn"], []):
+for arguments in (["--version"], ["--help"], ["run", "--help"], ["runn"], []):
     try:
         main(arguments)
     except SystemExit as end:
@@ -43,5 +49,23 @@ for arguments in (["--help"], ["run", "--help"], ["runn"], []):
 def test_help_and_unknown_commands_wait_for_no_library(tmp_path: Path) -> None:
     done = _evoclaims(tmp_path, code=HELP)
     ends = [line for line in done.stdout.splitlines() if line.startswith("ended")]
-    assert ends == ["ended with 0", "ended with 0", "ended with 2", "ended with 2"], done.stderr
+    assert ends == [*["ended with 0"] * 3, *["ended with 2"] * 2], done.stderr
+    assert done.stdout.startswith(f"evoclaims {metadata.version('evoclaims')}\n")
     assert "invalid choice: 'runn'" in done.stderr
+
+
+WITHOUT_JAX = """
+import sys
+from evoclaims.cli import main
+print(main(sys.argv[1:]), *sorted({"jax", "scipy", "pandas"} & sys.modules.keys()))
+"""
+
+
+@pytest.mark.parametrize(
+    ("arguments", "ends"), [(("verify",), "0"), (("status", "--storage=none"), "2"), (("report", "--storage="), "2")]
+)
+def test_a_command_that_computes_nothing_waits_for_no_large_library(
+    project: Project, stored: Store, arguments: tuple[str, ...], ends: str
+) -> None:
+    done = _evoclaims(project.path, *arguments, code=WITHOUT_JAX)
+    assert done.stdout.splitlines()[-1] == ends, done.stderr

@@ -24,13 +24,13 @@ def exported(evoclaims: Evoclaims, stored: Store) -> Evoclaims:
 
 def test_trials_are_exported_in_each_form(exported: Evoclaims) -> None:
     for form in ("json", "csv", "parquet"):
-        assert exported("export", "--as", form) == (0, f"wrote trials.{form}: 12 trials\n", "")
-    plain = json.loads(Path("trials.json").read_text())
+        assert exported("export", "--as", form) == (0, f"wrote report/trials.{form}: 12 trials\n", "")
+    plain = json.loads(Path("report/trials.json").read_text())
     assert plain["schema"] == 1
     for table in (
         pandas.DataFrame(plain["rows"]),
-        pandas.read_csv("trials.csv"),
-        pandas.read_parquet("trials.parquet"),
+        pandas.read_csv("report/trials.csv"),
+        pandas.read_parquet("report/trials.parquet"),
     ):
         assert table.groupby("method")["metrics.mean_success"].agg(["size", "mean"]).to_dict("index") == {
             "right": {"size": 10, "mean": 1.0},
@@ -53,14 +53,14 @@ def test_reference_trials_fill_in_what_the_store_lacks(exported: Evoclaims) -> N
     Path("elsewhere").mkdir()
     status, out, _ = exported("export", "--storage=elsewhere", "--out=here/t.json")
     assert (status, out) == (0, "wrote here/t.json: 12 trials\n")
-    assert exported("export")[1] == "wrote trials.json: 12 trials\n"
+    assert exported("export")[1] == "wrote report/trials.json: 12 trials\n"
 
 
 def test_verdicts_are_exported_one_row_a_claim(exported: Evoclaims) -> None:
-    assert exported("export", "--verdicts", "--tier=smoke")[:2] == (0, "wrote verdicts.json: 2 verdicts\n")
-    rows = json.loads(Path("verdicts.json").read_text())["rows"]
+    assert exported("export", "--verdicts", "--tier=smoke")[:2] == (0, "wrote report/verdicts.json: 2 verdicts\n")
+    rows = json.loads(Path("report/verdicts.json").read_text())["rows"]
     assert [(row["claim"], row["outcome"], row["n"]) for row in rows] == [("a", "supported", 10), ("b", "not run", 0)]
-    assert exported("export", "--verdicts")[1] == "wrote verdicts.json: 4 verdicts\n"
+    assert exported("export", "--verdicts")[1] == "wrote report/verdicts.json: 4 verdicts\n"
 
 
 def test_a_damaged_record_is_left_out_and_said(exported: Evoclaims) -> None:
@@ -68,13 +68,13 @@ def test_a_damaged_record_is_left_out_and_said(exported: Evoclaims) -> None:
     path = store.record_files(store.ids()[0])[-1]
     path.write_text("torn")
     status, out, err = exported("export")
-    assert (status, out) == (1, "wrote trials.json: 11 trials\n")
+    assert (status, out) == (1, "wrote report/trials.json: 11 trials\n")
     assert f"left out: Cannot use {path}: it is not one whole JSON text" in err
 
 
 def test_a_badge_counts_the_verdicts_of_a_tier(exported: Evoclaims) -> None:
-    assert exported("badge") == (0, "wrote claims-smoke.svg: supported 1 / not run 1\n", "")
-    root = ElementTree.parse("claims-smoke.svg").getroot()
+    assert exported("badge") == (0, "wrote report/claims-smoke.svg: supported 1 / not run 1\n", "")
+    root = ElementTree.parse("report/claims-smoke.svg").getroot()
     assert root.get("aria-label") == "claims (smoke): supported 1 / not run 1"
     assert exported("badge", "--tier=full", "--out=a/b.svg")[1] == "wrote a/b.svg: not run 2\n"
     assert Path("a/b.svg").exists()
@@ -96,3 +96,13 @@ def test_a_users_mistake_is_one_sentence(evoclaims: Evoclaims, arguments: tuple[
     status, _, err = evoclaims(*arguments)
     assert (status, err.count("\n")) == (2, 1)
     assert said in err
+
+
+def test_files_go_into_folders_that_git_leaves_alone(exported: Evoclaims) -> None:
+    exported("badge")
+    assert exported("badge", "--out=shown/it.svg")[0] == 0
+    assert Path("report/.gitignore").read_text() == "*\n"
+    assert not Path("shown/.gitignore").exists()  # the user's own
+    Path("report/.gitignore").unlink()
+    assert exported("export")[0] == 0
+    assert not Path("report/.gitignore").exists()  # who deletes it wants to commit the folder

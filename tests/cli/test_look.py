@@ -95,8 +95,8 @@ def _texts(path: str) -> list[str]:
 
 def test_a_task_is_drawn_without_any_trial(evoclaims: Evoclaims) -> None:
     Path("none").mkdir()
-    assert evoclaims("look", "maze", "--storage=none") == (0, "wrote maze.svg\n", "")
-    assert {"maze (smoke)", "1", "7", "simple_rob at the start, to scale"} <= set(_texts("maze.svg"))
+    assert evoclaims("look", "maze", "--storage=none") == (0, "wrote figures/maze.svg\n", "")
+    assert {"maze (smoke)", "1", "7", "simple_rob at the start, to scale"} <= set(_texts("figures/maze.svg"))
     assert not any(Path("none").iterdir())
     assert evoclaims("look", "course", "--out=a/b.PNG")[:2] == (0, "wrote a/b.PNG\n")
     assert Path("a/b.PNG").read_bytes().startswith(b"\x89PNG")
@@ -108,8 +108,8 @@ def test_the_paths_of_all_episodes_are_drawn(trained: Evoclaims) -> None:
     lines = out.splitlines()
     assert lines[0] == "random on maze (smoke)"
     assert lines[1].startswith("  seed 4: done after ")
-    assert lines[2:] == ["wrote random-maze-4-path.svg"]
-    texts = _texts("random-maze-4-path.svg")
+    assert lines[2:] == ["wrote figures/random-maze-4-path.svg"]
+    texts = _texts("figures/random-maze-4-path.svg")
     assert "random on maze (smoke), seed 4" in texts
     assert "0 of 3 episodes reach the goal" in texts
     assert "paths of the torso in 3 episodes, and their ends" in texts
@@ -146,7 +146,7 @@ def test_episodes_that_are_not_those_of_the_record_are_told(trained: Evoclaims) 
     plain["seal"] = content_hash({key: value for key, value in plain.items() if key != "seal"})
     path.write_text(json.dumps(plain))
     status, out, _ = trained("look", "maze", "--method=random", "--seed=4")
-    assert (status, out.splitlines()[-1]) == (0, "wrote random-maze-4-path.svg")
+    assert (status, out.splitlines()[-1]) == (0, "wrote figures/random-maze-4-path.svg")
     assert "The share of episodes that reach the goal is 0 here, and 0.75 in the record" in out
     (command,) = re.findall("`evoclaims (.*)`", out)
     assert trained(*command.split())[0] == 1
@@ -165,7 +165,7 @@ def test_a_page_shows_the_chosen_episode(trained: Evoclaims) -> None:
 
 def test_a_gif_has_a_frame_for_each_step(trained: Evoclaims) -> None:
     assert trained("look", "maze", "--method=map_elites", "--seed=4", "--as=gif")[0] == 0
-    image = optional("PIL.Image").open(io.BytesIO(Path("map_elites-maze-4-gif.gif").read_bytes()))
+    image = optional("PIL.Image").open(io.BytesIO(Path("figures/map_elites-maze-4-gif.gif").read_bytes()))
     assert image.n_frames == 5
 
 
@@ -178,7 +178,7 @@ def test_the_map_of_elites_is_the_stored_one(trained: Evoclaims, monkeypatch: py
     assert fitnesses.shape == (5, 4)
     elites = int(np.isfinite(fitnesses).sum())
     assert elites >= 1
-    assert any(text.startswith(f"{elites} elites; ") for text in _texts("map_elites-maze-4-elites.svg"))
+    assert any(text.startswith(f"{elites} elites; ") for text in _texts("figures/map_elites-maze-4-elites.svg"))
 
 
 CHAMPION = ("maze", "--method=random", "--seed=4")

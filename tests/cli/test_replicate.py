@@ -67,18 +67,18 @@ def test_files_have_the_same_numbers(evoclaims: Evoclaims) -> None:
     for form in ("csv", "json", "markdown"):
         assert evoclaims("replicate", "--tier=smoke", f"--as={form}") == (
             0,
-            f"wrote replication.{form}: 3 numbers\n",
+            f"wrote report/replication.{form}: 3 numbers\n",
             "",
         )
-    rows = json.loads(Path("replication.json").read_text())["rows"]
+    rows = json.loads(Path("report/replication.json").read_text())["rows"]
     assert [(row["method"], row["ours.mean"], row["answer"]) for row in rows] == [
         ("right", 1.0, "inside"),
         ("wrong", 0.0, "outside"),
         ("coin", None, "cannot be said"),
     ]
-    with Path("replication.csv").open() as file:
+    with Path("report/replication.csv").open() as file:
         assert [row["answer"] for row in csv.DictReader(file)] == [row["answer"] for row in rows]
-    table = Path("replication.markdown").read_text().splitlines()
+    table = Path("report/replication.markdown").read_text().splitlines()
     assert table[0] == "| number | protocol | published | ours | replicates | 95% of repetitions |"
     assert len(table) == 5
 

@@ -113,7 +113,7 @@ def test_no_text_of_a_record_or_an_argument_steers_the_terminal(
 def test_no_text_steers_what_files_for_people_show(hostile: Store, capfd: pytest.CaptureFixture[str]) -> None:
     for arguments in (("export", "--as=csv"), ("report",), ("accept",), ("badge",)):
         main(arguments)
-    for name in ("trials.csv", "report/report.md", "report/index.html", history.FILE, "claims-smoke.svg"):
+    for name in ("report/trials.csv", "report/report.md", "report/index.html", history.FILE, "report/claims-smoke.svg"):
         text = Path(name).read_text()
         assert steering(text) - {"\t"} == set(), name
 

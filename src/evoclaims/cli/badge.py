@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 
 from evoclaims.cli.project import open_project
-from evoclaims.cli.stored import write
+from evoclaims.cli.stored import REPORT, write
 from evoclaims.report.badge import colour_of, message_of, svg
 
 
@@ -15,8 +15,8 @@ def main(options: argparse.Namespace) -> int:
     project = open_project(options.storage)
     project.reproduction.tier(options.tier)
     reports = project.judge(options.tier)
-    out = Path(options.out or f"claims-{options.tier}.svg")
+    out = Path(options.out or REPORT / f"claims-{options.tier}.svg")
     message = message_of(reports)
-    write(out, svg(f"claims ({options.tier})", message, colour_of(reports)).encode())
+    write(out, svg(f"claims ({options.tier})", message, colour_of(reports)).encode(), ours=options.out is None)
     print(f"wrote {out}: {message}")
     return 0

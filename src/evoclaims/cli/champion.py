@@ -11,7 +11,7 @@ from typing import Final, get_args
 from rich.table import Table
 
 from evoclaims.cli.project import open_project
-from evoclaims.cli.stored import Stored, describe, load, write
+from evoclaims.cli.stored import FIGURES, Stored, describe, load, write
 from evoclaims.cli.terminal import styled
 from evoclaims.core.errors import UnknownNameError, UserError
 from evoclaims.networks import export, picture
@@ -43,9 +43,9 @@ def main(options: argparse.Namespace) -> int:
     PlainSpokenConsole(file=styled()).print(_table(replay))
     print(_judgement(replay))
     if made is not None:
-        default = f"{options.method}-{options.on}-{options.seed}.{options.form}"
+        default = FIGURES / f"{options.method}-{options.on}-{options.seed}.{options.form}"
         path = Path(default if options.out is None else options.out)
-        write(path, made)
+        write(path, made, ours=options.out is None)
         print(f"wrote {path}")
     return int(not replay.exact)
 

@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 
 from evoclaims.cli.project import ALL_TIERS, Project, open_project
-from evoclaims.cli.stored import write
+from evoclaims.cli.stored import REPORT, write
 from evoclaims.core.canonical import content_hash
 from evoclaims.core.errors import UnknownNameError, UserError
 from evoclaims.paper import references
@@ -40,8 +40,8 @@ def main(options: argparse.Namespace) -> int:
                 f"Neither {options.storage} nor the reference trials hold a trial of this tier; "
                 "`evoclaims run` runs some."
             )
-    out = Path(options.out or f"{what}.{options.form}")
-    write(out, export.FORMS[options.form](rows))
+    out = Path(options.out or REPORT / f"{what}.{options.form}")
+    write(out, export.FORMS[options.form](rows), ours=options.out is None)
     print(f"wrote {out}: {len(rows)} {what}")
     for error in damaged:
         print(f"left out: {error}", file=sys.stderr)

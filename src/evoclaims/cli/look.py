@@ -13,7 +13,7 @@ import numpy as np
 
 from evoclaims.cli.episodes import Outings, run_again
 from evoclaims.cli.project import open_project
-from evoclaims.cli.stored import Stored, describe, load, write
+from evoclaims.cli.stored import FIGURES, Stored, describe, load, write
 from evoclaims.core.errors import UnknownNameError, UserError
 from evoclaims.envs.ecorobot.robot_task import RobotTask
 from evoclaims.envs.ecorobot.views import film, page, pictures
@@ -103,7 +103,7 @@ def main(options: argparse.Namespace) -> int:
     """Draw the task; with --method, show what the champion does."""
     tier = open_project(options.storage).reproduction.tier(options.tier)
     path, data = _task_alone(options, tier) if options.method is None else _champion(options, tier)
-    write(path, data)
+    write(path, data, ours=options.out is None)
     print(f"wrote {path}")
     return 0
 
@@ -153,7 +153,7 @@ def _with_robot(tier: Tier, name: str, task: Any) -> RobotTask:
 
 def _target(out: str | None, default: str, endings: tuple[str, ...]) -> tuple[Path, str]:
     """Return the file to write, and its ending, which tells the format."""
-    path = Path(f"{default}.{endings[0]}" if out is None else out)
+    path = FIGURES / f"{default}.{endings[0]}" if out is None else Path(out)
     ending = path.suffix.removeprefix(".").lower()
     if ending not in endings:
         raise UserError(

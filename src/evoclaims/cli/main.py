@@ -6,6 +6,7 @@ import argparse
 import os
 import sys
 from collections.abc import Callable, Sequence
+from importlib import metadata
 
 from evoclaims.cli.terminal import plain_output
 from evoclaims.core.errors import UserError
@@ -35,8 +36,8 @@ def _ended(arguments: Sequence[str] | None) -> int:
     """Run one command to its end, or print the sentence that says why it failed."""
     options = _parser().parse_args(arguments)
     try:
-        run = _command(options.command)
         options.storage = _storage(options)
+        run = _command(options.command)
         status: int = run(options)
         sys.stdout.flush()
     except UserError as error:
@@ -66,6 +67,7 @@ def _storage(options: argparse.Namespace) -> str:
 def _parser() -> argparse.ArgumentParser:
     """Build the parser."""
     parser = argparse.ArgumentParser(prog="evoclaims", description="Claims of a paper, judged by real trials.")
+    parser.add_argument("--version", action="version", version=f"evoclaims {metadata.version('evoclaims')}")
     commands = parser.add_subparsers(dest="command", required=True, metavar="command")
 
     def add(name: str, text: str, kept: str = ".evoclaims") -> argparse.ArgumentParser:
@@ -143,7 +145,7 @@ def _parser() -> argparse.ArgumentParser:
         action="store_true",
         help="run the champions of robots' tasks once more and draw their ways (minutes)",
     )
-    report.add_argument("--out", metavar="FOLDER", default="report", help="where to (report/)")
+    report.add_argument("--out", metavar="FOLDER", help="where to (report/)")
 
     champion = add("champion", "replay a stored trial's champion on every level, and draw or export its network")
     champion.add_argument("method", help="the method")
@@ -152,7 +154,7 @@ def _parser() -> argparse.ArgumentParser:
     device(champion)
     champion.add_argument("--seed", type=int, default=0, help="the trial's seed (0)")
     champion.add_argument("--as", dest="form", metavar="FORM", help="also write its network: json, svg or png")
-    champion.add_argument("--out", metavar="FILE", help="where to (METHOD-TASK-SEED.FORM)")
+    champion.add_argument("--out", metavar="FILE", help="where to (figures/METHOD-TASK-SEED.FORM)")
 
     look = add("look", "draw a robot's task, or show what a stored champion does in it")
     look.add_argument("task", help="the task")
@@ -169,7 +171,9 @@ def _parser() -> argparse.ArgumentParser:
     )
     look.add_argument("--episode", type=int, default=0, metavar="N", help="which of the evaluation's episodes (0)")
     look.add_argument(
-        "--out", metavar="FILE", help="where to (TASK.svg, METHOD-TASK-SEED-FORM.…); a picture is svg or png"
+        "--out",
+        metavar="FILE",
+        help="where to (figures/TASK.svg, figures/METHOD-TASK-SEED-FORM.…); pictures are svg or png",
     )
 
     reproduce = add("reproduce", "redraw figures and tables of the paper from the trials at hand; run nothing")
@@ -183,7 +187,7 @@ def _parser() -> argparse.ArgumentParser:
         "--variant", metavar="NAME", default="", help="under this variant of the protocol; all: under each, too"
     )
     replicate.add_argument("--as", dest="form", metavar="FORM", help="write a file instead: csv, json or markdown")
-    replicate.add_argument("--out", metavar="FILE", help="where to (replication.FORM)")
+    replicate.add_argument("--out", metavar="FILE", help="where to (report/replication.FORM)")
 
     verify = add(
         "verify",
@@ -253,12 +257,12 @@ def _parser() -> argparse.ArgumentParser:
     export.add_argument("--tier", default="all", help="smoke, full or all (default)")
     export.add_argument("--verdicts", action="store_true", help="one row per claim instead of one per trial")
     export.add_argument("--as", dest="form", metavar="FORM", default="json", help="json (default), csv or parquet")
-    export.add_argument("--out", metavar="FILE", help="where to (trials.FORM, verdicts.FORM)")
+    export.add_argument("--out", metavar="FILE", help="where to (report/trials.FORM, report/verdicts.FORM)")
 
     tables = add("tables", "write the tables in Markdown files anew from the reference trials; 1 when one changed")
     tables.add_argument("files", nargs="+", metavar="FILE", help="such as README.md")
 
     badge = add("badge", "draw how many claims ended how, as a small SVG picture")
     tier(badge)
-    badge.add_argument("--out", metavar="FILE", help="where to (claims-TIER.svg)")
+    badge.add_argument("--out", metavar="FILE", help="where to (report/claims-TIER.svg)")
     return parser

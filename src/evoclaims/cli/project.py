@@ -12,6 +12,7 @@ from evoclaims.claims.as_published import AsPublished
 from evoclaims.claims.fetching import StoredOnly
 from evoclaims.claims.session import Session
 from evoclaims.cli.judging import judge
+from evoclaims.cli.storage import open_store
 from evoclaims.core.errors import UnknownNameError
 from evoclaims.paper.archive import Archive
 from evoclaims.paper.config import SuiteConfig, find_root, load_config, load_reproduction
@@ -96,14 +97,3 @@ def open_project(storage: str) -> Project:
     devices.configure()
     config = load_config(find_root(Path.cwd()))
     return Project(config, load_reproduction(config), storage)
-
-
-def open_store(name: str) -> Store:
-    """Return the store in the folder `name`, relative to the current one.
-
-    Raises:
-        UserError: when it exists but is not a store.
-    """
-    store = Store(Path(name))
-    store.check()
-    return store

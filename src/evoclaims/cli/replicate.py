@@ -11,7 +11,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from evoclaims.cli.project import Project, open_project
-from evoclaims.cli.stored import write
+from evoclaims.cli.stored import REPORT, write
 from evoclaims.cli.terminal import styled
 from evoclaims.core.errors import UnknownNameError, UserError
 from evoclaims.figures.figure import SIZES
@@ -38,8 +38,8 @@ def main(options: argparse.Namespace) -> int:
     project = open_project(options.storage)
     found = _found(project, options.tier, options.variant)
     if options.form:
-        out = Path(options.out or f"replication.{options.form}")
-        write(out, _FORMS[options.form](found))
+        out = Path(options.out or REPORT / f"replication.{options.form}")
+        write(out, _FORMS[options.form](found), ours=options.out is None)
         print(f"wrote {out}: {len(found)} numbers")
         return 0
     console = PlainSpokenConsole(file=styled())

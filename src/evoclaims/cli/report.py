@@ -10,7 +10,7 @@ from typing import Any
 
 from evoclaims.cli.episodes import run_again
 from evoclaims.cli.project import ALL_TIERS, Project, open_project
-from evoclaims.cli.stored import Stored, write
+from evoclaims.cli.stored import REPORT, Stored, write
 from evoclaims.envs.ecorobot.robot_task import RobotTask
 from evoclaims.envs.ecorobot.views import pictures
 from evoclaims.figures.replication import replications
@@ -61,9 +61,9 @@ def main(options: argparse.Namespace) -> int:
         mutants=mutation_matrix.load(reproduction.folder / mutation_matrix.FILE),
         generated=f"Written on {datetime.now(UTC):%Y-%m-%d %H:%M} UTC by evoclaims {metadata.version('evoclaims')}.",
     )
-    folder = Path(options.out)
+    folder = Path(options.out or REPORT)
     for name, text in (("index.html", html(page)), ("report.md", markdown(page))):
-        write(folder / name, text.encode())
+        write(folder / name, text.encode(), ours=options.out is None)
         print(f"wrote {folder / name}")
     for board in page.boards:
         print(f"claims ({board.tier}): {table_cells.totals(verdicts[board.tier])}")

@@ -9,7 +9,7 @@ import argparse
 from pathlib import Path
 
 from evoclaims.cli.project import open_project
-from evoclaims.cli.stored import write
+from evoclaims.cli.stored import FIGURES, write
 from evoclaims.figures import catalogue, files
 
 ALL = "all"
@@ -23,12 +23,12 @@ def main(options: argparse.Namespace) -> int:
     known = catalogue.names(reproduction)
     names = known if options.figure == ALL and known else (options.figure,)
     figures = [catalogue.load(reproduction, name) for name in names]
-    folder = Path("figures", options.tier) if options.out is None else Path(options.out)
+    folder = FIGURES / options.tier if options.out is None else Path(options.out)
     shown = 0
     for figure in figures:
         drawing = figure.draw(project.archive, reproduction, options.tier)
         for ending, data in files.contents(drawing).items():
-            write(folder / f"{figure.name}.{ending}", data, "folder")
+            write(folder / f"{figure.name}.{ending}", data, "folder", ours=options.out is None)
         print(f"{figure.name}: wrote {folder / figure.name}.png, .svg and .csv")
         for sentence in drawing.missing:
             print(f"  {sentence}")

@@ -8,6 +8,7 @@ from typing import Final
 
 from evoclaims.core.errors import UserError
 from evoclaims.paper.config import find_root
+from evoclaims.trials.store import Store
 from evoclaims.trials.store_files import DEFAULT_ROOT
 
 BEGINNING: Final = frozenset({"run", "mutants", "across", "bisect"})
@@ -38,6 +39,17 @@ def storage_of(named: str | None, command: str) -> str:
             "the project's own store."
         )
     return named
+
+
+def open_store(name: str) -> Store:
+    """Return the store in the folder `name`, relative to the current one.
+
+    Raises:
+        UserError: when it exists but is not a store.
+    """
+    store = Store(Path(name))
+    store.check()
+    return store
 
 
 def _project() -> Path:

@@ -2,19 +2,26 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
-from evoclaims.cli.project import open_store
+from evoclaims.cli.storage import open_store
 from evoclaims.core.errors import UserError
-from evoclaims.core.files import write_atomically
+from evoclaims.core.files import write_atomically, write_once
 from evoclaims.paper.reproduction import Tier
 from evoclaims.report.live_line import duration
 from evoclaims.trials import champions
 from evoclaims.trials.result import COMPLETE, TrialResult
 from evoclaims.trials.spec import Condition, TrialSpec
 from evoclaims.trials.time_limit import time_allowed
+
+REPORT: Final = Path("report")
+"""Where commands write what is to be read, unless --out says else."""
+
+FIGURES: Final = Path("figures")
+"""Where they write pictures."""
 
 
 @dataclass(frozen=True)
@@ -69,12 +76,20 @@ def describe(result: TrialResult) -> str:
     return f"{spent}, success by level {success} {took}"
 
 
-def write(path: Path, data: bytes, name: str = "file") -> None:
-    """Write a file that the user named with --out, or a file in a folder named so: `name` says which.
+def write(path: Path, data: bytes, name: str = "file", *, ours: bool = False) -> None:
+    """Write a file that the user named with --out, or a file in a folder named so.
+
+    Args:
+        path: the file.
+        data: its content.
+        name: what --out names: a file or a folder.
+        ours: whether nothing was named; `REPORT` or `FIGURES` is then made with a `.gitignore` that keeps git out.
 
     Raises:
         UserError: when it cannot be written there.
     """
     if path.is_dir():
         raise UserError(f"{path} is a folder; name a file in it with --out.")
+    if ours and not os.path.lexists(path.parts[0]):
+        write_once(Path(path.parts[0], ".gitignore"), b"*\n", f"Name another {name} with --out.")
     write_atomically(path, data, f"Name another {name} with --out.")

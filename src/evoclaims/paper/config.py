@@ -6,11 +6,14 @@ import sys
 import tomllib
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from evoclaims.core.errors import UserError
 from evoclaims.paper.importing import import_module
-from evoclaims.paper.reproduction import Reproduction
 from evoclaims.trials.time_limit import DEFAULT_LIMIT, seconds_of
+
+if TYPE_CHECKING:
+    from evoclaims.paper.reproduction import Reproduction
 
 
 @dataclass(frozen=True)
@@ -75,6 +78,8 @@ def load_reproduction(config: SuiteConfig) -> Reproduction:
     Raises:
         UserError: when the module or its `REPRODUCTION` is missing, or the module does not import.
     """
+    from evoclaims.paper.reproduction import Reproduction  # which needs jax, as no other setting does
+
     if str(config.root) not in sys.path:
         sys.path.insert(0, str(config.root))
     module = import_module(config.reproduction, config.root, "[tool.evoclaims]")
