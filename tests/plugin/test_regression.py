@@ -70,8 +70,22 @@ def test_a_changed_verdict_is_listed_and_fails_the_run_where_it_is_asked_to(
     result = accepted.run(*option)
     assert result.ret == status
     result.stdout.fnmatch_lines(
-        ["against the accepted verdicts: 1 the same, 1 changed", f"{mark}a (smoke): refuted -> supported"]
+        ["against the accepted verdicts: 1 the same, 1 changed", f"{mark}a (smoke): refuted -> supported: *"]
     )
+    (end,) = (line for line in result.outlines if line.startswith("claims: "))
+    assert end == "claims: 1 supported, 1 inconclusive; 1 of them not as accepted, see above"
+
+
+def test_a_changed_verdict_says_why_it_may_have_changed(accepted: Any) -> None:
+    _edit(outcome=Outcome.REFUTED)
+    said = " from the same trials to the bit, so that the code which judges or reads them has changed"
+    accepted.run().stdout.fnmatch_lines([f"a (smoke): refuted -> supported:{said}"])
+    _edit(trials="0" * 64, device="abacus", n=7)
+    shown = accepted.run().stdout.str()
+    draws = (
+        "its trials are other draws of the same experiment (device abacus -> cpu, n 7 -> 10); whether they drifted is"
+    )
+    assert f"a (smoke): refuted -> supported: {draws} not known: with 10 trials a side" in shown
 
 
 def test_claims_that_a_run_leaves_out_are_not_gone(accepted: Any) -> None:
@@ -145,7 +159,7 @@ def test_github_is_shown_the_verdicts_after_what_is_there_already(
     lines = page.read_text().splitlines()
     assert lines[:4] == ["before", "## Claims", "", "**1 supported, 1 inconclusive**"]
     assert sum(line.startswith(("| a ", "| b ")) for line in lines) == 2
-    assert "* a (smoke): refuted -&gt; supported" in lines
+    assert any(line.startswith("* a (smoke): refuted -&gt; supported: ") for line in lines)
     assert any(line.startswith("* reference trials: ") for line in lines)
 
 

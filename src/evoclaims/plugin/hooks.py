@@ -286,6 +286,6 @@ def pytest_report_teststatus(
 
     claimed = ClaimReport.from_json(plain)
     outcome = Outcome(claimed.outcome)
-    words = f"{outcome}, as accepted" if claimed.as_expected else str(outcome)
+    words = f"{outcome} (accepted)" if claimed.as_expected else str(outcome)
     colour = {"red": True} if report.failed else {"green": True} if outcome == Outcome.SUPPORTED else {"yellow": True}
     return words, outcome.symbol, (words.upper(), colour)

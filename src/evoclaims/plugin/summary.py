@@ -169,7 +169,9 @@ class Summary:
                 terminalreporter.write_line(self._said(f"warning: {warning}"), yellow=True)
         if table_cells.faults(self.reports):
             terminalreporter.write_line(table_cells.faults(self.reports))
-        terminalreporter.write_line(f"claims: {table_cells.totals(self.reports)}", bold=True)
+        changed = len(self._regression.changed) if self._regression else 0
+        differ = f"; {changed} of them not as accepted, see above" if changed else ""
+        terminalreporter.write_line(f"claims: {table_cells.totals(self.reports)}{differ}", bold=True)
         if not any(report.n for report in self.reports):
             what = "No trial was looked at" if self._judged else "No claim was judged"
             terminalreporter.write_line(f"{what}: nothing was measured.", red=True)
@@ -205,7 +207,26 @@ class Summary:
         if self._upgrade is not None:
             notes += self._upgrade.lines
         notes += verdict_changes(self.reports)
-        return [*notes, *(self._regression.lines if self._regression else ())]
+        return [*notes, *(self._regression.lines(self._reasons()) if self._regression else ())]
+
+    def _reasons(self) -> dict[tuple[str, str], str]:
+        """Return why verdicts may differ from the accepted ones, by tier and claim."""
+        changed = self._regression.changed if self._regression else {}
+        if not changed or self._drift is None:
+            return {}
+        from evoclaims.paper.archive import Archive
+        from evoclaims.verdicts.acceptance import entry_of
+        from evoclaims.verdicts.history import key_of
+        from evoclaims.verdicts.reasons import reason
+
+        session = make_session(self._config)
+        archive = Archive(session.store, session.reproduction.references)
+        judged = {key_of(report): report for report in self.reports if report.n}
+        return {
+            key: reason(judged[key], old, entry_of(judged[key], archive, ""), *self._drift)
+            for key, old in changed.items()
+            if key in judged
+        }
 
     def _write_json(self) -> None:
         """Write all verdicts to the file that --claims-json names; even if there are none, so no old file stays."""

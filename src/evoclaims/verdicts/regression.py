@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from evoclaims.core.errors import UserError
 from evoclaims.verdicts import history, transitions
 from evoclaims.verdicts.claim_report import ClaimReport
+from evoclaims.verdicts.history import Entry
 from evoclaims.verdicts.transitions import Kind, Transition
 
 
@@ -19,20 +20,35 @@ class Regression:
     Attributes:
         transitions: one for each claim of the run; empty if nothing has been accepted yet.
         matched: those that make the run fail.
+        accepted: the last accepted verdict of each claim.
     """
 
     transitions: tuple[Transition, ...]
     matched: tuple[Transition, ...]
+    accepted: Mapping[tuple[str, str], Entry]
 
     @property
-    def lines(self) -> list[str]:
-        """The counts, and a line for each verdict that differs from the accepted one; empty if none was accepted."""
+    def changed(self) -> dict[tuple[str, str], Entry]:
+        """The accepted verdicts that differ from the run's, by tier and claim."""
+        keys = [(one.tier, one.claim) for one in self.transitions if one.kind is Kind.CHANGED]
+        return {key: self.accepted[key] for key in keys}
+
+    def lines(self, reasons: Mapping[tuple[str, str], str]) -> list[str]:
+        """Return the counts, and a line for each verdict that differs from the accepted one; empty if there is none.
+
+        Args:
+            reasons: why changed verdicts may have done so, by tier and claim.
+        """
         if not self.transitions:
             return []
         said = [one for one in self.transitions if one.kind in (Kind.CHANGED, Kind.NEW_HISTORY)]
         return [
             f"against the accepted verdicts: {transitions.counts(self.transitions)}",
-            *(f"{'REGRESSION ' * (one in self.matched)}{transitions.describe(one)}" for one in said),
+            *(
+                f"{'REGRESSION ' * (one in self.matched)}{transitions.describe(one)}"
+                + (f": {reasons[one.tier, one.claim]}" if (one.tier, one.claim) in reasons else "")
+                for one in said
+            ),
         ]
 
 
@@ -49,14 +65,16 @@ def regression(folder: Path, reports: Sequence[ClaimReport], changes: str | None
     """
     path = folder / history.FILE
     patterns = transitions.parse_patterns(changes) if changes is not None else ()
-    accepted = transitions.accepted(history.load(path))
+    kept = history.load(path)
+    accepted = transitions.accepted(kept)
     if patterns and not accepted:
         raise UserError(
             f"There are no accepted verdicts to compare with, since {path} does not exist: "
             "`evoclaims accept` writes it."
         )
     if not accepted:
-        return Regression((), ())
+        return Regression((), (), {})
     now = transitions.standings(reports)
     found = transitions.compare({key: accepted[key] for key in accepted.keys() & now.keys()}, now)
-    return Regression(found, transitions.matched(found, patterns))
+    last = {key: entries[-1] for key, entries in kept.items() if key in now}
+    return Regression(found, transitions.matched(found, patterns), last)

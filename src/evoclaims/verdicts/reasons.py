@@ -1,0 +1,42 @@
+"""Why a verdict may differ from the accepted one: a change in what is computed, or new draws of the same experiment."""
+
+from __future__ import annotations
+
+from evoclaims.judging.baseline import DriftReport
+from evoclaims.judging.tripwire import DigestCheck
+from evoclaims.verdicts.acceptance import changes
+from evoclaims.verdicts.claim_report import ClaimReport
+from evoclaims.verdicts.history import Entry
+
+
+def reason(report: ClaimReport, old: Entry, new: Entry, drift: DriftReport, digests: DigestCheck) -> str:
+    """Return in a sentence why a claim's verdict may have changed.
+
+    Args:
+        report: of the claim, as it is now.
+        old: its accepted verdict, of the same fingerprint.
+        new: the verdict of now.
+        drift: the comparison of its trials, among others, with the reference trials.
+        digests: the comparison to the bit of those that the same kind of machine made with the same versions.
+    """
+    if old.trials == new.trials:
+        return "from the same trials to the bit, so that the code which judges or reads them has changed"
+    labels = {f"{source.label} ({report.tier})" for source in report.sources}
+    rows = [row for row in drift.rows if row.label in labels]
+    drifted = sorted({row.label for row in rows if row.drifted})
+    if drifted:
+        return f"the trials of {', '.join(drifted)} have drifted from the reference trials, as said above"
+    if {change.condition for change in digests.changed} & {source.condition for source in report.sources}:
+        return (
+            "the same seeds gave other trials with the same versions on the same kind of machine, so that the code "
+            "which runs them has changed"
+        )
+    moved = ", ".join([*changes(old, new), *([f"n {old.n} -> {new.n}"] if old.n != new.n else [])])
+    by = f" ({moved})" if moved else ""
+    checked = "none has drifted" if rows and labels == {row.label for row in rows if row.p is not None} else ""
+    seen = f"; {checked}, so that this is no sign of a mistake" if checked else "; whether they drifted is not known"
+    ps = f" (p was {old.p:.2g}, and is {new.p:.2g})" if old.p is not None and new.p is not None else ""
+    return (
+        f"its trials are other draws of the same experiment{by}{seen}: with {new.n} trials a side a verdict near its "
+        f"bound falls one way or the other by chance{ps}; `--claims-trials N` looks at more"
+    )

@@ -1,0 +1,59 @@
+"""Why a verdict may differ from the accepted one: what is found out tells a change of the code from chance."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+from hand_made_verdicts import report
+
+from evoclaims.judging.baseline import DriftReport, DriftRow
+from evoclaims.judging.tripwire import DigestChange, DigestCheck
+from evoclaims.judging.verdict import Outcome
+from evoclaims.verdicts.history import Entry
+from evoclaims.verdicts.reasons import reason
+from evoclaims.verdicts.source_trials import SourceTrials
+
+REPORT = replace(report(), sources=(SourceTrials("a", "t", "c" * 64, ("1",), {}, ()),))
+OLD = Entry(
+    outcome=Outcome.REFUTED,
+    reason="",
+    n=10,
+    p=0.04,
+    fingerprint="f",
+    accepted="2026-01-01",
+    versions={"jax": "0.11.2"},
+    device="H200",
+    revision="",
+    trials="1",
+)
+NEW = replace(OLD, outcome=Outcome.SUPPORTED, p=0.06, versions={"jax": "0.10.2"}, device="cpu", trials="2")
+FINE = DriftRow("a on t (smoke)", "reward", 10, 10, "no drift", p=0.5)
+ELSEWHERE = replace(FINE, label="b on t (smoke)", status="drift")
+SAME = DigestCheck(10, ())
+
+
+def _why(new: Entry = NEW, rows: tuple[DriftRow, ...] = (FINE, ELSEWHERE), digests: DigestCheck = SAME) -> str:
+    return reason(REPORT, OLD, new, DriftReport(rows, 0.01), digests)
+
+
+def test_other_draws_that_have_not_drifted_are_no_sign_of_a_mistake() -> None:
+    assert _why() == (
+        "its trials are other draws of the same experiment (jax 0.11.2 -> 0.10.2, device H200 -> cpu); none has "
+        "drifted, so that this is no sign of a mistake: with 10 trials a side a verdict near its bound falls one way "
+        "or the other by chance (p was 0.04, and is 0.06); `--claims-trials N` looks at more"
+    )
+
+
+@pytest.mark.parametrize("rows", [(), (replace(FINE, status="no reference", p=None),), (ELSEWHERE,)])
+def test_without_a_check_for_drift_nothing_is_said_to_be_no_mistake(rows: tuple[DriftRow, ...]) -> None:
+    assert "whether they drifted is not known" in _why(rows=rows)
+
+
+def test_a_change_of_what_is_computed_is_told_from_chance() -> None:
+    assert _why(replace(NEW, trials="1")).startswith("from the same trials to the bit")
+    drifted = replace(FINE, status="drift")
+    assert _why(rows=(drifted,)) == "the trials of a on t (smoke) have drifted from the reference trials, as said above"
+    changes = [DigestChange(condition * 64, 0, "x", "y") for condition in "cd"]
+    assert "the code which runs them has changed" in _why(digests=DigestCheck(10, tuple(changes[:1])))
+    assert "other draws" in _why(digests=DigestCheck(10, tuple(changes[1:])))
