@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import re
+import shutil
 from collections.abc import Callable
 
 import pytest
@@ -66,6 +68,7 @@ def test_the_command_runs_what_a_variant_changes_and_says_what_hangs_on_it(
     assert main(["run", "--variant", "traded"]) == 0
     shown = capsys.readouterr().out
     assert "right on parity (smoke)" in shown
+    assert "  right on parity (smoke): stored\nat most 0 s on such a device (cpu)\n" in shown
     assert "wrong on parity (smoke)" not in shown
     assert "traded: The right network is wrong" in shown
     assert "first: supported -> refuted" in shown
@@ -73,5 +76,17 @@ def test_the_command_runs_what_a_variant_changes_and_says_what_hangs_on_it(
     assert main(["reference", "--variant", "traded"]) == 0
     written = project.path / "reference" / "variants" / "traded" / "smoke"
     assert [path.name for path in written.iterdir()] == ["right-parity.jsonl"]
+    capsys.readouterr()
+    shutil.rmtree(".evoclaims")
+    assert main(["run", "--variant", "traded"]) == 0
+    committed = "  right on parity (smoke): committed, so not run; name method and task to run it here"
+    assert committed in capsys.readouterr().out.splitlines()
+    assert main(["run", "right", "--on", "parity", "--variant", "traded", "--trials", "2"]) == 0
+    assert "right on parity (smoke)" in capsys.readouterr().out.splitlines()
+    shutil.rmtree("reference")
+    assert main(["run", "--variant", "traded"]) == 0
+    shown = capsys.readouterr().out
+    assert re.search(r"^  right on parity \(smoke\): 8 trials to run, at most \d+ s$", shown, re.MULTILINE)
+    assert shown.index("8 trials to run") < shown.index("\nright on parity (smoke)\n")
     assert main(["run", "wrong", "--variant", "traded"]) == 2
     assert "changes none of these conditions" in capsys.readouterr().err

@@ -12,6 +12,7 @@ from evoclaims.claims.fetching import RunMissing
 from evoclaims.cli.project import Project, open_project
 from evoclaims.cli.stored import describe
 from evoclaims.cli.terminal import terminal
+from evoclaims.cli.variant_cost import to_run
 from evoclaims.core.errors import UnknownNameError, UserError
 from evoclaims.core.printable import printable
 from evoclaims.core.raised import in_one_line
@@ -53,6 +54,8 @@ def main(options: argparse.Namespace) -> int:
         for names in chosen:
             condition = tier.condition(*names)
             store.forget_timeouts((TrialSpec(condition, seed).id for seed in seeds), condition.versions)
+    if options.variant and not (options.method and options.on):
+        chosen = to_run(project, options.variant, options.tier, chosen, seeds, options.device)
     named = [(f"{' on '.join(names)} ({options.tier})", tier.condition(*names)) for names in chosen]
     failed = 0
     for name, condition, results in run_each(named, seeds, fetch, line, project.config.root):

@@ -1,0 +1,58 @@
+"""What a variant of the protocol costs to run, said beforehand; what is committed need not run."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from evoclaims.cli.project import Project
+from evoclaims.paper import references
+from evoclaims.paper.cost import known_pace
+from evoclaims.report.formatting import plural
+from evoclaims.report.live_line import duration
+from evoclaims.trials import devices
+from evoclaims.trials.result import COMPLETE
+from evoclaims.trials.spec import TrialSpec
+
+
+def to_run(
+    project: Project, variant: str, tier: str, names: Sequence[tuple[str, str]], seeds: Sequence[int], device: str
+) -> list[tuple[str, str]]:
+    """Print what the conditions of a variant cost here, and return those that are not committed.
+
+    Times are upper bounds, by earlier trials of the variant or of the protocol on such a device.
+
+    Args:
+        project: the project.
+        variant: its name.
+        tier: the conditions' tier.
+        names: method and task of each condition that the variant changes.
+        seeds: of the trials.
+        device: "auto", "cpu" or "gpu".
+    """
+    reproduction, store = project.reproduction, project.store
+    varied, plain = reproduction.tier(tier, variant), reproduction.tier(tier)
+    folder, kind = reproduction.references_of(variant), devices.choose(device)[0].device_kind
+    chosen, seconds, unknown = [], 0.0, 0
+    print(f"{variant}: {reproduction.variants[variant].says}")
+    for method, task in names:
+        condition = varied.condition(method, task)
+        here = [store.made_with(TrialSpec(condition, seed).id, condition.versions) for seed in seeds]
+        missing = here.count(None)
+        committed = references.load(references.path_of(folder, tier, method, task))
+        known = {one.seed for one in committed if one.condition == condition.id and one.status in COMPLETE}
+        says = "stored"
+        if missing and known >= set(seeds):
+            says = "committed, so not run; name method and task to run it here"
+        else:
+            chosen.append((method, task))
+        if missing and (method, task) in chosen:
+            found = known_pace(condition, store, folder, tier, method, task, kind) or known_pace(
+                plain.condition(method, task), store, reproduction.references, tier, method, task, kind
+            )
+            took = 0.0 if found is None else found.seconds(condition, missing)
+            seconds, unknown = seconds + took, unknown + (found is None)
+            says = f"{plural(missing, 'trial')} to run, {f'at most {duration(took)}' if found else 'time unknown'}"
+        print(f"  {method} on {task} ({tier}): {says}")
+    more = f", and {plural(unknown, 'condition')} of unknown time" * bool(unknown)
+    print(f"at most {duration(seconds)} on such a device ({kind}){more}", flush=True)
+    return chosen
