@@ -153,8 +153,8 @@ def test_the_same_command_writes_the_same_file_over_the_old_one(trained: Evoclai
         (("neat", "--on=parity", "--seed=-1"), "A seed is 0 or above and below 2147483648, not -1."),
         (
             ("neat", "--on=parity", "--seed=77"),
-            "holds no trial of neat on parity (smoke) with seed 77. `evoclaims run neat --on parity --tier smoke "
-            "--trials 1 --first-seed 77` runs it.",
+            "holds no trial of neat on parity (smoke) with seed 77, and reference trials come without champions. "
+            "`evoclaims run neat --on parity --tier smoke --trials 1 --first-seed 77` runs it, in at most ",
         ),
         (
             ("neat", "--on=parity", "--seed=4", "--as=pgn"),

@@ -19,13 +19,13 @@ import tiny_project
 from tiny_project import FILES, Evoclaims, Project
 
 from evoclaims.cli.episodes import run_again
+from evoclaims.cli.project import open_project
 from evoclaims.cli.stored import load
 from evoclaims.core.canonical import content_hash
 from evoclaims.core.drawing import optional
 from evoclaims.envs.ecorobot import physics
 from evoclaims.envs.ecorobot.physics import Body
 from evoclaims.envs.ecorobot.scene import Places, Scene
-from evoclaims.paper.config import load_config, load_reproduction
 from evoclaims.trials.store import Store
 
 # What the command imports late: pytester forgets the modules that a test has imported, and would load them twice.
@@ -116,8 +116,7 @@ def test_the_paths_of_all_episodes_are_drawn(trained: Evoclaims) -> None:
 
 
 def test_the_episodes_are_those_by_which_the_trial_was_judged(trained: Evoclaims) -> None:
-    tier = load_reproduction(load_config(Path())).tier("smoke")
-    trial = load(".evoclaims", tier, "smoke", "random", "maze", 4)
+    trial = load(open_project(".evoclaims"), "smoke", "random", "maze", 4)
     task: Any = trial.condition.task
     outings = run_again(trial, task, jax.devices("cpu")[0])
     assert [len(path) for path in outings.torsos] == [len(steps) for steps in outings.positions] == [5, 5, 5]
@@ -130,8 +129,7 @@ def test_the_episodes_are_those_by_which_the_trial_was_judged(trained: Evoclaims
 
 
 def test_an_episode_is_shown_up_to_its_end(trained: Evoclaims) -> None:
-    tier = load_reproduction(load_config(Path())).tier("smoke")
-    trial = load(".evoclaims", tier, "smoke", "random", "maze", 4)
+    trial = load(open_project(".evoclaims"), "smoke", "random", "maze", 4)
     task: Any = trial.condition.task
     # Every stone counts as crossed at once, one in a step: all seven after seven steps of nine.
     outings = run_again(trial, replace(task, within=20.0, episode_steps=9), jax.devices("cpu")[0])
@@ -172,8 +170,7 @@ def test_a_gif_has_a_frame_for_each_step(trained: Evoclaims) -> None:
 def test_the_map_of_elites_is_the_stored_one(trained: Evoclaims, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("evoclaims.cli.look.run_again", None)  # no episode is run for it
     assert trained("look", "maze", "--method=map_elites", "--seed=4", "--as=elites")[0] == 0
-    tier = load_reproduction(load_config(Path())).tier("smoke")
-    trial = load(".evoclaims", tier, "smoke", "map_elites", "maze", 4)
+    trial = load(open_project(".evoclaims"), "smoke", "map_elites", "maze", 4)
     _, fitnesses = trial.parameters
     assert fitnesses.shape == (5, 4)
     elites = int(np.isfinite(fitnesses).sum())
@@ -200,8 +197,8 @@ CHAMPION = ("maze", "--method=random", "--seed=4")
         (("maz", "--method=random"), "There is no task for random named 'maz'. Did you mean 'maze'?"),
         (
             ("maze", "--method=random", "--seed=77"),
-            "holds no trial of random on maze (smoke) with seed 77. `evoclaims run random --on maze --tier smoke "
-            "--trials 1 --first-seed 77` runs it.",
+            "holds no trial of random on maze (smoke) with seed 77, and reference trials come without champions. "
+            "`evoclaims run random --on maze --tier smoke --trials 1 --first-seed 77` runs it, in at most ",
         ),
         (("maze", "--method=random", "--seed=-1"), "A seed is 0 or above and below 2147483648, not -1."),
         (

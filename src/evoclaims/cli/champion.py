@@ -27,8 +27,8 @@ def main(options: argparse.Namespace) -> int:
         raise UnknownNameError("form of a network", options.form, FORMS)
     if options.out is not None and options.form is None:
         raise UserError(f"--out names the file that --as writes; add --as {', '.join(FORMS)}.")
-    tier, chosen = open_project(options.storage).reproduction.tier(options.tier), devices.choose(options.device)
-    trial = load(options.storage, tier, options.tier, options.method, options.on, options.seed)
+    project, chosen = open_project(options.storage), devices.choose(options.device)
+    trial = load(project, options.tier, options.method, options.on, options.seed)
     made = None
     if options.form is not None:
         made = FORMS[options.form](trial)

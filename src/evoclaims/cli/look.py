@@ -12,7 +12,7 @@ from typing import Any, Final, get_args
 import numpy as np
 
 from evoclaims.cli.episodes import Outings, run_again
-from evoclaims.cli.project import open_project
+from evoclaims.cli.project import Project, open_project
 from evoclaims.cli.stored import FIGURES, Stored, describe, load, write
 from evoclaims.core.errors import UnknownNameError, UserError
 from evoclaims.envs.ecorobot.robot_task import RobotTask
@@ -33,19 +33,19 @@ class Subject:
 
     Attributes:
         options: which trial, which of its evaluation's episodes, and where to run them again.
-        tier: of the trial.
+        project: with the trial.
         task: of the trial.
     """
 
     options: argparse.Namespace
-    tier: Tier
+    project: Project
     task: RobotTask
 
     @cached_property
     def trial(self) -> Stored:
         """The trial."""
         options = self.options
-        return load(options.storage, self.tier, options.tier, options.method, options.task, options.seed)
+        return load(self.project, options.tier, options.method, options.task, options.seed)
 
     @cached_property
     def outings(self) -> Outings:
@@ -101,15 +101,16 @@ class Form:
 
 def main(options: argparse.Namespace) -> int:
     """Draw the task; with --method, show what the champion does."""
-    tier = open_project(options.storage).reproduction.tier(options.tier)
-    path, data = _task_alone(options, tier) if options.method is None else _champion(options, tier)
+    project = open_project(options.storage)
+    path, data = _task_alone(options, project) if options.method is None else _champion(options, project)
     write(path, data, ours=options.out is None)
     print(f"wrote {path}")
     return 0
 
 
-def _task_alone(options: argparse.Namespace, tier: Tier) -> tuple[Path, bytes]:
+def _task_alone(options: argparse.Namespace, project: Project) -> tuple[Path, bytes]:
     """Return the file to write without --method, and its contents."""
+    tier = project.reproduction.tier(options.tier)
     if options.form is not None:
         raise UserError(f"--as {options.form} shows what a champion does; name its method with --method.")
     # Tasks of one name share a scene, even if some methods see more of it.
@@ -121,8 +122,9 @@ def _task_alone(options: argparse.Namespace, tier: Tier) -> tuple[Path, bytes]:
     return path, pictures.draw(task, [], f"{options.task} ({options.tier})", ending)
 
 
-def _champion(options: argparse.Namespace, tier: Tier) -> tuple[Path, bytes]:
+def _champion(options: argparse.Namespace, project: Project) -> tuple[Path, bytes]:
     """Return the file to write with --method, and its contents."""
+    tier = project.reproduction.tier(options.tier)
     name = "path" if options.form is None else options.form
     if name not in FORMS:
         raise UnknownNameError("way to look at a champion", name, FORMS)
@@ -134,7 +136,7 @@ def _champion(options: argparse.Namespace, tier: Tier) -> tuple[Path, bytes]:
             f"--episode is {options.episode}."
         )
     path, ending = _target(options.out, f"{options.method}-{options.task}-{options.seed}-{name}", form.endings)
-    subject = Subject(options, tier, task)
+    subject = Subject(options, project, task)
     data = form.make(subject, ending)
     print(f"{subject.trial.title}\n  {describe(subject.trial.result)}")
     if form.episodes and subject.difference:
@@ -183,8 +185,9 @@ def _gif(subject: Subject, ending: str) -> bytes:
 def _elites(subject: Subject, ending: str) -> bytes:
     """Draw the map of elites that MAP-Elites stores with its champion."""
     method, on = subject.options.method, subject.options.task
-    if not isinstance(subject.tier.condition(method, on).method, MapElites):
-        conditions = subject.tier.conditions.items()
+    tier = subject.project.reproduction.tier(subject.options.tier)
+    if not isinstance(tier.condition(method, on).method, MapElites):
+        conditions = tier.conditions.items()
         known = [
             name for (name, task), condition in conditions if task == on and isinstance(condition.method, MapElites)
         ]

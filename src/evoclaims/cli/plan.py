@@ -53,6 +53,12 @@ def main(options: argparse.Namespace) -> int:
     where = f"as they took on one {kind}" if options.like else f"on {len(chosen)} × {kind}"
     console.print(escape(f"Conditions of the {options.tier} tier, {where}"))
     console.print(_conditions(tier, store, used, paces, costs, project.config.seconds(None)))
+    own = sum(_has_run(store, tier, names) for names in used)
+    if not options.like and own < len(used):
+        console.print(
+            f"Times are by this store's own trials for {own} of {len(used)} conditions, for others by reference trials "
+            "on such a device, perhaps of another machine. A trial that has solved every level stops earlier."
+        )
     for sentence in _about(costs, tier.design.last.n):
         console.print(escape(sentence))
     console.print(f"\nClaims: the smallest p that the design allows (n trials a side, α {tier.design.alpha:g})")
@@ -113,6 +119,13 @@ def _conditions(
         style="bold",
     )
     return table
+
+
+def _has_run(store: Store, tier: Tier, names: tuple[str, str]) -> bool:
+    """Whether the store has a trial of a condition, made with the installed versions."""
+    condition = tier.condition(*names)
+    seeds = tier.design.seeds(tier.design.last.n)
+    return any(store.made_with(TrialSpec(condition, seed).id, condition.versions) is not None for seed in seeds)
 
 
 def _kinds(costs: Costs) -> list[str]:

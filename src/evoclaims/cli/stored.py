@@ -7,12 +7,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
-from evoclaims.cli.storage import open_store
+from evoclaims.cli.project import Project
 from evoclaims.core.errors import UserError
 from evoclaims.core.files import write_atomically, write_once
-from evoclaims.paper.reproduction import Tier
+from evoclaims.paper.cost import known_pace
 from evoclaims.report.live_line import duration
-from evoclaims.trials import champions
+from evoclaims.trials import champions, devices
 from evoclaims.trials.result import COMPLETE, TrialResult
 from evoclaims.trials.spec import Condition, TrialSpec
 from evoclaims.trials.time_limit import time_allowed
@@ -43,20 +43,24 @@ class Stored:
     file: Path
 
 
-def load(storage: str, tier: Tier, tier_name: str, method: str, task: str, seed: int) -> Stored:
+def load(project: Project, tier: str, method: str, task: str, seed: int) -> Stored:
     """Return a stored trial with its champion: this environment's, or else the newest of other versions.
 
     Raises:
-        UserError: for unknown names, a trial that is not stored (with the command that runs it), and as
-            `champions.load` does.
+        UserError: for unknown names, a trial that is not stored (with the command that runs it and what that takes),
+            and as `champions.load` does.
     """
-    condition, title = tier.condition(method, task), f"{method} on {task} ({tier_name})"
-    spec, store = TrialSpec(condition, seed), open_store(storage)
+    reproduction, store = project.reproduction, project.store
+    condition, title = reproduction.tier(tier).condition(method, task), f"{method} on {task} ({tier})"
+    spec = TrialSpec(condition, seed)
     result = store.get(spec.id, condition.versions)
     if result is None:
+        kind = devices.choose("auto")[0].device_kind
+        pace = known_pace(condition, store, reproduction.references, tier, method, task, kind)
+        takes = f", in at most {duration(pace.seconds(condition, 1))} on such a device ({kind})" if pace else ""
         raise UserError(
-            f"{store.root} holds no trial of {title} with seed {seed}. "
-            f"`evoclaims run {method} --on {task} --tier {tier_name} --trials 1 --first-seed {seed}` runs it."
+            f"{store.root} holds no trial of {title} with seed {seed}, and reference trials come without champions. "
+            f"`evoclaims run {method} --on {task} --tier {tier} --trials 1 --first-seed {seed}` runs it{takes}."
         )
     return Stored(title, condition, result, champions.load(store, condition, result), store.champion_file(result))
 

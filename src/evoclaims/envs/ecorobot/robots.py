@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from importlib import resources
 from typing import Final
 
+from evoclaims.core.errors import UserError
+
 OURS: Final = "evoclaims.envs.ecorobot:assets/"
 BRAX: Final = "brax:envs/assets/"
 
@@ -58,9 +60,22 @@ class Robot:
 
     @property
     def file(self) -> str:
-        """The path of the model's file."""
+        """The path of the model's file.
+
+        Raises:
+            UserError: when there is no such package, or no such file in it.
+        """
         package, _, path = self.xml.partition(":")
-        return str(resources.files(package) / path)
+        try:
+            found = resources.files(package) / path
+        except (ImportError, TypeError, ValueError) as error:
+            raise UserError(
+                f"The robot {self.name!r} has its model in {self.xml!r}, and there is no package {package!r}: write "
+                "PACKAGE:PATH, of a package that can be imported."
+            ) from error
+        if not found.is_file():
+            raise UserError(f"The robot {self.name!r} has its model in {self.xml!r}, and there is no file {found}.")
+        return str(found)
 
 
 SIMPLE_ROB: Final = Robot(
