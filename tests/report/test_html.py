@@ -183,3 +183,11 @@ def test_a_condition_is_drawn_once_for_all_claims(filled: Laboratory) -> None:
     parsed = Parsed(html(filled.page(*reports)))
     tags = Counter(tag for tag, _ in parsed.tags)
     assert (tags["symbol"], tags["use"]) == (2, 10)
+
+
+def test_the_settings_of_a_condition_are_listed_once_and_other_claims_lead_there(filled: Laboratory) -> None:
+    reports = [filled.judge(better_wins, tier="smoke", id=name) for name in ("A1", "A2")]
+    page = filled.page(*reports)
+    parsed = Parsed(html(page))
+    assert sum(attributes.get("class") == "settings" for _, attributes in parsed.tags) == len(page.conditions)
+    assert " ".join(parsed.text).count("Its settings are shown with") == len(page.conditions)
