@@ -81,6 +81,15 @@ def _parser() -> argparse.ArgumentParser:
     def device(command: argparse.ArgumentParser) -> None:
         command.add_argument("--device", default="auto", help="auto (default), cpu or gpu")
 
+    def processes(command: argparse.ArgumentParser) -> None:
+        command.add_argument(
+            "--numprocesses",
+            metavar="N",
+            default="1",
+            help="how many processes run trials (1, on all devices); auto: one for each GPU, and on processors as many "
+            "as keep the cores busy",
+        )
+
     plan = add("plan", "say what a tier would run, what it costs here, and what its verdicts can show")
     tier(plan)
     device(plan)
@@ -101,15 +110,14 @@ def _parser() -> argparse.ArgumentParser:
     )
     run.add_argument("--retry", action="store_true", help="run trials again that ran out of time under this limit")
     run.add_argument("--first-seed", type=int, default=0, metavar="SEED", help="seed of the first trial (0)")
+    processes(run)
 
     mutants = add("mutants", "plant faults in methods and tasks, run them, and write which of them the claims notice")
     tier(mutants)
     device(mutants)
     mutants.add_argument("--mutant", metavar="NAME", help="only this fault, such as minimizes")
     mutants.add_argument("--of", metavar="TARGET", help="only faults of this method or this task")
-    mutants.add_argument(
-        "--numprocesses", metavar="N", default="1", help="how many processes run trials; auto: one for each core"
-    )
+    processes(mutants)
     mutants.add_argument("--stored", action="store_true", help="run nothing: judge the trials that have run")
 
     power = add("power", "say from a pilot how often each claim ends as expected; 1 when one does less than 0.95")

@@ -7,21 +7,18 @@ import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-from evoclaims.claims.fetching import RunMissing
 from evoclaims.cli.project import Project, open_project
-from evoclaims.cli.run import run_each
+from evoclaims.cli.running import Running
+from evoclaims.cli.seats import Host, host_of
 from evoclaims.cli.terminal import terminal
 from evoclaims.cli.worker import Order
-from evoclaims.cli.workers import Workers, processes_of
 from evoclaims.core.errors import UnknownNameError, UserError
 from evoclaims.core.files import write_atomically
 from evoclaims.mutants import catalogue
-from evoclaims.mutants.conditions import Job, Planted, jobs, plantings, sharing_programs
+from evoclaims.mutants.conditions import Job, Planted, jobs, plantings
 from evoclaims.mutants.trying import Comparison, merged, noticed, under_faults
-from evoclaims.paper import references
 from evoclaims.report.live_line import LiveLine
-from evoclaims.trials.spec import Condition, TrialSpec
-from evoclaims.trials.time_limit import answers
+from evoclaims.trials.spec import Condition
 from evoclaims.verdicts import mutation_matrix
 from evoclaims.verdicts.history import key_of
 from evoclaims.verdicts.mutation_matrix import Fate, Sensitivity
@@ -31,7 +28,7 @@ from evoclaims.verdicts.sensitivity import Tried
 
 def main(options: argparse.Namespace) -> int:
     """Run the tier under each fault, judge its claims, and write what they notice; 1 when a condition failed."""
-    processes = processes_of(options.numprocesses)
+    host = host_of(options.numprocesses, options.device)
     project = open_project(options.storage)
     tier = project.reproduction.tier(options.tier)
     claims = project.judge(options.tier)
@@ -51,7 +48,7 @@ def main(options: argparse.Namespace) -> int:
             for source in report.sources
         }
         wanted = jobs({names: tier.condition(*names) for names in sorted(asked)}, planted)
-        failed = _run(project, wanted, options, processes)
+        failed = _run(project, wanted, options, host)
         claims = project.judge(options.tier)
     if not any(report.n for report in claims):
         raise UserError(
@@ -91,42 +88,20 @@ def _chosen(every: Sequence[Planted], options: argparse.Namespace) -> list[Plant
     return [one for one in every if options.mutant in (None, one.mutant) and options.of in (None, one.target)]
 
 
-def _run(
-    project: Project, wanted: Mapping[Job, Condition], options: argparse.Namespace, processes: int
-) -> frozenset[Job]:
-    """Run conditions that lack trials, and return those that still do."""
-    tier, limit = project.reproduction.tier(options.tier), project.config.seconds(None)
-    seeds = tier.design.seeds(tier.design.last.n)
-    line = LiveLine(*terminal())
-    fetch = RunMissing(project.store, options.device, line, limit)
-    fetch.check()
-
-    def lacks(one: Job) -> bool:
-        condition = wanted[one]
-        made = (project.store.made_with(TrialSpec(condition, seed).id, condition.versions) for seed in seeds)
-        return not all(answers(result, limit) for result in made)
-
-    groups = sharing_programs(filter(lacks, wanted), tier.conditions)
-    if processes == 1:
-        named = [(one.label, wanted[one]) for group in groups for one in group]
-        for _ in run_each(named, seeds, fetch, line, project.config.root):
-            pass
-    else:
-        order = Order(options.storage, options.tier, options.device, ())
-        Workers(order, processes, lacks).run((group, _seconds(project, options.tier, group)) for group in groups)
-    failed = frozenset(one for group in groups for one in group if lacks(one))
+def _run(project: Project, wanted: Mapping[Job, Condition], options: argparse.Namespace, host: Host) -> frozenset[Job]:
+    """Run conditions that lack trials, and return those that have failed."""
+    design = project.reproduction.tier(options.tier).design
+    order = Order(options.storage, options.tier, options.device, design.first_seed, design.last.n)
+    running = Running(project, order, host, LiveLine(*terminal()))
+    running.check()
+    failed = set()
+    for ended in running.run(wanted, lambda text: None):
+        if ended.error:
+            failed.add(ended.job)
+            print(f"evoclaims: {ended.job.label} failed: {ended.error}.", file=sys.stderr)
     if failed:
         print(f"evoclaims: {len(failed)} of {len(wanted)} conditions failed.", file=sys.stderr)
-    return failed
-
-
-def _seconds(project: Project, tier: str, group: Sequence[Job]) -> float:
-    """Return about how long a group of conditions takes: as long as the reference trials of the sound ones took."""
-    took = 0.0
-    for one in group:
-        trials = references.load(references.path_of(project.reproduction.references, tier, *one.names))
-        took += max([1.0, *(trial.timing["run"] + trial.timing["compile"] for trial in trials)])
-    return took
+    return frozenset(failed)
 
 
 def _told(row: Sensitivity) -> str:

@@ -3,29 +3,29 @@
 from __future__ import annotations
 
 import argparse
-import contextlib
 import sys
-from collections.abc import Iterable, Iterator, Sequence
-from pathlib import Path
+from collections.abc import Sequence
 
-from evoclaims.claims.fetching import RunMissing
 from evoclaims.cli.project import Project, open_project
+from evoclaims.cli.running import Running
+from evoclaims.cli.seats import host_of
 from evoclaims.cli.stored import describe
 from evoclaims.cli.terminal import terminal
 from evoclaims.cli.variant_cost import to_run
+from evoclaims.cli.worker import Order
 from evoclaims.core.errors import UnknownNameError, UserError
-from evoclaims.core.printable import printable
-from evoclaims.core.raised import in_one_line
 from evoclaims.judging.counting import MAX_TRIALS
+from evoclaims.mutants.conditions import Job
 from evoclaims.paper.reproduction import Tier
 from evoclaims.report.live_line import LiveLine
-from evoclaims.trials.result import TrialResult
 from evoclaims.trials.spec import Condition, TrialSpec
+from evoclaims.trials.store import Store
 from evoclaims.verdicts.robustness import matrix
 
 
 def main(options: argparse.Namespace) -> int:
     """Run what is missing and list the trials; 1 when a condition failed, which does not stop the others."""
+    host = host_of(options.numprocesses, options.device)
     project = open_project(options.storage)
     reproduction, store = project.reproduction, project.store
     tier = reproduction.tier(options.tier, options.variant)
@@ -47,27 +47,23 @@ def main(options: argparse.Namespace) -> int:
     seeds = range(options.first_seed, options.first_seed + n)
     for names in chosen[:1]:  # an invalid seed is so for every condition: it is reported once, and nothing is run
         _ = [TrialSpec(tier.condition(*names), seed) for seed in seeds]
-    line = LiveLine(*terminal())
-    fetch = RunMissing(store, options.device, line, project.config.seconds(options.time_limit))
-    fetch.check()
-    if options.retry:
-        for names in chosen:
-            condition = tier.condition(*names)
-            store.forget_timeouts((TrialSpec(condition, seed).id for seed in seeds), condition.versions)
+    order = Order(options.storage, options.tier, options.device, seeds[0], n, options.variant, options.time_limit)
+    running = Running(project, order, host, LiveLine(*terminal()))
+    running.check()
     if options.variant and not (options.method and options.on):
-        chosen = to_run(project, options.variant, options.tier, chosen, seeds, options.device)
-    named = [(f"{' on '.join(names)} ({options.tier})", tier.condition(*names)) for names in chosen]
+        chosen = to_run(project, options.variant, options.tier, chosen, seeds, running.device)
+    wanted = {Job("", *names): tier.condition(*names) for names in chosen}
+    if options.retry:
+        for condition in wanted.values():
+            store.forget_timeouts((TrialSpec(condition, seed).id for seed in seeds), condition.versions)
     failed = 0
-    for name, condition, results in run_each(named, seeds, fetch, line, project.config.root):
-        if results is None:
+    for ended in running.run(wanted, lambda text: print(f"  {text}", flush=True)):
+        name = f"{ended.job.label} ({options.tier})"
+        if ended.error:
             failed += 1
-            continue
-        print(name)
-        again = len(fetch.again.get(condition.id, ()))
-        if again:
-            print(f"  {again} of these were run again, since the stored ones were made with other versions")
-        for result in results:
-            print(f"  {describe(result)}")
+            print(f"evoclaims: {name} failed: {ended.error}.", file=sys.stderr)
+        else:
+            _print_trials(store, name, wanted[ended.job], seeds, ended.again)
     if failed and len(chosen) > 1:
         print(f"evoclaims: {failed} of {len(chosen)} conditions failed.", file=sys.stderr)
     if options.variant:
@@ -75,25 +71,15 @@ def main(options: argparse.Namespace) -> int:
     return int(failed > 0)
 
 
-def run_each(
-    conditions: Iterable[tuple[str, Condition]], seeds: Sequence[int], fetch: RunMissing, line: LiveLine, root: Path
-) -> Iterator[tuple[str, Condition, Sequence[TrialResult] | None]]:
-    """Run conditions one after the other; an error in one is printed in a line and does not stop the others.
-
-    Yields:
-        Each condition's name, the condition, and its trials, or None for one that failed.
-    """
-    for name, condition in conditions:
-        try:
-            with contextlib.closing(line):
-                results = fetch(condition, seeds)
-        except (KeyboardInterrupt, BrokenPipeError):  # the user, or the reader of the output, has stopped
-            raise
-        except BaseException as error:  # an error in a method or a task must not stop the other conditions
-            print(f"evoclaims: {name} failed: {printable(in_one_line(error, root))}.", file=sys.stderr)
-            yield name, condition, None
-            continue
-        yield name, condition, results
+def _print_trials(store: Store, name: str, condition: Condition, seeds: Sequence[int], again: int) -> None:
+    """List the trials of a condition."""
+    print(name)
+    if again:
+        print(f"  {again} of these were run again, since the stored ones were made with other versions")
+    for seed in seeds:
+        result = store.get(TrialSpec(condition, seed).id, condition.versions)
+        if result is not None:
+            print(f"  {describe(result)}")
 
 
 def _print_matrix(project: Project, tier: str, variant: str) -> None:

@@ -1,62 +1,150 @@
-"""A worker process of `evoclaims mutants --numprocesses N`: runs the conditions that it reads, and judges nothing."""
+"""The running of named conditions one after the other, in this process or in a worker process of `--numprocesses N`.
+
+A worker (`python -m evoclaims.cli.worker`) reads an `Order` and then conditions from its standard input, a line of JSON
+each, and answers on its standard output when each has ended; it judges nothing. It ends with its input.
+"""
 
 from __future__ import annotations
 
+import contextlib
+import os
+import queue
+import signal
 import sys
+import threading
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from typing import Any, Final
 
 import msgspec
 
 from evoclaims.claims.fetching import RunMissing
-from evoclaims.cli.project import open_project
-from evoclaims.cli.run import run_each
-from evoclaims.cli.terminal import plain_output
+from evoclaims.cli.project import Project, open_project
 from evoclaims.core.errors import UserError
+from evoclaims.core.printable import printable
+from evoclaims.core.raised import in_one_line
 from evoclaims.mutants import catalogue
 from evoclaims.mutants.conditions import Job, jobs, plantings
 from evoclaims.report.live_line import LiveLine
-from evoclaims.trials.allowance import end_without
+from evoclaims.trials.spec import Condition
 
-USER_ERROR = 2
+USER_ERROR: Final = 2
+
+TOLD_SECONDS: Final = 60.0
+"""Least time between two lines of progress about a condition: several processes write to one terminal."""
 
 
 @dataclass(frozen=True)
 class Order:
-    """What a worker is to do.
+    """What the conditions that are run have in common.
 
     Attributes:
         storage: folder of the store.
-        tier, device: as the command names them.
-        conditions: with which faults, in this order.
+        tier, device: as commands name them.
+        first_seed, trials: of each condition.
+        variant: of the protocol; empty for itself.
+        time_limit: of a batch, as --time-limit says; None for the project's own.
     """
 
     storage: str
     tier: str
     device: str
-    conditions: tuple[Job, ...]
+    first_seed: int
+    trials: int
+    variant: str = ""
+    time_limit: str | None = None
+
+    @property
+    def seeds(self) -> range:
+        """The seeds of each condition."""
+        return range(self.first_seed, self.first_seed + self.trials)
+
+
+class Told(msgspec.Struct, frozen=True, tag=True):
+    """A line of progress; empty when a worker is ready."""
+
+    text: str = ""
+
+
+class Ended(msgspec.Struct, frozen=True, tag=True):
+    """A condition has ended.
+
+    Attributes:
+        job: which.
+        error: why it failed, as a clause; empty where it did not.
+        again: trials that were run again, since the stored ones were made with other versions.
+    """
+
+    job: Job
+    error: str = ""
+    again: int = 0
+
+
+Reply = Told | Ended
+
+
+def condition_of(project: Project, order: Order, job: Job) -> Condition:
+    """Return the condition that a job names.
+
+    Raises:
+        UserError: for unknown names.
+    """
+    sound = {job.names: project.reproduction.tier(order.tier, order.variant).condition(*job.names)}
+    if not job.fault:
+        return sound[job.names]
+    return jobs(sound, plantings(sound, catalogue.load(project.reproduction)))[job]
+
+
+def run_jobs(project: Project, order: Order, asked: Iterable[Job], line: LiveLine) -> Iterator[Ended]:
+    """Run the missing trials of conditions one after the other; an error in one does not stop the others."""
+    fetch = RunMissing(project.store, order.device, line, project.config.seconds(order.time_limit))
+    for job in asked:
+        try:
+            condition = condition_of(project, order, job)
+            with contextlib.closing(line):
+                fetch(condition, order.seeds)
+        except (KeyboardInterrupt, BrokenPipeError):  # the user, or the reader of the output, has stopped
+            raise
+        except BaseException as error:  # an error in a method or a task must not stop the other conditions
+            yield Ended(job, printable(in_one_line(error, project.config.root)))
+        else:
+            yield Ended(job, again=len(fetch.again.get(condition.id, ())))
 
 
 def main() -> int:
-    """Run the conditions in the order on standard input; errors in one are printed and do not stop the others."""
-    order = msgspec.json.decode(sys.stdin.buffer.read(), type=Order)
-    with plain_output():
-        try:
-            project = open_project(order.storage)
-            tier = project.reproduction.tier(order.tier)
-            sound = {one.names: tier.condition(*one.names) for one in order.conditions}
-            known = jobs(sound, plantings(sound, catalogue.load(project.reproduction)))
-            line = LiveLine(lambda text: None, None)  # the command tells the progress of all workers
-            fetch = RunMissing(project.store, order.device, line, project.config.seconds(None))
-            named = [(one.label, known[one]) for one in order.conditions]
-            for _ in run_each(named, tier.design.seeds(tier.design.last.n), fetch, line, project.config.root):
-                pass
-        except UserError as error:
-            print(f"evoclaims: {error}", file=sys.stderr)
-            return USER_ERROR
+    """Run what standard input asks for; 2 where the project cannot be opened."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the command that has started this process ends it
+    replies = os.fdopen(os.dup(1), "wb", buffering=0)
+    os.dup2(2, 1)  # what methods and tasks print is no reply
+
+    def reply(one: Reply) -> None:
+        replies.write(msgspec.json.encode(one) + b"\n")
+
+    order = msgspec.json.decode(sys.stdin.buffer.readline(), type=Order)
+    try:
+        project = open_project(order.storage)
+    except UserError as error:
+        print(error, file=sys.stderr)
+        return USER_ERROR
+    asked: queue.SimpleQueue[Job] = queue.SimpleQueue()
+    threading.Thread(target=_read, args=(asked,), daemon=True).start()
+    reply(Told())
+    line = LiveLine(lambda text: reply(Told(text.strip())), None, log_seconds=TOLD_SECONDS)
+    for ended in run_jobs(project, order, iter(asked.get, None), line):
+        reply(ended)
     return 0
 
 
+def _read(asked: Any) -> None:
+    """Pass conditions on as they are asked for, and end the process with its input.
+
+    The command closes it when nothing is left to run, or has died: what runs then goes on from its checkpoint when it
+    is asked for again.
+    """
+    for text in sys.stdin.buffer:
+        asked.put(msgspec.json.decode(text, type=Job))
+    os._exit(0)
+
+
 if __name__ == "__main__":
-    status = main()
-    end_without(status)
-    raise SystemExit(status)
+    raise SystemExit(main())

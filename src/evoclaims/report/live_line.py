@@ -24,12 +24,23 @@ class LiveLine:
     """Draws the progress line; as a watcher of runs, it describes the one that it is told of."""
 
     def __init__(
-        self, write: Callable[[str], None], columns: int | None, clock: Callable[[], float] = time.monotonic
+        self,
+        write: Callable[[str], None],
+        columns: int | None,
+        clock: Callable[[], float] = time.monotonic,
+        log_seconds: float = LOG_SECONDS,
     ) -> None:
-        """Draw with `write`: in place on a terminal of `columns` columns, or as a log if None."""
+        """Draw with `write`: in place on a terminal of `columns` columns, or as a log if None.
+
+        Args:
+            write: takes text as it is.
+            columns: of the terminal.
+            clock: tells seconds.
+            log_seconds: least time between two lines of a log.
+        """
         self._write = write
         self._width = None if columns is None else max(columns - 1, 20)
-        self._seconds = LOG_SECONDS if columns is None else REWRITE_SECONDS
+        self._seconds = log_seconds if columns is None else REWRITE_SECONDS
         self._clock = clock
         self._at = -self._seconds
         self._open = False

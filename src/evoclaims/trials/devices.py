@@ -35,6 +35,11 @@ def configure() -> None:
     choose("auto")  # fail here with a clear error, not with a traceback in a later import
 
 
+def keep_off_gpus() -> None:
+    """Let jax in this process see no GPU, before its first use: a GPU's memory is for those that run trials on it."""
+    jax.config.update("jax_platforms", "cpu")
+
+
 def usable_cores() -> int:
     """Return how many cores this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

@@ -1,0 +1,68 @@
+"""The batches of trials that a store lacks, longest first: what several processes, or a cluster, have to run."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from evoclaims.cli.project import Project
+from evoclaims.mutants.conditions import Job
+from evoclaims.paper.estimates import Estimate, Missing, committed, estimates
+from evoclaims.trials.result import TrialResult
+from evoclaims.trials.spec import Condition, TrialSpec
+from evoclaims.trials.store import DamagedFileError, Store
+from evoclaims.trials.time_limit import answers
+
+
+@dataclass(frozen=True)
+class MissingBatch:
+    """The missing trials of one condition: no two processes run trials of one condition at a time.
+
+    Attributes:
+        job: names the condition.
+        seeds: those of the missing trials.
+        estimate: about how long they take.
+    """
+
+    job: Job
+    seeds: tuple[int, ...]
+    estimate: Estimate
+
+
+def missing_batches(
+    project: Project, tier: str, wanted: Mapping[Job, Condition], seeds: Sequence[int], limit: float, platform: str
+) -> list[MissingBatch]:
+    """List the batches of these conditions and seeds that the store lacks, the longest first.
+
+    Args:
+        project: has store and reference trials.
+        tier: whose reference trials say how long a condition takes, those of other tiers after them.
+        wanted: the conditions.
+        seeds: of each condition.
+        limit: seconds that a batch may take; trials that ran out of less time are missing, too.
+        platform: where they will run: "cpu" or "gpu".
+    """
+    owed: dict[Job, tuple[int, ...]] = {}
+    known: dict[Job, Missing] = {}
+    for job, condition in wanted.items():
+        found = [_looked_up(project.store, TrialSpec(condition, seed)) for seed in seeds]
+        owed[job] = tuple(seed for seed, (here, _) in zip(seeds, found, strict=True) if not answers(here, limit))
+        if owed[job]:
+            earlier = [trial for _, trial in found if trial is not None]
+            reference = committed(project.reproduction, tier, *job.names)
+            known[job] = Missing(condition, len(owed[job]), [*earlier, *reference])
+    batches = [MissingBatch(job, owed[job], found) for job, found in estimates(known, platform).items()]
+    return sorted(batches, key=lambda batch: -batch.estimate.seconds())
+
+
+def _looked_up(store: Store, spec: TrialSpec) -> tuple[TrialResult | None, TrialResult | None]:
+    """Return the record made with this environment's versions, and the best of any; damaged ones count as missing.
+
+    Whoever runs the trial names the damaged file.
+    """
+    versions = spec.condition.versions
+    try:
+        here = store.made_with(spec.id, versions)
+        return here, here or store.get(spec.id, versions)
+    except DamagedFileError:
+        return None, None

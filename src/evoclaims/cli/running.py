@@ -1,0 +1,79 @@
+"""Missing trials of conditions, run by this process or by several, as `--numprocesses` says."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+
+from evoclaims.claims.fetching import RunMissing
+from evoclaims.cli.missing import missing_batches
+from evoclaims.cli.project import Project
+from evoclaims.cli.seats import Host
+from evoclaims.cli.worker import Ended, Order, run_jobs
+from evoclaims.cli.workers import Workers, in_queue
+from evoclaims.mutants.conditions import Job
+from evoclaims.report.live_line import LiveLine, duration
+from evoclaims.trials import devices
+from evoclaims.trials.spec import Condition
+
+
+@dataclass(frozen=True)
+class Running:
+    """How a command runs trials.
+
+    Attributes:
+        project: what is run.
+        order: what the conditions have in common.
+        host: the processes and GPUs that may be used.
+        line: shows progress.
+    """
+
+    project: Project
+    order: Order
+    host: Host
+    line: LiveLine
+
+    @property
+    def limit(self) -> float:
+        """Seconds that a batch may take."""
+        return self.project.config.seconds(self.order.time_limit)
+
+    @property
+    def _device(self) -> str:
+        """What this process itself may look at: GPUs that workers share are theirs alone."""
+        return "cpu" if self.host.gpus and not self.host.alone else self.order.device
+
+    def check(self) -> None:
+        """Check before the first trial that the store can be written and the device exists; raise a `UserError`."""
+        RunMissing(self.project.store, self._device, self.line, self.limit).check()
+
+    def run(self, wanted: Mapping[Job, Condition], tell: Callable[[str], None]) -> Iterator[Ended]:
+        """Run what the store lacks of some conditions, and yield each when it has ended.
+
+        With several processes those that lack nothing come first, then each as it ends, with a line on the time left.
+
+        Args:
+            wanted: the conditions.
+            tell: is told the progress of worker processes; a process that runs everything draws its line.
+        """
+        if self.host.alone:
+            yield from run_jobs(self.project, self.order, wanted, self.line)
+            return
+        platform = "gpu" if self.host.gpus else devices.choose(self._device)[0].platform
+        seeds, tier = self.order.seeds, self.order.tier
+        batches = missing_batches(self.project, tier, wanted, seeds, self.limit, platform)
+        seconds = {batch.job: batch.estimate.seconds() for batch in batches}
+        yield from (Ended(job) for job in wanted if job not in seconds)
+        seats = self.host.seats(batches)
+        sound = self.project.reproduction.tier(tier, self.order.variant).conditions
+        total, done, began = sum(seconds.values()), 0.0, time.monotonic()
+        ended_jobs = Workers(self.order, seats, tell).run(in_queue(batches, sound, len(seats)))
+        for number, ended in enumerate(ended_jobs, start=1):
+            done += seconds[ended.job]
+            left = (time.monotonic() - began) * (total - done) / max(done, 1e-9)
+            print(
+                f"  {number} of {len(batches)} conditions have ended, {duration(left)} left: {ended.job.label}",
+                flush=True,
+            )
+            yield ended

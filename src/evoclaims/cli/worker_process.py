@@ -1,0 +1,90 @@
+"""A worker process, seen from the command that has started it."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import signal
+import subprocess
+import sys
+import threading
+from collections.abc import Callable, Mapping
+
+import msgspec
+
+from evoclaims.cli.worker import Ended, Order, Reply, Told
+from evoclaims.mutants.conditions import Job
+
+
+class Process:
+    """A process that runs one condition after the other, as it is asked to."""
+
+    def __init__(self, order: Order, environment: Mapping[str, str]) -> None:
+        """Start it, with these environment variables besides the command's own."""
+        self._process = subprocess.Popen(
+            [sys.executable, "-m", "evoclaims.cli.worker"],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            env={**os.environ, **environment},
+        )
+        self._errors = threading.Thread(target=self._pass_errors_on, daemon=True)
+        self._errors.start()
+        self._ask(order)
+
+    def is_ready(self) -> bool:
+        """Wait until it can run conditions; False where it has died before."""
+        return isinstance(self._reply(), Told)
+
+    def run(self, job: Job, tell: Callable[[str], None]) -> Ended | None:
+        """Run a condition to its end; None where the process died of it."""
+        self._ask(job)
+        while isinstance(reply := self._reply(), Told):
+            tell(reply.text)
+        return reply
+
+    def why(self) -> str:
+        """Return how it has ended, such as "status 7"."""
+        status = self._process.wait()
+        if status == -signal.SIGKILL:
+            return "SIGKILL: the system sends that where memory runs out"
+        return signal.Signals(-status).name if -status in set(signal.Signals) else f"status {status}"
+
+    def close(self) -> None:
+        """Give it nothing more to do, and wait for its end."""
+        stdin, stdout, stderr = self._process.stdin, self._process.stdout, self._process.stderr
+        assert stdin is not None
+        assert stdout is not None
+        assert stderr is not None
+        with contextlib.suppress(OSError):  # it is dead already
+            stdin.close()
+        self._process.wait()
+        self._errors.join()
+        stdout.close()
+        stderr.close()
+
+    def stop(self) -> None:
+        """End it, whatever it does; it is still to be closed."""
+        self._process.terminate()
+
+    def _ask(self, what: Order | Job) -> None:
+        """Write a line to its standard input; a dead process is found when it does not reply."""
+        with contextlib.suppress(OSError):
+            assert self._process.stdin is not None
+            self._process.stdin.write(msgspec.json.encode(what) + b"\n")
+            self._process.stdin.flush()
+
+    def _reply(self) -> Reply | None:
+        """Wait for its next reply; None where it has died."""
+        assert self._process.stdout is not None
+        line = self._process.stdout.readline()
+        try:
+            return msgspec.json.decode(line, type=Reply) if line else None
+        except msgspec.DecodeError:  # it died in the middle of a line
+            return None
+
+    def _pass_errors_on(self) -> None:
+        """Print what it writes to standard error."""
+        assert self._process.stderr is not None
+        for line in self._process.stderr:
+            print(line.decode(errors="replace"), end="", file=sys.stderr, flush=True)

@@ -1,0 +1,129 @@
+"""About how long missing trials of a condition will take: by earlier trials, or by their budget."""
+
+from __future__ import annotations
+
+import statistics
+from collections import defaultdict
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final, TypeVar
+
+from evoclaims.paper import references
+from evoclaims.paper.reproduction import Reproduction
+from evoclaims.trials.devices import layout_on
+from evoclaims.trials.result import COMPLETE, TrialResult
+from evoclaims.trials.spec import Condition
+
+Key = TypeVar("Key")
+
+COMPILE_SECONDS: Final = 10.0
+"""To compile a condition, where nothing is known: between a gate's and a robot's, on a processor."""
+
+STEP_SECONDS: Final = 1e-5
+"""An environment step, where no trial of any condition has run: it orders budgets and no more."""
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """How long a batch of trials takes.
+
+    Attributes:
+        compile: seconds.
+        work: seconds of running: of one core if each trial is a call of its own, else of the device.
+        trials: how many are missing.
+        layout: see `program.over_trials`.
+    """
+
+    compile: float
+    work: float
+    trials: int
+    layout: str
+
+    def seconds(self, cores: int = 1) -> float:
+        """Return the time that the batch takes in a process with so many cores."""
+        return self.compile + self.work / (min(self.trials, cores) if self.layout == "alone" else 1)
+
+    def cores_used(self, cores: int) -> float:
+        """Return how many of so many cores the batch uses, on average over its time; compiling takes one."""
+        return self.seconds() / self.seconds(cores)
+
+
+@dataclass(frozen=True)
+class Missing:
+    """What is known of the missing trials of a condition.
+
+    Attributes:
+        condition: what has to run.
+        trials: how many of them are missing.
+        earlier: trials of this condition, or of the same method and task, from anywhere.
+    """
+
+    condition: Condition
+    trials: int
+    earlier: Sequence[TrialResult]
+
+
+def committed(reproduction: Reproduction, tier: str, method: str, task: str) -> tuple[TrialResult, ...]:
+    """Return the reference trials of a method on a task, those of `tier` first."""
+    tiers = sorted(reproduction.tiers, key=lambda name: name != tier)
+    paths = (references.path_of(reproduction.references, name, method, task) for name in tiers)
+    return tuple(trial for path in paths for trial in references.load(path))
+
+
+def estimates(missing: Mapping[Key, Missing], platform: str) -> dict[Key, Estimate]:
+    """Estimate batches on a platform, such as "gpu".
+
+    Earlier trials of the same condition count as they were; those of the same method and task by their pace; what has
+    never run on such a platform counts by its budget, at the median pace of the others.
+    """
+    layout = layout_on(platform)
+    known = {key: _known(one, platform, layout) for key, one in missing.items()}
+    of_others = [_pace(missing[key], found) for key, found in known.items() if found is not None]
+    compiling = [found.compile for found in known.values() if found is not None]
+    pace = statistics.median(of_others) if of_others else STEP_SECONDS
+    compile_seconds = statistics.median(compiling) if compiling else COMPILE_SECONDS
+    return {
+        key: found or Estimate(compile_seconds, pace * _steps(one, layout), one.trials, layout)
+        for (key, one), found in zip(missing.items(), known.values(), strict=True)
+    }
+
+
+def _steps(one: Missing, layout: str) -> int:
+    """Return the environment steps that are run one after the other, at most."""
+    return one.condition.environment_steps * (one.trials if layout == "alone" else 1)
+
+
+def _pace(one: Missing, found: Estimate) -> float:
+    """Return seconds per environment step of the budget."""
+    return found.work / max(_steps(one, found.layout), 1)
+
+
+def _known(one: Missing, platform: str, layout: str) -> Estimate | None:
+    """Estimate by earlier trials; None where none ran on this platform."""
+    batches = _batches(trial for trial in one.earlier if _platform(trial) == platform)
+    same = [batch for batch in batches if batch[0].condition == one.condition.id]
+    if not batches:
+        return None
+    batch = max(same or batches[:1], key=len)
+    run = max(float(trial.timing["run"]) for trial in batch)
+    steps = [max(float(trial.metrics.get("environment_steps", 0.0)), 1.0) for trial in batch]
+    if layout == "alone":
+        run *= min(int((batch[0].provenance.get("device") or {}).get("count") or 1), len(batch))
+        work = run * one.trials / len(batch) if same else run / sum(steps) * _steps(one, layout)
+    else:
+        work = run if same else run / max(steps) * _steps(one, layout)
+    return Estimate(max(float(trial.timing["compile"]) for trial in batch), work, one.trials, layout)
+
+
+def _batches(trials: Iterable[TrialResult]) -> list[list[TrialResult]]:
+    """Return complete trials by batch, which share their times; in the order of the first of each."""
+    found: dict[str, list[TrialResult]] = defaultdict(list)
+    for trial in trials:
+        if trial.status in COMPLETE:
+            found[str(trial.timing["started"])].append(trial)
+    return list(found.values())
+
+
+def _platform(trial: TrialResult) -> str:
+    """Return the platform of a record's device; empty if it does not say."""
+    return str((trial.provenance.get("device") or {}).get("platform") or "")

@@ -1,0 +1,76 @@
+"""Which GPUs a process may use, found without jax, whose first look at a GPU takes hold of it.
+
+What a process sees is decided by its environment before jax starts there: this is how several processes of a host share
+its GPUs.
+"""
+
+from __future__ import annotations
+
+import importlib.metadata
+import os
+import re
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Final
+
+VISIBLE: Final = "CUDA_VISIBLE_DEVICES"
+MEMORY: Final = "XLA_PYTHON_CLIENT_MEM_FRACTION"
+"""The share of a GPU's memory that jax takes when it starts: three quarters, unless it is told otherwise."""
+
+SHARED_MEMORY: Final = 0.9
+"""What several processes on one GPU take of its memory together."""
+
+_NODES: Final = Path("/dev")
+
+
+def gpus(device: str) -> tuple[str, ...]:
+    """Return the GPUs that jax would use for `device` ("auto", "cpu" or "gpu"), as CUDA_VISIBLE_DEVICES names them.
+
+    None where jax has no plugin for CUDA, or JAX_PLATFORMS asks for other hardware.
+    """
+    asked = {name.strip() for name in os.environ.get("JAX_PLATFORMS", "").split(",")} - {""}
+    if device == "cpu" or (asked and not asked & {"cuda", "gpu"}) or not _has_plugin():
+        return ()
+    named = os.environ.get(VISIBLE)
+    if named is not None:
+        return tuple(name.strip() for name in named.split(",") if name.strip() not in ("", "-1", "NoDevFiles"))
+    nodes = [path for path in _NODES.glob("nvidia*") if re.fullmatch(r"nvidia\d+", path.name)]
+    return tuple(map(str, range(len(nodes))))  # CUDA numbers those that it may open from 0
+
+
+def _has_plugin() -> bool:
+    """Whether jax is installed with CUDA."""
+    return any("cuda" in plugin.name for plugin in importlib.metadata.entry_points(group="jax_plugins"))
+
+
+def shared(found: Sequence[str], processes: int) -> list[dict[str, str]]:
+    """Return the environment of each of several processes that share some GPUs (at least one).
+
+    Each has GPUs of its own, or several share one and its memory; a share that the user has set stays.
+    """
+    if processes <= len(found):
+        return [only(found[process::processes]) for process in range(processes)]
+    crowds = [len(range(place, processes, len(found))) for place in range(len(found))]
+    memory = [{} if MEMORY in os.environ else {MEMORY: f"{SHARED_MEMORY / crowd:.3f}"} for crowd in crowds]
+    places = [process % len(found) for process in range(processes)]
+    return [only([found[place]]) | (memory[place] if crowds[place] > 1 else {}) for place in places]
+
+
+def only(found: Sequence[str]) -> dict[str, str]:
+    """Return the environment of a process that sees these GPUs alone."""
+    return {VISIBLE: ",".join(found)}
+
+
+def environment_of_worker(device: str, environment: Mapping[str, str]) -> dict[str, str]:
+    """Return what a worker of pytest-xdist sets before jax starts there, so that each worker has its own GPU.
+
+    Args:
+        device: as --claims-device says.
+        environment: of the worker: pytest-xdist has put its number there, and how many there are.
+    """
+    worker = re.fullmatch(r"gw(\d+)", environment.get("PYTEST_XDIST_WORKER", ""))
+    count = int(environment.get("PYTEST_XDIST_WORKER_COUNT", "1"))
+    found = gpus(device)
+    if worker is None or not found:
+        return {}
+    return shared(found, max(count, 1))[int(worker[1]) % max(count, 1)]
