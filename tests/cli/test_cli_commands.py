@@ -316,7 +316,9 @@ def test_a_device_without_enough_memory_is_one_sentence(evoclaims: Evoclaims, mo
     status, _, err = evoclaims("run", "right", "--trials", "50")
     assert (status, err.count("\n")) == (1, 1)
     assert err.startswith("evoclaims: right on parity (smoke) failed: The device's memory ")
-    assert "does not hold 50 trials of hand_built on n_parity at once. Run fewer at a time: `evoclaims run`" in err
+    assert (
+        "does not hold 1 trial of hand_built on n_parity at once, and fewer cannot be run. Close what else uses" in err
+    )
 
 
 def test_reference_commits_the_trials_of_every_condition_that_has_enough(evoclaims: Evoclaims) -> None:

@@ -163,7 +163,7 @@ def test_a_device_without_enough_memory_is_a_sentence_of_the_claim(
     project.write(a="supported")
     result = project.run(own_store=True)
     assert result.ret == 1
-    sentence(result, "The device's memory does not hold 10 trials of hand_built on n_parity at once. Run fewer at a")
+    sentence(result, "The device's memory does not hold 1 trial of hand_built on n_parity at once, and fewer cannot")
 
 
 def test_trials_that_drifted_from_the_committed_ones_fail_the_run(project: Any) -> None:

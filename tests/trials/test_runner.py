@@ -102,7 +102,7 @@ def test_a_device_without_enough_memory_is_a_sentence_that_says_what_to_do(
         monkeypatch.setattr(Lanes, "advance", advance)
 
     fail("RESOURCE_EXHAUSTED: Out of memory while trying to allocate 123456 bytes.")
-    with pytest.raises(UserError, match="does not hold 5 trials of walker on n_parity at once. Run fewer at a time"):
+    with pytest.raises(UserError, match="does not hold 1 trial of walker on n_parity at once, and fewer cannot be run"):
         run_climbers(store, cpus)
     fail("INTERNAL: something else")
     with pytest.raises(jax.errors.JaxRuntimeError, match="something else"):

@@ -40,13 +40,13 @@ class Running:
         return self.project.config.seconds(self.order.time_limit)
 
     @property
-    def _device(self) -> str:
+    def device(self) -> str:
         """What this process itself may look at: GPUs that workers share are theirs alone."""
         return "cpu" if self.host.gpus and not self.host.alone else self.order.device
 
     def check(self) -> None:
         """Check before the first trial that the store can be written and the device exists; raise a `UserError`."""
-        RunMissing(self.project.store, self._device, self.line, self.limit).check()
+        RunMissing(self.project.store, self.device, self.line, self.limit).check()
 
     def run(self, wanted: Mapping[Job, Condition], tell: Callable[[str], None]) -> Iterator[Ended]:
         """Run what the store lacks of some conditions, and yield each when it has ended.
@@ -60,7 +60,7 @@ class Running:
         if self.host.alone:
             yield from run_jobs(self.project, self.order, wanted, self.line)
             return
-        platform = "gpu" if self.host.gpus else devices.choose(self._device)[0].platform
+        platform = "gpu" if self.host.gpus else devices.choose(self.device)[0].platform
         seeds, tier = self.order.seeds, self.order.tier
         batches = missing_batches(self.project, tier, wanted, seeds, self.limit, platform)
         seconds = {batch.job: batch.estimate.seconds() for batch in batches}

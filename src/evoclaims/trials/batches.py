@@ -62,6 +62,7 @@ class Run:
     Attributes:
         checkpoint_seconds: minimum time between two checkpoints.
         time_limit: seconds that a batch may take.
+        most: trials that a new batch has at most.
     """
 
     lanes: Lanes
@@ -69,6 +70,7 @@ class Run:
     watch: Watcher
     checkpoint_seconds: float
     time_limit: float
+    most: int
 
     @property
     def condition(self) -> Condition:
@@ -111,7 +113,7 @@ class Batch:
 
 
 def batches(run: Run, missing: Sequence[int]) -> Iterator[tuple[Header, Callable[[], Batch | None]]]:
-    """Yield the interrupted batches that contain a missing trial, then a batch of all other missing trials.
+    """Yield the interrupted batches that contain a missing trial, then the other missing trials, `most` in a batch.
 
     Each comes as its header and a function that begins it, which may take long: it traces and compiles. It returns
     None if the checkpoint of an interrupted batch is gone by then, because another process has finished it.
@@ -124,8 +126,8 @@ def batches(run: Run, missing: Sequence[int]) -> Iterator[tuple[Header, Callable
             yield header, partial(_resumed, run, header)
     # Earlier batches may take hours: another process may have stored the rest meanwhile.
     remaining = [seed for seed in remaining if not is_final(run.stored.get(seed))]
-    if remaining:
-        header = _planned(run.lanes, remaining)
+    for first in range(0, len(remaining), run.most):
+        header = _planned(run.lanes, remaining[first : first + run.most])
         yield header, partial(_started, run, header)
 
 

@@ -5,8 +5,7 @@ from __future__ import annotations
 import logging
 import math
 import time
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any, Final
@@ -14,12 +13,12 @@ from typing import Any, Final
 import jax
 import numpy as np
 
-from evoclaims.core.errors import UserError
 from evoclaims.trials import checkpoint
 from evoclaims.trials.allowance import Allowance, OutOfTimeError
 from evoclaims.trials.batches import Batch, Run, StoredTrials, batches, drop_finished_checkpoints
 from evoclaims.trials.checkpoint import Header
 from evoclaims.trials.devices import single_threaded_linear_algebra
+from evoclaims.trials.halving import halved, is_exhausted
 from evoclaims.trials.lanes import Lanes
 from evoclaims.trials.notice import announced
 from evoclaims.trials.pacing import Rhythm, Strides
@@ -60,20 +59,24 @@ def run(
     as "timeout" with their curves so far, and run again only when a call allows more. With a limit the work is done on
     another thread, since it may never return (see `allowance`).
 
+    A batch that the device's memory does not hold goes on in two halves (see `halving`).
+
     Raises:
-        UserError: when the store is damaged or cannot be written, or the device's memory does not hold the batch.
+        UserError: when the store is damaged or cannot be written, or the device's memory does not hold one trial.
     """
     stored = StoredTrials(store, condition, any_version, time_limit)
     wanted = list(dict.fromkeys(seeds))
+    most = len(wanted)
     while not stored.answer(found := [stored.get(seed) for seed in wanted]):
         store.check_writable()
         waits = partial(_tell_of_waiting, condition, len(seeds), watch)
         with announced(store.root, condition.id, waits), shared(store.root, condition.id, watch) as tell:
             owed = [seed for seed in wanted if stored.lacks(seed)]  # another process may have stored some meanwhile
-            one = Run(Lanes(condition, devices), stored, tell, checkpoint_seconds, time_limit)
-            with single_threaded_linear_algebra(), _memory_told(condition, len(owed)):
-                for header, begin in batches(one, owed):
-                    _finish(one, header, begin)
+            one = Run(Lanes(condition, devices), stored, tell, checkpoint_seconds, time_limit, most)
+            with single_threaded_linear_algebra():
+                too_large = _finish_all(one, owed)
+            if too_large is not None:
+                most = halved(one, too_large)
     drop_finished_checkpoints(stored)
     return [result for result in found if result is not None]
 
@@ -83,19 +86,19 @@ def _tell_of_waiting(condition: Condition, trials: int, watch: Watcher, text: st
     watch(RunProgress(condition.label, text, trials))
 
 
-@contextmanager
-def _memory_told(condition: Condition, trials: int) -> Iterator[None]:
-    """Turn an out-of-memory error of the device into a `UserError`."""
-    try:
-        yield
-    except jax.errors.JaxRuntimeError as error:
-        if "RESOURCE_EXHAUSTED" not in str(error):
-            raise
-        raise UserError(
-            f"The device's memory does not hold {trials} trials of {condition.label} at once. Run fewer at a time: "
-            "`evoclaims run` with --trials and --first-seed stores them part by part, and stored trials are not run "
-            "again."
-        ) from error
+def _finish_all(run: Run, owed: Sequence[int]) -> Header | None:
+    """Run all batches of the missing trials; or return the one that the device's memory does not hold.
+
+    That is for the caller to split, when nothing refers to this batch and its memory any more.
+    """
+    for header, begin in batches(run, owed):
+        try:
+            _finish(run, header, begin)
+        except jax.errors.JaxRuntimeError as error:
+            if not is_exhausted(error):
+                raise
+            return header
+    return None
 
 
 def _finish(run: Run, header: Header, begin: Callable[[], Batch | None]) -> None:
