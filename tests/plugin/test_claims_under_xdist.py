@@ -108,3 +108,39 @@ def test_what_keeps_workers_from_beginning_is_one_sentence_of_the_controllers(
     assert result.ret == pytest.ExitCode.USAGE_ERROR
     sentence(result, text)
     assert " ".join(result.stdout.str().split()).count(text) == 1
+
+
+FAKE_HOST = """
+import importlib.metadata
+import os
+
+found = importlib.metadata.entry_points
+importlib.metadata.entry_points = lambda **names: (
+    [type("Plugin", (), {"name": "xla_cuda12"})] if names.get("group") == "jax_plugins" else found(**names)
+)
+os.environ.setdefault("CUDA_VISIBLE_DEVICES", "GPU-a,GPU-b")
+"""
+
+SEEN = """
+import os
+from pathlib import Path
+
+Path("seen-" + os.environ.get("PYTEST_XDIST_WORKER", "controller")).write_text(os.environ["CUDA_VISIBLE_DEVICES"])
+"""
+
+
+def test_each_worker_has_its_own_gpu_before_a_conftest_is_loaded(project: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    """`-n auto` starts one for each GPU; jax's plugin for CUDA is planted."""
+    project.write("def test_nothing():\n    pass\n\n\ndef test_nothing_else():\n    pass\n")
+    (project.path / "fake_host.py").write_text(FAKE_HOST)
+    (project.path / "conftest.py").write_text(SEEN)
+    monkeypatch.delenv("JAX_PLATFORMS", raising=False)
+    monkeypatch.delenv("CUDA_VISIBLE_DEVICES", raising=False)
+    monkeypatch.setenv("PYTHONPATH", str(project.path), prepend=":")
+    result = project.run_apart("-p", "fake_host", "-n", "auto")
+    result.assert_outcomes(passed=2)
+    assert {path.name: path.read_text() for path in project.path.glob("seen-*")} == {
+        "seen-controller": "GPU-a,GPU-b",
+        "seen-gw0": "GPU-a",
+        "seen-gw1": "GPU-b",
+    }

@@ -13,7 +13,7 @@ import pytest
 
 from evoclaims.core.errors import UserError
 from evoclaims.core.printable import shown
-from evoclaims.plugin import options
+from evoclaims.plugin import options, own_gpu
 from evoclaims.plugin.distribution import Distribution, prepare
 from evoclaims.plugin.options import TIERS
 from evoclaims.plugin.progress import QUIET, ProgressLine, progress_of
@@ -34,6 +34,18 @@ _ended: pytest.StashKey[pytest.Session] = pytest.StashKey()
 def pytest_addoption(parser: pytest.Parser) -> None:
     """Add the options."""
     options.add(parser)
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_load_initial_conftests(early_config: pytest.Config) -> None:
+    """Give a worker of pytest-xdist its own GPU before anything can import jax."""
+    own_gpu.take(early_config)
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_auto_num_workers(config: pytest.Config) -> int | None:
+    """Let `-n auto` start a worker for each GPU."""
+    return own_gpu.workers(config)
 
 
 def pytest_configure(config: pytest.Config) -> None:
