@@ -59,80 +59,90 @@ class Workers:
         self._order = order
         self._seats = seats
         self._tell = tell
+        self._changed = threading.Condition()  # of all that follows
         self._left: deque[tuple[Job, ...]] = deque()
+        self._in_hands = 0
+        self._taken = 0
         self._deaths: Counter[Job] = Counter()
-        self._ended: queue.SimpleQueue[Ended | None] = queue.SimpleQueue()
         self._processes: set[Process] = set()
         self._threads: list[threading.Thread] = []
-        self._taken = 0
-        self._lock = threading.Lock()
         self._stopping = False
+        self._ended: queue.SimpleQueue[Ended | BaseException] = queue.SimpleQueue()
 
     def run(self, groups: Sequence[Sequence[Job]]) -> Iterator[Ended]:
         """Run groups of conditions in their order; yield each condition once, when it has ended."""
+        expected = {job for group in groups for job in group}
         first = {seat.first for seat in self._seats}
         self._left.extend(filter(None, (tuple(job for job in group if job not in first) for group in groups)))
-        expected = {job: None for group in groups for job in group}
         try:
             self._sit(self._seats)
             while expected:
                 ended = self._ended.get()
-                if ended is None:  # no seat is left
-                    yield from (Ended(job, "no worker process could start") for job in expected)
-                    return
-                del expected[ended.job]
+                if isinstance(ended, BaseException):
+                    raise ended
+                expected.discard(ended.job)
                 yield ended
         finally:
             self._stop()
 
     def _sit(self, seats: Sequence[Seat]) -> None:
         """Start a thread for each seat."""
-        with self._lock:
+        with self._changed:
             self._taken += len(seats)
-        for seat in seats:
-            thread = threading.Thread(target=self._work, args=(seat,), daemon=True)
-            self._threads.append(thread)
-            thread.start()
+            self._in_hands += sum(seat.first is not None for seat in seats)
+            threads = [threading.Thread(target=self._work, args=(seat,), daemon=True) for seat in seats]
+            self._threads += threads
+            for thread in threads:
+                thread.start()
 
     def _work(self, seat: Seat) -> None:
-        """Run conditions until none is left; a process that dies is replaced, and a seat where none starts given up."""
+        """Run conditions until none is left, then become other seats; pass on what should not happen."""
+        try:
+            self._run_at(seat)
+            self._sit(() if self._stopping else seat.then)
+            with self._changed:
+                self._taken -= 1
+                lost = [] if self._taken else list(self._left)
+            for job in (job for group in lost for job in group):
+                self._ended.put(Ended(job, "no worker process could start"))
+        except BaseException as error:
+            self._ended.put(error)
+
+    def _run_at(self, seat: Seat) -> None:
+        """Run conditions in a process that is replaced when it dies; give up where none starts."""
         process, failures = None, 0
         group = self._next() if seat.first is None else (seat.first,)
-        while group and failures < ATTEMPTS and not self._stopping:
+        while group:
             process = process or self._started(seat)
-            if process is None:
-                failures += 1
-                continue
-            failures = 0
-            if self._run(process, group):
-                process = None
-            group = self._next() if seat.first is None else ()
-        if group:
-            self._give_back(group)
+            failures = 0 if process else failures + 1
+            left = self._run(process, group) if process else group
+            process = process if process in self._processes else None
+            self._put_down(left)
+            group = self._next() if seat.first is None and failures < ATTEMPTS else ()
         if process is not None:
             self._dismiss(process)
-        if seat.then and not self._stopping:
-            self._sit(seat.then)
-        with self._lock:
-            self._taken -= 1
-            if self._taken == 0:
-                self._ended.put(None)
 
     def _next(self) -> tuple[Job, ...]:
-        """Take the first of the groups that are left; empty where none is."""
-        with self._lock:
-            return self._left.popleft() if self._left else ()
+        """Take the first group that is left; empty when all have ended: one in hands may yet be given back."""
+        with self._changed:
+            self._changed.wait_for(lambda: bool(self._left) or not self._in_hands or self._stopping)
+            if not self._left or self._stopping:
+                return ()
+            self._in_hands += 1
+            return self._left.popleft()
 
-    def _give_back(self, group: tuple[Job, ...]) -> None:
-        """Put conditions back in front of the others."""
-        if group:
-            with self._lock:
-                self._left.appendleft(group)
+    def _put_down(self, left: tuple[Job, ...]) -> None:
+        """Have a group in hands no more, and put what has not ended in front of the others."""
+        with self._changed:
+            self._in_hands -= 1
+            if left:
+                self._left.appendleft(left)
+            self._changed.notify_all()
 
     def _started(self, seat: Seat) -> Process | None:
         """Start a process; None where it has died before it was ready."""
         process = Process(self._order, seat.environment)
-        with self._lock:
+        with self._changed:
             self._processes.add(process)
             late = self._stopping
         if late:
@@ -144,38 +154,37 @@ class Workers:
             print(f"evoclaims: a worker process did not start: {process.why()}.", file=sys.stderr, flush=True)
         return None
 
-    def _run(self, process: Process, group: tuple[Job, ...]) -> bool:
-        """Run a group in a process; return whether that has died, and give back what it has not run."""
+    def _run(self, process: Process, group: tuple[Job, ...]) -> tuple[Job, ...]:
+        """Run a group in a process; return what is left of it where that has died."""
         for place, job in enumerate(group):
             ended = process.run(job, self._tell)
             if ended is not None:
                 self._ended.put(ended)
                 continue
             self._dismiss(process)
-            if not self._stopping:
-                self._deaths[job] += 1
-                died = f"its process died ({process.why()})"
-                if self._deaths[job] < ATTEMPTS:
-                    print(f"evoclaims: {job.label}: {died}; it is begun again.", file=sys.stderr, flush=True)
-                    self._give_back(group[place:])
-                else:
-                    self._ended.put(Ended(job, f"{died}, {ATTEMPTS} times"))
-                    self._give_back(group[place + 1 :])
-            return True
-        return False
+            if self._stopping:
+                return group[place:]
+            self._deaths[job] += 1
+            died = f"its process died ({process.why()})"
+            if self._deaths[job] < ATTEMPTS:
+                print(f"evoclaims: {job.label}: {died}; it is begun again.", file=sys.stderr, flush=True)
+                return group[place:]
+            self._ended.put(Ended(job, f"{died}, {ATTEMPTS} times"))
+            return group[place + 1 :]
+        return ()
 
     def _dismiss(self, process: Process) -> None:
         """Wait for a process that has ended, or has nothing more to do."""
         process.close()
-        with self._lock:
+        with self._changed:
             self._processes.discard(process)
 
     def _stop(self) -> None:
         """End all processes: what they have stored stays, and checkpoints let another call go on."""
-        with self._lock:
+        with self._changed:
             self._stopping = True
-            running = list(self._processes)
-        for process in running:
-            process.stop()
+            self._changed.notify_all()
+            for process in self._processes:
+                process.stop()
         for thread in self._threads:
             thread.join()

@@ -1,0 +1,362 @@
+"""`--numprocesses N`: the longest batch first, nothing lost and nothing twice, whatever processes die of."""
+
+from __future__ import annotations
+
+import heapq
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import msgspec
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from tiny_project import REPRODUCTION, Evoclaims, Project
+
+from evoclaims.cli import seats, workers
+from evoclaims.cli.missing import MissingBatch
+from evoclaims.cli.seats import Host, Seat, host_of, useful_processes
+from evoclaims.cli.worker import Ended, Order
+from evoclaims.cli.workers import ATTEMPTS, Workers, in_queue
+from evoclaims.core.errors import UserError
+from evoclaims.envs.gates.parity import NParity
+from evoclaims.methods.hand_built import HandBuilt
+from evoclaims.mutants.conditions import Job
+from evoclaims.paper.estimates import Estimate
+from evoclaims.trials import gpus
+from evoclaims.trials.budget import Budget
+from evoclaims.trials.integrity import verify
+from evoclaims.trials.spec import Condition
+from evoclaims.trials.store import Store
+
+ORDER = Order("store", "smoke", "cpu", 0, 10)
+
+
+def _batch(name: str, work: float, compile_seconds: float = 0.0, layout: str = "vector") -> MissingBatch:
+    return MissingBatch(Job("", name, "parity"), tuple(range(10)), Estimate(compile_seconds, work, 10, layout))
+
+
+def _conditions(batches: Sequence[MissingBatch], alike: bool = False) -> dict[tuple[str, str], Condition]:
+    """Return a condition for each batch; none shares programs with another unless they are `alike`."""
+    return {
+        batch.job.names: Condition(HandBuilt(), NParity(2), "curriculum", Budget(generations=1 if alike else i + 1))
+        for i, batch in enumerate(batches)
+    }
+
+
+works = st.lists(st.floats(0.1, 100), min_size=1, max_size=40)
+
+
+@given(works, st.integers(1, 8), st.booleans())
+def test_the_longest_comes_first_and_each_once(took: list[float], processes: int, alike: bool) -> None:
+    batches = [_batch(str(number), work) for number, work in enumerate(took)]
+    seconds = {batch.job: batch.estimate.seconds() for batch in batches}
+    groups = in_queue(batches, _conditions(batches, alike), processes)
+    totals = [sum(seconds[job] for job in group) for group in groups]
+    assert totals == sorted(totals, reverse=True)
+    assert Counter(job for group in groups for job in group) == Counter(list(seconds))
+    assert all(
+        total <= sum(took) / processes / 8 for group, total in zip(groups, totals, strict=True) if len(group) > 1
+    )
+
+
+def test_small_conditions_that_share_programs_stay_together() -> None:
+    batches = [_batch("large", 100.0), _batch("small", 1.0), _batch("tiny", 0.5)]
+    conditions = _conditions(batches, alike=True)
+    conditions["large", "parity"] = Condition(HandBuilt(), NParity(3), "curriculum", Budget(generations=1))
+    assert [[job.method for job in group] for group in in_queue(batches, conditions, 2)] == [
+        ["large"],
+        ["small", "tiny"],
+    ]
+
+
+@given(st.lists(st.floats(0.5, 10), min_size=100, max_size=100), st.booleans())
+def test_four_workers_end_a_hundred_small_batches_within_15_percent_of_their_share(
+    took: list[float], alike: bool
+) -> None:
+    """Each takes the next of the queue when it is free; batches take as long as estimated."""
+    batches = [_batch(str(number), work) for number, work in enumerate(took)]
+    seconds = {batch.job: batch.estimate.seconds() for batch in batches}
+    free = [0.0] * 4
+    for group in in_queue(batches, _conditions(batches, alike), 4):
+        heapq.heapreplace(free, free[0] + sum(seconds[job] for job in group))
+    assert max(free) <= 1.15 * sum(took) / 4
+
+
+@dataclass(eq=False)
+class FakeProcess:
+    """A process that dies of some conditions some times, or of being started."""
+
+    order: Order
+    environment: dict[str, str]
+    log: list[tuple[str, str]]
+    deadly: Counter[str]
+    broken: frozenset[str]
+    took: Callable[[], None] = field(default=lambda: None)
+
+    @property
+    def place(self) -> str:
+        return self.environment.get(gpus.VISIBLE, "")
+
+    def is_ready(self) -> bool:
+        return self.place not in self.broken
+
+    def run(self, job: Job, tell: Callable[[str], None]) -> Ended | None:
+        tell(f"{job.label}: training")
+        self.took()
+        self.log.append((self.place, job.method))
+        if self.deadly[job.method] > 0:
+            self.deadly[job.method] -= 1
+            return None
+        return Ended(job)
+
+    def why(self) -> str:
+        return "status 7"
+
+    def close(self) -> None:
+        pass
+
+    def stop(self) -> None:
+        pass
+
+
+Run = Callable[..., tuple[list[Ended], list[tuple[str, str]]]]
+
+
+@pytest.fixture
+def run(monkeypatch: pytest.MonkeyPatch) -> Run:
+    """A function that runs groups of conditions in fake processes; it returns how they ended, and who ran them."""
+
+    def started(
+        groups: Sequence[Sequence[str]],
+        places: Sequence[Seat] = (Seat(),),
+        deadly: Counter[str] | None = None,
+        broken: frozenset[str] = frozenset(),
+        took: Callable[[], None] = lambda: None,
+    ) -> tuple[list[Ended], list[tuple[str, str]]]:
+        log: list[tuple[str, str]] = []
+        deaths = Counter(deadly or {})
+
+        def process(order: Order, environment: dict[str, str]) -> FakeProcess:
+            return FakeProcess(order, environment, log, deaths, broken, took)
+
+        monkeypatch.setattr(workers, "Process", process)
+        asked = [[Job("", name, "parity") for name in group] for group in groups]
+        return list(Workers(ORDER, places, lambda text: None).run(asked)), log
+
+    return started
+
+
+def _gpu(name: str) -> Seat:
+    return Seat(gpus.only([name]))
+
+
+def test_a_process_that_dies_gives_back_what_it_has_not_run(run: Run, capsys: pytest.CaptureFixture[str]) -> None:
+    ended, log = run([["a", "b", "c"], ["d"]], deadly=Counter(b=1))
+    assert [(one.job.method, one.error) for one in ended] == [("a", ""), ("b", ""), ("c", ""), ("d", "")]
+    assert [name for _, name in log] == ["a", "b", "b", "c", "d"]
+    assert "evoclaims: b on parity: its process died (status 7); it is begun again." in capsys.readouterr().err
+
+
+def test_a_condition_that_every_process_dies_of_has_failed_and_the_rest_is_done(run: Run) -> None:
+    ended, log = run([["a", "b", "c"], ["d"]], deadly=Counter(b=99))
+    assert [(one.job.method, one.error) for one in ended if one.error] == [
+        ("b", "its process died (status 7), 3 times")
+    ]
+    assert sorted(one.job.method for one in ended) == ["a", "b", "c", "d"]
+    assert Counter(name for _, name in log) == Counter(a=1, b=ATTEMPTS, c=1, d=1)
+
+
+def test_a_gpu_where_no_process_starts_costs_no_condition(run: Run, capsys: pytest.CaptureFixture[str]) -> None:
+    ended, log = run([[name] for name in "abcdef"], [_gpu("0"), _gpu("1")], broken=frozenset({"1"}))
+    assert {one.job.method: one.error for one in ended} == dict.fromkeys("abcdef", "")
+    assert {place for place, _ in log} == {"0"}
+    assert capsys.readouterr().err.count("a worker process did not start: status 7") <= ATTEMPTS
+
+
+def test_where_no_process_starts_every_condition_has_failed(run: Run) -> None:
+    ended, _ = run([["a"], ["b", "c"]], [_gpu("0"), _gpu("1")], broken=frozenset({"0", "1"}))
+    assert [(one.job.method, one.error) for one in ended] == [(x, "no worker process could start") for x in "abc"]
+
+
+def test_a_condition_on_several_gpus_leaves_them_to_others_when_it_has_ended(run: Run) -> None:
+    wide = Seat(gpus.only(["0", "1"]), Job("", "wide", "parity"), (_gpu("0"), _gpu("1")))
+    ended, log = run(
+        [["wide"], *([str(number)] for number in range(8))], [wide, _gpu("2")], took=lambda: time.sleep(0.02)
+    )
+    assert len(ended) == 9
+    assert [place for place, name in log if name == "wide"] == ["0,1"]
+    rest = {place for place, name in log if name != "wide"}
+    assert rest == {"0", "1", "2"}
+
+
+def test_a_condition_that_dies_on_several_gpus_is_begun_again_on_one(run: Run) -> None:
+    wide = Seat(gpus.only(["0", "1"]), Job("", "wide", "parity"), (_gpu("0"), _gpu("1")))
+    ended, log = run([["wide"]], [wide], deadly=Counter(wide=1))
+    assert [(one.job.method, one.error) for one in ended] == [("wide", "")]
+    (first, _), (second, _) = log
+    assert (first, second in ("0", "1")) == ("0,1", True)
+
+
+@given(works, st.integers(2, 9))
+def test_conditions_of_two_shares_have_several_gpus_and_there_are_always_enough(took: list[float], count: int) -> None:
+    batches = sorted((_batch(str(i), work) for i, work in enumerate(took)), key=lambda one: -one.estimate.seconds())
+    found = tuple(map(str, range(count)))
+    made = Host(seats.AUTO, found).seats(batches)
+    assert sorted(gpu for seat in made for gpu in seat.environment[gpus.VISIBLE].split(",")) == sorted(found)
+    share = sum(took) / count
+    for seat in made:
+        number = len(seat.environment[gpus.VISIBLE].split(","))
+        if seat.first is None:
+            assert (number, seat.then) == (1, ())
+        else:
+            assert number == len(seat.then) == min(10, int(took[int(seat.first.method)] / share), count) >= 2
+
+
+def test_processes_are_as_many_as_keep_the_cores_busy() -> None:
+    running = [_batch(str(i), 1000.0, 0.0, "alone") for i in range(50)]  # ten trials each
+    compiling = [_batch(str(i), 0.0, 10.0, "alone") for i in range(50)]
+    assert useful_processes(running, 64) == 6
+    assert useful_processes(running, 2) == 1
+    assert useful_processes(compiling, 64) == 64
+    assert useful_processes(compiling, 2) == 2
+    assert len(Host(seats.AUTO, ()).seats(compiling[:1])) == 1
+    assert len(Host(3, ()).seats(compiling)) == 3
+    assert Host(3, ()).seats([]) == []
+
+
+def test_a_number_of_processes_is_one_or_more(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert host_of("3", "cpu") == Host(3, ())
+    assert host_of("auto", "cpu") == Host(seats.AUTO, ())
+    for text in ("0", "-1", "many", ""):
+        with pytest.raises(UserError, match="--numprocesses takes a number from 1 up, or auto"):
+            host_of(text, "cpu")
+
+
+@pytest.mark.parametrize(
+    ("text", "found", "alone"),
+    [("1", 4, True), ("auto", 1, True), ("auto", 4, False), ("2", 1, False), ("auto", 0, False)],
+)
+def test_a_command_whose_processes_have_gpus_keeps_off_these_itself(
+    text: str, found: int, alone: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    off: list[bool] = []
+    monkeypatch.setattr(gpus, "gpus", lambda device: tuple(map(str, range(found))))
+    monkeypatch.setattr("evoclaims.trials.devices.keep_off_gpus", lambda: off.append(True))
+    assert host_of(text, "auto").alone == alone
+    assert off == [True] * (found > 0 and not alone)
+
+
+DEADLY = '''
+
+import os
+import signal
+
+
+class Killed(Coin):
+    """Kills its process, as the system does where memory runs out, as often as the file says."""
+
+    name: ClassVar[str] = "killed"
+
+    def init(self, key, task):
+        left = Path(__file__).with_name("deaths")
+        number = int(left.read_text())
+        left.write_text(str(number - 1))
+        if number > 0:
+            os.kill(os.getpid(), signal.SIGKILL)
+        return super().init(key, task)
+
+
+METHODS = {"right": HandBuilt(), "killed": Killed(), "wrong": HandBuilt(negated=True)}
+'''
+
+
+@pytest.fixture
+def deadly(project: Project) -> Project:
+    """The tiny paper, with a method that kills its process."""
+    head, tail = REPRODUCTION.split("METHODS = {")
+    project.pytester.makepyfile(tiny_paper=head + DEADLY + tail.split("\n", 1)[1])
+    return project
+
+
+@pytest.mark.usefixtures("deadly")
+def test_a_killed_workers_batch_is_done_again_and_nothing_is_lost_or_twice(evoclaims: Evoclaims) -> None:
+    Path("deaths").write_text("1")
+    status, out, err = evoclaims("run", "--numprocesses=2", "--trials=3")
+    assert (status, err.count("it is begun again")) == (0, 1)
+    assert "killed on parity: its process died (SIGKILL: the system sends that where memory runs out)" in err
+    store = Store(Path(".evoclaims"))
+    assert len(store.ids()) == 9
+    assert verify(store, repair=False) == []
+    assert out.count("3 of 3 conditions have ended") == 1
+    first = {path: path.stat().st_mtime_ns for path in store.record_paths()}
+    Path("deaths").write_text("99")
+    status, _, err = evoclaims("run", "--numprocesses=2", "--trials=4")
+    assert status == 1
+    assert "killed on parity (smoke) failed: its process died (SIGKILL: the system sends that where" in err
+    assert "1 of 3 conditions failed." in err
+    assert len(store.ids()) == 11  # the fourth trials of the two others
+    assert {path: path.stat().st_mtime_ns for path in first} == first
+
+
+def test_two_runs_beside_each_other_share_the_work(evoclaims: Evoclaims, project: Project) -> None:
+    spy = "from evoclaims.cli import main; raise SystemExit(main(['run', 'coin', '--numprocesses=2', '--tier=full']))"
+    other = subprocess.Popen([sys.executable, "-c", spy], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    status, out, err = evoclaims("run", "coin", "--numprocesses=2", "--tier=full")
+    told, errors = other.communicate()
+    assert (status, other.returncode) == (0, 0), err + errors
+    lines = [[line for line in text.splitlines() if "seed" in line] for text in (out, told)]
+    assert lines[0] == lines[1]
+    assert len(lines[0]) == 10
+    assert "differently" not in out + told + err + errors
+    store = Store(Path(".evoclaims"))
+    assert (len(store.ids()), verify(store, repair=False)) == (10, [])
+
+
+SLOW = """
+
+import time
+
+
+class Slow(Coin):
+    name: ClassVar[str] = "slow"
+
+    def init(self, key, task):
+        Path(__file__).with_name("begun").write_text("")
+        time.sleep(600)
+
+
+METHODS = {"slow": Slow()}
+"""
+
+
+def test_a_worker_ends_with_the_command_that_has_started_it(evoclaims: Evoclaims, project: Project) -> None:
+    """Closing its input is all that a command does that is killed."""
+    head, tail = REPRODUCTION.split("METHODS = {")
+    tail = tail.split("\n", 1)[1].replace('method == "right"', "False")
+    project.pytester.makepyfile(tiny_paper=head + SLOW + tail)
+    worker = subprocess.Popen(
+        [sys.executable, "-m", "evoclaims.cli.worker"],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+    )
+    assert worker.stdin is not None
+    assert worker.stdout is not None
+    for line in (Order(".evoclaims", "smoke", "cpu", 0, 1), Job("", "slow", "parity")):
+        worker.stdin.write(msgspec.json.encode(line) + b"\n")
+    worker.stdin.flush()
+    deadline = time.monotonic() + 120
+    while not Path("begun").exists() and time.monotonic() < deadline:
+        time.sleep(0.05)
+    os.kill(worker.pid, signal.SIGINT)  # Ctrl-C reaches it, too, and is the command's to handle
+    assert worker.poll() is None
+    worker.stdin.close()
+    assert worker.wait(60) == 0
+    worker.stdout.close()
