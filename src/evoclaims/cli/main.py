@@ -204,6 +204,10 @@ def _parser() -> argparse.ArgumentParser:
     )
     verify.add_argument("--dry-run", action="store_true", help="list bad files and leave them where they are")
 
+    merge = add("merge", "copy trials, champions and verdicts of other stores into one; what is there already stays")
+    merge.add_argument("stores", nargs="+", metavar="STORE", help="a folder of trials, such as another machine's")
+    merge.add_argument("--dry-run", action="store_true", help="say what would be copied, and copy nothing")
+
     reference = add("reference", "write the stored trials of a tier as the committed reference trials")
     tier(reference)
     reference.add_argument("--variant", metavar="NAME", default="", help="those that only this variant has")

@@ -162,8 +162,8 @@ class Store(StoreFiles):
         versions = None if packages is None else recorded(result.provenance, packages)
         return self.record_path(result.id, versions)
 
-    def _present(self, result: TrialResult) -> TrialResult | None:
-        """Return the stored record of the same trial and versions as `result`."""
+    def present(self, result: TrialResult) -> TrialResult | None:
+        """Return the stored record of the same trial and versions as `result`; raises as `get` does."""
         packages = depends_on(result.provenance)
         if packages is None:
             return self.read(self.record_path(result.id))
@@ -184,14 +184,17 @@ class Store(StoreFiles):
             UserError: when the disk is full or read-only, or the stored record is damaged.
             ValueError: when `result` or `champion` gives no valid record.
         """
-        packed = pack(champion) if champion else b""
+        return self.put_packed(result, pack(champion) if champion else b"")
+
+    def put_packed(self, result: TrialResult, packed: bytes) -> Put:
+        """Store a trial with its champion's file, as another store holds it; see `put`."""
         sealed = dataclasses.replace(result, champion=hashlib.sha256(packed).hexdigest() if packed else "")
         record = dump(sealed)
         try:
             parse(record)
         except RecordError as error:  # a bug in the program: found here rather than by the next reader
             raise ValueError(str(error)) from error
-        present = self._present(result)
+        present = self.present(result)
         if present is not None and not _gives_way(present, result):
             return "present" if present.digest == result.digest else "differs"
         mark(self.root)
@@ -200,10 +203,10 @@ class Store(StoreFiles):
         path = self.home(result)
         if present is None and write_once(path, record, ADVICE):
             return "stored"
-        first = self._present(result)
+        first = self.present(result)
         if present is None and first is not None:  # another process was faster
             self._remove_champion_beside(first, sealed)
-            return self.put(result, champion)
+            return self.put_packed(result, packed)
         write_atomically(path, record, ADVICE)
         return "stored"
 
@@ -254,6 +257,16 @@ class Store(StoreFiles):
         """Return the champion's parameters for a record read from this store; raises as `champion` does."""
         if not result.champion:
             return {}
+        data = self.packed_champion(result)
+        try:
+            return unpack(data)
+        except ValueError as error:
+            raise DamagedFileError(self.champion_file(result), f"it is {error}") from error
+
+    def packed_champion(self, result: TrialResult) -> bytes:
+        """Return the champion's file for a record read from this store, empty without one; raises as `champion`."""
+        if not result.champion:
+            return b""
         path = self.champion_file(result)
         try:
             data = read_file(path)
@@ -261,10 +274,7 @@ class Store(StoreFiles):
             raise DamagedFileError(path, f"it cannot be read ({error.strerror or error})") from error
         if hashlib.sha256(data).hexdigest() != result.champion:
             raise DamagedFileError(path, "it is not the champion that the trial's record names")
-        try:
-            return unpack(data)
-        except ValueError as error:
-            raise DamagedFileError(path, f"it is {error}") from error
+        return data
 
     def ids(self) -> tuple[str, ...]:
         """Return the sorted ids of the stored trials, from file names only; the files are not opened."""

@@ -143,9 +143,10 @@ def named(claim_id: str, case: str) -> str:
 
 def save(report: ClaimReport, root: Path) -> ClaimReport:
     """Write the report under `root`/verdicts and return it with the path filled in, or why it could not be written."""
-    saved = replace(report, evidence=str(_path(report, root)))
+    saved = replace(report, evidence=str(evidence_path(report, root)))
     try:
-        write_atomically(_path(report, root), (json.dumps(saved.to_json(), indent=1, sort_keys=True) + "\n").encode())
+        text = json.dumps(saved.to_json(), indent=1, sort_keys=True) + "\n"
+        write_atomically(evidence_path(report, root), text.encode())
     except UserError as error:  # a full or read-only disk must not hide the verdict
         return replace(report, unsaved=str(error))
     return saved
@@ -154,7 +155,7 @@ def save(report: ClaimReport, root: Path) -> ClaimReport:
 def succeeding(report: ClaimReport, root: Path) -> ClaimReport:
     """Return the report with the claim's previous verdict, read from the file that this report will replace."""
     try:
-        last = ClaimReport.from_json(json.loads(_path(report, root).read_bytes()))
+        last = ClaimReport.from_json(json.loads(evidence_path(report, root).read_bytes()))
     except (OSError, ValueError):
         return report  # no file, or one written by another release: nothing is judged from it
     before = LastVerdict(last.outcome, last.fingerprint or None, versions_of(last.sources))
@@ -163,11 +164,11 @@ def succeeding(report: ClaimReport, root: Path) -> ClaimReport:
 
 def located(report: ClaimReport, root: Path) -> ClaimReport:
     """Return the report with the path of the file that an earlier run wrote, if any."""
-    path = _path(report, root)
+    path = evidence_path(report, root)
     return replace(report, evidence=str(path)) if os.path.isfile(path) else report
 
 
-def _path(report: ClaimReport, root: Path) -> Path:
+def evidence_path(report: ClaimReport, root: Path) -> Path:
     """Return the path of a report's file."""
     folder = root / "verdicts" / report.tier
     if report.variant:

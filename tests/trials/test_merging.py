@@ -1,0 +1,205 @@
+"""Stores meet: what is whole and new is copied, what is there stays, and what differs is named with both files."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+from collections import Counter
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from evoclaims.core import files
+from evoclaims.core.files import write_once
+from evoclaims.trials.integrity import verify
+from evoclaims.trials.merging import Merged, merge_trials
+from evoclaims.trials.result import TrialResult
+from evoclaims.trials.store import Store
+
+Make = Callable[..., TrialResult]
+
+
+@pytest.fixture
+def other(tmp_path: Path, make_result: Make, parameters: dict[str, Any]) -> Store:
+    """Another store, with the trials of three seeds."""
+    store = Store(tmp_path / "other")
+    for seed in range(3):
+        store.put(make_result(seed), parameters)
+    return store
+
+
+def _merge(source: Store, into: Store, dry_run: bool = False) -> list[Merged]:
+    return list(merge_trials(source, into, dry_run))
+
+
+def _contents(store: Store) -> dict[str, bytes]:
+    """Return the files of trials and champions."""
+    paths = [path for path in store.root.rglob("*") if path.is_file() and path.suffix in (".json", ".npz")]
+    return {str(path.relative_to(store.root)): path.read_bytes() for path in paths}
+
+
+def test_trials_and_champions_are_copied_to_the_byte(store: Store, other: Store) -> None:
+    assert Counter(one.fate for one in _merge(other, store)) == {"copied": 3}
+    assert _contents(store) == _contents(other)
+    assert verify(store, repair=False) == []
+
+
+def test_a_second_merge_copies_nothing(store: Store, other: Store) -> None:
+    _merge(other, store)
+    before = _contents(store)
+    times = {path: path.stat().st_mtime_ns for path in store.root.rglob("*")}
+    assert Counter(one.fate for one in _merge(other, store)) == {"there": 3}
+    assert _contents(store) == before
+    assert {path: path.stat().st_mtime_ns for path in store.root.rglob("*")} == times
+
+
+def test_a_dry_run_says_the_same_and_writes_nothing(store: Store, other: Store) -> None:
+    assert Counter(one.fate for one in _merge(other, store, dry_run=True)) == {"copied": 3}
+    assert not store.root.exists()
+
+
+def test_of_two_different_records_the_existing_one_stays_and_both_are_named(
+    store: Store, other: Store, make_result: Make
+) -> None:
+    mine = make_result(1, metrics={"last_success": 0.25}, levels={"success": (1.0, 0.25)})
+    store.put(mine, {"w": np.ones(2)})
+    fates = {one.path.name: one for one in _merge(other, store)}
+    assert Counter(one.fate for one in fates.values()) == {"copied": 2, "differs": 1}
+    (differs,) = (one for one in fates.values() if one.fate == "differs")
+    home = other.record_path(mine.id)
+    assert str(differs) == (
+        f"{home}: another record of this trial is in {store.record_path(mine.id)} and stays: "
+        "metrics (last_success 0.5 and 0.25), levels (success), champions differ; made on machines of one kind"
+    )
+    assert store.get(mine.id) == TrialResult(**{**vars(mine), "champion": store.get(mine.id).champion})  # type: ignore[union-attr]
+    assert store.champion(mine.id)["w"].tolist() == [1.0, 1.0]
+    assert verify(store, repair=False) == []
+
+
+def test_where_two_records_were_made_is_said(store: Store, other: Store, make_result: Make) -> None:
+    devices = {"platform": "gpu", "kind": "NVIDIA H200", "count": 1}
+    record = make_result(0, metrics={"last_success": 0.25})
+    store.put(TrialResult(**{**vars(record), "provenance": {**record.provenance, "device": devices}}), {})
+    (differs,) = (one for one in _merge(other, store) if one.fate == "differs")
+    assert differs.reason.endswith("differ; made on an unknown device and NVIDIA H200")
+
+
+@pytest.mark.parametrize("status", ["timeout", "crashed"])
+def test_a_trial_without_an_outcome_gives_way_and_never_replaces_one(
+    status: str, store: Store, other: Store, make_result: Make
+) -> None:
+    without = make_result(0, status=status)
+    store.put(without, {})
+    assert Counter(one.fate for one in _merge(other, store)) == {"copied": 3}
+    assert store.get(without.id).status == "done"  # type: ignore[union-attr]
+    behind = Store(store.root.parent / "behind")
+    behind.put(without, {})
+    assert [one.fate for one in _merge(behind, store)] == ["there"]
+    assert store.get(without.id).status == "done"  # type: ignore[union-attr]
+
+
+@pytest.mark.parametrize("torn", ["record", "champion"])
+def test_damaged_files_are_left_out_and_named(torn: str, store: Store, other: Store, trial_files: Any) -> None:
+    record, champion = trial_files(other, 1)
+    bad = record if torn == "record" else champion
+    bad.write_bytes(bad.read_bytes()[:-9])
+    fates = _merge(other, store)
+    assert Counter(one.fate for one in fates) == {"copied": 2, "damaged": 1}
+    (damaged,) = (one for one in fates if one.fate == "damaged")
+    assert damaged.path == bad
+    assert "left out" in str(damaged)
+    assert len(store.ids()) == 2
+
+
+def test_a_damaged_file_that_is_there_stays_for_verify_to_move(store: Store, other: Store, trial_files: Any) -> None:
+    _merge(other, store)
+    record, _ = trial_files(store, 1)
+    record.write_bytes(b"torn")
+    fates = _merge(other, store)
+    assert Counter(one.fate for one in fates) == {"there": 2, "damaged": 1}
+    assert record.read_bytes() == b"torn"
+
+
+def test_an_edited_record_is_not_copied(
+    store: Store, other: Store, trial_files: Any, edit_record: Callable[..., None]
+) -> None:
+    record, _ = trial_files(other, 1)
+    edit_record(record, reseal=False, metrics={"mean_success": 1.0})
+    assert Counter(one.fate for one in _merge(other, store)) == {"copied": 2, "damaged": 1}
+
+
+@pytest.fixture
+def trial_files(make_result: Make) -> Callable[[Store, int], tuple[Path, Path]]:
+    """A function that returns the files of record and champion of a seed."""
+    return lambda store, seed: (store.record_path(make_result(seed).id), store.champion_path(make_result(seed).id))
+
+
+KILLED = """
+import os, signal, sys
+from pathlib import Path
+from evoclaims.trials import store as stores
+from evoclaims.trials.merging import merge_trials
+from evoclaims.trials.store import Store
+
+left, write = int(sys.argv[3]), stores.write_once
+
+def write_once(*arguments):
+    global left
+    left -= 1
+    if left < 0:
+        os.kill(os.getpid(), signal.SIGKILL)
+    return write(*arguments)
+
+stores.write_once = write_once
+list(merge_trials(Store(Path(sys.argv[1])), Store(Path(sys.argv[2]))))
+"""
+
+
+@pytest.mark.parametrize("writes", [1, 2])
+def test_a_kill_in_the_middle_leaves_a_store_that_the_next_merge_completes(
+    writes: int, store: Store, other: Store
+) -> None:
+    """The first file is a champion, the second its record."""
+    command = [sys.executable, "-c", KILLED, str(other.root), str(store.root), str(writes)]
+    assert subprocess.run(command).returncode == -signal.SIGKILL
+    assert len(store.ids()) == writes - 1
+    assert {one.kind for one in verify(store, repair=False)} <= {"leftover"}
+    assert Counter(one.fate for one in _merge(other, store))["copied"] == 4 - writes
+    assert _contents(store) == _contents(other)
+
+
+def test_a_trial_that_a_run_stores_meanwhile_is_not_overwritten(
+    store: Store, other: Store, make_result: Make, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    racing = make_result(0, metrics={"last_success": 0.25})
+
+    def faster(self: Store, result: TrialResult, packed: bytes) -> str:
+        monkeypatch.undo()
+        store.put(racing, {"w": np.ones(2)})
+        return store.put_packed(result, packed)
+
+    monkeypatch.setattr(Store, "put_packed", faster)
+    assert Counter(one.fate for one in _merge(other, store)) == {"copied": 2, "differs": 1}
+    assert store.get(racing.id).digest == racing.digest  # type: ignore[union-attr]
+    assert verify(store, repair=False) == []
+
+
+def test_a_link_whose_confirmation_a_network_folder_loses_is_ours(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A server may have made the link when the client asks again and is told that the name is taken."""
+    link = os.link
+
+    def told_twice(source: Path, target: Path) -> None:
+        link(source, target)
+        raise FileExistsError(17, "File exists")
+
+    monkeypatch.setattr(files.os, "link", told_twice)
+    assert write_once(tmp_path / "file", b"ours") is True
+    assert write_once(tmp_path / "file", b"theirs") is False
+    assert (tmp_path / "file").read_bytes() == b"ours"
