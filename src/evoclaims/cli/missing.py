@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from evoclaims.cli.project import Project
-from evoclaims.mutants.conditions import Job
+from evoclaims.mutants.conditions import Job, Names
 from evoclaims.paper.estimates import Estimate, Missing, committed, estimates
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.spec import Condition, TrialSpec
@@ -44,13 +44,15 @@ def missing_batches(
     """
     owed: dict[Job, tuple[int, ...]] = {}
     known: dict[Job, Missing] = {}
+    reference: dict[Names, tuple[TrialResult, ...]] = {}
     for job, condition in wanted.items():
         found = [_looked_up(project.store, TrialSpec(condition, seed)) for seed in seeds]
         owed[job] = tuple(seed for seed, (here, _) in zip(seeds, found, strict=True) if not answers(here, limit))
         if owed[job]:
             earlier = [trial for _, trial in found if trial is not None]
-            reference = committed(project.reproduction, tier, *job.names)
-            known[job] = Missing(condition, len(owed[job]), [*earlier, *reference])
+            if job.names not in reference:  # a condition may have many faults
+                reference[job.names] = committed(project.reproduction, tier, *job.names)
+            known[job] = Missing(condition, len(owed[job]), [*earlier, *reference[job.names]])
     batches = [MissingBatch(job, owed[job], found) for job, found in estimates(known, platform).items()]
     return sorted(batches, key=lambda batch: -batch.estimate.seconds())
 

@@ -26,7 +26,7 @@ _NODES: Final = Path("/dev")
 def gpus(device: str) -> tuple[str, ...]:
     """Return the GPUs that jax would use for `device` ("auto", "cpu" or "gpu"), as CUDA_VISIBLE_DEVICES names them.
 
-    None where jax has no plugin for CUDA, or JAX_PLATFORMS asks for other hardware.
+    Empty where jax has no plugin for CUDA, or JAX_PLATFORMS asks for other hardware.
     """
     asked = {name.strip() for name in os.environ.get("JAX_PLATFORMS", "").split(",")} - {""}
     if device == "cpu" or (asked and not asked & {"cuda", "gpu"}) or not _has_plugin():
