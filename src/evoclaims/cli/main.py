@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import os
+import signal
 import sys
 from collections.abc import Callable, Sequence
 from importlib import metadata
@@ -11,6 +12,7 @@ from importlib import metadata
 from evoclaims.cli.terminal import plain_output
 from evoclaims.core.errors import UserError
 from evoclaims.trials.allowance import end_without
+from evoclaims.trials.stopping import interrupted_by
 
 USER_ERROR, INTERRUPTED, CLOSED_PIPE = 2, 130, 141
 
@@ -38,7 +40,8 @@ def _ended(arguments: Sequence[str] | None) -> int:
     try:
         options.storage = _storage(options)
         run = _command(options.command)
-        status: int = run(options)
+        with interrupted_by(signal.SIGTERM):
+            status: int = run(options)
         sys.stdout.flush()
     except UserError as error:
         print(f"evoclaims: {error}", file=sys.stderr)
@@ -111,6 +114,24 @@ def _parser() -> argparse.ArgumentParser:
     run.add_argument("--retry", action="store_true", help="run trials again that ran out of time under this limit")
     run.add_argument("--first-seed", type=int, default=0, metavar="SEED", help="seed of the first trial (0)")
     processes(run)
+
+    submit = add("submit", "submit the batches that a tier lacks as jobs of SLURM, or of this machine; none twice")
+    submit.add_argument("method", nargs="?", help="only this method")
+    submit.add_argument("--on", metavar="TASK", help="only this task")
+    tier(submit)
+    device(submit)
+    submit.add_argument("--cluster", default="slurm", help="slurm (default), or local: jobs on this machine")
+    submit.add_argument("--partition", metavar="NAME", help="SLURM's partition")
+    submit.add_argument("--gpus", type=int, metavar="N", help="GPUs of a job")
+    submit.add_argument("--cpus", type=int, metavar="N", help="CPU cores of a job")
+    submit.add_argument("--time", metavar="TIME", help="of a job, which goes on in another one if need be (2:00:00)")
+    submit.add_argument("--array", type=int, metavar="N", help="how many jobs run at a time (256; local: 1)")
+    submit.add_argument(
+        "--slurm", metavar="KEY=VALUE", action="append", default=[], help="another option of sbatch: account=lab"
+    )
+    submit.add_argument("--dry-run", action="store_true", help="only print the jobs and their estimated hours")
+
+    add("jobs", "show which submitted jobs are queued, running, done or failed, why, and where their logs are")
 
     mutants = add("mutants", "plant faults in methods and tasks, run them, and write which of them the claims notice")
     tier(mutants)

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import sys
 import tomllib
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -25,12 +26,14 @@ class SuiteConfig:
         reproduction: module that holds `REPRODUCTION`.
         claims: folder of claim tests, relative to `root`.
         time_limit: time that a batch of trials may take, such as "90s" or "24h" (see `trials.time_limit`).
+        slurm: what this site's jobs ask for (`[tool.evoclaims.slurm]`), as `evoclaims submit` reads it.
     """
 
     root: Path
     reproduction: str
     claims: str = "claims"
     time_limit: str = DEFAULT_LIMIT
+    slurm: Mapping[str, object] = field(default_factory=dict)
 
     def seconds(self, option: str | None) -> float:
         """Return the seconds that a batch of trials may take, from an option or else from these settings.
@@ -62,14 +65,17 @@ def load_config(root: Path) -> SuiteConfig:
     Raises:
         UserError: when the table is missing, has other keys, or a value that is not text.
     """
-    table = _tool_tables(root / "pyproject.toml").get("evoclaims")
-    known = isinstance(table, dict) and {"reproduction"} <= set(table) <= {"reproduction", "claims", "time_limit"}
-    if not isinstance(table, dict) or not known or not all(isinstance(value, str) for value in table.values()):
+    found = _tool_tables(root / "pyproject.toml").get("evoclaims")
+    table = dict(found) if isinstance(found, dict) else {}
+    slurm = table.pop("slurm", {})
+    known = {"reproduction"} <= set(table) <= {"reproduction", "claims", "time_limit"}
+    if not known or not isinstance(slurm, dict) or not all(isinstance(value, str) for value in table.values()):
         raise UserError(
             f'{root / "pyproject.toml"} needs a [tool.evoclaims] table with reproduction = "package.module" and, if '
-            'it is not "claims", claims = "folder"; time_limit = "24h" if trials may take another time; no other keys.'
+            'it is not "claims", claims = "folder"; time_limit = "24h" if trials may take another time; a table slurm '
+            "for a site's jobs; no other keys."
         )
-    return SuiteConfig(root=root, **table)
+    return SuiteConfig(root=root, **table, slurm=slurm)
 
 
 def load_reproduction(config: SuiteConfig) -> Reproduction:

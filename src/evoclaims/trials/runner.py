@@ -28,6 +28,7 @@ from evoclaims.trials.result import TrialResult
 from evoclaims.trials.result_making import curve_point, make_result, make_timeout
 from evoclaims.trials.running import shared
 from evoclaims.trials.spec import Condition, TrialSpec
+from evoclaims.trials.stopping import postponed
 from evoclaims.trials.store import Store
 from evoclaims.trials.time_limit import is_final
 
@@ -110,17 +111,21 @@ def _finish(run: Run, header: Header, begin: Callable[[], Batch | None]) -> None
             return  # another process finished the batch; `run` restarts what is not stored
         batch, header = begun, begun.header
         rhythm = Rhythm(run.checkpoint_seconds)
-        while batch.owed:
-            batch, progress = _go_on(run, batch, allowance, strides)
-            header = batch.header
-            late = bool(batch.owed) and allowance.left < 2 * strides.seconds  # the next call might not return in time
-            if batch.owed and (late or rhythm.due):
-                with rhythm.saving():
-                    _save(run, batch)
-            if progress is not None:
-                run.watch(progress)
-            if late:
-                raise OutOfTimeError
+        with postponed() as stop:
+            while batch.owed:
+                batch, progress = _go_on(run, batch, allowance, strides)
+                header = batch.header
+                late = bool(batch.owed) and allowance.left < 2 * strides.seconds  # the next call might not return
+                stopped = stop.is_set()
+                if batch.owed and (late or stopped or rhythm.due):
+                    with rhythm.saving():
+                        _save(run, batch)
+                if progress is not None:
+                    run.watch(progress)
+                if late:
+                    raise OutOfTimeError
+                if stopped:
+                    break
     except OutOfTimeError:
         _give_up(run, header)
     else:

@@ -1,0 +1,181 @@
+"""What each job asks the cluster for: options of `evoclaims submit`, else `[tool.evoclaims.slurm]`, else defaults."""
+
+from __future__ import annotations
+
+import argparse
+import math
+import re
+import shutil
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Final
+
+from msgspec import ValidationError, convert
+
+from evoclaims.cli.submitted import Cluster
+from evoclaims.core.errors import UnknownNameError, UserError
+from evoclaims.trials.time_limit import seconds_of
+
+DEFAULT_MINUTES: Final = 120
+"""A job that runs out of time goes on later, so that any time will do; a short one is scheduled sooner."""
+
+LOCAL_MINUTES: Final = 365 * 24 * 60
+"""On this machine nobody else waits for the end of a job."""
+
+MOST_TOGETHER: Final = {"slurm": 256, "local": 1}
+"""Jobs at a time: SLURM decides; here one batch uses all cores."""
+
+_ALWAYS_SET: Final = (
+    *("job_name", "output", "error", "open_mode", "signal", "requeue", "no_requeue"),
+    *("wrap", "nodes", "ntasks", "ntasks_per_node"),
+)
+
+OURS: Final = {
+    "array": "--array",
+    "time": "--time",
+    "partition": "--partition",
+    "gpus": "--gpus",
+    "gpus_per_node": "--gpus",
+    "cpus_per_task": "--cpus",
+    **dict.fromkeys(_ALWAYS_SET, ""),
+}
+"""Options of sbatch that are ours to set, and the options of `evoclaims submit` that they are set by, if any."""
+
+
+@dataclass(frozen=True)
+class Request:
+    """What each job asks for.
+
+    Attributes:
+        cluster: "slurm" or "local".
+        partition: SLURM's partition; empty for the cluster's default.
+        gpus, cpus: how many a job gets; 0 for what the cluster gives without asking.
+        minutes: of a job; it goes on in a new one where it is not done by then.
+        together: how many jobs run at a time.
+        setup: lines of shell that a job begins with.
+        more: further options of sbatch; a flag's value is True.
+    """
+
+    cluster: Cluster
+    partition: str
+    gpus: int
+    cpus: int
+    minutes: int
+    together: int
+    setup: tuple[str, ...]
+    more: Mapping[str, Any]
+
+    def told(self) -> str:
+        """Return what a job asks for, as part of a sentence."""
+        asks = [f"{self.gpus} GPU{'s' * (self.gpus != 1)}"] * (self.gpus > 0)
+        asks += [f"{self.cpus} CPU core{'s' * (self.cpus != 1)}"] * (self.cpus > 0)
+        if self.cluster == "slurm":
+            asks += [f"partition {self.partition}"] * bool(self.partition) + [f"{clock(self.minutes)} of time"]
+            asks += [key.replace("_", "-") + ("" if value is True else f"={value}") for key, value in self.more.items()]
+        return ", ".join(asks)
+
+
+@dataclass(frozen=True)
+class _Table:
+    """The keys of `[tool.evoclaims.slurm]` that are not simply options of sbatch."""
+
+    partition: str = ""
+    gpus: int = 0
+    cpus: int = 0
+    time: str = ""
+    array: int = MOST_TOGETHER["slurm"]
+    setup: tuple[str, ...] = ()
+
+
+def requested(options: argparse.Namespace, table: Mapping[str, object]) -> Request:
+    """Return what the jobs of a call ask for.
+
+    Args:
+        options: of the call; None where they were not given.
+        table: the site's defaults, for SLURM alone.
+
+    Raises:
+        UserError: for a value that means nothing, or where this machine has no SLURM.
+    """
+    if options.cluster not in MOST_TOGETHER:
+        raise UnknownNameError("cluster", options.cluster, MOST_TOGETHER)
+    local = options.cluster == "local"
+    if not local and not options.dry_run and shutil.which("sbatch") is None:
+        raise UserError("There is no SLURM here (no sbatch): --cluster local runs the same jobs on this machine.")
+    if local and options.slurm:
+        raise UserError("--slurm is for jobs of SLURM; --cluster local takes none.")
+    site = _Table(array=MOST_TOGETHER["local"]) if local else _site(table)
+    own = {key: value for key, value in table.items() if key not in _Table.__dataclass_fields__ and not local}
+    more = {**dict(_option(key, value) for key, value in own.items()), **dict(map(_given, options.slurm))}
+    time = options.time or site.time
+    return Request(
+        cluster=options.cluster,
+        partition=site.partition if options.partition is None else options.partition,
+        gpus=_count("--gpus", site.gpus if options.gpus is None else options.gpus, 0),
+        cpus=_count("--cpus", site.cpus if options.cpus is None else options.cpus, 0),
+        minutes=minutes_of(time) if time else LOCAL_MINUTES if local else DEFAULT_MINUTES,
+        together=_count("--array", site.array if options.array is None else options.array, 1),
+        setup=site.setup,
+        more=more,
+    )
+
+
+def minutes_of(text: str) -> int:
+    """Return the minutes, rounded up, of a time as SLURM writes it ("30", "2:00:00", "1-12") or we do ("90min", "2h").
+
+    Raises:
+        UserError: for any other text, or no time.
+    """
+    found = re.fullmatch(r"(?:(\d{1,4})-)?(\d{1,5})(?::(\d{1,2}))?(?::(\d{1,2}))?", text.strip(), re.ASCII)
+    if found is None:
+        seconds = seconds_of(text)
+        if math.isinf(seconds):
+            raise UserError("A job's time is a length of time such as 2:00:00 or 2h.")
+    else:
+        days, *parts = (None if part is None else int(part) for part in found.groups())
+        given = [part for part in parts if part is not None]
+        in_hours = days is not None or len(given) == 3  # else minutes, or minutes:seconds
+        units = (3600, 60, 1) if in_hours else (60, 1, 0)
+        seconds = float((days or 0) * 86400 + sum(part * unit for part, unit in zip(given, units, strict=False)))
+    if seconds <= 0:
+        raise UserError(f"A job needs some time, not {text!r}.")
+    return math.ceil(seconds / 60)
+
+
+def clock(minutes: int) -> str:
+    """Return minutes as SLURM writes a time: 2:00:00."""
+    return f"{minutes // 60}:{minutes % 60:02}:00"
+
+
+def _site(table: Mapping[str, object]) -> _Table:
+    """Return the site's defaults."""
+    try:
+        return convert({key: table[key] for key in _Table.__dataclass_fields__ if key in table}, _Table)
+    except ValidationError as error:
+        raise UserError(f"In pyproject.toml, [tool.evoclaims.slurm]: {error}.") from error
+
+
+def _given(text: str) -> tuple[str, Any]:
+    """Return key and value of `--slurm KEY=VALUE`, or of a flag, `--slurm KEY`."""
+    key, equals, value = text.partition("=")
+    return _option(key.strip(), value if equals else True)
+
+
+def _option(key: str, value: object) -> tuple[str, Any]:
+    """Return an option of sbatch as submitit takes it."""
+    name = key.removeprefix("--").replace("-", "_")
+    if not re.fullmatch(r"[a-z][a-z_]*", name) or not isinstance(value, str | int) or "\n" in str(value):
+        raise UserError(
+            f"An option of sbatch is a name and a text or a number, such as account=lab, not {key!r}: {value!r}."
+        )
+    if name in OURS:
+        instead = f"use {OURS[name]}" if OURS[name] else "evoclaims sets it"
+        raise UserError(f"The option {key} of sbatch cannot be passed through: {instead}.")
+    return name, value
+
+
+def _count(option: str, value: int, least: int) -> int:
+    """Return a number from `least` up."""
+    if value < least:
+        raise UserError(f"{option} takes a number from {least} up, not {value}.")
+    return value

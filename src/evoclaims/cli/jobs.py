@@ -1,0 +1,138 @@
+"""`evoclaims jobs`: what has become of the jobs that were submitted for this store."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from evoclaims.cli.job_states import GONE, Seen, State, states
+from evoclaims.cli.project import Project, open_project
+from evoclaims.cli.submitted import Batch, Submission, SubmittedJob, load_all, log_of
+from evoclaims.core.errors import UserError
+from evoclaims.trials.batches import StoredTrials
+from evoclaims.trials.notice import notice_path
+
+TAIL: Final = 20_000
+"""Bytes at the end of a log in which a reason is looked for."""
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where a batch was submitted last.
+
+    Attributes:
+        name: the submission's.
+        submission: the submission.
+        job: the job of it.
+        batch: the batch in the job.
+    """
+
+    name: str
+    submission: Submission
+    job: SubmittedJob
+    batch: Batch
+
+
+@dataclass(frozen=True)
+class Row:
+    """What has become of a batch.
+
+    Attributes:
+        place: where it was submitted.
+        state: "queued", "running", "done" or "failed".
+        reason: of the state; may be empty.
+        log: the job's output.
+    """
+
+    place: Place
+    state: str
+    reason: str
+    log: Path
+
+
+def main(options: argparse.Namespace) -> int:
+    """List the batches that were submitted, each where it was submitted last; 1 when one has failed."""
+    project = open_project(options.storage)
+    rows = list(_rows(project))
+    if not rows:
+        print(f"No job was submitted for {project.store.root}: `evoclaims submit` does.")
+        return 0
+    for row in rows:
+        job, batch = row.place.job, row.place.batch
+        told = f": {row.reason}" * bool(row.reason)
+        log = f" ({row.log})" * row.log.exists()
+        print(f"{row.state:8} {job.id}  {batch.label}, {row.place.submission.tier}{told}{log}")
+    counts = {state: sum(row.state == state for row in rows) for state in ("queued", "running", "done", "failed")}
+    print(", ".join(f"{count} {state}" for state, count in counts.items() if count))
+    if counts["failed"]:
+        print("`evoclaims submit` submits what has failed again; it goes on from its checkpoints.")
+    return int(counts["failed"] > 0)
+
+
+def active(project: Project) -> dict[str, str]:
+    """Return the conditions whose batch is queued or running, with a sentence that says so."""
+    return {
+        row.place.batch.condition: f"{row.state} already, as job {row.place.job.id}"
+        for row in _rows(project)
+        if row.state in ("queued", "running")
+    }
+
+
+def _rows(project: Project) -> Iterator[Row]:
+    """Yield what has become of each batch that was submitted."""
+    latest: dict[str, Place] = {}
+    for name, submission in load_all(project.store.root).items():
+        for job in submission.jobs:
+            latest |= {batch.condition: Place(name, submission, job, batch) for batch in job.batches}
+    owed = {condition for condition, place in latest.items() if _lacks(project, place)}
+    seen: dict[tuple[str, str], Seen] = {}
+    for name, submission in {place.name: place.submission for place in latest.values()}.items():
+        asked = {place.job.id for condition, place in latest.items() if place.name == name and condition in owed}
+        if asked:
+            seen |= {(name, job): found for job, found in states(submission, asked).items()}
+    for condition, place in latest.items():
+        log, job = log_of(project.store.root, place.name, place.job), seen.get((place.name, place.job.id), GONE)
+        if condition not in owed or (job.state is State.ENDED and not _lacks(project, place)):  # it ended meanwhile
+            yield Row(place, "done", "", log)
+        else:
+            yield Row(place, *_told(project, place, job, log), log)
+
+
+def _lacks(project: Project, place: Place) -> bool:
+    """Whether trials of a batch are missing; of one that the paper no longer has nothing is."""
+    try:
+        tier = project.reproduction.tier(place.submission.tier)
+        condition = tier.condition(place.batch.method, place.batch.task)
+    except UserError:
+        return False
+    stored = StoredTrials(project.store, condition, time_limit=project.config.seconds(None))
+    seeds = tier.design.seeds(tier.design.last.n)
+    return condition.id == place.batch.condition and any(stored.lacks(seed) for seed in seeds)
+
+
+def _told(project: Project, place: Place, seen: Seen, log: Path) -> tuple[str, str]:
+    """Return the state of a batch with missing trials, and its reason."""
+    if seen.state is State.ENDED:
+        words = "; ".join(filter(None, [seen.reason, last_words(log)]))
+        gone = "it is not queued any more and has said nothing" if seen == GONE else "it ended without a word"
+        return "failed", words or gone
+    elsewhere = len(place.job.batches) > 1 and not notice_path(project.store.root, place.batch.condition).exists()
+    if seen.state is State.RUNNING and elsewhere:
+        return "queued", f"{seen.reason} runs other batches now"
+    return str(seen.state), seen.reason
+
+
+def last_words(log: Path) -> str:
+    """Return the last sentence of ours in a job's output, else its last line; empty where there is none."""
+    try:
+        with open(log, "rb") as file:
+            file.seek(max(0, log.stat().st_size - TAIL))
+            lines = file.read().decode(errors="replace").splitlines()
+    except OSError:
+        return ""
+    ours = [line for line in lines if line.startswith("evoclaims: ")]
+    said = [line for line in lines if line.strip()]
+    return ours[-1].removeprefix("evoclaims: ") if ours else said[-1].strip() if said else ""

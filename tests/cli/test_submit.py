@@ -1,0 +1,276 @@
+"""`evoclaims submit` and `jobs`: what a stand-in for SLURM is asked for, and real jobs of this machine.
+
+Jobs on SLURM itself are tested in tests/slurm.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from tiny_project import PYPROJECT, Evoclaims
+
+from evoclaims.cli import job_states, submit
+from evoclaims.cli.batch_job import BatchJob
+from evoclaims.cli.job_request import minutes_of
+from evoclaims.cli.missing import MissingBatch
+from evoclaims.cli.submit import dealt
+from evoclaims.mutants.conditions import Job
+from evoclaims.paper.estimates import Estimate
+from evoclaims.trials.store import Store
+
+pytest.importorskip("submitit", reason="jobs are NOT TESTED here: submitit is not installed (evoclaims[slurm])")
+
+SITE = """
+[tool.evoclaims.slurm]
+partition = "gpu"
+gpus = 1
+time = "30"
+account = "lab"
+setup = ["module load cuda"]
+"""
+
+
+class StandIn:
+    """Programs that are called as SLURM's are, and answer what a test wants."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder, self.script, self.queue = folder, folder / "script", folder / "queue"
+        self.program("sbatch", f'cp "$1" {self.script}; echo Submitted batch job 41')
+        self.program("squeue", f"cat {self.queue}")
+        self.program("srun", "exit 1")
+        self.queue.write_text("")
+
+    def program(self, name: str, line: str) -> None:
+        """Write a program of one line of shell."""
+        (self.folder / name).write_text(f"#!/bin/sh\n{line}\n")
+        (self.folder / name).chmod(0o755)
+
+    def asked(self) -> set[str]:
+        """Return what the last job array has asked for, and forget it."""
+        lines = self.script.read_text().splitlines()
+        self.script.unlink()
+        return {line.removeprefix("#SBATCH --") for line in lines if line.startswith("#SBATCH")}
+
+
+@pytest.fixture
+def slurm(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> StandIn:
+    folder = tmp_path_factory.mktemp("bin")
+    monkeypatch.setenv("PATH", str(folder), prepend=os.pathsep)
+    return StandIn(folder)
+
+
+def test_a_site_says_in_two_lines_what_jobs_ask_for_and_options_come_first(
+    evoclaims: Evoclaims, slurm: StandIn
+) -> None:
+    Path("pyproject.toml").write_text(PYPROJECT + SITE)
+    assert evoclaims("submit", "--on=parity", "--array=2", "--slurm=qos=night", "--slurm", "exclusive")[0] == 0
+    script = slurm.script.read_text()
+    assert "\nmodule load cuda\n" in script
+    asked = slurm.asked()
+    assert {"array=0-3%2", "partition=gpu", "gpus-per-node=1", "time=30", "account=lab", "qos=night"} < asked
+    assert {"exclusive", "requeue", "signal=USR2@90", "open-mode=append"} < asked
+    _, out, _ = evoclaims(
+        "submit", "right", "--gpus=0", "--time=2h", "--partition=cpu", "--slurm=account=other", "--dry-run"
+    )
+    assert "each with partition cpu, 2:00:00 of time, account=other" in out
+
+
+def test_nothing_is_submitted_twice_and_what_failed_is_submitted_again(evoclaims: Evoclaims, slurm: StandIn) -> None:
+    status, out, _ = evoclaims("submit")
+    assert (status, len(out.splitlines())) == (0, 8)
+    assert "4 batches of the smoke tier in 4 jobs on SLURM, at most 4 at a time, each with 2:00:00 of time:" in out
+    assert "sbatch --dependency=afterany:41 --wrap='pytest -m smoke --claims-stored" in out
+    assert slurm.asked()
+    slurm.queue.write_text("41_0|PENDING|Priority|\n41_1|RUNNING|None|node7\n41_2|OUT_OF_MEMORY|OutOfMemory|node8\n")
+    status, out, _ = evoclaims("jobs")
+    lines = out.splitlines()
+    assert status == 1
+    assert lines[0].startswith("queued   41_0  ")
+    assert lines[0].endswith(", smoke: Priority")
+    assert lines[1].endswith(", smoke: on node7")
+    assert lines[2].endswith(", smoke: out of memory on node8")
+    assert lines[3].endswith(", smoke: it is not queued any more and has said nothing")
+    assert lines[4] == "1 queued, 1 running, 2 failed"
+    _, out, _ = evoclaims("submit")
+    assert "queued already, as job 41_0" in out
+    assert "running already, as job 41_1" in out
+    assert "2 batches of the smoke tier" in out
+    assert "array=0-1%2" in slurm.asked()
+
+
+def test_trying_writes_and_submits_nothing(evoclaims: Evoclaims, slurm: StandIn) -> None:
+    before = sorted(Path.cwd().rglob("*"))
+    status, out, _ = evoclaims("submit", "--dry-run", "--on=parity")
+    assert status == 0
+    assert "right on parity: 10 trials, about" in out
+    assert not slurm.script.exists()
+    assert sorted(path for path in Path.cwd().rglob("*") if "__pycache__" not in path.parts) == [
+        path for path in before if "__pycache__" not in path.parts
+    ]
+
+
+@pytest.mark.usefixtures("stored")
+def test_only_what_is_missing_is_submitted(evoclaims: Evoclaims, slurm: StandIn) -> None:
+    assert "Nothing to submit: no batch of the smoke tier is missing." in evoclaims("submit", "right")[1]
+    assert not slurm.script.exists()
+    assert "2 batches of the smoke tier in 2 jobs" in evoclaims("submit")[1]  # neither right nor wrong
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        (["--cluster=cloud"], "cluster"),
+        (["--time=soon"], "A time limit is a length of time"),
+        (["--time=0"], "A job needs some time, not '0'."),
+        (["--gpus=-1"], "--gpus takes a number from 0 up, not -1."),
+        (["--array=0"], "--array takes a number from 1 up, not 0."),
+        (["--slurm=time=3"], "The option time of sbatch cannot be passed through: use --time."),
+        (["--slurm=output=x"], "The option output of sbatch cannot be passed through: evoclaims sets it."),
+        (["--slurm==3"], "An option of sbatch is a name and a text or a number"),
+        (["--slurm=a=1\n#SBATCH --uid=0"], "An option of sbatch is a name and a text or a number"),
+        (["--cluster=local", "--slurm=account=lab"], "--slurm is for jobs of SLURM"),
+        (["nobody"], "nobody"),
+    ],
+)
+@pytest.mark.usefixtures("slurm")
+def test_what_means_nothing_is_a_sentence(evoclaims: Evoclaims, arguments: list[str], sentence: str) -> None:
+    status, _, err = evoclaims("submit", *arguments)
+    assert status == 2
+    assert sentence in err
+    assert not Path(".evoclaims/jobs").exists()
+
+
+def test_a_site_s_table_is_checked(evoclaims: Evoclaims, slurm: StandIn) -> None:
+    Path("pyproject.toml").write_text(PYPROJECT + '\n[tool.evoclaims.slurm]\ngpus = "one"\n')
+    assert "In pyproject.toml, [tool.evoclaims.slurm]: Expected `int`, got `str`" in evoclaims("submit")[2]
+
+
+def test_without_slurm_or_submitit_a_sentence_says_what_to_do(
+    evoclaims: Evoclaims, slurm: StandIn, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "submitit", None)
+    assert "pip install 'evoclaims[slurm]'" in evoclaims("submit")[2]
+    monkeypatch.setenv("PATH", "/nowhere")
+    assert "There is no SLURM here (no sbatch): --cluster local runs" in evoclaims("submit")[2]
+
+
+def test_what_slurm_refuses_is_a_sentence_and_leaves_nothing(evoclaims: Evoclaims, slurm: StandIn) -> None:
+    slurm.program("sbatch", "echo 'sbatch: error: invalid partition specified: gpu' >&2; exit 1")
+    status, _, err = evoclaims("submit")
+    assert status == 2
+    assert "The jobs were not submitted: sbatch: error: invalid partition specified: gpu" in err
+    assert not list(Path(".evoclaims/jobs").glob("*"))
+
+
+def test_a_silent_slurm_and_a_torn_record_are_sentences(evoclaims: Evoclaims, slurm: StandIn) -> None:
+    assert evoclaims("submit", "right")[0] == 0
+    slurm.queue.unlink()
+    status, _, err = evoclaims("submit", "right")
+    assert status == 2
+    assert "SLURM does not say which jobs are queued (squeue: cat: " in err
+    (path,) = Path(".evoclaims/jobs").glob("*.json")
+    path.write_text(path.read_text().replace('"41"', '"41; rm -rf ~"'))
+    status, _, err = evoclaims("jobs")
+    assert status == 2
+    assert f"Cannot read which jobs were submitted, {path}: " in err
+
+
+def test_jobs_of_this_machine_store_their_trials_and_failures_say_why(evoclaims: Evoclaims) -> None:
+    """Two jobs: one network by the toss of a coin, and one that raises."""
+    until = time.monotonic() + 300
+    for method in ("coin", "broken"):
+        status, out, _ = evoclaims("submit", method, "--cluster=local")
+        assert status == 0
+        process = out.partition("Submitted 1 job, from ")[2].split()[0]
+        while os.readlink(f"/proc/{process}/fd/1") != os.devnull:  # `evoclaims submit | tee log` does not wait for it
+            assert time.monotonic() < until
+    assert "already, as job" in evoclaims("submit", "broken", "--cluster=local")[1]
+    while "running" in (told := evoclaims("jobs"))[1]:
+        assert time.monotonic() < until
+        time.sleep(0.5)
+    status, out, _ = told
+    done, failed, counted, _ = out.splitlines()
+    assert status == 1
+    assert done.startswith("done ")
+    assert failed.startswith("failed ")
+    assert "broken on parity (smoke) failed: RuntimeError: out of order" in failed
+    assert Path(failed.rpartition("(")[2].rstrip(")")).read_text().count("$ ") == 1
+    assert counted == "1 done, 1 failed"
+    assert len(Store(Path(".evoclaims")).ids()) == 10
+    assert evoclaims("jobs", "--storage=elsewhere")[0] == 2
+
+
+@pytest.mark.parametrize(
+    ("text", "minutes"),
+    [("30", 30), ("30:01", 31), ("2:00:00", 120), ("1-12", 2160), ("1-0:30", 1470), ("2h", 120), ("90s", 2)],
+)
+def test_a_time_is_written_as_slurm_does_or_as_we_do(text: str, minutes: int) -> None:
+    assert minutes_of(text) == minutes
+
+
+@given(st.lists(st.floats(0.1, 1000)), st.integers(1, 5))
+def test_batches_of_this_machine_are_dealt_once_and_evenly(seconds: list[float], jobs: int) -> None:
+    each = sorted(seconds, reverse=True)
+    batches = [MissingBatch(Job("", "m", str(i)), (0,), Estimate(0.0, took, 1, "alone")) for i, took in enumerate(each)]
+    hands = dealt(batches, jobs)
+    assert sorted((one.job.task for hand in hands for one in hand), key=int) == [one.job.task for one in batches]
+    sums = [sum(one.estimate.seconds() for one in hand) for hand in hands]
+    assert max(sums, default=0) - min(sums, default=0) <= max(each, default=0) + 1e-9
+
+
+def test_a_job_ends_its_batch_before_it_is_requeued_and_is_pickled_as_text(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    slow = "import signal, time; signal.signal(15, lambda *_: exit(open('told', 'w').close())); time.sleep(60)"
+    job = BatchJob([[sys.executable, "-c", slow]], str(tmp_path))
+    pickled = tmp_path / "pickled"
+
+    def told(*_: Any) -> None:
+        os.kill(job.process, signal.SIGUSR2)  # SLURM tells all processes; only the checkpoint ends the batch
+        job.checkpoint().dump(pickled)
+        raise TimeoutError
+
+    before = signal.signal(signal.SIGALRM, told)
+    signal.setitimer(signal.ITIMER_REAL, 1.0)
+    try:
+        with pytest.raises(TimeoutError):
+            job()
+    finally:
+        signal.signal(signal.SIGALRM, before)
+    assert Path("told").exists()
+    assert job.process == 0
+    load = "import pickle, sys; pickle.load(open(sys.argv[1], 'rb')); print('jax' in sys.modules)"
+    assert subprocess.check_output([sys.executable, "-c", load, str(pickled)]) == b"False\n"
+
+
+def test_a_job_s_failed_batches_are_counted_and_do_not_stop_the_others(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    python = [sys.executable, "-S", "-c"]
+    commands = [
+        [*python, "raise SystemExit(1)"],
+        [*python, "import os; os.kill(os.getpid(), 9)"],
+        [*python, "print(7)"],
+    ]
+    with pytest.raises(RuntimeError, match="2 of 3 batches failed"):
+        BatchJob(commands, str(tmp_path))()
+    out = capfd.readouterr().out
+    assert "evoclaims: the process died of SIGKILL." in out
+    assert out.endswith("\n7\n")
+
+
+def test_another_machine_s_process_may_still_run(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(job_states.socket, "gethostname", lambda: "here")
+    local = submit.Submission(1, "local", "there", "smoke", ())
+    assert job_states.states(local, ["7"])["7"].state == "running"
