@@ -144,6 +144,7 @@ def _parser() -> argparse.ArgumentParser:
     power = add("power", "say from a pilot how often each claim ends as expected; 1 when one does less than 0.95")
     tier(power)
     device(power)
+    processes(power)
     power.add_argument("--only", metavar="CLAIMS", help="only these claims, by id or name, such as G1,S2[cma_es]")
     power.add_argument(
         "--run",

@@ -9,16 +9,19 @@ from collections.abc import Mapping, Sequence
 from rich.markup import escape
 from rich.table import Table
 
-from evoclaims.claims.fetching import RunMissing, StoredOnly
+from evoclaims.claims.fetching import StoredOnly
 from evoclaims.claims.power import Asserted, ClaimPower, Listening, Names, Pilots, asserted, only
 from evoclaims.cli.project import Project, open_project
 from evoclaims.cli.reference import of_one_environment
-from evoclaims.cli.run import run_each
+from evoclaims.cli.running import Running
+from evoclaims.cli.seats import Host, host_of
 from evoclaims.cli.terminal import styled, terminal
+from evoclaims.cli.worker import Order
 from evoclaims.core.errors import UserError
 from evoclaims.core.packages import recorded
 from evoclaims.judging.counting import MAX_TRIALS
 from evoclaims.judging.design import Design
+from evoclaims.mutants.conditions import Job
 from evoclaims.report import power_cells
 from evoclaims.report.console import PlainSpokenConsole
 from evoclaims.report.live_line import LiveLine
@@ -29,6 +32,7 @@ from evoclaims.verdicts.versions import change
 
 def main(options: argparse.Namespace) -> int:
     """Print the power of each claim; 1 when one is below 0.95 or cannot be told, or a condition failed."""
+    host = host_of(options.numprocesses, options.device)
     project = open_project(options.storage)
     design = project.reproduction.tier(options.tier).design
     if options.draws < 1:
@@ -38,7 +42,9 @@ def main(options: argparse.Namespace) -> int:
     pilots = Pilots(project.reproduction, options.tier, every)
     wanted = {names: group.condition for one in chosen for names, group in one.groups.items()}
     if options.run or options.stored:
-        _make(project, pilots, {names: one for names, one in wanted.items() if pilots.unfit(names)}, design, options)
+        _make(
+            project, pilots, {names: one for names, one in wanted.items() if pilots.unfit(names)}, design, options, host
+        )
     powers = pilots.powers(chosen, options.draws)
     if not any(one.power for one in powers):
         told = "; ".join(power_cells.troubles(powers)[:1]) or "no claim has a test"
@@ -65,6 +71,7 @@ def _make(
     wanted: Mapping[Names, Condition],
     design: Design,
     options: argparse.Namespace,
+    host: Host,
 ) -> None:
     """Make the pilots that are missing: run their trials unless they are stored, and write each that is complete."""
     seeds = range(options.first_seed, options.first_seed + options.trials)
@@ -84,15 +91,15 @@ def _make(
         for names, condition in wanted.items():
             _write(project, pilots, names, condition, seeds)
         return
-    line = LiveLine(*terminal())
-    fetch = RunMissing(project.store, options.device, line, project.config.seconds(None))
+    order = Order(options.storage, options.tier, options.device, seeds[0], options.trials)
+    running = Running(project, order, host, LiveLine(*terminal()))
     if wanted:
-        fetch.check()
-    for names, condition in wanted.items():
-        named = [(f"{' on '.join(names)} ({options.tier})", condition)]
-        for _, _, results in run_each(named, seeds, fetch, line, project.config.root):
-            if results is not None:
-                _write(project, pilots, names, condition, seeds)
+        running.check()
+    for ended in running.run({Job("", *names): one for names, one in wanted.items()}, lambda text: print(f"  {text}")):
+        if ended.error:
+            print(f"evoclaims: {ended.job.label} ({options.tier}) failed: {ended.error}.", file=sys.stderr)
+        else:
+            _write(project, pilots, ended.job.names, wanted[ended.job.names], seeds)
 
 
 def _write(project: Project, pilots: Pilots, names: Names, condition: Condition, seeds: Sequence[int]) -> None:

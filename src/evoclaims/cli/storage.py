@@ -11,7 +11,7 @@ from evoclaims.paper.config import find_root
 from evoclaims.trials.store import Store
 from evoclaims.trials.store_files import DEFAULT_ROOT
 
-BEGINNING: Final = frozenset({"run", "submit", "mutants", "across", "bisect", "merge"})
+BEGINNING: Final = frozenset({"run", "submit", "mutants", "power", "across", "bisect", "merge"})
 """Commands that create a missing store; the others read one."""
 
 APART: Final = {"across": ".evoclaims-releases", "bisect": ".evoclaims-releases"}
