@@ -81,7 +81,7 @@ def test_a_changed_constant_of_a_library_is_told_with_its_name_and_nothing_else_
     assert told.startswith(f"{change.package} {old} -> {new}\n"), ran.stdout + ran.stderr
     (changed,) = re.findall(rf"\n  {change.condition} \(smoke\): {N} trials run again, (\d+) of {N} not the same", told)
     assert int(changed) > 0
-    assert re.findall(r"^  (.*): compiling", ran.stdout, re.MULTILINE) == [_label(change.condition)]
+    assert set(re.findall(r"(\w+ on \w+): compiling", ran.stdout)) <= {_label(change.condition)}
     after = _records(folder)
     assert before.items() <= after.items()
     assert len(after) == len(before) + N

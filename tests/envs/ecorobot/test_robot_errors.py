@@ -69,7 +69,7 @@ def test_a_sensor_has_rays_and_a_reach(sensor: Any, numbers: dict[str, Any]) -> 
 
 def test_a_robot_without_a_file_says_so() -> None:
     nowhere = replace(SIMPLE_ROB, name="ghost", xml="evoclaims.envs.ecorobot:assets/ghost.xml")
-    with pytest.raises(UserError, match="The model of the robot ghost cannot be read: .*ghost.xml"):
+    with pytest.raises(UserError, match=r"The robot 'ghost' has its model in .*, and there is no file .*ghost\.xml"):
         _ = Scene(nowhere).model
 
 
