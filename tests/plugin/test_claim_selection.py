@@ -56,7 +56,7 @@ def test_one_case_of_a_claim_is_selected_by_its_name(project: Any, sentence: Sen
         "@says('a')\n@pytest.mark.parametrize('case', ['x', 'y'])\ndef test_a(case, trials, verdict):\n    pass\n"
     )
     chosen = project.run("--collect-only", "-q", "--claims-only=a[y]")
-    assert [line for line in chosen.outlines if "::" in line] == ["claims/test_claims.py::test_a[smoke-y]"]
+    assert [line for line in chosen.outlines if "::" in line] == ["claims/test_claims.py::test_a[y-a-smoke]"]
     sentence(
         project.run("--claims-only=a[z]"), "There is no claim named 'a[z]'. Did you mean 'a[y]'? Known: a[x], a[y]."
     )

@@ -134,8 +134,8 @@ def test_each_worker_has_its_own_gpu_before_a_conftest_is_loaded(project: Any, m
     project.write("def test_nothing():\n    pass\n\n\ndef test_nothing_else():\n    pass\n")
     (project.path / "fake_host.py").write_text(FAKE_HOST)
     (project.path / "conftest.py").write_text(SEEN)
-    monkeypatch.delenv("JAX_PLATFORMS", raising=False)
-    monkeypatch.delenv("CUDA_VISIBLE_DEVICES", raising=False)
+    for name in ("JAX_PLATFORMS", "CUDA_VISIBLE_DEVICES", "PYTEST_XDIST_WORKER"):  # the run around may set it
+        monkeypatch.delenv(name, raising=False)
     monkeypatch.setenv("PYTHONPATH", str(project.path), prepend=":")
     result = project.run_apart("-p", "fake_host", "-n", "auto")
     result.assert_outcomes(passed=2)
