@@ -50,8 +50,7 @@ def compare_digests(new: Sequence[TrialResult], reference: Sequence[TrialResult]
 
 def _comparable_key(trial: TrialResult) -> tuple[str, int, str] | None:
     """Return what two records must share to be comparable, or None if the record does not have it."""
-    device = trial.provenance.get("device") or {}
-    made_by = [device.get("kind"), trial.provenance.get("machine"), trial.provenance.get("versions")]
+    made_by = [trial.device.get("kind"), trial.provenance.get("machine"), trial.provenance.get("versions")]
     if not all(made_by):
         return None
     return trial.condition, trial.seed, canonical_json(made_by)

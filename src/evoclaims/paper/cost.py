@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import time
 from collections import defaultdict
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import jax
 import numpy as np
@@ -57,7 +56,7 @@ def known_pace(
     trials = [trial for trial in stored if trial is not None and is_final(trial)]
     committed = references.load(references.path_of(folder, tier, method, task))
     trials += [trial for trial in committed if trial.condition == condition.id]
-    batch = _largest_batch(trial for trial in trials if _device(trial).get("kind") == kind)
+    batch = _largest_batch(trial for trial in trials if trial.device.get("kind") == kind)
     if not batch:
         return None
     took, steps = Took.of(batch), [trial.metrics["steps"] for trial in batch]
@@ -84,7 +83,7 @@ class Took:
     def of(batch: Sequence[TrialResult]) -> Took:
         """Read the records of a batch, at least one."""
         compiling, running = (max(float(trial.timing[name]) for trial in batch) for name in ("compile", "run"))
-        return Took(compiling, running, len(batch), layout_on(str(_device(batch[0])["platform"])))
+        return Took(compiling, running, len(batch), layout_on(str(batch[0].device["platform"])))
 
     def seconds(self, trials: int) -> float:
         """Return about how long so many trials of the same condition take."""
@@ -93,22 +92,21 @@ class Took:
 
 def took(trials: Iterable[TrialResult], platform: str) -> Took | None:
     """Return how long the largest batch among trials of one condition took on a platform; None if there is none."""
-    batch = _largest_batch(trial for trial in trials if _device(trial).get("platform") == platform)
+    batch = _largest_batch(trial for trial in trials if trial.device.get("platform") == platform)
     return Took.of(batch) if batch else None
 
 
 def _largest_batch(trials: Iterable[TrialResult]) -> list[TrialResult]:
     """Return the trials of the largest batch that came to an end; none if there is none."""
-    batches: dict[str, list[TrialResult]] = defaultdict(list)
+    return max(by_batch(trial for trial in trials if trial.status in COMPLETE), key=len, default=[])
+
+
+def by_batch(trials: Iterable[TrialResult]) -> list[list[TrialResult]]:
+    """Return trials by batch, which share their times; in the order of the first of each."""
+    batches: dict[tuple[str, str], list[TrialResult]] = defaultdict(list)
     for trial in trials:
-        if trial.status in COMPLETE:
-            batches[str(trial.timing["started"])].append(trial)
-    return max(batches.values(), key=len, default=[])
-
-
-def _device(trial: TrialResult) -> Mapping[str, Any]:
-    """Return what a record says about its device; nothing for old records."""
-    return trial.provenance.get("device") or {}
+        batches[str(trial.timing["started"]), str(trial.device.get("kind"))].append(trial)
+    return list(batches.values())
 
 
 def measured_pace(condition: Condition, devices: Sequence[jax.Device]) -> Pace:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import statistics
-from collections import defaultdict
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final, TypeVar
 
 from evoclaims.paper import references
+from evoclaims.paper.cost import by_batch
 from evoclaims.paper.reproduction import Reproduction
 from evoclaims.trials.devices import layout_on
 from evoclaims.trials.result import COMPLETE, TrialResult
@@ -42,10 +42,6 @@ class Estimate:
     def seconds(self, cores: int = 1) -> float:
         """Return the time that the batch takes in a process with so many cores."""
         return self.compile + self.work / (min(self.trials, cores) if self.layout == "alone" else 1)
-
-    def cores_used(self, cores: int) -> float:
-        """Return how many of so many cores the batch uses, on average over its time; compiling takes one."""
-        return self.seconds() / self.seconds(cores)
 
 
 @dataclass(frozen=True)
@@ -100,7 +96,8 @@ def _pace(one: Missing, found: Estimate) -> float:
 
 def _known(one: Missing, platform: str, layout: str) -> Estimate | None:
     """Estimate by earlier trials; None where none ran on this platform."""
-    batches = _batches(trial for trial in one.earlier if _platform(trial) == platform)
+    here = (trial for trial in one.earlier if trial.device.get("platform") == platform)
+    batches = by_batch(trial for trial in here if trial.status in COMPLETE)
     same = [batch for batch in batches if batch[0].condition == one.condition.id]
     if not batches:
         return None
@@ -108,22 +105,8 @@ def _known(one: Missing, platform: str, layout: str) -> Estimate | None:
     run = max(float(trial.timing["run"]) for trial in batch)
     steps = [max(float(trial.metrics.get("environment_steps", 0.0)), 1.0) for trial in batch]
     if layout == "alone":
-        run *= min(int((batch[0].provenance.get("device") or {}).get("count") or 1), len(batch))
+        run *= min(int(batch[0].device.get("count") or 1), len(batch))
         work = run * one.trials / len(batch) if same else run / sum(steps) * _steps(one, layout)
     else:
         work = run if same else run / max(steps) * _steps(one, layout)
     return Estimate(max(float(trial.timing["compile"]) for trial in batch), work, one.trials, layout)
-
-
-def _batches(trials: Iterable[TrialResult]) -> list[list[TrialResult]]:
-    """Return complete trials by batch, which share their times; in the order of the first of each."""
-    found: dict[str, list[TrialResult]] = defaultdict(list)
-    for trial in trials:
-        if trial.status in COMPLETE:
-            found[str(trial.timing["started"])].append(trial)
-    return list(found.values())
-
-
-def _platform(trial: TrialResult) -> str:
-    """Return the platform of a record's device; empty if it does not say."""
-    return str((trial.provenance.get("device") or {}).get("platform") or "")

@@ -83,4 +83,4 @@ def _bits_should_agree(one: TrialResult, other: TrialResult) -> bool:
 
 def _made_on_cpu(trial: TrialResult) -> bool:
     """Whether a record says that it was made on a CPU; False if it names no device."""
-    return (trial.provenance.get("device") or {}).get("platform") == "cpu"
+    return trial.device.get("platform") == "cpu"

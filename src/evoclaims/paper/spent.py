@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any
 
 from evoclaims.paper import references
+from evoclaims.paper.cost import by_batch
 from evoclaims.paper.reproduction import Reproduction
 from evoclaims.trials.result import TrialResult
 
@@ -42,7 +42,7 @@ def spent(reproduction: Reproduction, tier: str, method: str, task: str) -> Spen
     trials = [trial for trial in _committed(reproduction, tier, method, task) if trial.condition == condition.id]
     seconds: dict[str, float] = defaultdict(float)
     for batch in _batches(trials):
-        device = _device(batch[0])
+        device = batch[0].device
         if device.get("platform") != "cpu":
             seconds[str(device.get("kind"))] += batch[0].timing["run"] + batch[0].timing["compile"]
     others = (_committed(reproduction, name, method, task) for name in reproduction.tiers if name != tier)
@@ -59,7 +59,7 @@ def _core_pace(trials: Iterable[TrialResult]) -> float | None:
     """Return the seconds of a core per environment step; a batch takes as many cores as it has trials, if there are."""
     used = steps = 0.0
     for batch in _batches(trials):
-        device = _device(batch[0])
+        device = batch[0].device
         if device.get("platform") == "cpu":
             used += batch[0].timing["run"] * min(int(device.get("count") or 1), len(batch))
             steps += sum(trial.metrics.get("environment_steps", 0.0) for trial in batch)
@@ -67,14 +67,5 @@ def _core_pace(trials: Iterable[TrialResult]) -> float | None:
 
 
 def _batches(trials: Iterable[TrialResult]) -> list[list[TrialResult]]:
-    """Return trials by batch, which share their times; those that did not end by themselves are left out."""
-    found: dict[tuple[str, str], list[TrialResult]] = defaultdict(list)
-    for trial in trials:
-        if trial.status == "done":
-            found[str(trial.timing["started"]), str(_device(trial).get("kind"))].append(trial)
-    return list(found.values())
-
-
-def _device(trial: TrialResult) -> Mapping[str, Any]:
-    """Return what a record says about its device; nothing for old records."""
-    return trial.provenance.get("device") or {}
+    """Return trials by batch; those that did not end by themselves are left out."""
+    return by_batch(trial for trial in trials if trial.status == "done")

@@ -95,7 +95,7 @@ def _difference(one: TrialResult, other: TrialResult) -> str:
         )
         parts += [f"{name} ({', '.join(scalars)})"] if keys else []
     parts += ["champions"] if one.champion != other.champion else []
-    devices = [str((trial.provenance.get("device") or {}).get("kind", "an unknown device")) for trial in (one, other)]
+    devices = [str(trial.device.get("kind", "an unknown device")) for trial in (one, other)]
     machines = [str(trial.provenance.get("machine", "an unknown machine")) for trial in (one, other)]
     where = devices if devices[0] != devices[1] else machines
     made = f"; made on {where[0]} and {where[1]}" if where[0] != where[1] else "; made on machines of one kind"

@@ -49,6 +49,11 @@ class TrialResult:
     provenance: Mapping[str, Any]
     champion: str = ""
 
+    @property
+    def device(self) -> Mapping[str, Any]:
+        """Platform, kind and count of the devices that made the trial; empty in a record that does not say."""
+        return self.provenance.get("device") or {}
+
     def to_json(self) -> dict[str, Any]:
         """Return the record as plain JSON, sealed with a hash that detects torn or edited files."""
         plain: dict[str, Any] = {"schema": SCHEMA, **as_plain(self)}

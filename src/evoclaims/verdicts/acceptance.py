@@ -76,7 +76,7 @@ def entry_of(report: ClaimReport, archive: Archive, today: str) -> Entry:
         fingerprint=report.fingerprint,
         accepted=today,
         versions=versions_of(trials),
-        device=_joined((trial.provenance.get("device") or {}).get("kind") for trial in trials),
+        device=_joined(trial.device.get("kind") for trial in trials),
         revision=_joined(_revision(trial) for trial in trials),
         trials=content_hash(sorted(trial.digest for trial in trials)),
     )
@@ -112,8 +112,7 @@ def changes(old: Entry, new: Entry) -> list[str]:
 
 def _packages(trial: TrialResult) -> dict[str, str]:
     """Return the versions of one trial; a package that was not installed is left out."""
-    device = trial.provenance.get("device") or {}
-    cuda = trial.provenance.get("cuda") if device.get("platform") == "gpu" else None
+    cuda = trial.provenance.get("cuda") if trial.device.get("platform") == "gpu" else None
     found = {**(trial.provenance.get("versions") or {}), **(cuda or {})}
     return {str(name): str(version) for name, version in found.items() if version is not None}
 

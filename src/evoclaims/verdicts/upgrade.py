@@ -162,7 +162,7 @@ def _told(one: Succession) -> str:
 
 def _same_machine(old: TrialResult, new: TrialResult) -> bool:
     """Whether two trials were made on one class of machine, on a CPU and with the same settings."""
-    if any((trial.provenance.get("device") or {}).get("platform") != "cpu" for trial in (old, new)):
+    if any(trial.device.get("platform") != "cpu" for trial in (old, new)):
         return False
     before, now = what_fixes_bits(old.provenance), what_fixes_bits(new.provenance)
     return all(before[name] == now[name] for name in (before.keys() & now.keys()) - {"versions"})
