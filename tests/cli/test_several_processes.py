@@ -186,6 +186,18 @@ def test_where_no_process_starts_every_condition_has_failed(run: Run) -> None:
     assert [(one.job.method, one.error) for one in ended] == [(x, "no worker process could start") for x in "abc"]
 
 
+def test_an_error_that_ends_all_leaves_no_process_behind(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    closed: list[str] = []
+    monkeypatch.setattr(FakeProcess, "close", lambda process: closed.append(process.place))
+
+    def fail() -> None:
+        raise BrokenPipeError
+
+    with pytest.raises(BrokenPipeError):
+        run([["a"]], [_gpu("0")], took=fail)
+    assert closed == ["0"]
+
+
 def test_a_condition_on_several_gpus_leaves_them_to_others_when_it_has_ended(run: Run) -> None:
     wide = Seat(gpus.only(["0", "1"]), Job("", "wide", "parity"), (_gpu("0"), _gpu("1")))
     ended, log = run(

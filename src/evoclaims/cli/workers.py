@@ -61,7 +61,7 @@ class Workers:
         self._tell = tell
         self._changed = threading.Condition()  # of all that follows
         self._left: deque[tuple[Job, ...]] = deque()
-        self._in_hands = 0
+        self._running = 0
         self._taken = 0
         self._deaths: Counter[Job] = Counter()
         self._processes: set[Process] = set()
@@ -89,7 +89,7 @@ class Workers:
         """Start a thread for each seat."""
         with self._changed:
             self._taken += len(seats)
-            self._in_hands += sum(seat.first is not None for seat in seats)
+            self._running += sum(seat.first is not None for seat in seats)
             threads = [threading.Thread(target=self._work, args=(seat,), daemon=True) for seat in seats]
             self._threads += threads
             for thread in threads:
@@ -117,24 +117,24 @@ class Workers:
             failures = 0 if process else failures + 1
             left = self._run(process, group) if process else group
             process = process if process in self._processes else None
-            self._put_down(left)
+            self._give_back(left)
             group = self._next() if seat.first is None and failures < ATTEMPTS else ()
         if process is not None:
             self._dismiss(process)
 
     def _next(self) -> tuple[Job, ...]:
-        """Take the first group that is left; empty when all have ended: one in hands may yet be given back."""
+        """Take the first group that is left; empty when all have ended: one that runs may yet be given back."""
         with self._changed:
-            self._changed.wait_for(lambda: bool(self._left) or not self._in_hands or self._stopping)
+            self._changed.wait_for(lambda: bool(self._left) or not self._running or self._stopping)
             if not self._left or self._stopping:
                 return ()
-            self._in_hands += 1
+            self._running += 1
             return self._left.popleft()
 
-    def _put_down(self, left: tuple[Job, ...]) -> None:
-        """Have a group in hands no more, and put what has not ended in front of the others."""
+    def _give_back(self, left: tuple[Job, ...]) -> None:
+        """Count a group as running no more, and put what has not ended in front of the others."""
         with self._changed:
-            self._in_hands -= 1
+            self._running -= 1
             if left:
                 self._left.appendleft(left)
             self._changed.notify_all()
@@ -188,3 +188,5 @@ class Workers:
                 process.stop()
         for thread in self._threads:
             thread.join()
+        for process in tuple(self._processes):  # those of threads that have failed
+            self._dismiss(process)
