@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import json
 import os
 import shutil
 import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from wheels import write_wheel
 
+from evoclaims.core import environments
 from evoclaims.core.environments import Environment, NotInstallableError, Recipe, checked, make, reason
 from evoclaims.core.errors import UserError
 from evoclaims.core.releases import between, released
@@ -124,6 +127,24 @@ def test_another_python_with_pins_gets_this_program_first_and_then_the_release_o
     assert first.endswith(f"--editable {tmp_path}")
     assert second == f"pip install --python {environment.python} --constraint {constraints} pebble==1.1"
     assert constraints.read_text() == "# what we had\njax==0.10.2\npebble-stone==3\n"
+
+
+@pytest.mark.parametrize(
+    ("origin", "asked"),
+    [
+        (
+            {"url": "file:///our%20work/it", "dir_info": {"editable": True}},
+            ["--editable", "/our work/it"],
+        ),
+        ({"url": "file:///our%20work/it.whl", "archive_info": {}}, ["/our work/it.whl"]),
+    ],
+)
+def test_this_program_is_found_in_a_folder_with_a_space_in_its_name(
+    monkeypatch: pytest.MonkeyPatch, origin: dict[str, object], asked: list[str]
+) -> None:
+    distribution = SimpleNamespace(read_text=lambda name: json.dumps(origin))
+    monkeypatch.setattr(environments.importlib.metadata, "distribution", lambda name: distribution)
+    assert environments._this_program() == asked
 
 
 def test_without_such_a_python_that_is_said(make_one: Make, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

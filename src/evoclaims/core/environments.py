@@ -22,6 +22,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
+from urllib.parse import urlsplit
+from urllib.request import url2pathname
 
 from filelock import FileLock
 from packaging.utils import canonicalize_name
@@ -229,7 +231,7 @@ def _this_program() -> list[str]:
     if repository:
         return [f"{PROGRAM} @ {repository['vcs']}+{url}@{repository['commit_id']}"]
     if url.startswith("file://"):
-        return [*["--editable"] * bool(origin.get("dir_info", {}).get("editable")), url.removeprefix("file://")]
+        return [*["--editable"] * bool(origin.get("dir_info", {}).get("editable")), url2pathname(urlsplit(url).path)]
     return [f"{PROGRAM}=={distribution.version}"]
 
 
