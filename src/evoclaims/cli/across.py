@@ -91,7 +91,11 @@ def _recipes(options: argparse.Namespace) -> list[Recipe]:
     versions = [_version(package, word) for word in named] or [""]
     pins = [Path(name) for name in options.constraints or ()] or [None]
     found = itertools.product(versions, options.python or [""], pins)
-    return list(dict.fromkeys(Recipe(package, version, python, file) for version, python, file in found))
+    recipes = list(dict.fromkeys(Recipe(package, version, python, file) for version, python, file in found))
+    labels = [recipe.label for recipe in recipes]
+    if alike := sorted({label for label in labels if labels.count(label) > 1}):
+        raise UserError(f"Several environments would be called {alike[0]}: give the files of pins different names.")
+    return recipes
 
 
 def _version(package: str, word: str) -> str:
