@@ -6,6 +6,7 @@ Jobs on SLURM itself are tested in tests/slurm.
 from __future__ import annotations
 
 import os
+import shlex
 import signal
 import subprocess
 import sys
@@ -123,6 +124,24 @@ def test_only_what_is_missing_is_submitted(evoclaims: Evoclaims, slurm: StandIn)
     assert "Nothing to submit: no batch of the smoke tier is missing." in evoclaims("submit", "right")[1]
     assert not slurm.script.exists()
     assert "2 batches of the smoke tier in 2 jobs" in evoclaims("submit")[1]  # neither right nor wrong
+
+
+@pytest.mark.usefixtures("stored")
+def test_a_damaged_record_does_not_hide_what_has_become_of_jobs(evoclaims: Evoclaims, slurm: StandIn) -> None:
+    record = next(iter(Store(Path(".evoclaims")).record_paths()))
+    record.unlink()
+    assert evoclaims("submit")[0] == 0
+    record.write_bytes(b"torn")
+    status, out, _ = evoclaims("jobs")
+    assert status == 1
+    assert out.splitlines()[-2] == "3 failed"  # the damaged one, and two that nobody has run
+
+
+def test_jobs_of_this_machine_are_estimated_on_its_gpus(evoclaims: Evoclaims, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert " hours of a job, " in evoclaims("submit", "--cluster=local", "--dry-run")[1]
+    monkeypatch.setattr(submit, "gpus", lambda device: ("0",))
+    assert " hours of a GPU, " in evoclaims("submit", "--cluster=local", "--dry-run")[1]
+    assert " hours of a job, " in evoclaims("submit", "--cluster=local", "--device=cpu", "--dry-run")[1]
 
 
 @pytest.mark.parametrize(
@@ -267,7 +286,7 @@ def test_a_job_s_failed_batches_are_counted_and_do_not_stop_the_others(
         BatchJob(commands, str(tmp_path))()
     out = capfd.readouterr().out
     assert "evoclaims: the process died of SIGKILL." in out
-    assert out.endswith("\n7\n")
+    assert out.endswith(f"\n$ {shlex.join(commands[2])}\n7\n")  # for a shell
 
 
 def test_another_machine_s_process_may_still_run(monkeypatch: pytest.MonkeyPatch) -> None:

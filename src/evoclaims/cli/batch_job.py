@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import shlex
 import signal
 import time
 from collections.abc import Sequence
@@ -79,7 +80,7 @@ class BatchJob:
 
     def _run(self, command: Sequence[str]) -> int:
         """Run a command and return its status."""
-        print(f"$ {' '.join(command)}", flush=True)
+        print(f"$ {shlex.join(command)}", flush=True)
         # SLURM tells all processes of a job that its time is nearly over. The batch would die of that signal: it is
         # blocked there, and `checkpoint` alone tells it. (A `subprocess.Popen` has locks, and may not be waited for in
         # a signal's handler while it is waited for outside.)

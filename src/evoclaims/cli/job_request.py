@@ -14,6 +14,7 @@ from msgspec import ValidationError, convert
 
 from evoclaims.cli.submitted import Cluster
 from evoclaims.core.errors import UnknownNameError, UserError
+from evoclaims.report.formatting import plural
 from evoclaims.trials.time_limit import seconds_of
 
 DEFAULT_MINUTES: Final = 120
@@ -67,8 +68,8 @@ class Request:
 
     def told(self) -> str:
         """Return what a job asks for, as part of a sentence."""
-        asks = [f"{self.gpus} GPU{'s' * (self.gpus != 1)}"] * (self.gpus > 0)
-        asks += [f"{self.cpus} CPU core{'s' * (self.cpus != 1)}"] * (self.cpus > 0)
+        asks = [plural(self.gpus, "GPU")] * (self.gpus > 0)
+        asks += [plural(self.cpus, "CPU core")] * (self.cpus > 0)
         if self.cluster == "slurm":
             asks += [f"partition {self.partition}"] * bool(self.partition) + [f"{clock(self.minutes)} of time"]
             asks += [key.replace("_", "-") + ("" if value is True else f"={value}") for key, value in self.more.items()]

@@ -14,6 +14,7 @@ from evoclaims.cli.submitted import Batch, Submission, SubmittedJob, load_all, l
 from evoclaims.core.errors import UserError
 from evoclaims.trials.batches import StoredTrials
 from evoclaims.trials.notice import notice_path
+from evoclaims.trials.store import DamagedFileError
 
 TAIL: Final = 20_000
 """Bytes at the end of a log in which a reason is looked for."""
@@ -110,7 +111,10 @@ def _lacks(project: Project, place: Place) -> bool:
         return False
     stored = StoredTrials(project.store, condition, time_limit=project.config.seconds(None))
     seeds = tier.design.seeds(tier.design.last.n)
-    return condition.id == place.batch.condition and any(stored.lacks(seed) for seed in seeds)
+    try:
+        return condition.id == place.batch.condition and any(stored.lacks(seed) for seed in seeds)
+    except DamagedFileError:  # whoever runs the trial names the file
+        return True
 
 
 def _told(project: Project, place: Place, seen: Seen, log: Path) -> tuple[str, str]:

@@ -25,8 +25,10 @@ from evoclaims.cli.submitted import SCHEMA, Batch, Submission, SubmittedJob, fol
 from evoclaims.core.canonical import content_hash
 from evoclaims.core.errors import UserError
 from evoclaims.mutants.conditions import Job
+from evoclaims.report.formatting import plural
 from evoclaims.report.live_line import duration
 from evoclaims.trials.devices import usable_cores
+from evoclaims.trials.gpus import gpus
 from evoclaims.trials.notice import announced
 
 ONE_AT_A_TIME: Final = content_hash("evoclaims submit")
@@ -62,7 +64,8 @@ def _plan(
     by_id = {tier.condition(*pair).id: pair for pair in reversed(names)}  # two names may mean the same trials
     conditions = {Job("", *pair): tier.condition(*pair) for pair in by_id.values()}
     seeds, limit = tier.design.seeds(tier.design.last.n), project.config.seconds(None)
-    platform = "gpu" if options.device == "gpu" or (options.device == "auto" and request.gpus) else "cpu"
+    has_gpu = request.gpus or (request.cluster == "local" and gpus("auto"))  # jobs here see what this process sees
+    platform = "gpu" if options.device == "gpu" or (options.device == "auto" and has_gpu) else "cpu"
     lacking = missing_batches(project, options.tier, conditions, seeds, limit, platform)
     busy = active(project)
     for one in lacking:
@@ -76,14 +79,14 @@ def _plan(
     where = "this machine" if request.cluster == "local" else "SLURM"
     asks = request.told()
     print(
-        f"{_counted(len(batches), 'batch', 'batches')} of the {options.tier} tier in {_counted(len(jobs), 'job')} on "
+        f"{plural(len(batches), 'batch', 'batches')} of the {options.tier} tier in {plural(len(jobs), 'job')} on "
         f"{where}, at most {min(request.together, len(jobs))} at a time{asks and f', each with {asks}'}:"
     )
     cores = request.cpus or (usable_cores() if request.cluster == "local" else 1)
     for number, job in enumerate(jobs):
         for one in job:
             took = duration(one.estimate.seconds(cores))
-            print(f"  {number:3}  {one.job.label}: {_counted(len(one.seeds), 'trial')}, about {took}")
+            print(f"  {number:3}  {one.job.label}: {plural(len(one.seeds), 'trial')}, about {took}")
     print(_cost([one.estimate.seconds(cores) for one in batches], request, platform))
     return jobs
 
@@ -195,14 +198,9 @@ def _say_what_now(project: Project, options: argparse.Namespace, submission: Sub
     """Print how to look at the jobs, and how to judge what they store."""
     first = submission.jobs[0].id.partition("_")[0]
     judge = f"pytest -m {options.tier} --claims-stored --claims-storage={shlex.quote(str(project.store.root))}"
-    counted = _counted(len(submission.jobs), "job")
+    counted = plural(len(submission.jobs), "job")
     print(f"Submitted {counted}, from {submission.jobs[0].id} on: `evoclaims jobs` shows them.")
     print(f"Afterwards `{judge}` judges what they have stored", end="")
     if submission.cluster == "slurm":
         print(f"; or as a job of its own: sbatch --dependency=afterany:{first} --wrap={shlex.quote(judge)}", end="")
     print(".", flush=True)
-
-
-def _counted(number: int, one: str, several: str = "") -> str:
-    """Return a number of things."""
-    return f"{number} {one if number == 1 else several or f'{one}s'}"

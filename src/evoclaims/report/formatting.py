@@ -53,9 +53,9 @@ def place_key(place: str) -> tuple[bool, list[int], str]:
     return place[:1] != "§", [int(digits) for digits in re.findall(r"\d+", place)], place
 
 
-def plural(count: int, word: str) -> str:
-    """Return "1 trial", "2 trials"."""
-    return f"{count} {word}" + ("" if count == 1 else "s")
+def plural(count: int, word: str, several: str = "") -> str:
+    """Return "1 trial", "2 trials"; the plural is `several` where that is not the word with an s."""
+    return f"{count} {word if count == 1 else several or f'{word}s'}"
 
 
 def listed(values: Iterable[object], most: int = 12) -> str:
