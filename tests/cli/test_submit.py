@@ -8,6 +8,7 @@ from __future__ import annotations
 import os
 import shlex
 import signal
+import socket
 import subprocess
 import sys
 import time
@@ -19,13 +20,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 from tiny_project import PYPROJECT, Evoclaims
 
-from evoclaims.cli import job_states, submit
+from evoclaims.cli import job_states, jobs, submit
 from evoclaims.cli.batch_job import BatchJob
 from evoclaims.cli.job_request import minutes_of
+from evoclaims.cli.job_states import Seen, State
 from evoclaims.cli.missing import MissingBatch
 from evoclaims.cli.submit import dealt
+from evoclaims.cli.submitted import load_all
 from evoclaims.mutants.conditions import Job
 from evoclaims.paper.estimates import Estimate
+from evoclaims.trials.notice import announced, notice_path
 from evoclaims.trials.store import Store
 
 pytest.importorskip("submitit", reason="jobs are NOT TESTED here: submitit is not installed (evoclaims[slurm])")
@@ -135,6 +139,28 @@ def test_a_damaged_record_does_not_hide_what_has_become_of_jobs(evoclaims: Evocl
     status, out, _ = evoclaims("jobs")
     assert status == 1
     assert out.splitlines()[-2] == "3 failed"  # the damaged one, and two that nobody has run
+
+
+def test_of_a_job_s_batches_that_one_runs_which_a_living_process_has_announced(
+    evoclaims: Evoclaims, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    at_work = Seen(State.RUNNING, "process 1")
+    monkeypatch.setattr(submit, "_send", lambda *_: ["1"])
+    monkeypatch.setattr(jobs, "states", lambda submission, asked: dict.fromkeys(asked, at_work))
+    root = Path(".evoclaims")
+    assert evoclaims("submit", "--on=parity", "--cluster=local")[0] == 0
+    (submission,) = load_all(root).values()
+    first, second, *_ = (batch.condition for batch in submission.jobs[0].batches)
+    killed = subprocess.Popen(["true"])
+    killed.wait()
+    owner = f"pid={killed.pid}\nhost={socket.gethostname()}\nmode=lease\ntoken={'a' * 32}\nduration=60.0\n"
+    with announced(root, second):
+        notice_path(root, first).write_text(f"filelock/2\n{owner}")
+        lines = evoclaims("jobs")[1].splitlines()
+    assert lines[0].startswith("queued ")
+    assert lines[0].endswith(": process 1 runs other batches now")
+    assert lines[1].startswith("running ")
+    assert lines[-1] == "3 queued, 1 running"
 
 
 def test_jobs_of_this_machine_are_estimated_on_its_gpus(evoclaims: Evoclaims, monkeypatch: pytest.MonkeyPatch) -> None:

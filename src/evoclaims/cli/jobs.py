@@ -13,7 +13,7 @@ from evoclaims.cli.project import Project, open_project
 from evoclaims.cli.submitted import Batch, Submission, SubmittedJob, load_all, log_of
 from evoclaims.core.errors import UserError
 from evoclaims.trials.batches import StoredTrials
-from evoclaims.trials.notice import notice_path
+from evoclaims.trials.notice import is_announced
 from evoclaims.trials.store import DamagedFileError
 
 TAIL: Final = 20_000
@@ -123,7 +123,7 @@ def _told(project: Project, place: Place, seen: Seen, log: Path) -> tuple[str, s
         words = "; ".join(filter(None, [seen.reason, last_words(log)]))
         gone = "it is not queued any more and has said nothing" if seen == GONE else "it ended without a word"
         return "failed", words or gone
-    elsewhere = len(place.job.batches) > 1 and not notice_path(project.store.root, place.batch.condition).exists()
+    elsewhere = len(place.job.batches) > 1 and not is_announced(project.store.root, place.batch.condition)
     if seen.state is State.RUNNING and elsewhere:
         return "queued", f"{seen.reason} runs other batches now"
     return str(seen.state), seen.reason

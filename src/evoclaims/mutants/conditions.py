@@ -54,7 +54,7 @@ def plantings(sound: Conditions, mutants: Mapping[str, Mutant]) -> tuple[Planted
 
 @dataclass(frozen=True)
 class Job:
-    """One condition that is run to try mutants.
+    """One condition that a command runs: sound, or with a fault planted.
 
     Attributes:
         fault: name of what is planted, such as "cma_es: minimizes"; empty for the sound condition.
