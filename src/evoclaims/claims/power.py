@@ -19,11 +19,9 @@ from evoclaims.judging.verdict import Outcome, Verdict
 from evoclaims.paper import pilots
 from evoclaims.paper.reproduction import Reproduction
 from evoclaims.paper.trial_group import TrialGroup
+from evoclaims.paper.variant import Names
 from evoclaims.trials.result import TrialResult
 from evoclaims.verdicts.claim_report import ClaimReport, named
-
-Names = tuple[str, str]
-"""A method and a task, as claims name them."""
 
 _DECIDED: Final = (Outcome.SUPPORTED, Outcome.REFUTED, Outcome.INCONCLUSIVE)
 

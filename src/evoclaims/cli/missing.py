@@ -6,8 +6,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from evoclaims.cli.project import Project
-from evoclaims.mutants.conditions import Job, Names
+from evoclaims.mutants.conditions import Job
 from evoclaims.paper.estimates import Estimate, Missing, committed, estimates
+from evoclaims.paper.variant import Names
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.spec import Condition, TrialSpec
 from evoclaims.trials.store import DamagedFileError, Store

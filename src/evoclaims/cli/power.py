@@ -10,7 +10,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from evoclaims.claims.fetching import StoredOnly
-from evoclaims.claims.power import Asserted, ClaimPower, Listening, Names, Pilots, asserted, only
+from evoclaims.claims.power import Asserted, ClaimPower, Listening, Pilots, asserted, only
 from evoclaims.cli.project import Project, open_project
 from evoclaims.cli.reference import of_one_environment
 from evoclaims.cli.running import Running
@@ -22,6 +22,7 @@ from evoclaims.core.packages import recorded
 from evoclaims.judging.counting import MAX_TRIALS
 from evoclaims.judging.design import Design
 from evoclaims.mutants.conditions import Job
+from evoclaims.paper.variant import Names
 from evoclaims.report import power_cells
 from evoclaims.report.console import PlainSpokenConsole
 from evoclaims.report.live_line import LiveLine

@@ -7,13 +7,10 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from evoclaims.mutants.mutant import Mutant
-from evoclaims.paper.variant import Conditions
+from evoclaims.paper.variant import Conditions, Names
 from evoclaims.trials.spec import Condition
 from evoclaims.verdicts.claim_report import ClaimReport
 from evoclaims.verdicts.mutation_matrix import Part
-
-Names = tuple[str, str]
-"""A method and a task, as claims name them."""
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from evoclaims.methods.cma_es import CmaEs
 from evoclaims.methods.map_elites import MapElites
 from evoclaims.mutants import of_methods, of_tasks
 from evoclaims.mutants.planting import Fault, plant
-from evoclaims.paper.variant import Conditions
+from evoclaims.paper.variant import Conditions, Names
 from evoclaims.trials.spec import Condition
 from evoclaims.verdicts.mutation_matrix import Part
 
@@ -30,7 +30,7 @@ class Mutant:
     part: Part
     change: Callable[[Condition], Condition | None]
 
-    def conditions(self, sound: Conditions, target: str) -> dict[tuple[str, str], Condition]:
+    def conditions(self, sound: Conditions, target: str) -> dict[Names, Condition]:
         """Return the faulty conditions of one method, or one task, by the names under which claims ask for them."""
         place = 0 if self.part == "method" else 1
         changed = {names: self.change(one) for names, one in sound.items() if names[place] == target}

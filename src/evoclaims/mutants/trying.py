@@ -8,11 +8,11 @@ from functools import cache
 
 from evoclaims.judging.baseline import ALPHA, DriftCase, check_drift
 from evoclaims.judging.verdict import Outcome
-from evoclaims.mutants.conditions import Names, Planted
+from evoclaims.mutants.conditions import Planted
 from evoclaims.paper.archive import Archive
 from evoclaims.paper.references import METRICS, load, path_of
 from evoclaims.paper.reproduction import Reproduction
-from evoclaims.paper.variant import Variant
+from evoclaims.paper.variant import Names, Variant
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.spec import Condition
 from evoclaims.verdicts.acceptance import UNDECIDED

@@ -8,7 +8,10 @@ from typing import Any
 
 from evoclaims.trials.spec import Condition
 
-Conditions = Mapping[tuple[str, str], Condition]
+Names = tuple[str, str]
+"""A method and a task, as claims name them."""
+
+Conditions = Mapping[Names, Condition]
 
 
 @dataclass(frozen=True)
@@ -24,7 +27,7 @@ class Variant:
     conditions: Mapping[str, Conditions]
 
 
-def changed(conditions: Conditions, change: Callable[[str, str, Condition], Any]) -> dict[tuple[str, str], Condition]:
+def changed(conditions: Conditions, change: Callable[[str, str, Condition], Any]) -> dict[Names, Condition]:
     """Return the new conditions where `change(method, task, condition)` returns a different one.
 
     `change` returns a condition, or None where the detail does not matter.
