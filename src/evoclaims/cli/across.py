@@ -13,7 +13,7 @@ from typing import Final
 from packaging.utils import canonicalize_name
 
 from evoclaims.cli.elsewhere import Elsewhere
-from evoclaims.cli.project import open_store
+from evoclaims.cli.storage import open_store
 from evoclaims.cli.stored import write
 from evoclaims.cli.terminal import styled
 from evoclaims.core.environments import Recipe, checked, installed_here
@@ -89,7 +89,7 @@ def _recipes(options: argparse.Namespace) -> list[Recipe]:
     if not (named or options.constraints or options.python):
         raise UserError("Name what is to differ: --package NAME VERSION ..., --constraints FILE ... or --python 3.13.")
     versions = [_version(package, word) for word in named] or [""]
-    pins = [Path(name) for name in options.constraints or ()] or [None]
+    pins: list[Path | None] = [Path(name) for name in options.constraints or ()] or [None]
     found = itertools.product(versions, options.python or [""], pins)
     recipes = list(dict.fromkeys(Recipe(package, version, python, file) for version, python, file in found))
     labels = [recipe.label for recipe in recipes]

@@ -78,7 +78,7 @@ class BatchJob:
         self.process = 0
         return DelayedSubmission(self)
 
-    def _run(self, command: Sequence[str]) -> int:
+    def _run(self, command: list[str]) -> int:
         """Run a command and return its status."""
         print(f"$ {shlex.join(command)}", flush=True)
         # SLURM tells all processes of a job that its time is nearly over. The batch would die of that signal: it is

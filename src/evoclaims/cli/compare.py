@@ -9,7 +9,8 @@ from itertools import chain
 from pathlib import Path
 
 from evoclaims.cli.judging import judge
-from evoclaims.cli.project import Project, open_project, open_store
+from evoclaims.cli.project import Project, open_project
+from evoclaims.cli.storage import open_store
 from evoclaims.cli.stored import write
 from evoclaims.core.errors import UserError
 from evoclaims.judging.baseline import DriftReport

@@ -93,13 +93,13 @@ def _rows(project: Project) -> Iterator[Row]:
     for name, submission in {place.name: place.submission for place in latest.values()}.items():
         asked = {place.job.id for condition, place in latest.items() if place.name == name and condition in owed}
         if asked:
-            seen |= {(name, job): found for job, found in states(submission, asked).items()}
+            seen |= {(name, job): one for job, one in states(submission, asked).items()}
     for condition, place in latest.items():
-        log, job = log_of(project.store.root, place.name, place.job), seen.get((place.name, place.job.id), GONE)
-        if condition not in owed or (job.state is State.ENDED and not _lacks(project, place)):  # it ended meanwhile
+        log, found = log_of(project.store.root, place.name, place.job), seen.get((place.name, place.job.id), GONE)
+        if condition not in owed or (found.state is State.ENDED and not _lacks(project, place)):  # it ended meanwhile
             yield Row(place, "done", "", log)
         else:
-            yield Row(place, *_told(project, place, job, log), log)
+            yield Row(place, *_told(project, place, found, log), log)
 
 
 def _lacks(project: Project, place: Place) -> bool:
