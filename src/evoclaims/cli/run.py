@@ -51,7 +51,7 @@ def main(options: argparse.Namespace) -> int:
     running = Running(project, order, host, LiveLine(*terminal()))
     running.check()
     if options.variant and not (options.method and options.on):
-        chosen = to_run(project, options.variant, options.tier, chosen, seeds, running.device)
+        chosen = to_run(running, chosen)
     wanted = {Job("", *names): tier.condition(*names) for names in chosen}
     if options.retry:
         for condition in wanted.values():

@@ -4,40 +4,37 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from evoclaims.cli.project import Project
+from evoclaims.cli.running import Running
 from evoclaims.paper import references
 from evoclaims.paper.cost import known_pace
+from evoclaims.paper.variant import Names
 from evoclaims.report.formatting import plural
 from evoclaims.report.live_line import duration
 from evoclaims.trials import devices
 from evoclaims.trials.result import COMPLETE
 from evoclaims.trials.spec import TrialSpec
+from evoclaims.trials.time_limit import answers
 
 
-def to_run(
-    project: Project, variant: str, tier: str, names: Sequence[tuple[str, str]], seeds: Sequence[int], device: str
-) -> list[tuple[str, str]]:
+def to_run(running: Running, names: Sequence[Names]) -> list[Names]:
     """Print what the conditions of a variant cost here, and return those that are not committed.
 
     Times are upper bounds, by earlier trials of the variant or of the protocol on such a device.
 
     Args:
-        project: the project.
-        variant: its name.
-        tier: the conditions' tier.
-        names: method and task of each condition that the variant changes.
-        seeds: of the trials.
-        device: "auto", "cpu" or "gpu".
+        running: how they are run.
+        names: of the conditions that the variant changes.
     """
-    reproduction, store = project.reproduction, project.store
+    reproduction, store = running.project.reproduction, running.project.store
+    tier, variant, seeds = running.order.tier, running.order.variant, running.order.seeds
     varied, plain = reproduction.tier(tier, variant), reproduction.tier(tier)
-    folder, kind = reproduction.references_of(variant), devices.choose(device)[0].device_kind
+    folder, kind = reproduction.references_of(variant), devices.choose(running.device)[0].device_kind
     chosen, seconds, unknown = [], 0.0, 0
     print(f"{variant}: {reproduction.variants[variant].says}")
     for method, task in names:
         condition = varied.condition(method, task)
-        here = [store.made_with(TrialSpec(condition, seed).id, condition.versions) for seed in seeds]
-        missing = here.count(None)
+        here = (store.made_with(TrialSpec(condition, seed).id, condition.versions) for seed in seeds)
+        missing = sum(not answers(one, running.limit) for one in here)
         committed = references.load(references.path_of(folder, tier, method, task))
         known = {one.seed for one in committed if one.condition == condition.id and one.status in COMPLETE}
         says = "stored"
