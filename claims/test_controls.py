@@ -2,7 +2,7 @@
 
 import pytest
 
-from evoclaims import claim
+from evoclaims import claim, without_smoke
 
 TASKS = ["n_parity", "simple_alu"]
 
@@ -11,18 +11,25 @@ TASKS = ["n_parity", "simple_alu"]
     "C1",
     says="Random search, with the encoding and the evaluations of CMA-ES, does not solve 6-parity",
     where="control",
-    smoke="Random search, with the encoding and the evaluations of CMA-ES, does not solve 4-parity",
+    smoke="Random search, with the encoding and the evaluations of CMA-ES, gets at least ten of 4-parity's 16 rows "
+    "right, but not all, and has less success than CMA-ES",
 )
-def test_random_search_does_not_solve_parity(trials, verdict):
+def test_random_search_does_not_solve_parity(trials, verdict, claim_tier):
     random_search = trials("random_search", on="n_parity_direct")
-    verdict(random_search.does_not_solve_the_last_level.in_most_trials())
+    unsolved = random_search.does_not_solve_the_last_level.in_most_trials()
+    if claim_tier == "smoke":
+        cma_es = trials("cma_es", on="n_parity_direct")
+        learnt = random_search.last_success.between(10 / 16, 1)
+        verdict(unsolved & learnt & (cma_es.last_success > random_search.last_success))
+    else:
+        verdict(unsolved)
 
 
 @claim(
     "C2",
     says="A network built by hand is right on every row of every level, and its negation on none",
     where="control",
-    smoke="A network built by hand is right on every row of every level of 4-parity and of the first three of Simple "
+    smoke="A network built by hand is right on every row of every level of 3-parity and of the first two of Simple "
     "ALU, and its negation on none",
 )
 @pytest.mark.parametrize("task", TASKS)
@@ -36,8 +43,9 @@ def test_a_right_circuit_scores_one_and_a_wrong_one_zero(trials, verdict, task):
     "C5",
     says="Trials of one method, split into halves at random, are found different no more often than chance allows",
     where="control",
-    smoke="Trials of one method on 4-parity, split into halves at random, are found different no more often than "
-    "chance allows",
+    smoke=None,
+    because="it is about the judge: no fault of a method or a task can change it. How often the judge is wrong about "
+    "ten trials is tested by itself (tests/judging/test_false_positive_rates.py)",
 )
 @pytest.mark.parametrize("method", ["cma_es", "ppo", "random_search"])
 def test_a_method_is_not_better_than_itself(trials, verdict, method):
@@ -51,7 +59,19 @@ def test_a_method_is_not_better_than_itself(trials, verdict, method):
     where="control",
     smoke="In 10,000 steps PPO learns to collect more reward with the half-cheetah than a random policy does",
 )
-@pytest.mark.parametrize("task", ["locomotion_half_cheetah", "locomotion_ant"])
+@pytest.mark.parametrize(
+    "task",
+    [
+        "locomotion_half_cheetah",
+        pytest.param(
+            "locomotion_ant",
+            marks=without_smoke(
+                because="an ant that stands still collects more than one that moves at random, so an untrained network "
+                "passes, too; 10,000 steps teach the ant no more"
+            ),
+        ),
+    ],
+)
 def test_ppo_learns_to_run(trials, verdict, task):
     ppo = trials("ppo", on=task)
     random_policy = trials("random_policy", on=task)

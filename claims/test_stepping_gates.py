@@ -1,11 +1,11 @@
 """§5.1: what the paper says about the stepping gates (Figs. 3 and 4).
 
-Smoke judges each sentence on a smaller instance: 4-parity and the first three operations of the ALU.
+Smoke judges a sentence on 3-parity and the first two operations of the ALU, where they can show it (docs/smoke.md).
 """
 
 import pytest
 
-from evoclaims import Outcome, claim, expected
+from evoclaims import Outcome, claim, expected, without_smoke
 
 TASKS = ["n_parity", "simple_alu"]
 
@@ -15,22 +15,25 @@ PARITY_BY_SINES = expected(
 NEAT_FORGETS = expected(
     Outcome.REFUTED, tier="full", because="NEAT forgets what it knew on the way up N-parity: see G2"
 )
-NEAT_NEEDS_TIME = expected(Outcome.REFUTED, tier="smoke", because="NEAT needs more than 300 generations: see G2")
-TIED_AT_THREE_LEVELS = expected(
-    Outcome.REFUTED,
-    tier="smoke",
-    because="after 300 generations CMA-ES has two or three of the third level's 14 rows wrong, as PPO or more: "
-    "undecided with jax 0.10, refuted with 0.11 (PPO is above in 7 of 10 pairs)",
+SMALL_PARITY_BY_SINES = without_smoke(because="HyperNEAT, whose CPPNs may use sines, draws 3-parity as well")
+PPO_SOLVES_SMALL_GATES = without_smoke(
+    because="PPO solves 3-parity and two operations of the ALU as well, and 4-parity in half of the trials; its "
+    "trouble begins with tasks that take the others minutes"
 )
 PAIRS = [
-    pytest.param("cma_es", "hyperneat", "n_parity", marks=PARITY_BY_SINES),
+    pytest.param("cma_es", "hyperneat", "n_parity", marks=[PARITY_BY_SINES, SMALL_PARITY_BY_SINES]),
     ("cma_es", "hyperneat", "simple_alu"),
-    ("cma_es", "ppo", "n_parity"),
-    pytest.param("cma_es", "ppo", "simple_alu", marks=TIED_AT_THREE_LEVELS),
-    pytest.param("neat", "hyperneat", "n_parity", marks=[PARITY_BY_SINES, NEAT_NEEDS_TIME]),
-    pytest.param("neat", "hyperneat", "simple_alu", marks=NEAT_NEEDS_TIME),
-    pytest.param("neat", "ppo", "n_parity", marks=[NEAT_FORGETS, NEAT_NEEDS_TIME]),
-    pytest.param("neat", "ppo", "simple_alu", marks=NEAT_NEEDS_TIME),
+    pytest.param("cma_es", "ppo", "n_parity", marks=PPO_SOLVES_SMALL_GATES),
+    pytest.param("cma_es", "ppo", "simple_alu", marks=PPO_SOLVES_SMALL_GATES),
+    pytest.param("neat", "hyperneat", "n_parity", marks=[PARITY_BY_SINES, SMALL_PARITY_BY_SINES]),
+    pytest.param(
+        "neat",
+        "hyperneat",
+        "simple_alu",
+        marks=without_smoke(because="on two operations of the ALU both get most rows of the second right, and few all"),
+    ),
+    pytest.param("neat", "ppo", "n_parity", marks=[NEAT_FORGETS, PPO_SOLVES_SMALL_GATES]),
+    pytest.param("neat", "ppo", "simple_alu", marks=PPO_SOLVES_SMALL_GATES),
 ]
 
 
@@ -38,8 +41,11 @@ PAIRS = [
     "G1",
     says="CMA-ES successfully solves all levels for both tasks",
     where="§5.1, Fig. 3",
-    smoke="CMA-ES solves all three levels of 4-parity, and the first three levels of Simple ALU",
-    expect=Outcome.REFUTED,
+    smoke="CMA-ES, training a perceptron, solves both levels of 3-parity, and the first two operations of Simple ALU",
+)
+@expected(
+    Outcome.REFUTED,
+    tier="full",
     because="local optima: nearly all of the population ties one row short; full: 2 of 10 solve 6-parity, none of 10 "
     "gets past XOR in the ALU. The published code trains a 4 x 32 perceptron instead of the network of appendix A.3, "
     "whose landscape is kinder (docs/protocol.md)",
@@ -54,7 +60,7 @@ def test_cma_es_solves_every_level(trials, verdict, task):
     "G2",
     says="NEAT solves N-parity",
     where="§5.1, Fig. 3",
-    smoke="NEAT solves all three levels of 4-parity",
+    smoke="NEAT solves both levels of 3-parity",
 )
 @expected(
     Outcome.REFUTED,
@@ -62,11 +68,6 @@ def test_cma_es_solves_every_level(trials, verdict, task):
     because="ten trials end at levels 1 to 4 and forget earlier ones: on the rows of one level alone, answering always "
     "the same is as good as what solved the level before. Asked the rows of all levels so far, as one published "
     "environment does, NEAT comes to the published curve (docs/protocol.md)",
-)
-@expected(
-    Outcome.REFUTED,
-    tier="smoke",
-    because="300 generations of 256 genomes are too few: one trial of ten solves the first level",
 )
 def test_neat_solves_parity(trials, verdict):
     neat = trials("neat", on="n_parity")
@@ -77,19 +78,24 @@ def test_neat_solves_parity(trials, verdict):
     "G3",
     says="NEAT ... stops at level 5 of the Simple ALU task",
     where="§5.1, Fig. 3",
-    smoke="NEAT stops at the first or the second of three levels of Simple ALU",
+    smoke="NEAT solves the first operation of Simple ALU and stops at the second, at which CMA-ES has more success",
 )
 def test_neat_stops_within_the_alu(trials, verdict, claim_tier):
     neat = trials("neat", on="simple_alu")
-    lowest, highest = {"full": (4, 6), "smoke": (0, 1)}[claim_tier]
-    verdict(neat.furthest_reached.between(lowest, highest) & neat.does_not_solve_the_last_level.in_most_trials())
+    if claim_tier == "smoke":
+        cma_es = trials("cma_es", on="simple_alu")
+        verdict(neat.furthest_reached.between(1, 1) & (cma_es.last_success > neat.last_success))
+    else:
+        verdict(neat.furthest_reached.between(4, 6) & neat.does_not_solve_the_last_level.in_most_trials())
 
 
 @claim(
     "G4",
     says="HyperNEAT initially makes some progress, but its performance quickly drops with increasing levels",
     where="§5.1, Fig. 3",
-    smoke="HyperNEAT solves the first of three levels, not the last, and its success falls from level to level",
+    smoke=None,
+    because="HyperNEAT, whose CPPNs may use sines, solves 3-parity in most trials; and in a smoke budget it solves the "
+    "first operation of the ALU in three of twenty",
 )
 @pytest.mark.parametrize(
     "task",
@@ -102,10 +108,7 @@ def test_neat_stops_within_the_alu(trials, verdict, claim_tier):
                 "code lets a CPPN use sigmoids only, unlike the text of §4",
             ),
         ),
-        pytest.param(
-            "simple_alu",
-            marks=expected(Outcome.REFUTED, tier="smoke", because="300 generations are too few for the first level"),
-        ),
+        "simple_alu",
     ],
 )
 def test_hyperneat_drops_with_the_levels(trials, verdict, task):
@@ -121,13 +124,9 @@ def test_hyperneat_drops_with_the_levels(trials, verdict, task):
     "G5",
     says="PPO only reached the first level of both tasks",
     where="§5.1, Fig. 3",
-    smoke="PPO solves no level but the first of 4-parity, and of the first three levels of Simple ALU",
-)
-@expected(
-    Outcome.REFUTED,
-    tier="smoke",
-    because="the smaller tasks let more than half of the trials past the first level; full is undecided, with 5 of 10 "
-    "and 4 of 10 trials staying there",
+    smoke=None,
+    because="PPO solves 3-parity and two operations of the ALU, and 4-parity in half of the trials: small gates do not "
+    "stop it. Full is undecided, with 5 of 10 and 4 of 10 trials staying at the first level",
 )
 @pytest.mark.parametrize("task", TASKS)
 def test_ppo_stays_at_the_first_level(trials, verdict, task):
@@ -139,7 +138,7 @@ def test_ppo_stays_at_the_first_level(trials, verdict, task):
     "G7",
     says="When directly solving 6-parity (without going through the intermediate levels) PPO solves the task",
     where="§5.1, Fig. 4",
-    smoke="When directly solving 4-parity, PPO solves it",
+    smoke="When directly solving 3-parity, PPO solves it",
 )
 @expected(
     Outcome.REFUTED,
@@ -157,7 +156,9 @@ def test_ppo_solves_parity_without_the_curriculum(trials, verdict):
     says="The issue does not lie in the capacity of PPO but in its inability to progress through the levels of our "
     "curriculum",
     where="§5.1, Fig. 4",
-    smoke="PPO does better on 4-parity without the curriculum than with it",
+    smoke=None,
+    because="PPO solves 3-parity with the curriculum as well; on 4-parity, at 23 CPU seconds a trial, it does better "
+    "without in four pairs of five, which ten trials a side show in five runs of six",
 )
 def test_ppo_is_better_without_the_curriculum(trials, verdict):
     direct = trials("ppo", on="n_parity_direct")
@@ -169,13 +170,15 @@ def test_ppo_is_better_without_the_curriculum(trials, verdict):
     "G6",
     says="Direct encodings perform best in this benchmark",
     where="§5.1, Fig. 3",
-    smoke="CMA-ES and NEAT have more success than HyperNEAT and PPO at the second and the third level",
+    smoke="CMA-ES has more success than HyperNEAT at the second of two operations of Simple ALU, of whose rows "
+    "HyperNEAT has learnt at least six in ten",
 )
 @pytest.mark.parametrize(("direct", "other", "task"), PAIRS)
-def test_direct_encodings_perform_best(trials, verdict, direct, other, task):
+def test_direct_encodings_perform_best(trials, verdict, claim_tier, direct, other, task):
     encoded_directly = trials(direct, on=task)
     others = trials(other, on=task)
-    verdict(encoded_directly.success.above(others.success, beyond=0))
+    better = encoded_directly.success.above(others.success, beyond=0)
+    verdict(better & others.last_success.between(0.6, 1) if claim_tier == "smoke" else better)
 
 
 @claim(
@@ -183,7 +186,8 @@ def test_direct_encodings_perform_best(trials, verdict, direct, other, task):
     says="NEAT's performance degrades slightly when directly solving 6-parity (without going through the intermediate "
     "levels)",
     where="§5.1, Fig. 4",
-    smoke="NEAT has less success on 4-parity without the curriculum than with it, but still at least 0.75",
+    smoke=None,
+    because="NEAT solves 3-parity with the curriculum and without it",
 )
 @expected(
     Outcome.REFUTED,
@@ -200,7 +204,7 @@ def test_neat_degrades_slightly_without_the_curriculum(trials, verdict):
     "G10",
     says="NEAT grows large networks for the stepping gates tasks",
     where="§5.2.1",
-    smoke="Most neurons of NEAT's champions are hidden on 4-parity, and on the first three levels of Simple ALU",
+    smoke="Most neurons of NEAT's champions are hidden on 3-parity, and on the first two operations of Simple ALU",
 )
 @pytest.mark.parametrize("task", TASKS)
 def test_neat_grows_large_networks(trials, verdict, task):
@@ -213,10 +217,12 @@ def test_neat_grows_large_networks(trials, verdict, task):
     says="NEAT grows large networks for the stepping gates tasks while the networks found for this maze are "
     "surprisingly small",
     where="§5.2.1",
-    smoke="In the room with three stones, at most half of the neurons of NEAT's champions are hidden",
+    smoke="In the room with three stones, at most half of the neurons of NEAT's champions are hidden, and they cross "
+    "about two",
 )
 @expected(Outcome.REFUTED, tier="full", because="the champions have 98 to 100 neurons, as many as the arrays hold")
 @pytest.mark.parametrize("task", ["stones"])
-def test_neat_s_networks_stay_small_in_the_maze(trials, verdict, task):
+def test_neat_s_networks_stay_small_in_the_maze(trials, verdict, claim_tier, task):
     neat = trials("neat", on=task)
-    verdict(neat.champion_is_mostly_input_and_output.in_most_trials())
+    small = neat.champion_is_mostly_input_and_output.in_most_trials()
+    verdict(small & neat.stones.between(1.25, 3) if claim_tier == "smoke" else small)

@@ -22,8 +22,8 @@ from evoclaims.methods import (
     Ppo,
     RandomSearch,
 )
-from evoclaims.methods.neat import Settings, Species
-from evoclaims.networks import AllSkips
+from evoclaims.methods.neat import Attribute, Mutation, Settings, Species
+from evoclaims.networks import AllSkips, Mlp
 
 Conditions = dict[tuple[str, str], Condition]
 
@@ -81,21 +81,33 @@ def _full() -> Conditions:
 
 
 def _smoke() -> Conditions:
-    """Return the scaled-down instances: 4-parity and the first three operations of the ALU.
+    """Return the scaled-down instances (docs/smoke.md): 3-parity and the first two operations of the ALU.
 
-    A whole budget takes seconds on one core; PPO takes larger steps on smaller batches, since it gets a few hundred
-    updates instead of the paper's hundreds of thousands.
+    Random search solves 3-parity, so control C1 asks it and CMA-ES for 4-parity. Small populations for few generations
+    need larger steps than the paper's: of NEAT's weights, and of PPO's networks, which also have more neurons.
     """
-    parity, alu = NParity(bits=4), SimpleAlu(level_count=3)
-    network = AllSkips(hidden=16)
-    ppo = Ppo(environments=256, batch_size=256, minibatches=8, learning_rate=3e-3)
-    small = Settings(population=256, nodes=32, connections=96, species=Species(most=10))
-    cppn = replace(small, activations=CPPN_FUNCTIONS)
-    generations, steps = Budget(generations=300), Budget(environment_steps=800_000)
+    parity, alu = NParity(bits=3), SimpleAlu(level_count=2)
+    network = Mlp(layers=(8,) * 3)
+    ppo = Ppo(policy_layers=(16,) * 3, environments=256, batch_size=256, minibatches=8, learning_rate=3e-3)
+    mutation = Mutation(weight=Attribute(mutate_rate=0.5, power=0.5))
+    small = Settings(population=256, nodes=12, connections=36, mutation=mutation, species=Species(most=10))
+    large = replace(small, population=512, nodes=32, connections=96)
+    cppn = replace(large, activations=CPPN_FUNCTIONS)
+    steps = Budget(environment_steps=100_000)
+    generations = Budget(generations=400)
+    conditions: Conditions = {}
+    for method in (CmaEs, RandomSearch):
+        solver, hard = (method(population=population, network=network) for population in (256, 4_096))
+        conditions |= {
+            (method.name, "n_parity"): Condition(solver, parity, "curriculum", generations),
+            (method.name, "simple_alu"): Condition(hard, alu, "curriculum", Budget(generations=150)),
+            (method.name, "n_parity_direct"): Condition(solver, NParity(bits=4), "direct", Budget(generations=500)),
+        }
+    neat = Budget(generations=3_000)
     return {
-        **_on_every_task(parity, alu, CmaEs(population=256, network=network), generations, generations),
-        **_on_every_task(parity, alu, RandomSearch(population=256, network=network), generations, generations),
-        **_on_every_task(parity, alu, Neat(small), generations, generations),
+        **conditions,
+        **_on_every_task(parity, alu, Neat(small), neat, neat),
+        ("neat", "simple_alu"): Condition(Neat(large), alu, "curriculum", Budget(generations=1_500)),
         **_on_every_task(parity, alu, HyperNeat(cppn), generations, generations),
         **_tensorneat(parity, alu, small, cppn, generations, generations),
         **_on_every_task(_sampled(parity), _sampled(alu), ppo, steps, steps),

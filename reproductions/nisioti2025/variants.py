@@ -30,9 +30,9 @@ def _published_alu(method: str, task: str, condition: Condition) -> Condition | 
 
 
 def _perceptron(method: str, task: str, condition: Condition) -> Condition | None:
-    """CMA-ES with the published script's network; in the smoke tier, with a small one."""
+    """CMA-ES with the published script's network; with smoke's robots a small one. Its gates have perceptrons."""
     trained: Any = condition.method
-    if not isinstance(trained, CmaEs):
+    if not isinstance(trained, CmaEs) or isinstance(trained.network, Mlp):
         return None
     layers = (32,) * 4 if trained.network == AllSkips(hidden=24) else (8,) * 2
     return replace(condition, method=replace(trained, network=Mlp(layers)))
