@@ -94,6 +94,13 @@ def test_what_cannot_be_read_or_written_is_left_out(tmp_path: Path) -> None:
         assert running(tmp_path) == []
 
 
+@pytest.mark.parametrize("hostile", [b'{"condition": "\xff"}', b'{"x":' + b"[" * 100_000])
+def test_a_hostile_file_stops_no_run(tmp_path: Path, hostile: bytes) -> None:
+    with announced(tmp_path, CONDITION):
+        progress_path(tmp_path, CONDITION).write_bytes(hostile)
+        assert running(tmp_path) == []
+
+
 def test_what_a_dead_process_told_is_not_shown_and_is_swept(tmp_path: Path) -> None:
     with announced(tmp_path, CONDITION), shared(tmp_path, CONDITION, ignore) as tell:
         tell(TRAINING)

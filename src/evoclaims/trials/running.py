@@ -67,7 +67,7 @@ def running(store_root: Path) -> list[Running]:
     """Return what processes that share a store are running, those that began first in front."""
     found = []
     for path in (store_root / "running").glob("*.progress"):
-        with contextlib.suppress(OSError, msgspec.DecodeError):  # it is being written, or gone by now
+        with contextlib.suppress(OSError, ValueError, RecursionError):  # it is being written, gone by now, or damaged
             one = msgspec.json.decode(path.read_bytes(), type=Running)
             if one.condition == path.stem and is_announced(store_root, one.condition):
                 found.append(one)
