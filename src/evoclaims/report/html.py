@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import base64
 import functools
-import hashlib
 import json
 import re
 from collections.abc import Iterator, Mapping
@@ -15,6 +14,7 @@ from typing import Final
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
+from evoclaims.core.content_policy import exactly
 from evoclaims.judging.verdict import Outcome
 from evoclaims.report import charts, formatting, replication_cells
 from evoclaims.report.fault_grid import LEGEND
@@ -92,7 +92,7 @@ def _cleaned(value: object) -> object:
 def policy(style: str, script: str) -> str:
     """Return the page's Content-Security-Policy: nothing from outside, and no script or style but its own."""
     return (
-        f"default-src 'none'; img-src data:; style-src {_digest(style)}; script-src {_digest(script)}; "
+        f"default-src 'none'; img-src data:; style-src {exactly(style)}; script-src {exactly(script)}; "
         "base-uri 'none'; form-action 'none'"
     )
 
@@ -139,8 +139,3 @@ def _json(value: object) -> str:
 def _asset(name: str) -> Markup:
     """Return a file of the package as it is."""
     return Markup((resources.files("evoclaims.report") / "assets" / name).read_text(encoding="utf-8"))  # noqa: S704
-
-
-def _digest(text: str) -> str:
-    """Return the source expression that allows exactly this text."""
-    return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import hashlib
 import html
 import json
 import re
@@ -99,6 +100,8 @@ def test_a_hostile_label_stays_data(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_the_page_asks_for_nothing_and_forbids_the_browser_to() -> None:
     text = page(MAZE, _motion(MAZE), "").decode()
     assert 'http-equiv="Content-Security-Policy" content="default-src \'none\';' in text
+    (script,) = re.findall(r"<script>(.*?)</script>", text, re.DOTALL)
+    assert f"script-src 'sha256-{base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()}';" in text
     assert not re.search(r"https?:|\bsrc=|\bhref=|url\(|\bimport\b|fetch\(|XMLHttpRequest", text)
 
 

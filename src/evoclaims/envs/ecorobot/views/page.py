@@ -13,6 +13,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from evoclaims.core.content_policy import exactly
 from evoclaims.envs.ecorobot.maze import Maze
 from evoclaims.envs.ecorobot.robot_task import RobotTask
 from evoclaims.envs.ecorobot.views.marks import marks
@@ -27,7 +28,7 @@ def page(task: RobotTask, motion: Motion, title: str) -> bytes:
     """Return the page of an episode.
 
     It contains the viewer (`assets/viewer.html`, `assets/viewer.js`) and, as JSON, what `scenery` returns. It needs
-    no network, and its policy forbids network access.
+    no network, and its policy forbids network access and any other script.
 
     Args:
         task: whose marks are shown, and whose robot sets the first view.
@@ -38,7 +39,8 @@ def page(task: RobotTask, motion: Motion, title: str) -> bytes:
     data = json.dumps(scenery(task, motion), allow_nan=False).replace("<", "\\u003c")
     template = Template((ASSETS / "viewer.html").read_text("utf-8"))
     script = (ASSETS / "viewer.js").read_text("utf-8")
-    return template.substitute(title=html.escape(title), data=data, script=script).encode()
+    shown = {"title": html.escape(title), "data": data, "script": script, "allowed": exactly(script)}
+    return template.substitute(shown).encode()
 
 
 def scenery(task: RobotTask, motion: Motion) -> dict[str, Any]:
