@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Collection
 
-from evoclaims.core.errors import UnknownNameError
+from evoclaims.core.errors import UnknownNameError, UserError
 
 
 def selected(option: str, known: Collection[str]) -> set[str]:
@@ -16,7 +16,7 @@ def selected(option: str, known: Collection[str]) -> set[str]:
         known: ids of claims, and perhaps whole names such as "G1[n_parity]".
 
     Raises:
-        UnknownNameError: for a name that selects nothing.
+        UserError: for a name that selects nothing, and when there is no name.
     """
     chosen: set[str] = set()
     for name in filter(None, map(str.strip, option.split(","))):
@@ -26,4 +26,6 @@ def selected(option: str, known: Collection[str]) -> set[str]:
             alike = {one for one in known if ("[" in one) == ("[" in name)}
             raise UnknownNameError("claim", name, alike or {"(none collected)"})
         chosen |= found
+    if not chosen:
+        raise UserError(f"{option!r} names no claim: name some, such as G1 or G1,S2, or leave the option out.")
     return chosen

@@ -32,14 +32,14 @@ def main(options: argparse.Namespace) -> int:
         raise UnknownNameError("form of a table", options.form, FORMS)
     project = open_project(options.storage)
     project.reproduction.tier(options.tier)
-    reports = project.judge(options.tier)
+    reports = table_cells.ordered(project.judge(options.tier))
     if options.only is not None:
         wanted = selected(options.only, {name for report in reports for name in (report.claim, report.name)})
         reports = [report for report in reports if wanted & {report.claim, report.name}]
     if options.form is None:
         _print(reports, options.tier, options.why)
     else:
-        print(FORMS[options.form](table_cells.ordered(reports)), end="")
+        print(FORMS[options.form](reports), end="")
     return int(any(report.failed for report in reports))
 
 
