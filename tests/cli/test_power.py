@@ -39,6 +39,7 @@ def test_without_a_pilot_it_says_how_to_make_one(evoclaims: Evoclaims) -> None:
     assert (status, out, err.count("\n")) == (2, "", 1)
     assert "a: no pilot of right on parity (it has not been made)" in err
     assert "`evoclaims power --run`" in err
+    assert "`evoclaims power --only 'a, b' --run`" in evoclaims("power", "--only", "a, b")[2]
 
 
 def test_a_pilot_is_run_once_and_read_ever_after(piloted: Evoclaims, stored: Store) -> None:
@@ -143,6 +144,14 @@ def test_a_mistake_is_a_sentence(evoclaims: Evoclaims, arguments: tuple[str, ...
     status, _, err = evoclaims("power", *arguments)
     assert (status, err.count("\n"), PILOT.exists()) == (2, 1, False)
     assert said in err
+
+
+def test_a_pilot_is_either_run_or_taken_from_what_has_run(
+    evoclaims: Evoclaims, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit):
+        evoclaims("power", "--run", "--stored")
+    assert "argument --stored: not allowed with argument --run" in capsys.readouterr().err
 
 
 def test_a_pilot_changes_no_verdict(piloted: Evoclaims) -> None:

@@ -93,6 +93,9 @@ def test_a_pilot_that_was_edited_or_torn_is_a_sentence(
     path.write_text(path.read_text().replace(was, now, 1))
     with pytest.raises(UserError, match="is no pilot: .* make it anew with `evoclaims power --run`"):
         pilots.load(path)
+    path.write_text("")
+    with pytest.raises(UserError, match="is no pilot: Input data was truncated"):
+        pilots.load(path)
     path.unlink()
     path.mkdir()
     with pytest.raises(UserError, match="is no pilot"):

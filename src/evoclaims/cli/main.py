@@ -146,12 +146,13 @@ def _parser() -> argparse.ArgumentParser:
     device(power)
     processes(power)
     power.add_argument("--only", metavar="CLAIMS", help="only these claims, by id or name, such as G1,S2[cma_es]")
-    power.add_argument(
+    made = power.add_mutually_exclusive_group()
+    made.add_argument(
         "--run",
         action="store_true",
         help="first run the trials of missing pilots, and write them; commit what it writes",
     )
-    power.add_argument("--stored", action="store_true", help="first write missing pilots from trials that have run")
+    made.add_argument("--stored", action="store_true", help="first write missing pilots from trials that have run")
     power.add_argument("--trials", type=int, default=50, metavar="N", help="trials per condition of a new pilot (50)")
     power.add_argument(
         "--first-seed",
@@ -271,7 +272,7 @@ def _parser() -> argparse.ArgumentParser:
     across.add_argument(
         "--as", dest="form", metavar="FORM", help="also write it: markdown, csv, json, or a chart as svg"
     )
-    across.add_argument("--out", metavar="FILE", help="where to (across.FORM; .md for markdown)")
+    across.add_argument("--out", metavar="FILE", help="where to (report/across.FORM; .md for markdown)")
 
     bisect = add(
         "bisect",

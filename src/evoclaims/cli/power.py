@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import shlex
 import sys
 from collections.abc import Mapping, Sequence
 
@@ -147,7 +148,6 @@ def _versions(pilots: Pilots, wanted: Mapping[Names, Condition]) -> list[str]:
 
 def _advice(options: argparse.Namespace) -> str:
     """Return the sentence that says how pilots are made."""
-    chosen = f" --tier {options.tier}" * (options.tier != "smoke") + f" --only {options.only}" * (
-        options.only is not None
-    )
+    chosen = f" --tier {options.tier}" * (options.tier != "smoke")
+    chosen += "" if options.only is None else f" --only {shlex.quote(options.only)}"
     return f"`evoclaims power{chosen} --run` runs and writes the pilots that are missing."

@@ -83,7 +83,7 @@ def load(path: Path) -> tuple[TrialResult, ...]:
         UserError: when the file cannot be read, or is damaged or edited.
     """
     try:
-        first, *rest = map(json.decode, read_file(path).splitlines())
+        first, *rest = map(json.decode, read_file(path).splitlines() or [b""])
         shared, trials = convert(first, _Shared), convert(rest, list[_Trial])
         sealed = {name: value for name, value in first.items() if name != "seal"}
         if shared.schema != SCHEMA:
