@@ -83,10 +83,10 @@ def _conditions(
     """
     table = Table(box=None, pad_edge=False)
     kinds, cores = _kinds(costs), any(cost.core_pace for cost in costs.values())
-    measured = [f"took on one {kind}" for kind in kinds] + ["CPU core hours"] * cores
-    for heading in ("condition", "cached", "missing", "environment steps", "time, at most", *measured):
-        names = heading == "condition"
-        table.add_column(heading, justify="left" if names else "right", no_wrap=names)
+    measured = [f"took on one\n{kind}" for kind in kinds] + ["CPU\ncore hours"] * cores
+    for heading in ("condition", "cached", "missing", "environment\nsteps", "time,\nat most", *measured):
+        first = heading == "condition"  # it alone is broken where the terminal is narrow
+        table.add_column(escape(heading), justify="left" if first else "right", no_wrap=not first, overflow="fold")
     seeds = tier.design.seeds(tier.design.last.n)
     steps, seconds, unknown = 0, 0.0, False
     needed = {names: costs[names].core_seconds(tier.condition(*names).environment_steps * len(seeds)) for names in used}
@@ -169,7 +169,7 @@ def _claims(reports: Sequence[ClaimReport], costs: Costs) -> Table:
     kinds = _kinds(costs)
     for heading in ("claim", "n", "α", "p for", "p against", "can be decided", *(f"took on one {k}" for k in kinds)):
         names = heading == "claim"
-        table.add_column(heading, justify="left" if names else "right", no_wrap=names)
+        table.add_column(escape(heading), justify="left" if names else "right", no_wrap=names)
     for report in reports:
         used = [(source.method, source.task) for source in report.sources]
         for look in report.attainable:
