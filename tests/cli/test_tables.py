@@ -97,7 +97,7 @@ def test_published_numbers_are_a_table_too(committed: Evoclaims) -> None:
         (PAGE.replace("verdicts", "verdict"), "There is no kind of table named 'verdict'. Did you mean 'verdicts'?"),
         (PAGE.replace("verdicts full", "verdicts ful"), "There is no tier named 'ful'."),
         (PAGE.replace("smoke:traded", "smoke:trade"), "There is no variant named 'trade'."),
-        (None, "Cannot read page.md"),
+        (None, "Cannot read page.md: No such file or directory."),
     ],
 )
 def test_a_mistake_is_a_sentence(committed: Evoclaims, text: str | None, said: str) -> None:
