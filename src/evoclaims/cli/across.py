@@ -14,7 +14,7 @@ from packaging.utils import canonicalize_name
 
 from evoclaims.cli.elsewhere import Elsewhere
 from evoclaims.cli.storage import open_store
-from evoclaims.cli.stored import write
+from evoclaims.cli.stored import REPORT, write
 from evoclaims.cli.terminal import styled
 from evoclaims.core.environments import Recipe, checked, installed_here
 from evoclaims.core.errors import UnknownNameError, UserError
@@ -56,8 +56,8 @@ def main(options: argparse.Namespace) -> int:
     for line in (*found.lines, *_unused(found, options.package), across_table.headline(found)):
         print(line)
     if options.form is not None:
-        out = Path(options.out or f"across.{'md' if options.form == 'markdown' else options.form}")
-        write(out, FORMS[options.form](found))
+        out = Path(options.out or REPORT / f"across.{'md' if options.form == 'markdown' else options.form}")
+        write(out, FORMS[options.form](found), ours=options.out is None)
         print(f"wrote {out}")
     return int(bool(found.changed or found.without_verdicts))
 
