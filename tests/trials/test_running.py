@@ -10,12 +10,13 @@ from typing import Any
 
 import pytest
 from climbers import CLIMBING, run_climbers
+from msgspec import json
 
 from evoclaims.trials import running as bulletins
 from evoclaims.trials.integrity import verify
 from evoclaims.trials.notice import announced, notice_path, progress_path, sweep
 from evoclaims.trials.progress import RunProgress, ignore
-from evoclaims.trials.running import running, shared
+from evoclaims.trials.running import Running, running, shared
 from evoclaims.trials.store import Store
 
 CONDITION, OTHER = "c0" * 32, "0c" * 32
@@ -98,6 +99,14 @@ def test_what_cannot_be_read_or_written_is_left_out(tmp_path: Path) -> None:
 def test_a_hostile_file_stops_no_run(tmp_path: Path, hostile: bytes) -> None:
     with announced(tmp_path, CONDITION):
         progress_path(tmp_path, CONDITION).write_bytes(hostile)
+        assert running(tmp_path) == []
+
+
+def test_a_pipe_or_a_name_that_is_no_id_stops_no_run(tmp_path: Path) -> None:
+    with announced(tmp_path, CONDITION):
+        Path(tmp_path, "running", "no-id.progress").write_bytes(json.encode(Running("no-id", 0.0, TRAINING)))
+        if hasattr(os, "mkfifo"):
+            os.mkfifo(progress_path(tmp_path, CONDITION))
         assert running(tmp_path) == []
 
 

@@ -14,6 +14,8 @@ from typing import Final
 
 import msgspec
 
+from evoclaims.core.errors import UserError
+from evoclaims.core.files import read_file
 from evoclaims.trials.notice import is_announced, progress_path
 from evoclaims.trials.progress import RunProgress, Watcher
 
@@ -67,8 +69,10 @@ def running(store_root: Path) -> list[Running]:
     """Return what processes that share a store are running, those that began first in front."""
     found = []
     for path in (store_root / "running").glob("*.progress"):
-        with contextlib.suppress(OSError, ValueError, RecursionError):  # it is being written, gone by now, or damaged
-            one = msgspec.json.decode(path.read_bytes(), type=Running)
+        with contextlib.suppress(
+            OSError, ValueError, RecursionError, UserError
+        ):  # being written, gone by now, or damaged
+            one = msgspec.json.decode(read_file(path), type=Running)
             if one.condition == path.stem and is_announced(store_root, one.condition):
                 found.append(one)
     return sorted(found, key=lambda one: (one.since, one.condition))
