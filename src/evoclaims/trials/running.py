@@ -69,9 +69,8 @@ def running(store_root: Path) -> list[Running]:
     """Return what processes that share a store are running, those that began first in front."""
     found = []
     for path in (store_root / "running").glob("*.progress"):
-        with contextlib.suppress(
-            OSError, ValueError, RecursionError, UserError
-        ):  # being written, gone by now, or damaged
+        # It may be written just now, gone, or damaged.
+        with contextlib.suppress(OSError, ValueError, RecursionError, UserError):
             one = msgspec.json.decode(read_file(path), type=Running)
             if one.condition == path.stem and is_announced(store_root, one.condition):
                 found.append(one)
