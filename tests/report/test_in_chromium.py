@@ -92,6 +92,20 @@ def test_the_page_loads_without_a_complaint_or_a_request(browser: Chromium, addr
     assert browser.evaluate("document.getElementById('shown').textContent") == "9 of 9 claims"
 
 
+def test_evidence_is_shown_on_demand_and_by_a_link_to_its_claim(browser: Chromium, address: str) -> None:
+    shown = "[...document.querySelectorAll('.claim')].filter(s => s.querySelector('.parts')?.checkVisibility())"
+    browser.open(address)
+    assert browser.evaluate(f"{shown}.length") == 0
+    browser.evaluate("document.querySelector('#S1-full summary').click()")
+    browser.evaluate("location.hash = '#G1-full'")
+    assert browser.evaluate(f"new Promise(done => setTimeout(() => done({shown}.map(s => s.id))))") == [
+        "G1-full",
+        "S1-full",
+    ]
+    browser.evaluate("dispatchEvent(new Event('beforeprint'))")
+    assert browser.evaluate("[...document.querySelectorAll('.evidence')].every(one => one.open)")
+
+
 def test_hostile_text_runs_nothing(browser: Chromium, address: str) -> None:
     browser.open(address)
     assert browser.evaluate("document.title") == "Claims of tiny"

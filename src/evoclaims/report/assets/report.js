@@ -61,6 +61,8 @@
   const follow = () => {
     if (location.hash.startsWith("#?")) return set(new URLSearchParams(location.hash.slice(2)));
     const target = document.getElementById(location.hash.slice(1));
+    const evidence = target?.querySelector("details.evidence");
+    if (evidence) evidence.open = true;
     if (target?.hidden) {
       set(new URLSearchParams()); // a link to a claim shows it, whatever the filters say
       target.scrollIntoView();
@@ -79,6 +81,9 @@
   form.addEventListener("submit", (event) => event.preventDefault());
   form.addEventListener("reset", () => setTimeout(change));
   addEventListener("hashchange", follow);
+  addEventListener("beforeprint", () => {
+    for (const evidence of document.querySelectorAll("details.evidence")) evidence.open = true; // paper has no clicks
+  });
   apply();
   follow();
 })();
