@@ -20,7 +20,7 @@ def test_no_claim_of_the_paper_has_moved_since_its_verdict_was_accepted(tmp_path
     names = {(c["tier"], f"{c['claim']}[{c['case']}]" if c["case"] else c["claim"]): c["verdict"] for c in claims}
     assert {c["outcome"] for c in claims} == {"not run"}, said
     accepted = load(ROOT / "reproductions" / "nisioti2025" / FILE)
-    assert len(accepted) > 100
+    assert len(accepted) > 80
     assert {key: names[key]["fingerprint"] for key in accepted} == {
         key: entries[-1].fingerprint for key, entries in accepted.items()
     }
