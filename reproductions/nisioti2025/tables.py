@@ -7,6 +7,7 @@ from typing import Any
 
 from evoclaims import Condition
 from evoclaims.figures import Block, Figure, Listing
+from evoclaims.networks import AllSkips, Mlp
 from reproductions.nisioti2025.figures import PUBLISHED
 
 Settings = Mapping[str, Callable[[Condition], Any]]
@@ -18,6 +19,13 @@ def _length(condition: Condition) -> str:
     if budget.generations is not None:
         return f"{budget.generations:,} generations"
     return f"{budget.environment_steps:,} environment steps"
+
+
+def _encoding(network: AllSkips | Mlp) -> str:
+    """Return the network that CMA-ES trains: the paper's, or the perceptron of smoke's gates."""
+    if isinstance(network, AllSkips):
+        return f"{network.hidden} hidden neurons, all skip connections"
+    return _layers(network.layers)
 
 
 def _layers(widths: tuple[int, ...]) -> str:
@@ -65,7 +73,7 @@ PPO: Settings = {
     "training length": _length,
 }
 CMA_ES: Settings = {
-    "architecture": lambda c: f"{c.method.network.hidden} hidden neurons, all skip connections",
+    "architecture": lambda c: _encoding(c.method.network),
     "population size": lambda c: c.method.population,
     "training length": _length,
 }

@@ -38,7 +38,8 @@ def test_each_option_of_pytest_is_one_that_the_plugin_takes(pytestconfig: pytest
 
 def test_the_claim_that_is_shown_is_a_claim_of_the_paper() -> None:
     (shown,) = (text for text in PYTHON if "@claim" in text)
-    assert shown.strip() in (ROOT / "claims" / "test_stepping_gates.py").read_text(encoding="utf-8")
+    claims = [path.read_text(encoding="utf-8") for path in (ROOT / "claims").glob("*.py")]
+    assert any(shown.strip() in text for text in claims)
 
 
 def test_the_robot_and_the_task_that_are_shown_are_made(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

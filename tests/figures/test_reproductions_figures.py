@@ -45,6 +45,6 @@ def test_the_gates_figures_show_every_committed_trial(archive: Archive, tier: st
     for name, names in shown.items():
         drawing = catalogue.load(REPRODUCTION, name).draw(archive, REPRODUCTION, tier)
         committed = [trial for pair in names for trial in archive.trials(conditions[pair], range(10))]
-        assert None not in committed
-        assert _trials(drawing) == {trial.id for trial in committed if trial is not None}
-        assert drawing.missing == ()
+        assert _trials(drawing) == {trial.id for trial in committed if trial is not None} != set()
+        complete = tier == "full"  # smoke has trials of the conditions that its claims read
+        assert (None not in committed, drawing.missing == ()) == (complete, complete)

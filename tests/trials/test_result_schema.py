@@ -140,5 +140,5 @@ def test_any_json_in_any_field_is_read_or_refused_with_a_sentence(make_result: M
 
 def test_every_committed_record_is_accepted_and_written_back_to_the_same_bytes() -> None:
     lines = [line for path in sorted(REFERENCE.rglob("*.jsonl")) for line in path.read_bytes().splitlines()]
-    assert len(lines) > 900
+    assert len(lines) > 700
     assert all(dump(parse(line)).rstrip(b"\n") == line for line in lines)
