@@ -14,7 +14,7 @@ import pytest
 from plain_mujoco import quickly_compiled
 
 from evoclaims.envs.base import Episode, TaskState
-from evoclaims.envs.ecorobot import physics
+from evoclaims.envs.ecorobot import physics, robot_task
 from evoclaims.envs.ecorobot.deceptive import DeceptiveMaze
 from evoclaims.envs.ecorobot.locomotion import Locomotion
 from evoclaims.envs.ecorobot.physics import Body
@@ -39,7 +39,9 @@ def gliding() -> Iterator[None]:
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(physics, "act", glide)
+        robot_task._kernel.cache_clear()
         yield
+    robot_task._kernel.cache_clear()  # or tests of other files would get steps that glide
 
 
 def _changed(state: TaskState, **changes: Any) -> TaskState:
