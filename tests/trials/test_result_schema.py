@@ -21,7 +21,7 @@ from evoclaims.trials.store import DamagedFileError, Store
 Make = Callable[..., TrialResult]
 Edit = Callable[..., None]
 
-REFERENCE = Path(__file__).parents[2] / "reproductions" / "nisioti2025"
+REFERENCE = Path(__file__).parents[2] / "reproductions" / "nisioti2025" / "reference"
 
 
 def nested(depth: int) -> Any:
