@@ -108,7 +108,7 @@ def test_hyperneat_fails_in_the_difficult_maze(trials, verdict, claim_tier):
     says="None of the considered methods manages to address both complex locomotion and transfer learning",
     where="§6",
     smoke="No method leads the ant past the first of three stepping stones, though NEAT, HyperNEAT and CMA-ES lead the "
-    "simplest robot further, and PPO learns to collect more reward on open ground with the ant than a random policy",
+    "simplest robot further, and PPO collects more reward with it than a random policy",
 )
 @pytest.mark.parametrize("method", ["neat", "hyperneat", "cma_es", "ppo"])
 def test_no_method_leads_the_ant_through_the_maze(trials, verdict, claim_tier, method):
@@ -119,5 +119,5 @@ def test_no_method_leads_the_ant_through_the_maze(trials, verdict, claim_tier, m
     simple = trials("neat" if method == "ppo" else method, on="stones")
     says = ant.crosses_at_most(1.5).stays() & (simple.stones > ant.stones)
     if method == "ppo":
-        says &= trials("ppo", on="locomotion_ant").reward > trials("random_policy", on="locomotion_ant").reward
+        says &= trials("ppo", on="stones").reward > trials("random_policy", on="stones").reward
     verdict(says)

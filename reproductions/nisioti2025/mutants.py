@@ -8,10 +8,12 @@ from typing import Any, ClassVar
 import jax.numpy as jnp
 
 from evoclaims.envs import Box, DeceptiveMaze, Obstacles, Rangefinders, Ruling, SteppingStones
-from evoclaims.methods import HyperNeat, Neat, Ppo
+from evoclaims.methods import HandBuilt, HyperNeat, Neat, Ppo, RandomPolicy
 from evoclaims.methods.neat import Attribute, Mutation
-from evoclaims.mutants import Fault, of_task, with_method, with_task
+from evoclaims.mutants import Fault, Mutant, of_task, with_method, with_task
 from evoclaims.networks import Substrate
+from reproductions.nisioti2025 import ecorobot
+from reproductions.nisioti2025.waypoints import Waypoints
 
 MAZES = (SteppingStones, DeceptiveMaze)
 
@@ -43,6 +45,17 @@ def _in_a_point(method: Any) -> Any:
     if method.substrate is None:
         return method
     return replace(method, substrate=Substrate(tuple(((0.0, 0.0),) * len(layer) for layer in method.substrate.layers)))
+
+
+def _learning(one: Any) -> Any:
+    """A baseline that has learnt: instead of a random policy NEAT, or where NEAT is not run, PPO."""
+    if not isinstance(one.method, RandomPolicy):
+        return None
+    for conditions in (ecorobot.SMOKE, ecorobot.FULL):
+        for (_, task), other in conditions.items():
+            if other.id == one.id:
+                return conditions.get(("neat", task)) or conditions["ppo", task]
+    return None
 
 
 class StonesPayNothing(Fault):
@@ -121,6 +134,11 @@ class UnseeingRays(Fault):
 
 
 MUTANTS = {
+    "baseline-has-learnt": Mutant("has learnt", "method", _learning),
+    "answers-the-opposite": with_method(
+        "answers the opposite", lambda method: replace(method, negated=not method.negated), only=HandBuilt
+    ),
+    "stands-still": with_method("stands still", lambda method: replace(method, speed=0.0), only=Waypoints),
     "learning-rate-0": with_method(
         "has a learning rate of 0", lambda method: replace(method, learning_rate=0.0), only=Ppo
     ),

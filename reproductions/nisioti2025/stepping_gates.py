@@ -93,7 +93,7 @@ def _smoke() -> Conditions:
     small = Settings(population=256, nodes=12, connections=36, mutation=mutation, species=Species(most=10))
     large = replace(small, population=512, nodes=32, connections=96)
     cppn = replace(large, activations=CPPN_FUNCTIONS)
-    steps = Budget(environment_steps=100_000)
+    steps, longer = Budget(environment_steps=100_000), Budget(environment_steps=400_000)
     generations = Budget(generations=400)
     conditions: Conditions = {}
     for method in (CmaEs, RandomSearch):
@@ -111,6 +111,7 @@ def _smoke() -> Conditions:
         **_on_every_task(parity, alu, HyperNeat(cppn), generations, generations),
         **_tensorneat(parity, alu, small, cppn, generations, generations),
         **_on_every_task(_sampled(parity), _sampled(alu), ppo, steps, steps),
+        ("ppo", "n_parity_direct"): Condition(ppo, _sampled(parity), "direct", longer),
         **_hand_built(parity, alu),
     }
 

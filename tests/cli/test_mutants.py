@@ -88,6 +88,24 @@ def test_a_claim_that_notices_no_fault_is_called_insensitive_wherever_it_is_show
     assert said in out
 
 
+def test_a_claim_that_has_lost_its_smoke_test_loses_its_row_and_its_accepted_verdict(
+    accepted: Evoclaims, project: Project
+) -> None:
+    assert accepted("mutants", "--mutant=paralysed")[0] == 0
+    assert {claim for _, claim in load(Path("mutants.toml"))} == {"a", "b"}
+    body = BODIES["supported"]
+    project.write(
+        "@claim('a', says='a at full size', where='§1', smoke=None, because='it is small')\n"
+        f"def test_a(trials, verdict):\n    {body}\n\n"
+        f"@says('b')\ndef test_b(trials, verdict):\n    {BODIES['refuted']}\n"
+    )
+    assert accepted("mutants", "--stored", "--mutant=paralysed")[0] == 0
+    assert {claim for _, claim in load(Path("mutants.toml"))} == {"b"}
+    status, out, _ = accepted("accept", "--tier=smoke")
+    assert (status, "retired: a (smoke), which was supported: it has no smoke test: it is small" in out) == (1, True)
+    assert accepted("accept", "--tier=smoke")[0] == 0
+
+
 def test_a_matrix_that_is_damaged_is_told_before_the_first_trial(project: Project, sentence: Sentence) -> None:
     project.write(a="supported")
     Path("mutants.toml").write_text("schema = 1\n[smoke.a")

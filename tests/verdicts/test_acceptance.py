@@ -119,6 +119,17 @@ def test_new_trials_of_another_revision_alone_are_no_new_entry(store: Store, jud
     assert _accept(store, before, judged(_provenance(sha="c" * 40)))[:2] == (before, ())
 
 
+def test_a_claim_that_has_lost_its_test_at_a_tier_loses_the_verdicts_it_had_there(store: Store, judged: Report) -> None:
+    before, _, _ = _accept(store, {}, judged(_provenance()))
+    before = {**before, ("full", "G1"): before[KEY]}
+    untested = judged(outcome=Outcome.NOT_RUN, reason="it has no smoke test: because", has_test=False)
+    made = accept(before, [untested], Archive(store), "2025-11-02")
+    assert made.retired == ("G1 (smoke), which was supported: it has no smoke test: because",)
+    assert made.history == {("full", "G1"): before[KEY]}
+    assert (made.accepted, made.left) == ((), ())
+    assert accept(made.history, [untested], Archive(store), "2025-11-02").retired == ()
+
+
 @pytest.mark.parametrize("outcome", ["not run", "error"])
 def test_what_says_nothing_of_a_claim_is_never_accepted(store: Store, judged: Report, outcome: str) -> None:
     silent = judged(outcome=Outcome(outcome), reason="10 trials\x1b are missing")

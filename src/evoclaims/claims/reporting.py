@@ -51,7 +51,8 @@ def skipped(claim: Claim, case: str, tier: str, reason: str) -> ClaimReport:
 
 def without_instance(claim: Claim, case: str, tier: str, because: str) -> ClaimReport:
     """Build the report of a claim that has no test at a tier."""
-    return _unjudged(claim, case, tier, Outcome.NOT_RUN, f"it has no {tier} test: {because}")
+    report = _unjudged(claim, case, tier, Outcome.NOT_RUN, f"it has no {tier} test: {because}")
+    return replace(report, has_test=False)
 
 
 def expecting(report: ClaimReport, expectation: Expectation | None) -> ClaimReport:

@@ -25,11 +25,13 @@ def main(options: argparse.Namespace) -> int:
     for tier, claim in before.keys() - now:
         if tier in tiers:
             print(f"kept: {claim} ({tier}), which is no longer among the claims")
-    if not made.accepted:
+    if not (made.accepted or made.retired):
         print(f"{path} stays as it is: no verdict differs from the accepted one.")
         return 0
     write_atomically(path, history.dump(made.history).encode())
     for line in made.accepted:
         print(f"accepted: {line}")
+    for line in made.retired:
+        print(f"retired: {line}")
     print(f"wrote {path}: look at the changes and commit them")
     return 1

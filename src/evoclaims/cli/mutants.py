@@ -63,7 +63,7 @@ def main(options: argparse.Namespace) -> int:
         mutation_matrix.load(path),
         noticed(comparison, claims, planted, reports, {(one.fault, one.names) for one in failed}),
         options.tier,
-        {key_of(report): [one.name for one in every if one.touching(report)] for report in claims},
+        {key_of(report): [one.name for one in every if one.touching(report)] for report in claims if report.has_test},
     )
     write_atomically(path, mutation_matrix.dump(matrix).encode())
     for (on, claim), row in sorted(matrix.items()):

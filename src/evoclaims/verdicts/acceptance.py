@@ -25,16 +25,20 @@ class Acceptance:
     Attributes:
         history: with the new entries.
         accepted: a line for each new entry.
+        retired: a line for each claim whose entries are left out, since it no longer has a test at their tier.
         left: a line for each claim whose current verdict is not accepted.
     """
 
     history: History
     accepted: tuple[str, ...]
+    retired: tuple[str, ...]
     left: tuple[str, ...]
 
 
 def accept(history: History, reports: Sequence[ClaimReport], archive: Archive, today: str) -> Acceptance:
     """Append an entry for every claim whose outcome, fingerprint, versions or device has changed since the last one.
+
+    A claim without a test at its tier has no verdicts there: those accepted earlier were about another sentence.
 
     Args:
         history: verdicts accepted so far.
@@ -42,11 +46,15 @@ def accept(history: History, reports: Sequence[ClaimReport], archive: Archive, t
         archive: where their trials are.
         today: ISO 8601 date.
     """
-    grown, accepted, left = dict(history), [], []
+    grown, accepted, retired, left = dict(history), [], [], []
     for report in reports:
         key = key_of(report)
         name = f"{key[1]} ({key[0]})"
         past = history.get(key, ())
+        if not report.has_test:
+            if grown.pop(key, ()):
+                retired.append(f"{name}, which was {past[-1].outcome}: {printable(report.reason)}")
+            continue
         if report.outcome in UNDECIDED:
             kept = f"it stays {past[-1].outcome}, accepted on {past[-1].accepted}" if past else "nothing is accepted"
             left.append(f"{name} is {report.outcome} now ({printable(report.reason)}): {kept}")
@@ -56,7 +64,7 @@ def accept(history: History, reports: Sequence[ClaimReport], archive: Archive, t
         if said:
             grown[key] = (*past, entry)
             accepted.append(f"{name}: {said}")
-    return Acceptance(grown, tuple(accepted), tuple(left))
+    return Acceptance(grown, tuple(accepted), tuple(retired), tuple(left))
 
 
 def entry_of(report: ClaimReport, archive: Archive, today: str) -> Entry:

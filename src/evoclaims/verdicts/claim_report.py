@@ -65,6 +65,7 @@ class ClaimReport:
         unsaved: why that file could not be written; empty if it was, or need not be.
         before: the verdict that the store held before this run, if any.
         tried: whether planted faults change the verdict, according to the committed matrix of mutants.
+        has_test: whether the claim has a test at this tier.
     """
 
     claim: str
@@ -84,6 +85,7 @@ class ClaimReport:
     unsaved: str = ""
     before: LastVerdict | None = None
     tried: Tried = Tried.NOT_TRIED
+    has_test: bool = True
 
     @property
     def name(self) -> str:
