@@ -20,6 +20,7 @@ from evoclaims.methods.neat.settings import Attribute, Mutation, Settings, Speci
 from evoclaims.methods.ppo import Ppo
 from evoclaims.methods.random_policy import RandomPolicy
 from evoclaims.methods.random_search import RandomSearch
+from evoclaims.methods.seldom_decomposed_cma_es import SeldomDecomposedCmaEs
 from evoclaims.methods.tensorneat import NeatTensorneat
 from evoclaims.networks.all_skips import AllSkips
 from evoclaims.networks.mlp import Mlp
@@ -78,6 +79,13 @@ METHODS = {
         task=NParity(3),
         cost=12 * 8,
         other=CmaEs(256, network=AllSkips(8)),
+        curriculum=200,
+    ),
+    "seldom_decomposed_cma_es": Entry(
+        method=SeldomDecomposedCmaEs(12, network=AllSkips(3)),
+        task=NParity(3),
+        cost=12 * 8,
+        other=SeldomDecomposedCmaEs(256, network=AllSkips(8), replaced=0.1),
         curriculum=200,
     ),
     "neat": Entry(

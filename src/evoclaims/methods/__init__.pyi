@@ -16,4 +16,5 @@ from evoclaims.methods.ppo import LevelTest as LevelTest
 from evoclaims.methods.ppo import Ppo as Ppo
 from evoclaims.methods.random_policy import RandomPolicy as RandomPolicy
 from evoclaims.methods.random_search import RandomSearch as RandomSearch
+from evoclaims.methods.seldom_decomposed_cma_es import SeldomDecomposedCmaEs as SeldomDecomposedCmaEs
 from evoclaims.methods.tensorneat import NeatTensorneat as NeatTensorneat

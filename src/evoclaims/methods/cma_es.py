@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -102,9 +103,16 @@ class CmaEs:
     def _search(self, task: Task) -> tuple[CMA_ES, Any]:
         """Build evosax's algorithm and its default parameters for the task's encoding."""
         size = self.network.size(task.observation_size, task.action_size)
-        search = CMA_ES(self.population, jnp.zeros(size), fitness_shaping_fn=ordinal_weights, metrics_fn=_no_metrics)
+        search = self._algorithm(
+            self.population, jnp.zeros(size), fitness_shaping_fn=ordinal_weights, metrics_fn=_no_metrics
+        )
         with implicit_promotions():
             return search, search.default_params
+
+    @property
+    def _algorithm(self) -> Callable[..., CMA_ES]:
+        """Return what makes the search."""
+        return CMA_ES
 
 
 def _no_metrics(*_: Any) -> dict[str, jax.Array]:
