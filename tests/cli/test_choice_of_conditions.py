@@ -6,7 +6,7 @@ import jax
 from tiny_project import Evoclaims
 
 from evoclaims.cli.project import open_project
-from evoclaims.cli.run import choose
+from evoclaims.cli.run import named
 from evoclaims.trials.result_making import make_timeout
 from evoclaims.trials.spec import TrialSpec
 from reproductions.nisioti2025 import REPRODUCTION
@@ -14,10 +14,10 @@ from reproductions.nisioti2025 import REPRODUCTION
 
 def test_a_method_that_may_not_be_installed_runs_only_when_it_is_named() -> None:
     tier = REPRODUCTION.tier("smoke")
-    everything = {method for method, _ in choose(tier, None, None)}
+    everything = {method for method, _ in named(tier, None, None)}
     assert "neat" in everything
     assert not {name for name in everything if name.endswith("_tensorneat")}
-    assert choose(tier, "neat_tensorneat", "n_parity") == [("neat_tensorneat", "n_parity")]
+    assert named(tier, "neat_tensorneat", "n_parity") == [("neat_tensorneat", "n_parity")]
 
 
 def test_trials_of_a_variant_that_ran_out_of_less_time_are_counted_among_those_to_run(evoclaims: Evoclaims) -> None:

@@ -112,6 +112,20 @@ def test_nothing_is_submitted_twice_and_what_failed_is_submitted_again(evoclaims
     assert "array=0-1%2" in slurm.asked()
 
 
+def test_what_a_variant_changes_is_submitted_under_it(evoclaims: Evoclaims, slurm: StandIn) -> None:
+    status, out, _ = evoclaims("submit", "--variant=traded")
+    assert status == 0
+    assert "1 batch of the smoke tier in 1 job on SLURM" in out
+    assert "right on parity: 10 trials" in out
+    assert "--claims-variant=traded" in out
+    slurm.queue.write_text("41|PENDING|Priority|\n")
+    assert evoclaims("jobs")[1].splitlines()[0] == "queued   41  right on parity, smoke, traded: Priority"
+    assert "queued already" in evoclaims("submit", "--variant=traded")[1]
+    status, _, err = evoclaims("submit", "coin", "--variant=traded")
+    assert (status, err.count("\n")) == (2, 1)
+    assert "The variant traded changes none of these conditions at the smoke tier; it changes: right on parity." in err
+
+
 def test_trying_writes_and_submits_nothing(evoclaims: Evoclaims, slurm: StandIn) -> None:
     before = sorted(Path.cwd().rglob("*"))
     status, out, _ = evoclaims("submit", "--dry-run", "--on=parity")

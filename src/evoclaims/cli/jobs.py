@@ -65,7 +65,7 @@ def main(options: argparse.Namespace) -> int:
         job, batch = row.place.job, row.place.batch
         told = f": {row.reason}" * bool(row.reason)
         log = f" ({row.log})" * row.log.exists()
-        print(f"{row.state:8} {job.id}  {batch.label}, {row.place.submission.tier}{told}{log}")
+        print(f"{row.state:8} {job.id}  {batch.label}, {row.place.submission.tier_and_variant}{told}{log}")
     counts = {state: sum(row.state == state for row in rows) for state in ("queued", "running", "done", "failed")}
     print(", ".join(f"{count} {state}" for state, count in counts.items() if count))
     if counts["failed"]:
@@ -105,7 +105,7 @@ def _rows(project: Project) -> Iterator[Row]:
 def _lacks(project: Project, place: Place) -> bool:
     """Whether trials of a batch are missing; of one that the paper no longer has nothing is."""
     try:
-        tier = project.reproduction.tier(place.submission.tier)
+        tier = project.reproduction.tier(place.submission.tier, place.submission.variant)
         condition = tier.condition(place.batch.method, place.batch.task)
     except UserError:
         return False

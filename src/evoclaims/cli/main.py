@@ -118,6 +118,7 @@ def _parser() -> argparse.ArgumentParser:
     submit = add("submit", "submit the batches that a tier lacks as jobs of SLURM, or of this machine; none twice")
     submit.add_argument("method", nargs="?", help="only this method")
     submit.add_argument("--on", metavar="TASK", help="only this task")
+    submit.add_argument("--variant", metavar="NAME", default="", help="what this variant of the protocol changes")
     tier(submit)
     device(submit)
     submit.add_argument("--cluster", default="slurm", help="slurm (default), or local: jobs on this machine")

@@ -16,7 +16,8 @@ from evoclaims.cli.worker import Order
 from evoclaims.core.errors import UnknownNameError, UserError
 from evoclaims.judging.counting import MAX_TRIALS
 from evoclaims.mutants.conditions import Job
-from evoclaims.paper.reproduction import Tier
+from evoclaims.paper.reproduction import Reproduction, Tier
+from evoclaims.paper.variant import Names
 from evoclaims.report.live_line import LiveLine
 from evoclaims.trials.spec import Condition, TrialSpec
 from evoclaims.trials.store import Store
@@ -28,16 +29,7 @@ def main(options: argparse.Namespace) -> int:
     host = host_of(options.numprocesses, options.device)
     project = open_project(options.storage)
     reproduction, store = project.reproduction, project.store
-    tier = reproduction.tier(options.tier, options.variant)
-    chosen = choose(tier, options.method, options.on)
-    if options.variant:
-        touched = reproduction.variants[options.variant].conditions.get(options.tier, {})
-        chosen = [names for names in chosen if names in touched]
-        if not chosen:
-            raise UserError(
-                f"The variant {options.variant} changes none of these conditions at the {options.tier} tier; it "
-                f"changes: {', '.join(sorted(' on '.join(names) for names in touched)) or 'none'}."
-            )
+    tier, chosen = choose(reproduction, options)
     n = options.trials if options.trials is not None else tier.design.last.n
     if not 1 <= n <= MAX_TRIALS:
         raise UserError(
@@ -95,7 +87,27 @@ def _print_matrix(project: Project, tier: str, variant: str) -> None:
         print("  No claim can be judged yet: each needs all trials of its tier.")
 
 
-def choose(tier: Tier, method: str | None, task: str | None) -> list[tuple[str, str]]:
+def choose(reproduction: Reproduction, options: argparse.Namespace) -> tuple[Tier, list[Names]]:
+    """Return the tier that options name, and which of its conditions they select; of a variant, what it changes.
+
+    Raises:
+        UserError: for an unknown name, and for conditions that the variant leaves as they are; it lists the known ones.
+    """
+    tier = reproduction.tier(options.tier, options.variant)
+    chosen = named(tier, options.method, options.on)
+    if not options.variant:
+        return tier, chosen
+    touched = reproduction.variants[options.variant].conditions.get(options.tier, {})
+    chosen = [names for names in chosen if names in touched]
+    if not chosen:
+        raise UserError(
+            f"The variant {options.variant} changes none of these conditions at the {options.tier} tier; it changes: "
+            f"{', '.join(sorted(' on '.join(names) for names in touched)) or 'none'}."
+        )
+    return tier, chosen
+
+
+def named(tier: Tier, method: str | None, task: str | None) -> list[Names]:
     """Return the conditions that a method and a task select; an error for an unknown name lists the known ones.
 
     An `optional` method, which needs packages that may not be installed, runs only when it is named.

@@ -10,7 +10,7 @@ import shutil
 import socket
 import sys
 import warnings
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
@@ -30,6 +30,7 @@ from evoclaims.report.live_line import duration
 from evoclaims.trials.devices import usable_cores
 from evoclaims.trials.gpus import gpus
 from evoclaims.trials.notice import announced
+from evoclaims.trials.spec import Condition
 
 ONE_AT_A_TIME: Final = content_hash("evoclaims submit")
 """What a call announces, so that two at once do not submit the same."""
@@ -41,29 +42,29 @@ def main(options: argparse.Namespace) -> int:
     """Submit what is missing and not submitted yet, and say which jobs that makes."""
     project = open_project(options.storage)
     request = requested(options, project.config.slurm)
-    names = choose(project.reproduction.tier(options.tier), options.method, options.on)
+    tier, names = choose(project.reproduction, options)
+    by_id = {tier.condition(*pair).id: pair for pair in reversed(names)}  # two names may mean the same trials
+    conditions = {Job("", *pair): tier.condition(*pair) for pair in by_id.values()}
     if options.dry_run:
-        _plan(project, options, request, names)
+        _plan(project, options, request, conditions)
         return 0
     project.store.check_writable()
     with announced(project.store.root, ONE_AT_A_TIME):
-        jobs = _plan(project, options, request, names)
+        jobs = _plan(project, options, request, conditions)
         if jobs:
             name = new_name()
-            submission = _submitted(project, options, request, name, jobs)
+            submission = _submitted(project, options, request, name, jobs, conditions)
             save(project.store.root, name, submission)
             _say_what_now(project, options, submission)
     return 0
 
 
 def _plan(
-    project: Project, options: argparse.Namespace, request: Request, names: Sequence[tuple[str, str]]
+    project: Project, options: argparse.Namespace, request: Request, conditions: Mapping[Job, Condition]
 ) -> list[list[MissingBatch]]:
     """Print and return the jobs that are to be submitted, each with its batches."""
-    tier = project.reproduction.tier(options.tier)
-    by_id = {tier.condition(*pair).id: pair for pair in reversed(names)}  # two names may mean the same trials
-    conditions = {Job("", *pair): tier.condition(*pair) for pair in by_id.values()}
-    seeds, limit = tier.design.seeds(tier.design.last.n), project.config.seconds(None)
+    design = project.reproduction.tier(options.tier).design
+    seeds, limit = design.seeds(design.last.n), project.config.seconds(None)
     has_gpu = request.gpus or (request.cluster == "local" and gpus("auto"))  # jobs here see what this process sees
     platform = "gpu" if options.device == "gpu" or (options.device == "auto" and has_gpu) else "cpu"
     lacking = missing_batches(project, options.tier, conditions, seeds, limit, platform)
@@ -112,7 +113,12 @@ def dealt(batches: Sequence[MissingBatch], jobs: int) -> list[list[MissingBatch]
 
 
 def _submitted(
-    project: Project, options: argparse.Namespace, request: Request, name: str, jobs: Sequence[Sequence[MissingBatch]]
+    project: Project,
+    options: argparse.Namespace,
+    request: Request,
+    name: str,
+    jobs: Sequence[Sequence[MissingBatch]],
+    conditions: Mapping[Job, Condition],
 ) -> Submission:
     """Submit jobs.
 
@@ -126,6 +132,7 @@ def _submitted(
 
     def command(batch: MissingBatch) -> list[str]:
         chosen = [batch.job.method, f"--on={batch.job.task}", f"--tier={options.tier}", f"--device={device}"]
+        chosen += [f"--variant={options.variant}"] * bool(options.variant)
         return [sys.executable, "-m", "evoclaims", "run", *chosen, f"--storage={root}"]
 
     folder = folder_of(root, name)
@@ -133,12 +140,11 @@ def _submitted(
     requeues = MOST_REQUEUES if math.isinf(limit) else min(math.ceil(limit / (60 * request.minutes)), MOST_REQUEUES)
     work = [BatchJob([command(one) for one in job], str(project.config.root.absolute())) for job in jobs]
     sent = _send(request, folder, requeues, work)
-    tier = project.reproduction.tier(options.tier)
     made = tuple(
-        SubmittedJob(id_, tuple(Batch(*one.job.names, tier.condition(*one.job.names).id) for one in job))
+        SubmittedJob(id_, tuple(Batch(*one.job.names, conditions[one.job].id) for one in job))
         for id_, job in zip(sent, jobs, strict=True)
     )
-    return Submission(SCHEMA, request.cluster, socket.gethostname(), options.tier, made)
+    return Submission(SCHEMA, request.cluster, socket.gethostname(), options.tier, made, options.variant)
 
 
 def _send(request: Request, folder: Path, requeues: int, work: Sequence[BatchJob]) -> list[str]:
@@ -198,6 +204,7 @@ def _say_what_now(project: Project, options: argparse.Namespace, submission: Sub
     """Print how to look at the jobs, and how to judge what they store."""
     first = submission.jobs[0].id.partition("_")[0]
     judge = f"pytest -m {options.tier} --claims-stored --claims-storage={shlex.quote(str(project.store.root))}"
+    judge += f" --claims-variant={options.variant}" * bool(options.variant)
     counted = plural(len(submission.jobs), "job")
     print(f"Submitted {counted}, from {submission.jobs[0].id} on: `evoclaims jobs` shows them.")
     print(f"Afterwards `{judge}` judges what they have stored", end="")

@@ -64,6 +64,7 @@ class Submission:
         host: the machine that the call was made on.
         tier: of their conditions.
         jobs: all of them.
+        variant: of the protocol; empty for itself.
     """
 
     schema: Literal[1]
@@ -71,6 +72,12 @@ class Submission:
     host: Name
     tier: Name
     jobs: tuple[SubmittedJob, ...]
+    variant: str = ""
+
+    @property
+    def tier_and_variant(self) -> str:
+        """How both are called in a line."""
+        return f"{self.tier}, {self.variant}" if self.variant else self.tier
 
 
 def new_name() -> str:
