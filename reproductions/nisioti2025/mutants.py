@@ -8,9 +8,9 @@ from typing import Any, ClassVar
 import jax.numpy as jnp
 
 from evoclaims.envs import Box, DeceptiveMaze, Obstacles, Rangefinders, Ruling, SteppingStones
-from evoclaims.methods import HandBuilt, HyperNeat, Neat, Ppo, RandomPolicy
+from evoclaims.methods import HandBuilt, HyperNeat, Neat, Policy, Ppo, RandomPolicy
 from evoclaims.methods.neat import Attribute, Mutation
-from evoclaims.mutants import Fault, Mutant, of_task, with_method, with_task
+from evoclaims.mutants import Fault, Mutant, of_method, of_task, with_method, with_task
 from evoclaims.networks import Substrate
 from reproductions.nisioti2025 import ecorobot
 from reproductions.nisioti2025.waypoints import Waypoints
@@ -48,14 +48,29 @@ def _in_a_point(method: Any) -> Any:
 
 
 def _learning(one: Any) -> Any:
-    """A baseline that has learnt: instead of a random policy NEAT, or where NEAT is not run, PPO."""
+    """A baseline that has learnt: instead of a random policy NEAT, or where NEAT is not run, PPO.
+
+    With one report less than the learner that claims compare it with, it has trials of its own.
+    """
     if not isinstance(one.method, RandomPolicy):
         return None
     for conditions in (ecorobot.SMOKE, ecorobot.FULL):
         for (_, task), other in conditions.items():
             if other.id == one.id:
-                return conditions.get(("neat", task)) or conditions["ppo", task]
+                learner = conditions.get(("neat", task)) or conditions["ppo", task]
+                return replace(learner, budget=replace(learner.budget, reports=learner.budget.reports - 1))
     return None
+
+
+class AnswersTheOpposite(Fault):
+    """A circuit built by hand whose outputs are negated; the negated one's are not."""
+
+    says: ClassVar[str] = "answers the opposite"
+
+    def best(self, task: Any, state: Any) -> Policy:
+        """Return the other circuit."""
+        policy: Policy = replace(self.sound, negated=not self.sound.negated).best(task, state)
+        return policy
 
 
 class StonesPayNothing(Fault):
@@ -135,9 +150,7 @@ class UnseeingRays(Fault):
 
 MUTANTS = {
     "baseline-has-learnt": Mutant("has learnt", "method", _learning),
-    "answers-the-opposite": with_method(
-        "answers the opposite", lambda method: replace(method, negated=not method.negated), only=HandBuilt
-    ),
+    "answers-the-opposite": of_method(AnswersTheOpposite, only=HandBuilt),
     "stands-still": with_method("stands still", lambda method: replace(method, speed=0.0), only=Waypoints),
     "learning-rate-0": with_method(
         "has a learning rate of 0", lambda method: replace(method, learning_rate=0.0), only=Ppo
