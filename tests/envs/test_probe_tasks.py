@@ -8,9 +8,9 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from probes import CONSTANT, COPY, CURRICULUM, DELAYED, PROBES, SURVIVAL, Probe
 
 from evoclaims.envs.base import Episode, PolicyFn
-from evoclaims.envs.probes import CONSTANT, COPY, CURRICULUM, DELAYED, PROBES, SURVIVAL, Probe
 
 YES: PolicyFn = lambda observation: jnp.ones(1)  # noqa: E731
 REPEAT: PolicyFn = lambda observation: observation[:1]  # noqa: E731

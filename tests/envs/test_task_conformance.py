@@ -10,6 +10,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from probes import PROBES
 
 from evoclaims.core.canonical import canonical_json
 from evoclaims.envs.ecorobot.deceptive import DeceptiveMaze
@@ -19,7 +20,6 @@ from evoclaims.envs.ecorobot.robots import SIMPLE_ROB
 from evoclaims.envs.ecorobot.stones import SteppingStones
 from evoclaims.envs.gates.alu import SimpleAlu
 from evoclaims.envs.gates.parity import NParity
-from evoclaims.envs.probes import PROBES
 
 EXACT: dict[str, Any] = {
     "parity": NParity(3),

@@ -8,10 +8,10 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from probes import CURRICULUM, DELAYED, SURVIVAL
 
 from evoclaims.core.keys import streams
 from evoclaims.envs.gates.parity import NParity
-from evoclaims.envs.probes import CURRICULUM, DELAYED, SURVIVAL
 from evoclaims.methods.collect import Interaction, collect
 
 ENVIRONMENTS, ROUNDS, UNROLL = 3, 4, 2

@@ -8,12 +8,12 @@ from typing import Any
 import jax
 import numpy as np
 import pytest
+from probes import COPY
 
 from evoclaims.core.errors import UserError
 from evoclaims.envs.gates.alu import SimpleAlu
 from evoclaims.envs.gates.parity import NParity
 from evoclaims.envs.gates.truth_table import TruthTable
-from evoclaims.envs.probes import COPY
 from evoclaims.methods.hand_built import HandBuilt
 from evoclaims.trials.rollout import score_every_level
 

@@ -9,11 +9,11 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from probes import CONSTANT, Probe
 from workbench import Workbench, leaves
 
 from evoclaims.core.errors import UserError
 from evoclaims.envs.gates.parity import NParity
-from evoclaims.envs.probes import CONSTANT, Probe
 from evoclaims.methods.ppo import LevelTest, Ppo
 
 SMALL = Ppo(policy_layers=(3,), value_layers=(3,), environments=4, batch_size=4, minibatches=1, updates_per_batch=1)

@@ -8,9 +8,9 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import pytest
+from probes import PROBES, Probe
 from small_methods import METHODS, Entry
 
-from evoclaims.envs.probes import PROBES, Probe
 from evoclaims.trials import lanes
 from evoclaims.trials.budget import Budget
 from evoclaims.trials.runner import run

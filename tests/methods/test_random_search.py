@@ -7,11 +7,11 @@ from typing import Any
 import jax
 import numpy as np
 import pytest
+from probes import Probe
 from workbench import Workbench
 
 from evoclaims.core.errors import UserError
 from evoclaims.core.keys import stream
-from evoclaims.envs.probes import Probe
 from evoclaims.methods.random_search import RandomSearch
 from evoclaims.networks.all_skips import AllSkips
 

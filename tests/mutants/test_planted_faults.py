@@ -8,12 +8,12 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from probes import COPY
 
 from evoclaims.core.errors import UserError
 from evoclaims.envs.base import Episode, PolicyFn
 from evoclaims.envs.gates.alu import SimpleAlu
 from evoclaims.envs.gates.parity import NParity
-from evoclaims.envs.probes import COPY
 from evoclaims.methods.cma_es import CmaEs
 from evoclaims.methods.hand_built import HandBuilt
 from evoclaims.methods.random_search import RandomSearch

@@ -10,13 +10,13 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from probes import CURRICULUM
 from trial_toys import Walker
 
 from evoclaims.core.errors import UserError
 from evoclaims.envs.base import Episode
 from evoclaims.envs.gates.parity import NParity
 from evoclaims.envs.gates.truth_table import TruthTable
-from evoclaims.envs.probes import CURRICULUM
 from evoclaims.methods.base import Policy, Progress
 from evoclaims.methods.hand_built import HandBuilt
 from evoclaims.trials.budget import Budget

@@ -10,10 +10,10 @@ from typing import Any
 import jax
 import numpy as np
 import pytest
+from probes import Probe
 
 from evoclaims.core.errors import UserError
 from evoclaims.envs.gates.parity import NParity
-from evoclaims.envs.probes import Probe
 from evoclaims.methods.neat.neat import Neat
 from evoclaims.methods.neat.settings import PAPER, Mutation, Settings, Species
 from evoclaims.trials.budget import Budget
