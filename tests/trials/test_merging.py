@@ -77,7 +77,7 @@ def test_of_two_different_records_the_existing_one_stays_and_both_are_named(
         "metrics (last_success 0.5 and 0.25), levels (success), champions differ; made on machines of one kind"
     )
     assert store.get(mine.id) == TrialResult(**{**vars(mine), "champion": store.get(mine.id).champion})  # type: ignore[union-attr]
-    assert store.champion(mine.id)["w"].tolist() == [1.0, 1.0]
+    assert store.champion_of(store.get(mine.id))["w"].tolist() == [1.0, 1.0]
     assert verify(store, repair=False) == []
 
 

@@ -74,7 +74,7 @@ def test_an_odd_champion_is_a_damaged_file_that_verify_moves_aside(
     path.unlink()
     make(path)
     with pytest.raises(DamagedFileError, match="it cannot be read"):
-        store.champion(trial.id)
+        store.champion_of(store.get(trial.id))
     assert store.record_path(trial.id) in {problem.path for problem in verify(store, repair=True)}
 
 

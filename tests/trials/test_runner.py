@@ -84,7 +84,7 @@ def test_a_trial_that_another_process_stored_meanwhile_with_other_bits_is_told_o
     assert [result.digest for result in results] == [
         other.digest if result.seed == other.seed else result.digest for result in uninterrupted
     ]
-    assert store.champion(other.id)["w"].tolist() == [1.0, 1.0, 1.0]
+    assert store.champion_of(store.get(other.id))["w"].tolist() == [1.0, 1.0, 1.0]
     text = f"seed {other.seed} is stored already and came out differently here: the first record stays"
     assert text in log.phases()
     assert [record.getMessage() for record in caplog.records if record.name.startswith("evoclaims")] == [

@@ -15,7 +15,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from evoclaims.trials.result import TrialResult
-from evoclaims.trials.result_codec import RecordError, dump, parse
+from evoclaims.trials.result_codec import dump, parse
+from evoclaims.trials.result_schema import RecordError
 from evoclaims.trials.store import DamagedFileError, Store
 
 Make = Callable[..., TrialResult]
@@ -188,7 +189,7 @@ def test_a_swapped_champion_is_refused(store: Store, trial: TrialResult, make_re
     store.put(other, {"bias": np.ones(2)})
     store.champion_path(trial.id).write_bytes(store.champion_path(other.id).read_bytes())
     with pytest.raises(DamagedFileError, match="not the champion that the trial's record names") as caught:
-        store.champion(trial.id)
+        store.champion_of(store.get(trial.id))
     assert caught.value.path == store.champion_path(trial.id)
 
 
@@ -198,13 +199,13 @@ def test_a_champion_with_one_flipped_byte_is_refused(store: Store, trial: TrialR
     data[len(data) // 2] ^= 1
     path.write_bytes(data)
     with pytest.raises(DamagedFileError, match="not the champion"):
-        store.champion(trial.id)
+        store.champion_of(store.get(trial.id))
 
 
 def test_a_missing_champion_is_refused(store: Store, trial: TrialResult) -> None:
     store.champion_path(trial.id).unlink()
     with pytest.raises(DamagedFileError, match="cannot be read"):
-        store.champion(trial.id)
+        store.champion_of(store.get(trial.id))
 
 
 @pytest.mark.parametrize("data", [b"", b"PK\x03\x04 and more", b"\x80\x04N.", b"\x93NUMPY"])
@@ -214,7 +215,7 @@ def test_a_champion_that_is_no_npz_is_refused_though_its_hash_is_right(
     store.champion_path(trial.id).write_bytes(data)
     edit_record(store.record_path(trial.id), champion=hashlib.sha256(data).hexdigest())
     with pytest.raises(DamagedFileError, match="not a readable npz file"):
-        store.champion(trial.id)
+        store.champion_of(store.get(trial.id))
 
 
 def test_a_pickle_inside_a_champion_is_never_opened(store: Store, trial: TrialResult, edit_record: Edit) -> None:
@@ -223,4 +224,4 @@ def test_a_pickle_inside_a_champion_is_never_opened(store: Store, trial: TrialRe
         np.savez(file, allow_pickle=True, w=np.array([{"a": 1}], dtype=object))
     edit_record(store.record_path(trial.id), champion=hashlib.sha256(path.read_bytes()).hexdigest())
     with pytest.raises(DamagedFileError, match="not a readable npz file"):
-        store.champion(trial.id)
+        store.champion_of(store.get(trial.id))

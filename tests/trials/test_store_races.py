@@ -66,7 +66,7 @@ def test_the_first_record_keeps_its_own_champion_in_every_order(
     kept = store.get(results["A"].id)
     assert kept is not None
     assert kept.digest == results[first].digest
-    np.testing.assert_array_equal(store.champion(kept.id)["w"], champions[first]["w"])
+    np.testing.assert_array_equal(store.champion_of(store.get(kept.id))["w"], champions[first]["w"])
     assert len(store.champion_files(kept.id)) == 1
     assert verify(store, repair=False) == []
     assert not list(store.root.rglob("*.tmp"))
@@ -78,7 +78,7 @@ def test_equal_trials_are_stored_once_in_every_order(
 ) -> None:
     puts = {name: lambda: store.put(make_result(), parameters) for name in "AB"}
     assert sorted(_interleaved(monkeypatch, order, puts).values()) == ["present", "stored"]
-    assert store.champion(make_result().id).keys() == parameters.keys()
+    assert store.champion_of(store.get(make_result().id)).keys() == parameters.keys()
     assert verify(store, repair=False) == []
 
 
@@ -106,7 +106,7 @@ def test_a_champion_that_a_killed_process_left_is_a_leftover_once_settled(store:
     (problem,) = verify(store, repair=True)
     assert (problem.kind, problem.path) == ("leftover", store.champion_path(raced.id))
     assert "no record of its trial names it" in problem.reason
-    assert store.champion(raced.id)["w"].tolist() == [1.0, 1.0, 1.0]
+    assert store.champion_of(store.get(raced.id))["w"].tolist() == [1.0, 1.0, 1.0]
 
 
 def test_a_damaged_record_takes_all_its_champions_aside(store: Store, raced: TrialResult) -> None:
@@ -137,7 +137,7 @@ def test_a_crashed_trial_that_another_process_ran_again_meanwhile_keeps_a_matchi
     store.put(make_result(status="crashed"), {"w": np.zeros(1)})
     assert store.put(make_result(), {"w": np.ones(1)}) == "stored"
     assert store.put(make_result(metrics={"mean_success": 0.0}), {"w": np.full(1, 2.0)}) == "differs"
-    assert store.champion(make_result().id)["w"].tolist() == [1.0]
+    assert store.champion_of(store.get(make_result().id))["w"].tolist() == [1.0]
 
 
 @pytest.fixture(params=["links", "no links"])

@@ -41,7 +41,7 @@ def test_a_store_copied_over_another_holds_the_trials_of_both(
         assert {result.seed for result in one.results(errors)} == ours | theirs
         assert errors == []
         for seed in ours | theirs:
-            assert one.champion(make_result(seed).id)["w"][0] == seed
+            assert one.champion_of(one.get(make_result(seed).id))["w"][0] == seed
 
 
 def test_processes_that_put_the_same_trials_at_once_leave_a_sound_store(store: Store, make_result: Make) -> None:
@@ -70,7 +70,7 @@ def test_processes_that_put_the_same_trials_at_once_leave_a_sound_store(store: S
     assert {result.id for result in store.results(errors)} == {result.id for result in results}
     assert errors == []
     for result in results:
-        assert store.champion(result.id)["w"].shape == (1000,)
+        assert store.champion_of(store.get(result.id))["w"].shape == (1000,)
     assert not list(store.root.rglob("*.tmp"))
 
 

@@ -59,7 +59,7 @@ def test_the_champion_beside_a_record_is_the_one_of_the_same_trial_alone(tmp_pat
     batch, alone = Store(tmp_path / "batch"), Store(tmp_path / "alone")
     wanted = run(CONDITIONS["walker"], SEEDS, batch, cpus)[1]
     run(CONDITIONS["walker"], [wanted.seed], alone, cpus)
-    theirs, ours = batch.champion(wanted.id), alone.champion(wanted.id)
+    theirs, ours = batch.champion_of(batch.get(wanted.id)), alone.champion_of(alone.get(wanted.id))
     assert ours.keys() == theirs.keys()
     assert ours.keys()
     for leaf in ours:

@@ -11,7 +11,7 @@ from typing import Any, Final
 
 import jax
 import numpy as np
-from numpy.typing import NDArray
+from msgspec import convert
 
 from evoclaims.core.canonical import content_hash
 from evoclaims.core.errors import UserError
@@ -84,8 +84,7 @@ def find(folder: Path, condition: str, platform: str) -> list[Header]:
         DamagedFileError: when one of them is torn or edited.
     """
     found = [_header(path) for path in sorted(folder.glob(f"{condition}-*.npz"))]
-    headers = [header for header in found if header is not None]
-    return [h for h in headers if h.condition == condition and h.platform == platform and h.schema == SCHEMA]
+    return [header for header in found if header is not None and header.platform == platform]
 
 
 def sound_ones(folder: Path, condition: str) -> list[Header]:
@@ -94,9 +93,7 @@ def sound_ones(folder: Path, condition: str) -> list[Header]:
     for path in sorted(folder.glob(f"{condition}-*.npz")):
         with contextlib.suppress(DamagedFileError):
             headers.append(_header(path))
-    return [
-        header for header in headers if header is not None and header.condition == condition and header.schema == SCHEMA
-    ]
+    return [header for header in headers if header is not None]
 
 
 def newest(folder: Path, header: Header) -> Header | None:
@@ -112,28 +109,12 @@ def newest(folder: Path, header: Header) -> Header | None:
 
 
 def _header(path: Path) -> Header | None:
-    """Return a checkpoint's header, or None when the file is gone; its state is not read."""
+    """Return a checkpoint's header, or None when the file is gone or of another release; its state is not read."""
     try:
         with _opened(path) as (header, _):
-            return header
+            return header if header.schema == SCHEMA else None
     except FileNotFoundError:
         return None
-
-
-def read(path: Path) -> tuple[Header, list[NDArray[Any]]]:
-    """Return a checkpoint's header and the leaves of its state.
-
-    Raises:
-        DamagedFileError: when the file is torn, edited, misplaced or not a checkpoint.
-        FileNotFoundError: when it is gone.
-    """
-    with _opened(path) as (header, packed):
-        return header, [packed[name] for name in _leaves(packed)]
-
-
-def _leaves(packed: Packed) -> list[str]:
-    """Return the names of the state's leaves in order."""
-    return sorted(packed.kinds.keys() - {_HEADER})
 
 
 @contextlib.contextmanager
@@ -141,7 +122,7 @@ def _opened(path: Path) -> Iterator[tuple[Header, Packed]]:
     """Open a checkpoint and yield its header and its arrays, which can be read while it is open.
 
     Raises:
-        DamagedFileError: as for `read`, also for errors found inside the block.
+        DamagedFileError: when the file is torn, edited, misplaced or no checkpoint, also if that is found in the block.
         FileNotFoundError: when the file is gone.
     """
     try:
@@ -151,7 +132,7 @@ def _opened(path: Path) -> Iterator[tuple[Header, Packed]]:
             packed = Packed(file)
             if packed.nbytes(_HEADER) > _HEADER_BYTES:
                 raise DamagedFileError(path, "its header is longer than that of any batch of trials")
-            header = Header(**json.loads(packed[_HEADER].tobytes()))
+            header = convert(asdict(Header(**json.loads(packed[_HEADER].tobytes()))), Header)
             if header.schema == SCHEMA:
                 if not _is_sound(header):
                     raise DamagedFileError(path, "its header does not describe a batch of trials")
@@ -165,18 +146,11 @@ def _opened(path: Path) -> Iterator[tuple[Header, Packed]]:
 
 
 def _is_sound(header: Header) -> bool:
-    """Whether the fields of a header have the types and the sizes that the runner relies on."""
-    points = [point for curve in header.curves.values() for values in curve.values() for point in values]
+    """Whether the fields of a header fit each other as the runner relies on."""
     return (
         is_hash(header.condition)
-        and all(type(seed) is int for seed in header.batch)
         and all(seed is None or seed in header.batch for seed in header.lanes)
         and header.curves.keys() == {str(seed) for seed in header.batch}
-        and type(header.chunks) is int
-        and all(isinstance(number, int | float) for number in (*points, header.run_seconds, header.compile_seconds))
-        and isinstance(header.platform, str)
-        and isinstance(header.started, str)
-        and isinstance(header.versions, str)
     )
 
 
@@ -195,7 +169,7 @@ def restore(folder: Path, header: Header, like: Any) -> TrialState | None:
         with _opened(path) as (there, packed):
             if _text(there) != _text(header):
                 return None
-            names = _leaves(packed)
+            names = sorted(packed.kinds.keys() - {_HEADER})
             # Compare before reading: a file must not take more memory than the state it represents.
             if [packed.kinds[name] for name in names] != [(x.shape, x.dtype) for x in expected]:
                 raise UserError(

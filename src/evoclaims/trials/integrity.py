@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import dataclasses
 import itertools
 import os
@@ -15,7 +14,6 @@ from typing import Final, Literal
 
 from evoclaims.core.errors import UserError
 from evoclaims.core.printable import printable
-from evoclaims.trials.result import TrialResult
 from evoclaims.trials.store import DamagedFileError, Store
 from evoclaims.trials.store_files import SPARE_DIGITS, record_id
 
@@ -104,17 +102,8 @@ def _champions_of(store: Store, path: Path) -> tuple[Path, ...]:
     trial_id = record_id(path)
     if trial_id is None or path.parent != store.record_path(trial_id).parent:
         return ()
-    named = {store.champion_file(result) for result in _sound_records(store, trial_id)}
+    named = {store.champion_file(result) for result in store.results([], store.record_files(trial_id))}
     return tuple(champion for champion in store.champion_files(trial_id) if champion not in named)
-
-
-def _sound_records(store: Store, trial_id: str) -> Iterator[TrialResult]:
-    """Yield the readable records of a trial; unreadable ones are reported elsewhere."""
-    for path in store.record_files(trial_id):
-        with contextlib.suppress(DamagedFileError):
-            result = store.read(path)
-            if result is not None:
-                yield result
 
 
 def _champions(store: Store) -> Iterator[Problem]:

@@ -11,26 +11,14 @@ from collections.abc import Mapping
 from typing import Any, Final, NoReturn, cast
 
 from evoclaims.core.canonical import canonical_json
-from evoclaims.core.errors import UserError
-from evoclaims.core.printable import printable
 from evoclaims.trials.result import SCHEMA, TrialResult
-from evoclaims.trials.result_schema import Number, SchemaError, Vector, check
+from evoclaims.trials.result_schema import Number, RecordError, Vector, check
 
 _HASH: Final = re.compile(r"[0-9a-f]{64}")
 _WORDS: Final = {"nan": math.nan, "inf": math.inf, "-inf": -math.inf}
-_LONGEST: Final = 300
 _MOST_DIGITS: Final = 19
 _ENCODER: Final = json.JSONEncoder(sort_keys=True, separators=(",", ":"), allow_nan=False)
 _FIELDS: Final = {field.name for field in dataclasses.fields(TrialResult)} | {"schema", "seal"}
-
-
-class RecordError(UserError):
-    """A text is not a valid trial record; `reason` is a clause that says why."""
-
-    def __init__(self, reason: str) -> None:
-        """Store `reason` for a caller that knows the file name."""
-        super().__init__(f"This is not a sound trial record: {reason}.")
-        self.reason = reason
 
 
 def is_hash(text: object) -> bool:
@@ -57,10 +45,7 @@ def parse(data: bytes | str) -> TrialResult:
         _fail(f"these fields are missing or unknown: {', '.join(sorted(plain.keys() ^ _FIELDS))}")
     if not _is_sealed(data, plain):
         _fail("its contents do not match its seal, so it was torn or edited")
-    try:
-        record = check(plain)
-    except SchemaError as error:
-        _fail(str(error))
+    record = check(plain)
     spec = record.spec
     if type(spec.get("seed")) is not int or spec["seed"] != record.seed:
         _fail("its seed does not agree with its specification")
@@ -68,25 +53,14 @@ def parse(data: bytes | str) -> TrialResult:
         _fail("its id is not the hash of its specification")
     if _hash_of_json({key: value for key, value in spec.items() if key != "seed"}) != record.condition:
         _fail("its condition is not the hash of its specification without the seed")
-    return TrialResult(
-        id=record.id,
-        condition=record.condition,
-        spec=spec,
-        seed=record.seed,
-        status=record.status,
-        metrics={name: _number(value) for name, value in record.metrics.items()},
-        levels=_vectors(record.levels),
-        curves=_vectors(record.curves),
-        digest=record.digest,
-        timing=record.timing,
-        provenance=record.provenance,
-        champion=record.champion,
-    )
+    fields: dict[str, Any] = {name: getattr(record, name) for name in _FIELDS - {"schema", "seal"}}
+    fields["metrics"] = {name: _number(value) for name, value in record.metrics.items()}
+    return TrialResult(**{**fields, "levels": _vectors(record.levels), "curves": _vectors(record.curves)})
 
 
 def _fail(reason: str) -> NoReturn:
     """Raise `RecordError`."""
-    raise RecordError(printable(reason)[:_LONGEST])
+    raise RecordError(reason)
 
 
 def _is_sealed(data: bytes, plain: dict[str, Any]) -> bool:

@@ -10,10 +10,15 @@ from typing import Annotated, Any, Final, Literal
 
 from msgspec import Meta, Struct, ValidationError, convert
 
+from evoclaims.core.errors import UserError
+from evoclaims.core.printable import printable
 from evoclaims.trials.result import COMPLETE, Status
 
 DEEPEST: Final = 64
 """Maximum nesting of objects and lists in the free JSON parts of a record."""
+
+LONGEST_REASON: Final = 300
+"""Most characters of a reason."""
 
 LONGEST_SECONDS: Final = 1e10
 """Three hundred years: a longer time is an error; sums of shorter times stay finite."""
@@ -110,8 +115,13 @@ class Provenance(Struct):
     x64: bool | None = None
 
 
-class SchemaError(ValueError):
-    """A record does not fit the schema; the text is a clause that says where."""
+class RecordError(UserError):
+    """A text is not a valid trial record; `reason` is a clause that says why."""
+
+    def __init__(self, reason: str) -> None:
+        """Store `reason` for a caller that knows the file name."""
+        self.reason = printable(reason)[:LONGEST_REASON]
+        super().__init__(f"This is not a sound trial record: {self.reason}.")
 
 
 def check(plain: dict[str, Any]) -> Record:
@@ -121,7 +131,7 @@ def check(plain: dict[str, Any]) -> Record:
         plain: the record as read from JSON; its integers must fit into a float.
 
     Raises:
-        SchemaError: naming the first field that does not fit the schema.
+        RecordError: naming the first field that does not fit the schema.
     """
     _check_depth([plain["spec"], plain["timing"], plain["provenance"]])
     record: Record = _fitted(plain, Record, "")
@@ -132,7 +142,7 @@ def check(plain: dict[str, Any]) -> Record:
         _fitted(record.metrics, Metrics, "metrics")
         _fitted(record.levels, Levels, "levels")
     if len({len(curve) for curve in record.curves.values()}) > 1:
-        raise SchemaError("its curves are not equally long")
+        raise RecordError("its curves are not equally long")
     return record
 
 
@@ -143,9 +153,9 @@ def _fitted(value: Any, kind: Any, name: str) -> Any:
     except ValidationError as error:
         problem, _, path = str(error).partition(" - at `$")
         place = f"{name}{path.rstrip('`')}".lstrip(".").replace("[...]", "")
-        raise SchemaError(f"its {place or 'contents'} field is not as the schema says: {problem}") from error
+        raise RecordError(f"its {place or 'contents'} field is not as the schema says: {problem}") from error
     except UnicodeEncodeError as error:
-        raise SchemaError(f"a name in its {name} field is no text") from error
+        raise RecordError(f"a name in its {name} field is no text") from error
 
 
 def _check_depth(level: list[Any]) -> None:
@@ -155,7 +165,7 @@ def _check_depth(level: list[Any]) -> None:
         if not tables:
             return
         level = [item for table in tables for item in table]
-    raise SchemaError(f"it is nested too deeply: more than {DEEPEST} levels")
+    raise RecordError(f"it is nested too deeply: more than {DEEPEST} levels")
 
 
 _NESTING: Final = frozenset((dict, list))

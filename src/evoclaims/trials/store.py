@@ -25,7 +25,8 @@ from evoclaims.core.files import read_file, write_atomically, write_once
 from evoclaims.core.packages import Versions, agree, depends_on, recorded
 from evoclaims.trials.arrays import pack, unpack
 from evoclaims.trials.result import TrialResult
-from evoclaims.trials.result_codec import RecordError, dump, parse
+from evoclaims.trials.result_codec import dump, parse
+from evoclaims.trials.result_schema import RecordError
 from evoclaims.trials.store_files import StoreFiles, record_id
 from evoclaims.trials.store_mark import ADVICE, check_store, mark
 from evoclaims.trials.time_limit import time_allowed
@@ -99,8 +100,8 @@ class Store(StoreFiles):
             if result is not None and agree(result.provenance, versions):
                 return result
         # A record from when its condition declared other packages has their hash in its name.
-        rest = (self._sound(path) for path in self.record_files(trial_id) if path not in usual)
-        return next((result for result in rest if result is not None and agree(result.provenance, versions)), None)
+        rest = self.results([], (path for path in self.record_files(trial_id) if path not in usual))
+        return next((result for result in rest if agree(result.provenance, versions)), None)
 
     def get(self, trial_id: str, versions: Versions | None = None) -> TrialResult | None:
         """Return the record of a trial, made with any versions, or None when there is none.
@@ -120,16 +121,7 @@ class Store(StoreFiles):
 
     def others(self, trial_id: str, versions: Versions) -> tuple[TrialResult, ...]:
         """Return the records of a trial that were made with other versions; raises as `get` does."""
-        usual = self.record_path(trial_id, versions)
-        read = (self.read(path) for path in self.record_files(trial_id) if path != usual)
-        return tuple(result for result in read if result is not None and not agree(result.provenance, versions))
-
-    def _sound(self, path: Path) -> TrialResult | None:
-        """Read one of several records; a damaged one is None here, and `evoclaims verify` reports it."""
-        try:
-            return self.read(path)
-        except DamagedFileError:
-            return None
+        return tuple(result for result in self.records(trial_id) if not agree(result.provenance, versions))
 
     def read(self, path: Path) -> TrialResult | None:
         """Return the trial in the record file `path` of this store, or None when the file is not there.
@@ -158,16 +150,12 @@ class Store(StoreFiles):
 
     def home(self, result: TrialResult) -> Path:
         """Return where a record belongs."""
-        packages = depends_on(result.provenance)
-        versions = None if packages is None else recorded(result.provenance, packages)
-        return self.record_path(result.id, versions)
+        return self.record_path(result.id, _versions(result))
 
     def present(self, result: TrialResult) -> TrialResult | None:
         """Return the stored record of the same trial and versions as `result`; raises as `get` does."""
-        packages = depends_on(result.provenance)
-        if packages is None:
-            return self.read(self.record_path(result.id))
-        return self.made_with(result.id, recorded(result.provenance, packages))
+        versions = _versions(result)
+        return self.read(self.home(result)) if versions is None else self.made_with(result.id, versions)
 
     def put(self, result: TrialResult, champion: Mapping[str, Any]) -> Put:
         """Store a trial and its champion's parameters (named arrays of any shape; empty for none).
@@ -241,30 +229,20 @@ class Store(StoreFiles):
             if _sha256(path) == sealed.champion:
                 path.unlink(missing_ok=True)
 
-    def champion(self, trial_id: str) -> dict[str, NDArray[Any]]:
-        """Return the champion's parameters by name (empty when the trial has none).
+    def champion_of(self, result: TrialResult) -> dict[str, NDArray[Any]]:
+        """Return a champion's parameters by name for a record read from this store (empty when the trial has none).
 
         Raises:
-            UserError: when there is no such trial.
-            DamagedFileError: when the record or the champion is missing, torn or swapped.
+            DamagedFileError: when the champion is missing, torn or swapped.
         """
-        result = self.get(trial_id)
-        if result is None:
-            raise UserError(f"There is no trial {trial_id} in {self.root}.")
-        return self.champion_of(result)
-
-    def champion_of(self, result: TrialResult) -> dict[str, NDArray[Any]]:
-        """Return the champion's parameters for a record read from this store; raises as `champion` does."""
-        if not result.champion:
-            return {}
         data = self.packed_champion(result)
         try:
-            return unpack(data)
+            return unpack(data) if result.champion else {}
         except ValueError as error:
             raise DamagedFileError(self.champion_file(result), f"it is {error}") from error
 
     def packed_champion(self, result: TrialResult) -> bytes:
-        """Return the champion's file for a record read from this store, empty without one; raises as `champion`."""
+        """Return the champion's file for a record read from this store, empty without one; raises as `champion_of`."""
         if not result.champion:
             return b""
         path = self.champion_file(result)
@@ -281,19 +259,17 @@ class Store(StoreFiles):
         named = ((record_id(path), path) for path in self.record_paths())
         return tuple(sorted({one for one, path in named if one and path.parent == self.record_path(one).parent}))
 
-    def results(self, errors: list[DamagedFileError]) -> Iterator[TrialResult]:
-        """Iterate over every valid record in the order of ids; append an error to `errors` for each bad file.
+    def results(self, errors: list[DamagedFileError], paths: Iterable[Path] | None = None) -> Iterator[TrialResult]:
+        """Iterate over every valid record in the order of ids, or in some files; append to `errors` for each bad file.
 
         A trial that was run with several versions has several records.
         """
-        for path in self.record_paths():
+        for path in self.record_paths() if paths is None else paths:
             try:
-                result = self.read(path)
+                if (result := self.read(path)) is not None:
+                    yield result
             except DamagedFileError as error:
                 errors.append(error)
-                continue
-            if result is not None:
-                yield result
 
 
 def _gives_way(present: TrialResult, result: TrialResult) -> bool:
@@ -301,6 +277,12 @@ def _gives_way(present: TrialResult, result: TrialResult) -> bool:
     if present.status == "timeout":
         return result.status != "timeout" or time_allowed(result) > time_allowed(present)
     return present.status == "crashed" and present.digest != result.digest
+
+
+def _versions(result: TrialResult) -> Versions | None:
+    """Return the versions that the name of a record stands for; None for old ones, whose names have no versions."""
+    packages = depends_on(result.provenance)
+    return None if packages is None else recorded(result.provenance, packages)
 
 
 def newest(results: Iterable[TrialResult]) -> TrialResult | None:
