@@ -67,19 +67,9 @@ class ThreeStones(SteppingStones):
         return STONES
 
     @property
-    def boxes(self) -> tuple[Box, ...]:
-        """The walls."""
-        return WALL_BETWEEN.walls
-
-    @property
-    def area(self) -> Area:
-        """The ground between the outer walls."""
-        return WALL_BETWEEN.area
-
-    @property
-    def start(self) -> tuple[float, float]:
-        """Before the first stone."""
-        return WALL_BETWEEN.start
+    def plan(self) -> MazePlan:
+        """The room."""
+        return WALL_BETWEEN
 
 
 @dataclass(frozen=True)

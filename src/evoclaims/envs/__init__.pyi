@@ -6,12 +6,12 @@ from evoclaims.envs.base import fitting as fitting
 from evoclaims.envs.ecorobot.boxes import Box as Box
 from evoclaims.envs.ecorobot.brax_env import BraxEnv as BraxEnv
 from evoclaims.envs.ecorobot.deceptive import DeceptiveMaze as DeceptiveMaze
-from evoclaims.envs.ecorobot.deceptive import MazePlan as MazePlan
 from evoclaims.envs.ecorobot.locomotion import Locomotion as Locomotion
+from evoclaims.envs.ecorobot.maze import MazePlan as MazePlan
 from evoclaims.envs.ecorobot.obstacles import Obstacles as Obstacles
+from evoclaims.envs.ecorobot.outing import Ruling as Ruling
 from evoclaims.envs.ecorobot.robot_task import ROBOT_PACKAGES as ROBOT_PACKAGES
 from evoclaims.envs.ecorobot.robot_task import RobotTask as RobotTask
-from evoclaims.envs.ecorobot.robot_task import Ruling as Ruling
 from evoclaims.envs.ecorobot.robots import ANT as ANT
 from evoclaims.envs.ecorobot.robots import HALF_CHEETAH as HALF_CHEETAH
 from evoclaims.envs.ecorobot.robots import ROBOTS as ROBOTS

@@ -97,7 +97,7 @@ def test_a_frame_on_obstacles_is_that_of_mjx_though_only_the_two_nearest_are_sim
 def test_four_hundred_frames_along_walls_stay_with_mujoco() -> None:
     world = scene(SIMPLE_ROB, stones.WALLS)
     data = mujoco.MjData(world.whole)
-    data.qpos[:2] = stones.START
+    data.qpos[:2] = stones.PLAN.start
     # South, then east along the wall, on over the small oblique one, and west into it from the other side.
     pushes = np.repeat([[0, 0, 0, 1], [0, 1, 0, 1], [1, 1, 0, 1], [0, 0, 1, 1]], 20, axis=0).astype(np.float64)
     touching, way = 0, []
@@ -112,7 +112,7 @@ def test_four_hundred_frames_along_walls_stay_with_mujoco() -> None:
         body = physics.act(world, body, push, world.turns)
         return body, body.position
 
-    start = physics.resting(jnp.asarray([*stones.START, 0.0], jnp.float32), jnp.zeros(3))
+    start = physics.resting(jnp.asarray([*stones.PLAN.start, 0.0], jnp.float32), jnp.zeros(3))
     ours = quickly_compiled(lambda body: jax.lax.scan(act, body, jnp.asarray(pushes, jnp.float32)))(start)[1]
     assert touching >= 100
     np.testing.assert_allclose(ours, np.array(way), rtol=0.0, atol=1e-4)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar, Final, Literal, NamedTuple, get_args
+from typing import ClassVar, Final, Literal, get_args
 
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
@@ -12,21 +12,12 @@ from evoclaims.core.errors import UnknownNameError
 from evoclaims.core.pytree import pytree
 from evoclaims.envs.ecorobot import stones
 from evoclaims.envs.ecorobot.boxes import Box
-from evoclaims.envs.ecorobot.maze import Area, Maze
+from evoclaims.envs.ecorobot.maze import Maze, MazePlan
+from evoclaims.envs.ecorobot.outing import Outing, Ruling
 from evoclaims.envs.ecorobot.pose import Pose
-from evoclaims.envs.ecorobot.robot_task import ROBOT_PACKAGES, Outing, Ruling
+from evoclaims.envs.ecorobot.robot_task import ROBOT_PACKAGES
 
 Difficulty = Literal["easy", "difficult"]
-
-
-class MazePlan(NamedTuple):
-    """A maze: walls, the ground between them, start, target, and the distance that counts as reached, m."""
-
-    walls: tuple[Box, ...]
-    area: Area
-    start: tuple[float, float]
-    target: tuple[float, float]
-    within: float
 
 
 EASY: Final = MazePlan(
@@ -42,7 +33,7 @@ EASY: Final = MazePlan(
     target=(-4.0, 9.0),
     within=1.1,
 )
-DIFFICULT: Final = MazePlan(stones.WALLS, stones.AREA, stones.START, stones.TARGET, within=0.1)
+DIFFICULT: Final = stones.PLAN
 PLANS: Final = {"easy": EASY, "difficult": DIFFICULT}
 
 
@@ -85,26 +76,6 @@ class DeceptiveMaze(Maze):
     def plan(self) -> MazePlan:
         """The maze."""
         return PLANS[self.difficulty]
-
-    @property
-    def boxes(self) -> tuple[Box, ...]:
-        """The walls."""
-        return self.plan.walls
-
-    @property
-    def area(self) -> Area:
-        """The ground between the outer walls."""
-        return self.plan.area
-
-    @property
-    def start(self) -> tuple[float, float]:
-        """Where the robot starts."""
-        return self.plan.start
-
-    @property
-    def target(self) -> tuple[float, float]:
-        """The target's place."""
-        return self.plan.target
 
     def memory(self, pose: Pose) -> Approach:
         """Store the target's distance."""

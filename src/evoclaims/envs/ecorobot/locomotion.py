@@ -9,8 +9,9 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
 from evoclaims.envs.ecorobot.boxes import Box
+from evoclaims.envs.ecorobot.outing import Ruling
 from evoclaims.envs.ecorobot.pose import Pose
-from evoclaims.envs.ecorobot.robot_task import ROBOT_PACKAGES, RobotTask, Ruling
+from evoclaims.envs.ecorobot.robot_task import ROBOT_PACKAGES, RobotTask
 from evoclaims.envs.ecorobot.robots import HALF_CHEETAH, Robot
 
 

@@ -6,12 +6,13 @@ from abc import abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Final
+from typing import Final, NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float
 from numpy.typing import NDArray
+from scipy import ndimage
 
 from evoclaims.envs.ecorobot.boxes import Box
 from evoclaims.envs.ecorobot.robot_task import RobotTask
@@ -26,6 +27,16 @@ FINE: Final = 4
 """Points along each side of a cell for computing reachability."""
 
 
+class MazePlan(NamedTuple):
+    """A maze: walls, the ground between them, start, target, and the distance that counts as reached, m."""
+
+    walls: tuple[Box, ...]
+    area: Area
+    start: tuple[float, float]
+    target: tuple[float, float]
+    within: float
+
+
 @dataclass(frozen=True)
 class Maze(RobotTask):
     """A task among walls. The policy sees positions, velocities and five rangefinders."""
@@ -34,17 +45,31 @@ class Maze(RobotTask):
 
     @property
     @abstractmethod
-    def area(self) -> Area:
-        """The ground between the outer walls."""
+    def plan(self) -> MazePlan:
+        """The maze."""
 
     @property
-    @abstractmethod
+    def boxes(self) -> tuple[Box, ...]:
+        """The walls."""
+        return self.plan.walls
+
+    @property
+    def area(self) -> Area:
+        """The ground between the outer walls."""
+        return self.plan.area
+
+    @property
+    def start(self) -> tuple[float, float]:
+        """Where the robot starts, m."""
+        return self.plan.start
+
+    @property
     def target(self) -> tuple[float, float]:
         """The target's place, m."""
+        return self.plan.target
 
     def reachable(self, cells: tuple[int, int] = CELLS) -> NDArray[np.bool_]:
         """Return which cells of a grid over the area the torso's centre can reach, shape [cells along x, along y]."""
-        assert self.start is not None
         return _reachable(self.boxes, self.area, self.start, self.robot.torso_radius, cells)
 
     def path_measures(
@@ -76,14 +101,9 @@ def _reachable(
     for box in boxes:
         free &= box.distance(points) >= radius
     first = tuple(int(np.argmin(np.abs(axis - at))) for axis, at in zip(axes, start, strict=True))
-    flooded, edge = np.zeros_like(free), [first]
-    flooded[first] = True
-    while edge:
-        x, y = edge.pop()
-        for i, j in ((x + 1, y), (x - 1, y), (x, y + 1), (x, y - 1)):
-            if 0 <= i < free.shape[0] and 0 <= j < free.shape[1] and free[i, j] and not flooded[i, j]:
-                flooded[i, j] = True
-                edge.append((i, j))
+    free[first] = True
+    areas, _ = ndimage.label(free)
+    flooded = areas == areas[first]
     ground = flooded.reshape(cells[0], FINE, cells[1], FINE).any(axis=(1, 3))
     ground.setflags(write=False)
     return ground

@@ -13,8 +13,9 @@ from evoclaims.core.errors import UnknownNameError
 from evoclaims.core.pytree import pytree
 from evoclaims.envs.ecorobot.boxes import Box
 from evoclaims.envs.ecorobot.locomotion import forward
+from evoclaims.envs.ecorobot.outing import Outing, Ruling
 from evoclaims.envs.ecorobot.pose import Pose
-from evoclaims.envs.ecorobot.robot_task import ROBOT_PACKAGES, Outing, RobotTask, Ruling
+from evoclaims.envs.ecorobot.robot_task import ROBOT_PACKAGES, RobotTask
 from evoclaims.envs.ecorobot.robots import HALF_CHEETAH, Robot
 
 Heights = Literal["hierarchical", "medium", "high"]

@@ -6,7 +6,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from copy import copy
 from dataclasses import dataclass, field
-from functools import cached_property, lru_cache
+from functools import cached_property, lru_cache, partial
 from typing import Any, Final
 
 import jax
@@ -15,11 +15,11 @@ from jaxtyping import Array, Bool, Float, Int, PRNGKeyArray
 
 from evoclaims.core.errors import UserError
 from evoclaims.core.keys import streams
-from evoclaims.core.pytree import pytree, select, strong
+from evoclaims.core.pytree import select, strong
 from evoclaims.envs.base import Episode, PolicyFn, TaskState, fitting
 from evoclaims.envs.ecorobot import physics
 from evoclaims.envs.ecorobot.boxes import Box
-from evoclaims.envs.ecorobot.physics import Body
+from evoclaims.envs.ecorobot.outing import Outing, Ruling
 from evoclaims.envs.ecorobot.pose import Pose, torso
 from evoclaims.envs.ecorobot.robots import SIMPLE_ROB, Robot
 from evoclaims.envs.ecorobot.scene import Places, Scene, scene
@@ -28,42 +28,6 @@ from evoclaims.kernels.one_kernel import one_kernel
 
 ROBOT_PACKAGES: Final = ("llvmlite", "mujoco", "mujoco-mjx")
 """Packages that every robot task depends on; a task declares these and any others it needs."""
-
-
-@pytree
-class Outing:
-    """The inner state of an episode.
-
-    Attributes:
-        body: the moving state.
-        pose: the torso's.
-        time: environment steps made.
-        memory: the rule's memory.
-        effort: sum of the squared actions so far.
-        overturned: steps spent upside-down.
-    """
-
-    body: Body
-    pose: Pose
-    time: Int[Array, ""]
-    memory: Any
-    effort: Float[Array, ""]
-    overturned: Float[Array, ""]
-
-
-@pytree
-class Ruling:
-    """The rule's result for one step.
-
-    Attributes:
-        memory: the rule's new memory.
-        reward: of the step.
-        ended: whether the task is over.
-    """
-
-    memory: Any
-    reward: Float[Array, ""]
-    ended: Bool[Array, ""]
 
 
 @dataclass(frozen=True)
@@ -184,7 +148,7 @@ class RobotTask(ABC):
         )
         if self.start is not None:
             position = position.at[:2].set(jnp.asarray(self.start, jnp.float32))
-        draw = jax.random.normal if robot.normal_velocity else _uniform
+        draw = jax.random.normal if robot.normal_velocity else partial(jax.random.uniform, minval=-1.0, maxval=1.0)
         velocity = robot.velocity_noise * draw(velocity_key, (int(self.scene.model.nv),))
         pose = torso(self.scene, position)
         outing = strong(
@@ -312,8 +276,3 @@ def _kernel(task: RobotTask) -> Callable[[TaskState, Array, Places], TaskState]:
     return one_kernel(
         lambda state, action, places: task.with_numbers(places).plain_step(state, action), f"A step of {task.name}"
     )
-
-
-def _uniform(key: PRNGKeyArray, shape: tuple[int, ...]) -> Array:
-    """Draw from [-1, 1)."""
-    return jax.random.uniform(key, shape, minval=-1.0, maxval=1.0)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib import resources
 from typing import Final
 
@@ -119,19 +119,8 @@ HUMANOID: Final = Robot(
     scales_actions=True,
     free_coordinates=2,
 )
-WALKER2D: Final = Robot(
-    "walker2d",
-    BRAX + "walker2d.xml",
-    frames=4,
-    torso_radius=0.05,
-    control_cost=1e-3,
-    healthy_reward=1.0,
-    healthy_height=(0.8, 2.0),
-    healthy_pitch=1.0,
-    position_noise=5e-3,
-    velocity_noise=5e-3,
-    normal_velocity=False,
-    velocity_limit=10.0,
+WALKER2D: Final = replace(
+    HOPPER, name="walker2d", xml=BRAX + "walker2d.xml", healthy_height=(0.8, 2.0), healthy_pitch=1.0
 )
 
 ROBOTS: Final = {robot.name: robot for robot in (SIMPLE_ROB, ANT, HALF_CHEETAH, HOPPER, HUMANOID, WALKER2D)}

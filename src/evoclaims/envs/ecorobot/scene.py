@@ -100,11 +100,6 @@ class Scene:
         arrays = {name: getattr(self.whole, name)[box_geoms(self.whole)] for name in GEOMS}
         return {name: array for name, array in arrays.items() if np.ptp(array, axis=0).any()}
 
-    @property
-    def centres(self) -> NDArray[np.float32]:
-        """Centres of all boxes, shape [boxes, 3], m."""
-        return np.array([box.place for box in self.boxes], np.float32).reshape(-1, 3)
-
 
 @lru_cache(maxsize=64)
 def scene(robot: Robot, boxes: tuple[Box, ...] = ()) -> Scene:

@@ -21,10 +21,6 @@ ARENA: Final = math.hypot(8.0, 8.0)
 class Sensor(Protocol):
     """How a robot senses the world, as part of its observation."""
 
-    @property
-    def size(self) -> int:
-        """Number of readings."""
-
     def read(self, scene: Scene, pose: Pose) -> Float[Array, " size"]:
         """Return the readings, each in [0, 1]."""
 
@@ -44,11 +40,6 @@ class Rangefinders:
     def __post_init__(self) -> None:
         """Check the numbers."""
         _check(self.count, self.reach)
-
-    @property
-    def size(self) -> int:
-        """One reading per ray."""
-        return self.count
 
     def read(self, scene: Scene, pose: Pose) -> Float[Array, " size"]:
         """Return distance / reach of each ray, 1 for nothing."""
@@ -71,11 +62,6 @@ class PieSlices:
     def __post_init__(self) -> None:
         """Check the numbers."""
         _check(self.count, self.reach)
-
-    @property
-    def size(self) -> int:
-        """One reading per sector."""
-        return self.count
 
     def read(self, scene: Scene, pose: Pose) -> Float[Array, " size"]:
         """Return 1 for each sector in which one of five rays (at -45°, -22.5°, 0, 22.5°, 45°) hits, else 0."""
@@ -103,9 +89,10 @@ def distances(scene: Scene, pose: Pose, angles: np.ndarray) -> Float[Array, " ra
     if not scene.boxes:
         return nearest
     axes = jnp.asarray(np.stack([box.rotation for box in scene.boxes]), jnp.float32)
+    centres = jnp.asarray(np.array([box.place for box in scene.boxes], np.float32))
     sizes = jnp.asarray(np.stack([box.size for box in scene.boxes]), jnp.float32)
     # In each box's own frame (slab method, Kay and Kajiya 1986): rays × boxes × axes.
-    local_origins = jnp.einsum("rbi,bij->rbj", origins[:, None] - jnp.asarray(scene.centres)[None], axes)
+    local_origins = jnp.einsum("rbi,bij->rbj", origins[:, None] - centres[None], axes)
     local_directions = jnp.einsum("ri,bij->rbj", directions, axes)
     steep = jnp.where(jnp.abs(local_directions) < 1e-9, 1e-9, local_directions)
     one, other = (-sizes[None] - local_origins) / steep, (sizes[None] - local_origins) / steep

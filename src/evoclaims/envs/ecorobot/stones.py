@@ -10,9 +10,10 @@ from jaxtyping import Array, Bool, Float, Int
 
 from evoclaims.core.pytree import pytree
 from evoclaims.envs.ecorobot.boxes import Box
-from evoclaims.envs.ecorobot.maze import Area, Maze
+from evoclaims.envs.ecorobot.maze import Maze, MazePlan
+from evoclaims.envs.ecorobot.outing import Outing, Ruling
 from evoclaims.envs.ecorobot.pose import Pose
-from evoclaims.envs.ecorobot.robot_task import ROBOT_PACKAGES, Outing, Ruling
+from evoclaims.envs.ecorobot.robot_task import ROBOT_PACKAGES
 from evoclaims.envs.ecorobot.sensors import ARENA
 
 WALLS: Final = (
@@ -26,9 +27,8 @@ WALLS: Final = (
     Box((0.0, 0.5), (0.5, 0.1), angle=30.0),
     Box((2.5, 4.0), (1.5, 0.1), angle=-30.0),
 )
-AREA: Final[Area] = ((-4.0, 4.0), (0.0, 7.0))
-START: Final = (-3.0, 1.0)
 TARGET: Final = (-3.0, 6.0)
+PLAN: Final = MazePlan(WALLS, area=((-4.0, 4.0), (0.0, 7.0)), start=(-3.0, 1.0), target=TARGET, within=0.1)
 STONES: Final = ((-1.0, 2.5), (3.2, 1.0), (3.2, 2.5), (0.0, 4.5), (1.0, 6.0), (-2.0, 6.0), TARGET)
 """In order, m; the target is the last."""
 BONUS: Final = 1000.0
@@ -66,19 +66,9 @@ class SteppingStones(Maze):
         return STONES
 
     @property
-    def boxes(self) -> tuple[Box, ...]:
-        """The walls."""
-        return WALLS
-
-    @property
-    def area(self) -> Area:
-        """The ground between the outer walls."""
-        return AREA
-
-    @property
-    def start(self) -> tuple[float, float]:
-        """The lower left corner."""
-        return START
+    def plan(self) -> MazePlan:
+        """The maze."""
+        return PLAN
 
     @property
     def target(self) -> tuple[float, float]:

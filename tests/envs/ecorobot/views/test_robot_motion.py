@@ -13,7 +13,7 @@ from evoclaims.envs.ecorobot.deceptive import DeceptiveMaze
 from evoclaims.envs.ecorobot.obstacles import PLACES, Obstacles
 from evoclaims.envs.ecorobot.robots import ANT
 from evoclaims.envs.ecorobot.scene import scene
-from evoclaims.envs.ecorobot.stones import START, SteppingStones
+from evoclaims.envs.ecorobot.stones import PLAN, SteppingStones
 from evoclaims.envs.ecorobot.views.motion import at_start, motion
 
 STONES, RUN, ANT_MAZE = SteppingStones(), Obstacles(), DeceptiveMaze(robot=ANT)
@@ -59,7 +59,7 @@ def test_all_obstacles_are_shown_though_few_are_simulated() -> None:
 def test_a_maze_starts_with_the_robot_at_its_start() -> None:
     shown = at_start(STONES)
     assert shown.frames == 1
-    np.testing.assert_allclose(shown.torso[0], [*START, 0.2], atol=1e-6)
+    np.testing.assert_allclose(shown.torso[0], [*PLAN.start, 0.2], atol=1e-6)
 
 
 def test_nothing_is_shown_from_the_first_frame_on_that_is_not_finite() -> None:
