@@ -26,7 +26,7 @@ from evoclaims.methods.neat.neat import Neat
 from evoclaims.methods.neat.reproduction import offspring
 from evoclaims.methods.neat.settings import Attribute, Mutation, Settings, Species
 from evoclaims.methods.neat.species import SpeciesState, speciate
-from evoclaims.methods.tensorneat import NeatTensorneat, library, neat, policy
+from evoclaims.methods.tensorneat import NeatTensorneat, library, neat
 from evoclaims.methods.tensorneat_genes import Genes, translated
 from evoclaims.networks.graph import GraphNetwork
 from evoclaims.trials.result_making import is_sound
@@ -211,7 +211,7 @@ def test_a_new_level_resets_records_if_told_to(on_level_up: Any, level: int, for
 def test_ours_and_tensorneats_forward_pass_agree(evolved: Any) -> None:
     network = GraphNetwork(TASK.observation_size, TASK.action_size, LIVELY.activations, LIVELY.output)
     rows = jnp.concatenate([jax.random.normal(jax.random.key(0), (6, 3)), jnp.array([[0.5, jnp.nan, 1.0]])])
-    theirs = policy(neat(LIVELY, TASK.observation_size, TASK.action_size), _state()).function
+    theirs = NeatTensorneat(LIVELY).best(TASK, _state()).function
 
     def both(genome: Any) -> tuple[Any, Any]:
         graph, genes = network.express(genome), translated(genome)

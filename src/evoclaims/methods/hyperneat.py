@@ -10,13 +10,12 @@ from typing import ClassVar
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float, Int, PRNGKeyArray
+from jaxtyping import Array, Float
 
 from evoclaims.core.errors import UserError
 from evoclaims.envs.base import Task
-from evoclaims.methods.base import Policy, Progress
 from evoclaims.methods.neat import settings as neat
-from evoclaims.methods.neat.evolution import Evolution, begin, evolve, policy
+from evoclaims.methods.neat.evolution import GenomeMethod
 from evoclaims.methods.neat.settings import Settings
 from evoclaims.networks.genome import Genome
 from evoclaims.networks.graph import GraphNetwork
@@ -67,7 +66,7 @@ class SubstrateNetwork:
 
 
 @dataclass(frozen=True)
-class HyperNeat:
+class HyperNeat(GenomeMethod):
     """HyperNEAT on a layered substrate, or on one whose neurons are placed by hand.
 
     Attributes:
@@ -97,24 +96,6 @@ class HyperNeat:
                 "HyperNEAT's threshold lies in [0, 1) and its largest weight is finite and above 0: not "
                 f"{self.threshold} and {self.max_weight}."
             )
-
-    def init(self, key: PRNGKeyArray, task: Task) -> Evolution:
-        """Draw the first population of CPPNs; a `UserError` says when substrate and task do not fit."""
-        return begin(key, self.settings, self.encoding(task))
-
-    def step(
-        self, key: PRNGKeyArray, task: Task, level: Int[Array, ""], state: Evolution
-    ) -> tuple[Evolution, Progress]:
-        """Run one generation."""
-        return evolve(key, self.settings, self.encoding(task), task, level, state)
-
-    def best(self, task: Task, state: Evolution) -> Policy:
-        """Return the best CPPN of the last population that was evaluated, on the level it was evaluated on."""
-        return policy(self.encoding(task), state)
-
-    def cost(self, task: Task) -> int:
-        """Return the environment steps of one generation, at the longest episode."""
-        return self.settings.population * task.horizon
 
     def encoding(self, task: Task) -> SubstrateNetwork:
         """Return how a genome encodes a policy of the task's size."""

@@ -196,7 +196,7 @@ class Ppo:
         return networks.make_ppo_networks(
             task.observation_size,
             task.action_size,
-            preprocess_observations_fn=running_statistics.normalize if self.normalize_observations else _unchanged,
+            **({"preprocess_observations_fn": running_statistics.normalize} if self.normalize_observations else {}),
             policy_hidden_layer_sizes=self.policy_layers,
             value_hidden_layer_sizes=self.value_layers,
         )
@@ -272,8 +272,3 @@ class Ppo:
             Episode(fitness=examined.fitness, success=success),
             Episode(fitness=examined.fitness, success=jnp.zeros_like(success)),
         )
-
-
-def _unchanged(observation: Array, statistics: Any) -> Array:
-    """Leave the observation as it is."""
-    return observation

@@ -22,7 +22,7 @@ from evoclaims.core.pytree import pytree, strong
 from evoclaims.envs.base import Episode, PolicyFn, Task
 from evoclaims.methods.base import Policy, Progress
 from evoclaims.methods.champion import no_episode
-from evoclaims.methods.neat.settings import PAPER, Settings, Species
+from evoclaims.methods.neat.settings import PAPER, Settings
 from evoclaims.methods.tensorneat_genes import Genes, present
 from evoclaims.networks.activations import ACTIVATIONS
 
@@ -59,17 +59,54 @@ class NeatTensorneat:
 
     def init(self, key: PRNGKeyArray, task: Task) -> TensorneatState:
         """Draw the first population; a `UserError` says when TensorNEAT is missing or the network does not fit."""
-        return begin(key, self._algorithm(task))
+        algorithm, state = self._algorithm(task), library().common.State(randkey=jax.random.key_data(key))
+        with implicit_promotions():
+            made = strong(algorithm.setup(state))
+            nodes, connections = algorithm.ask(made)
+        return TensorneatState(
+            library=_plain(made),
+            level=jnp.zeros((), jnp.int32),
+            champion=Genes(nodes=nodes[0], connections=connections[0]),
+            episode=no_episode(),
+        )
 
     def step(
         self, key: PRNGKeyArray, task: Task, level: Int[Array, ""], state: TensorneatState
     ) -> tuple[TensorneatState, Progress]:
-        """Run one generation."""
-        return evolve(key, self._algorithm(task), self.settings.species, task, level, state)
+        """Evaluate the population on `level` and let TensorNEAT replace it by the next."""
+        algorithm = self._algorithm(task)
+        episode_key, reproduction_key = streams(key, "episode", "reproduction")
+        now = _restored(state.library, reproduction_key)
+        if self.settings.species.on_level_up == "reset":
+            now = _without_records(now, level != state.level)
+        genes = Genes(*algorithm.ask(now))
+        keys = jax.random.split(episode_key, genes.nodes.shape[0])
+        episodes = jax.vmap(lambda k, g: task.episode(_acting(algorithm, g), k, level))(keys, genes)
+        fitness = jnp.where(jnp.isnan(episodes.fitness), -jnp.inf, episodes.fitness)
+        best = fitness.shape[0] - 1 - jnp.argmax(fitness[::-1])
+        champion, episode = jax.tree.map(lambda leaf: leaf[best], (genes, episodes))
+        with implicit_promotions():
+            following = strong(algorithm.tell(now, fitness))
+        nodes, connections = _count(genes.nodes), _count(genes.connections)
+        metrics = {
+            "nodes": jnp.mean(nodes),
+            "connections": jnp.mean(connections),
+            "champion_nodes": nodes[best],
+            "champion_connections": connections[best],
+            "species": jnp.sum(~jnp.isnan(now.species.species_keys), dtype=jnp.int32).astype(jnp.float32),
+        }
+        progress = Progress(
+            fitness=episode.fitness,
+            success=episode.success,
+            healthy=jnp.isfinite(episode.fitness) & _is_whole(champion),
+            metrics=metrics,
+        )
+        return TensorneatState(library=_plain(following), level=level, champion=champion, episode=episode), progress
 
     def best(self, task: Task, state: TensorneatState) -> Policy:
-        """Return the best genome of the last population that was evaluated."""
-        return policy(self._algorithm(task), state)
+        """Return the best genome of the last population that was evaluated; its parameters are the genome."""
+        algorithm = self._algorithm(task)
+        return Policy(parameters=state.champion, function=lambda genes, x: _acting(algorithm, genes)(x))
 
     def used(self, parameters: Genes) -> Any:
         """Return only the rows that hold a gene."""
@@ -155,58 +192,6 @@ def neat(settings: Settings, inputs: int, outputs: int) -> Any:
         survival_threshold=species.survival,
         compatibility_threshold=species.threshold,
     )
-
-
-def begin(key: PRNGKeyArray, algorithm: Any) -> TensorneatState:
-    """Draw the first population; its first genome is the champion until one has been evaluated."""
-    state = library().common.State(randkey=jax.random.key_data(key))
-    with implicit_promotions():
-        made = strong(algorithm.setup(state))
-        nodes, connections = algorithm.ask(made)
-    return TensorneatState(
-        library=_plain(made),
-        level=jnp.zeros((), jnp.int32),
-        champion=Genes(nodes=nodes[0], connections=connections[0]),
-        episode=no_episode(),
-    )
-
-
-def evolve(
-    key: PRNGKeyArray, algorithm: Any, species: Species, task: Task, level: Int[Array, ""], state: TensorneatState
-) -> tuple[TensorneatState, Progress]:
-    """Evaluate the population on `level` and let TensorNEAT replace it by the next."""
-    episode_key, reproduction_key = streams(key, "episode", "reproduction")
-    now = _restored(state.library, reproduction_key)
-    if species.on_level_up == "reset":
-        now = _without_records(now, level != state.level)
-    genes = Genes(*algorithm.ask(now))
-    keys = jax.random.split(episode_key, genes.nodes.shape[0])
-    episodes = jax.vmap(lambda k, g: task.episode(_acting(algorithm, g), k, level))(keys, genes)
-    fitness = jnp.where(jnp.isnan(episodes.fitness), -jnp.inf, episodes.fitness)
-    best = fitness.shape[0] - 1 - jnp.argmax(fitness[::-1])
-    champion, episode = jax.tree.map(lambda leaf: leaf[best], (genes, episodes))
-    with implicit_promotions():
-        following = strong(algorithm.tell(now, fitness))
-    nodes, connections = _count(genes.nodes), _count(genes.connections)
-    metrics = {
-        "nodes": jnp.mean(nodes),
-        "connections": jnp.mean(connections),
-        "champion_nodes": nodes[best],
-        "champion_connections": connections[best],
-        "species": jnp.sum(~jnp.isnan(now.species.species_keys), dtype=jnp.int32).astype(jnp.float32),
-    }
-    progress = Progress(
-        fitness=episode.fitness,
-        success=episode.success,
-        healthy=jnp.isfinite(episode.fitness) & _is_whole(champion),
-        metrics=metrics,
-    )
-    return TensorneatState(library=_plain(following), level=level, champion=champion, episode=episode), progress
-
-
-def policy(algorithm: Any, state: TensorneatState) -> Policy:
-    """Return the champion as a policy; its parameters are the genome."""
-    return Policy(parameters=state.champion, function=lambda genes, x: _acting(algorithm, genes)(x))
 
 
 def _acting(algorithm: Any, genes: Genes) -> PolicyFn:

@@ -6,6 +6,9 @@ one. Every change of a genome keeps this order, and nothing ever sorts.
 
 from __future__ import annotations
 
+from dataclasses import replace
+from functools import partial
+
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int
@@ -83,21 +86,14 @@ class Genome:
 def resized(genomes: Genome, nodes: int, connections: int) -> Genome:
     """Cut or pad the last axis of every gene to these capacities; what is cut off must be empty."""
 
-    def resize(leaf: Array, size: int, empty: int) -> Array:
+    def resize(size: int, leaf: Array, empty: int = 0) -> Array:
         missing = size - leaf.shape[-1]
         if missing <= 0:
             return leaf[..., :size]
         return jnp.concatenate([leaf, jnp.full((*leaf.shape[:-1], missing), empty, leaf.dtype)], axis=-1)
 
-    old = genomes.nodes
-    return Genome(
-        nodes=Nodes(
-            key=resize(old.key, nodes, EMPTY),
-            bias=resize(old.bias, nodes, 0),
-            response=resize(old.response, nodes, 0),
-            activation=resize(old.activation, nodes, 0),
-        ),
-        connections=jax.tree.map(lambda leaf: resize(leaf, connections, 0), genomes.connections),
-        node_count=genomes.node_count,
-        connection_count=genomes.connection_count,
+    return replace(
+        genomes,
+        nodes=jax.tree.map(partial(resize, nodes), genomes.nodes, Nodes(EMPTY, 0, 0, 0)),
+        connections=jax.tree.map(partial(resize, connections), genomes.connections),
     )

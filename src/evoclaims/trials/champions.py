@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 from evoclaims.core.errors import UserError
 from evoclaims.core.keys import EVALUATION, TRAINING, trial_key
 from evoclaims.core.provenance import what_fixes_bits
-from evoclaims.envs.base import Episode, Task
+from evoclaims.envs.base import Episode
 from evoclaims.methods.base import Policy
+from evoclaims.methods.neat.evolution import GenomeMethod
 from evoclaims.networks.genome import Genome
 from evoclaims.networks.graph import GraphNetwork
 from evoclaims.networks.substrate import Substrate
@@ -27,34 +28,6 @@ from evoclaims.trials.result_making import named_leaves, provenance
 from evoclaims.trials.rollout import score_every_level
 from evoclaims.trials.spec import Condition
 from evoclaims.trials.store import Store
-
-
-class GenomeNetwork(Protocol):
-    """The network that a genome itself describes (see `GraphNetwork`)."""
-
-    @property
-    def inputs(self) -> int:
-        """Number of inputs."""
-
-    @property
-    def outputs(self) -> int:
-        """Number of outputs."""
-
-    @property
-    def activations(self) -> tuple[str, ...]:
-        """Activation functions that node genes index."""
-
-    @property
-    def output(self) -> str:
-        """Activation function of the outputs."""
-
-
-@runtime_checkable
-class Encoded(Protocol):
-    """A method whose policies' parameters may be genomes."""
-
-    def encoding(self, task: Task) -> GenomeNetwork:
-        """Return how a genome encodes a policy of the task's size."""
 
 
 @runtime_checkable
@@ -131,7 +104,7 @@ def replay(condition: Condition, result: TrialResult, parameters: Any, devices: 
 
 def network_of(condition: Condition, parameters: Any) -> GraphNetwork | None:
     """Return the network of a champion that is a genome; None for any other champion."""
-    if not isinstance(parameters, Genome) or not isinstance(condition.method, Encoded):
+    if not isinstance(parameters, Genome) or not isinstance(condition.method, GenomeMethod):
         return None
     encoding = condition.method.encoding(condition.task)
     return GraphNetwork(encoding.inputs, encoding.outputs, encoding.activations, encoding.output)

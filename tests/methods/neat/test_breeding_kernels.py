@@ -17,11 +17,10 @@ from hypothesis import strategies as st
 from without_kernels import BREEDING, without_kernels
 
 from evoclaims.envs.gates.parity import NParity
-from evoclaims.methods.neat.evolution import begin, evolve
+from evoclaims.methods.neat.neat import Neat
 from evoclaims.methods.neat.settings import Attribute, Mutation, Settings, Species
 from evoclaims.methods.neat.structure import descendants, packed
 from evoclaims.networks.genome import Genome
-from evoclaims.networks.graph import GraphNetwork
 
 
 def _both_ways(function: Callable[..., Any]) -> tuple[Any, Any]:
@@ -73,7 +72,7 @@ def test_nvidias_assembler_takes_the_kernels(tmp_path: Path) -> None:
 @pytest.mark.parametrize("most_nodes", [NODES, pytest.param(40, marks=pytest.mark.slow)])
 def test_thirty_generations_are_the_same_to_the_bit(most_nodes: int) -> None:
     """Of genomes that reach the limits of their arrays, in several species; two trials at once."""
-    task, network = NParity(3), GraphNetwork(3, 1)
+    task = NParity(3)
     chosen = Settings(
         population=24,
         nodes=most_nodes,
@@ -82,13 +81,15 @@ def test_thirty_generations_are_the_same_to_the_bit(most_nodes: int) -> None:
         species=Species(most=5, threshold=1.5, exempt=1, survival=0.4),
     )
 
+    method = Neat(chosen)
+
     def evolution(key: Any) -> Any:
         def generation(state: Any, key: Any) -> Any:
-            state, progress = evolve(key, chosen, network, task, jnp.zeros((), jnp.int32), state)
+            state, progress = method.step(key, task, jnp.zeros((), jnp.int32), state)
             return state, (progress, state.population.species.count)
 
         first, rest = jax.random.split(key)
-        return jax.lax.scan(generation, begin(first, chosen, network), jax.random.split(rest, 30))
+        return jax.lax.scan(generation, method.init(first, task), jax.random.split(rest, 30))
 
     by_kernels, without = (
         jax.device_get(each(jax.random.split(jax.random.key(5), 2))) for each in _both_ways(jax.vmap(evolution))

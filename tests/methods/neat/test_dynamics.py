@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from evoclaims.envs.gates.parity import NParity
-from evoclaims.methods.neat.evolution import Evolution, begin, evolve
+from evoclaims.methods.neat.evolution import Evolution
+from evoclaims.methods.neat.neat import Neat
 from evoclaims.methods.neat.settings import Mutation, Settings, Species
-from evoclaims.networks.graph import GraphNetwork
 
 pytestmark = pytest.mark.slow
 
@@ -22,7 +22,7 @@ SETTINGS = Settings(
     mutation=Mutation(node_add=0.1),
     species=Species(most=20, on_level_up="keep"),
 )
-TASK, NETWORK, LAST = NParity(6), GraphNetwork(6, 1), jnp.asarray(4, jnp.int32)
+TASK, LAST, METHOD = NParity(6), jnp.asarray(4, jnp.int32), Neat(SETTINGS)
 
 
 def test_genomes_have_as_many_nodes_after_120_generations_as_tensorneats() -> None:
@@ -35,10 +35,10 @@ def test_genomes_have_as_many_nodes_after_120_generations_as_tensorneats() -> No
         start, train = jax.random.split(key)
 
         def generation(state: Evolution, key: jax.Array) -> tuple[Evolution, jax.Array]:
-            state, progress = evolve(key, SETTINGS, NETWORK, TASK, LAST, state)
+            state, progress = METHOD.step(key, TASK, LAST, state)
             return state, progress.success
 
-        state = begin(start, SETTINGS, NETWORK)
+        state = METHOD.init(start, TASK)
         state, success = jax.lax.scan(generation, state, jax.random.split(train, GENERATIONS))
         return jnp.mean(state.population.genomes.node_count.astype(jnp.float32)), success
 

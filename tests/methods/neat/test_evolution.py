@@ -14,12 +14,12 @@ from genomes import at, read, read_all, same
 
 from evoclaims.envs.gates.parity import NParity
 from evoclaims.methods.neat import capacity
-from evoclaims.methods.neat.evolution import Evolution, begin, evolve, policy
+from evoclaims.methods.neat.evolution import Evolution
+from evoclaims.methods.neat.neat import Neat
 from evoclaims.methods.neat.settings import Attribute, LevelUp, Mutation, Settings, Species
 from evoclaims.networks.genome import resized
-from evoclaims.networks.graph import GraphNetwork
 
-TASK, NETWORK, POPULATION, GENERATIONS = NParity(3), GraphNetwork(3, 1), 24, 8
+TASK, POPULATION, GENERATIONS = NParity(3), 24, 8
 PEAK = 10.0
 """A record that no fitness on parity, at most 0, can beat."""
 
@@ -46,11 +46,13 @@ class Bench:
 def _bench(settings: Settings) -> Bench:
     keys = jax.random.split(jax.random.key(8), GENERATIONS)
 
+    method = Neat(settings)
+
     def generation(key: Any, level: Any, state: Evolution) -> Any:
-        return evolve(key, settings, NETWORK, TASK, level, state)
+        return method.step(key, TASK, level, state)
 
     with jax.numpy_dtype_promotion("strict"), jax.numpy_rank_promotion("raise"), jax.debug_key_reuse(True):
-        state = jax.jit(lambda key: begin(key, settings, NETWORK))(jax.random.key(2))
+        state = jax.jit(lambda key: method.init(key, TASK))(jax.random.key(2))
         level = jnp.zeros((), jnp.int32)
         step = jax.jit(generation).lower(keys[0], level, state).compile()
     states, reports = [state], []
@@ -144,7 +146,7 @@ def test_nobody_is_champion_before_the_first_evaluation(resetting: Bench) -> Non
 
 def test_the_policy_is_the_champions_network(resetting: Bench) -> None:
     state = resetting.states[-1]
-    act, rows = policy(NETWORK, jax.device_put(state)), TASK.table.inputs
+    act, rows = Neat().best(TASK, jax.device_put(state)), TASK.table.inputs
     wanted = reference.forward(read(state.champion), rows.astype(np.float64), 1)
     np.testing.assert_allclose(jax.vmap(act)(rows), wanted, atol=1e-5)
 

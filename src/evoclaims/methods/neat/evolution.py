@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from functools import partial
 from typing import Any, Protocol
 
@@ -25,6 +26,8 @@ class Encoding(Protocol):
 
     Attributes:
         inputs, outputs: of the network that the genome itself describes.
+        activations: functions that its node genes index.
+        output: function of its outputs.
     """
 
     @property
@@ -34,6 +37,14 @@ class Encoding(Protocol):
     @property
     def outputs(self) -> int:
         """Outputs of the genome's network."""
+
+    @property
+    def activations(self) -> tuple[str, ...]:
+        """Activation functions of its nodes."""
+
+    @property
+    def output(self) -> str:
+        """Activation function of its outputs."""
 
     def express(self, genome: Genome) -> Any:
         """Turn a genome into its phenotype: a tree of arrays."""
@@ -59,50 +70,63 @@ class Evolution:
     episode: Episode
 
 
-def begin(key: PRNGKeyArray, settings: Settings, encoding: Encoding) -> Evolution:
-    """Draw the first population; its first genome is the champion until one has been evaluated."""
-    population = first_population(key, settings, encoding.inputs, encoding.outputs)
-    return Evolution(
-        population=population,
-        level=jnp.zeros((), jnp.int32),
-        champion=jax.tree.map(lambda leaf: leaf[0], population.genomes),
-        episode=no_episode(),
-    )
+class GenomeMethod(ABC):
+    """A method that evolves genomes; a subclass, a frozen dataclass with `settings`, says what a genome encodes."""
 
+    settings: Settings
 
-def evolve(
-    key: PRNGKeyArray, settings: Settings, encoding: Encoding, task: Task, level: Int[Array, ""], state: Evolution
-) -> tuple[Evolution, Progress]:
-    """Evaluate the population on `level` and replace it by the next."""
-    population = state.population
-    if settings.species.on_level_up == "reset":
-        population = select(level == state.level, population, forget_records(population))
-    episode_key, reproduction_key = streams(key, "episode", "reproduction")
-    run = partial(_evaluate, encoding, task)
-    sizes = capacities(settings, encoding.inputs, encoding.outputs)
-    episodes = in_capacity(sizes, (population.genomes,), run, episode_key, level, population.genomes)
-    fitness = jnp.where(jnp.isnan(episodes.fitness), -jnp.inf, episodes.fitness)
-    # The newest of equals, as everywhere in NEAT.
-    best = settings.population - 1 - jnp.argmax(fitness[::-1])
-    champion, episode = jax.tree.map(lambda leaf: leaf[best], (population.genomes, episodes))
-    following = next_population(reproduction_key, settings, population, fitness, encoding.inputs, encoding.outputs)
-    genomes = population.genomes
-    metrics = {
-        "nodes": jnp.mean(genomes.node_count.astype(jnp.float32)),
-        "connections": jnp.mean(genomes.connection_count.astype(jnp.float32)),
-        "champion_nodes": champion.node_count.astype(jnp.float32),
-        "champion_connections": champion.connection_count.astype(jnp.float32),
-        "species": population.species.count.astype(jnp.float32),
-    }
-    genes = champion.nodes.bias, champion.nodes.response, champion.connections.weight
-    healthy = jnp.all(jnp.isfinite(jnp.concatenate([*genes, episode.fitness[None]])))
-    progress = Progress(fitness=episode.fitness, success=episode.success, healthy=healthy, metrics=metrics)
-    return Evolution(population=following, level=level, champion=champion, episode=episode), progress
+    @abstractmethod
+    def encoding(self, task: Task) -> Encoding:
+        """Return how a genome encodes a policy of the task's size; a `UserError` says when they do not fit."""
 
+    def init(self, key: PRNGKeyArray, task: Task) -> Evolution:
+        """Draw the first population; a `UserError` says when the smallest network does not fit."""
+        encoding = self.encoding(task)
+        population = first_population(key, self.settings, encoding.inputs, encoding.outputs)
+        return Evolution(
+            population=population,
+            level=jnp.zeros((), jnp.int32),
+            champion=jax.tree.map(lambda leaf: leaf[0], population.genomes),
+            episode=no_episode(),
+        )
 
-def policy(encoding: Encoding, state: Evolution) -> Policy:
-    """Return the champion as a policy; its parameters are the genome."""
-    return Policy(parameters=state.champion, function=lambda genome, x: encoding.apply(encoding.express(genome), x))
+    def step(
+        self, key: PRNGKeyArray, task: Task, level: Int[Array, ""], state: Evolution
+    ) -> tuple[Evolution, Progress]:
+        """Evaluate the population on `level` and replace it by the next."""
+        encoding, settings, population = self.encoding(task), self.settings, state.population
+        if settings.species.on_level_up == "reset":
+            population = select(level == state.level, population, forget_records(population))
+        episode_key, reproduction_key = streams(key, "episode", "reproduction")
+        run = partial(_evaluate, encoding, task)
+        sizes = capacities(settings, encoding.inputs, encoding.outputs)
+        episodes = in_capacity(sizes, (population.genomes,), run, episode_key, level, population.genomes)
+        fitness = jnp.where(jnp.isnan(episodes.fitness), -jnp.inf, episodes.fitness)
+        # The newest of equals, as everywhere in NEAT.
+        best = settings.population - 1 - jnp.argmax(fitness[::-1])
+        champion, episode = jax.tree.map(lambda leaf: leaf[best], (population.genomes, episodes))
+        following = next_population(reproduction_key, settings, population, fitness, encoding.inputs, encoding.outputs)
+        genomes = population.genomes
+        metrics = {
+            "nodes": jnp.mean(genomes.node_count.astype(jnp.float32)),
+            "connections": jnp.mean(genomes.connection_count.astype(jnp.float32)),
+            "champion_nodes": champion.node_count.astype(jnp.float32),
+            "champion_connections": champion.connection_count.astype(jnp.float32),
+            "species": population.species.count.astype(jnp.float32),
+        }
+        genes = champion.nodes.bias, champion.nodes.response, champion.connections.weight
+        healthy = jnp.all(jnp.isfinite(jnp.concatenate([*genes, episode.fitness[None]])))
+        progress = Progress(fitness=episode.fitness, success=episode.success, healthy=healthy, metrics=metrics)
+        return Evolution(population=following, level=level, champion=champion, episode=episode), progress
+
+    def best(self, task: Task, state: Evolution) -> Policy:
+        """Return the best genome of the last population that was evaluated, on the level it was evaluated on."""
+        encoding = self.encoding(task)
+        return Policy(parameters=state.champion, function=lambda genome, x: encoding.apply(encoding.express(genome), x))
+
+    def cost(self, task: Task) -> int:
+        """Return the environment steps of one generation, at the longest episode."""
+        return self.settings.population * task.horizon
 
 
 def _evaluate(

@@ -5,17 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from jaxtyping import Array, Int, PRNGKeyArray
-
 from evoclaims.envs.base import Task
-from evoclaims.methods.base import Policy, Progress
-from evoclaims.methods.neat.evolution import Evolution, begin, evolve, policy
+from evoclaims.methods.neat.evolution import GenomeMethod
 from evoclaims.methods.neat.settings import PAPER, Settings
 from evoclaims.networks.graph import GraphNetwork
 
 
 @dataclass(frozen=True)
-class Neat:
+class Neat(GenomeMethod):
     """NEAT whose genomes are the policies' networks."""
 
     name: ClassVar[str] = "neat"
@@ -23,24 +20,6 @@ class Neat:
     packages: ClassVar[tuple[str, ...]] = ("llvmlite",)
 
     settings: Settings = PAPER
-
-    def init(self, key: PRNGKeyArray, task: Task) -> Evolution:
-        """Draw the first population; a `UserError` says when the smallest network does not fit."""
-        return begin(key, self.settings, self.encoding(task))
-
-    def step(
-        self, key: PRNGKeyArray, task: Task, level: Int[Array, ""], state: Evolution
-    ) -> tuple[Evolution, Progress]:
-        """Run one generation."""
-        return evolve(key, self.settings, self.encoding(task), task, level, state)
-
-    def best(self, task: Task, state: Evolution) -> Policy:
-        """Return the best genome of the last population that was evaluated, on the level it was evaluated on."""
-        return policy(self.encoding(task), state)
-
-    def cost(self, task: Task) -> int:
-        """Return the environment steps of one generation, at the longest episode."""
-        return self.settings.population * task.horizon
 
     def encoding(self, task: Task) -> GraphNetwork:
         """Return how a genome encodes a policy of the task's size."""

@@ -5,6 +5,7 @@ TensorNEAT's variant: a species has a centre; a genome joins the nearest centre 
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import jax
@@ -95,8 +96,7 @@ def speciate(settings: Species, species: SpeciesState, population: Genome, gener
         founder = jnp.argmax(grouping.member_of == NONE).astype(jnp.int32)
         founded = _join(grouping, grouping.count, founder)
         distances = to_all(_at(population, founder))
-        founded = _attract(settings, founded, grouping.count, distances)
-        return _Grouping(grouping.count + 1, founded.centre_of, founded.member_of, founded.nearest)
+        return replace(_attract(settings, founded, grouping.count, distances), count=grouping.count + 1)
 
     def unfinished(grouping: _Grouping) -> Bool[Array, ""]:
         return jnp.any(grouping.member_of == NONE) & (grouping.count < settings.most)
@@ -131,8 +131,8 @@ def _at(genomes: Genome, place: Any) -> Genome:
 
 def _join(grouping: _Grouping, place: Int[Array, ""], chosen: Int[Array, ""]) -> _Grouping:
     """Make the genome `chosen` the centre of the species at `place`."""
-    return _Grouping(
-        count=grouping.count,
+    return replace(
+        grouping,
         centre_of=grouping.centre_of.at[place].set(chosen),
         member_of=grouping.member_of.at[chosen].set(place),
         nearest=grouping.nearest.at[chosen].set(0.0),
@@ -145,9 +145,8 @@ def _attract(
     """Add to the species at `place` all genomes within the threshold that are not in a nearer one."""
     free = grouping.member_of == NONE
     joins = (distances < settings.threshold) & (free | (distances < grouping.nearest))
-    return _Grouping(
-        count=grouping.count,
-        centre_of=grouping.centre_of,
+    return replace(
+        grouping,
         member_of=jnp.where(joins, place, grouping.member_of),
         nearest=jnp.where(joins, distances, grouping.nearest),
     )
