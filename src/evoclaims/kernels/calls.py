@@ -1,4 +1,4 @@
-"""Calls of kernels in XLA's programs, and what all of jax's primitives that call kernels have in common."""
+"""Calls of kernels in XLA's programs, by a primitive of jax: its rules for platforms, batches and derivatives."""
 
 from __future__ import annotations
 
@@ -9,8 +9,9 @@ from typing import Any, Final, Protocol
 
 import jax
 import numpy as np
+from jax.core import ShapedArray
 from jax.extend.core import Primitive
-from jax.interpreters import ad, mlir
+from jax.interpreters import ad, batching, mlir
 from jaxtyping import Array
 
 from evoclaims.kernels import gpu_kernel, machine_code
@@ -22,7 +23,17 @@ Shapes = Sequence[jax.ShapeDtypeStruct]
 
 
 class Callee(Protocol):
-    """A kernel; each method computes every element of a batch."""
+    """A kernel; each method that calls it computes every element of a batch."""
+
+    @property
+    def outputs(self) -> Shapes:
+        """Shapes of the results of one element."""
+
+    def batch(self, leaves: Sequence[Any]) -> tuple[int, ...]:
+        """Return the batch dimensions of arguments."""
+
+    def in_front(self, leaves: Sequence[Array], axes: Sequence[int | None]) -> list[Array]:
+        """Add a batch dimension, which each argument has at its axis, in front of the others."""
 
     def as_it_is(self, *leaves: Array) -> list[Array]:
         """Call the function itself."""
@@ -57,15 +68,6 @@ def on_gpu(text: str, operands: Sequence[Array], shapes: Shapes, threads: int) -
     )
 
 
-def register(primitive: Primitive) -> None:
-    """Register what a primitive with a `Callee` as parameter `kernel` does: on each platform, alone, as derivatives."""
-    primitive.def_impl(partial(_alone, primitive))
-    ad.primitive_jvps[primitive] = _derivative
-    mlir.register_lowering(primitive, _lowered(lambda kernel: kernel.as_it_is))
-    mlir.register_lowering(primitive, _lowered(lambda kernel: kernel.on_host), platform="cpu")
-    mlir.register_lowering(primitive, _lowered(_for_gpu), platform="cuda")
-
-
 @cache
 def _host_target(text: str) -> str:
     """Return the name under which XLA knows the kernel of a text; compile it first."""
@@ -75,10 +77,28 @@ def _host_target(text: str) -> str:
     return name
 
 
-def _alone(primitive: Primitive, *leaves: Array, kernel: Callee) -> list[Array]:
+CALL: Final = Primitive("kernel")
+"""A kernel's call: the arguments' batch dimensions are in front of its own; its parameter `kernel` is a `Callee`."""
+CALL.multiple_results = True
+
+
+@CALL.def_impl
+def _alone(*leaves: Array, kernel: Callee) -> list[Array]:
     """Run outside of compiled programs."""
-    made: list[Array] = jax.jit(partial(primitive.bind, kernel=kernel))(*leaves)
+    made: list[Array] = jax.jit(partial(CALL.bind, kernel=kernel))(*leaves)
     return made
+
+
+@CALL.def_abstract_eval
+def _shapes(*leaves: ShapedArray, kernel: Callee) -> list[ShapedArray]:
+    """Return the results' shapes."""
+    return [ShapedArray((*kernel.batch(leaves), *out.shape), out.dtype) for out in kernel.outputs]
+
+
+def _batched(leaves: Sequence[Array], axes: Sequence[int | None], kernel: Callee) -> tuple[list[Array], list[int]]:
+    """Compute a batch of calls."""
+    results = CALL.bind(*kernel.in_front(leaves, axes), kernel=kernel)
+    return results, [0] * len(results)
 
 
 def _derivative(values: Sequence[Any], tangents: Sequence[Any], kernel: Callee) -> Any:
@@ -100,3 +120,10 @@ def _for_gpu(kernel: Callee) -> Callable[..., list[Array]]:
     capability = getattr(jax.devices()[0], "compute_capability", None)
     is_new_enough = capability is None or float(capability) >= gpu_kernel.CAPABILITY
     return kernel.on_gpu if is_new_enough else kernel.as_it_is
+
+
+batching.primitive_batchers[CALL] = _batched
+ad.primitive_jvps[CALL] = _derivative
+mlir.register_lowering(CALL, _lowered(lambda kernel: kernel.as_it_is))
+mlir.register_lowering(CALL, _lowered(lambda kernel: kernel.on_host), platform="cpu")
+mlir.register_lowering(CALL, _lowered(_for_gpu), platform="cuda")

@@ -1,4 +1,4 @@
-"""Running a kernel over groups of rows, as jax's primitive `grouped`; `group_kernel` has the kernels' texts."""
+"""Running a kernel over groups of rows; `group_kernel` has the kernels' texts."""
 
 from __future__ import annotations
 
@@ -7,13 +7,10 @@ import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
-from typing import Any, Final
+from typing import Any
 
 import jax
 import jax.numpy as jnp
-from jax.core import ShapedArray
-from jax.extend.core import Primitive
-from jax.interpreters import batching
 from jaxtyping import Array
 
 from evoclaims.kernels import calls, group_kernel, machine_code
@@ -51,7 +48,7 @@ class GroupKernel:
         """Compute it, for any batch. With only the rows batched, or the groups, these are not copied."""
         if not self.supported:
             return list(self.function(*leaves))
-        made: list[Array] = CALL.bind(*leaves, kernel=self)
+        made: list[Array] = calls.CALL.bind(*leaves, kernel=self)
         return made
 
     @cached_property
@@ -77,6 +74,11 @@ class GroupKernel:
         shapes = (*self.groups, *self.rows)
         parts = [leaf.shape[: leaf.ndim - len(own.shape)] for leaf, own in zip(leaves, shapes, strict=True)]
         return tuple(1 if set(sizes) == {1} else next(s for s in sizes if s != 1) for sizes in zip(*parts, strict=True))
+
+    def in_front(self, leaves: Sequence[Array], axes: Sequence[int | None]) -> list[Array]:
+        """Add a batch dimension in front of the others, of size 1 where it is the same in the whole batch."""
+        pairs = zip(leaves, axes, strict=True)
+        return [leaf[None] if axis is None else jnp.moveaxis(leaf, axis, 0) for leaf, axis in pairs]
 
     def as_it_is(self, *leaves: Array) -> list[Array]:
         """Call the function itself, for every element of a batch."""
@@ -157,28 +159,3 @@ class GroupKernel:
 def _warn_once(text: str) -> None:
     """Warn, whatever the filters of warnings say, at most once in a process."""
     warnings.warn(text, stacklevel=6)
-
-
-CALL: Final = Primitive("grouped")
-"""A kernel's call: all arguments have the same number of batch dimensions in front, of size 1 where it is the same
-in the whole batch."""
-CALL.multiple_results = True
-
-
-@CALL.def_abstract_eval
-def _shapes(*leaves: ShapedArray, kernel: GroupKernel) -> list[ShapedArray]:
-    """Return the results' shapes."""
-    return [ShapedArray((*kernel.batch(leaves), *out.shape), out.dtype) for out in kernel.outputs]
-
-
-def _batched(leaves: Sequence[Array], axes: Sequence[int | None], kernel: GroupKernel) -> tuple[list[Array], list[int]]:
-    """Add a batch dimension in front of the others."""
-    moved = [
-        leaf[None] if axis is None else jnp.moveaxis(leaf, axis, 0) for leaf, axis in zip(leaves, axes, strict=True)
-    ]
-    results = CALL.bind(*moved, kernel=kernel)
-    return results, [0] * len(results)
-
-
-batching.primitive_batchers[CALL] = _batched
-calls.register(CALL)

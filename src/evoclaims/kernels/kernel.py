@@ -92,6 +92,17 @@ class Kernel:
         shape: tuple[int, ...] = leaves[deepest].shape[: depths[deepest]]
         return shape
 
+    def in_front(self, leaves: Sequence[Array], axes: Sequence[int | None]) -> list[Array]:
+        """Add a batch dimension in front of the others; arguments that are the same in the whole batch stay so."""
+        size = next(leaf.shape[axis] for leaf, axis in zip(leaves, axes, strict=True) if axis is not None)
+
+        def moved(leaf: Array, axis: int | None, alone: jax.ShapeDtypeStruct) -> Array:
+            if axis is not None:
+                return jnp.moveaxis(leaf, axis, 0)
+            return leaf if leaf.ndim == len(alone.shape) else jnp.broadcast_to(leaf, (size, *leaf.shape))
+
+        return list(map(moved, leaves, axes, self.shapes))
+
     def on_host(self, *leaves: Array) -> list[Array]:
         """Call the kernel for this machine's processor, for every element of a batch."""
 

@@ -5,16 +5,12 @@ XLA splits a robot's time step into some hundred kernels. Here the whole step is
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import cache
-from typing import Any, Final
+from typing import Any
 
 import jax
 import jax.numpy as jnp
-from jax.core import ShapedArray
-from jax.extend.core import Primitive
-from jax.interpreters import batching
-from jaxtyping import Array
 
 from evoclaims.kernels import calls
 from evoclaims.kernels.kernel import Kernel, Shapes
@@ -41,34 +37,6 @@ def one_kernel(function: Callable[..., Any], name: str) -> Callable[..., Any]:
         made = kernel(treedef, tuple(jax.ShapeDtypeStruct(leaf.shape, leaf.dtype) for leaf in leaves))
         if not leaves or not made.supported:
             return function(*arguments)
-        return jax.tree.unflatten(made.structure, CALL.bind(*leaves, kernel=made))
+        return jax.tree.unflatten(made.structure, calls.CALL.bind(*leaves, kernel=made))
 
     return run
-
-
-CALL: Final = Primitive("one_kernel")
-"""A kernel's call: the arguments' batch dimensions are in front of the kernel's own."""
-CALL.multiple_results = True
-
-
-@CALL.def_abstract_eval
-def _shapes(*leaves: ShapedArray, kernel: Kernel) -> list[ShapedArray]:
-    """Return the results' shapes."""
-    return [ShapedArray((*kernel.batch(leaves), *out.shape), out.dtype) for out in kernel.outputs]
-
-
-def _batched(leaves: Sequence[Array], axes: Sequence[int | None], kernel: Kernel) -> tuple[list[Array], list[int]]:
-    """Add a batch dimension in front of the others; arguments that are the same in the whole batch stay as they are."""
-    size = next(leaf.shape[axis] for leaf, axis in zip(leaves, axes, strict=True) if axis is not None)
-
-    def in_front(leaf: Array, axis: int | None, alone: jax.ShapeDtypeStruct) -> Array:
-        if axis is not None:
-            return jnp.moveaxis(leaf, axis, 0)
-        return leaf if leaf.ndim == len(alone.shape) else jnp.broadcast_to(leaf, (size, *leaf.shape))
-
-    results = CALL.bind(*map(in_front, leaves, axes, kernel.shapes), kernel=kernel)
-    return results, [0] * len(results)
-
-
-batching.primitive_batchers[CALL] = _batched
-calls.register(CALL)

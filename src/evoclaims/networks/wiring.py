@@ -13,6 +13,7 @@ from evoclaims.core.pytree import pytree
 from evoclaims.kernels.control import repeat
 from evoclaims.kernels.group_kernel import Rows
 from evoclaims.kernels.grouped import GroupKernel
+from evoclaims.kernels.words import load, store
 from evoclaims.networks.genome import Genome
 
 
@@ -94,41 +95,32 @@ def _write(lanes: Rows, nodes: int, connections: int, groups: Sequence[str], res
     places = page.allocate("i32", nodes, 4)
     count = page.put(f"load i32, ptr {count_at}, align 4")
 
-    def at(array: str, place: str) -> str:
-        return page.put(f"getelementptr i32, ptr {array}, i32 {place}")
-
-    def load(array: str, place: str) -> str:
-        return page.put(f"load i32, ptr {at(array, place)}, align 4")
-
-    def store(value: str, array: str, place: str) -> None:
-        page.write(f"store i32 {value}, ptr {at(array, place)}, align 4")
-
     def clear(slot: str) -> list[str]:
-        store("0", places, slot)
+        store(page, "0", places, slot)
         return []
 
     def tally(connection: str) -> list[str]:
-        slot = load(target, connection)
-        store(page.put(f"add i32 {load(places, slot)}, 1"), places, slot)
+        slot = load(page, target, connection)
+        store(page, page.put(f"add i32 {load(page, places, slot)}, 1"), places, slot)
         return []
 
     def add_up(slot: str, before: str) -> list[str]:
-        after = page.put(f"add i32 {before}, {load(places, slot)}")
-        store(before, places, slot)
-        store(after, ends, slot)
+        after = page.put(f"add i32 {before}, {load(page, places, slot)}")
+        store(page, before, places, slot)
+        store(page, after, ends, slot)
         return [after]
 
     def move(connection: str) -> list[str]:
-        slot = load(target, connection)
-        place = load(places, slot)
-        store(page.put(f"add i32 {place}, 1"), places, slot)
-        store(load(source, connection), sorted_source, place)
-        store(load(weight, connection), sorted_weight, place)  # as bits
+        slot = load(page, target, connection)
+        place = load(page, places, slot)
+        store(page, page.put(f"add i32 {place}, 1"), places, slot)
+        store(page, load(page, source, connection), sorted_source, place)
+        store(page, load(page, weight, connection), sorted_weight, place)  # as bits
         return []
 
     def empty(place: str) -> list[str]:
-        store("0", sorted_source, place)
-        store("0", sorted_weight, place)
+        store(page, "0", sorted_source, place)
+        store(page, "0", sorted_weight, place)
         return []
 
     repeat(page, "0", str(nodes), [], clear)
