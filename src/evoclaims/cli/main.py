@@ -38,7 +38,9 @@ def _ended(arguments: Sequence[str] | None) -> int:
     """Run one command to its end, or print the sentence that says why it failed."""
     options = _parser().parse_args(arguments)
     try:
-        options.storage = _storage(options)
+        from evoclaims.cli.storage import storage_of
+
+        options.storage = storage_of(options.storage, options.command)
         run = _command(options.command)
         with interrupted_by(signal.SIGTERM):
             status: int = run(options)
@@ -58,13 +60,6 @@ def _command(name: str) -> Callable[[argparse.Namespace], int]:
 
     function: Callable[[argparse.Namespace], int] = importlib.import_module(f"evoclaims.cli.{name}").main
     return function
-
-
-def _storage(options: argparse.Namespace) -> str:
-    """Return the folder of the command's store."""
-    from evoclaims.cli.storage import storage_of
-
-    return storage_of(options.storage, options.command)
 
 
 def _parser() -> argparse.ArgumentParser:

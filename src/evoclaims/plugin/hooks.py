@@ -5,8 +5,7 @@ Nothing heavy is imported here at the top: pytest loads this file in every run o
 
 from __future__ import annotations
 
-import re
-from collections.abc import Callable, Generator, Iterable
+from collections.abc import Callable, Generator
 from typing import TYPE_CHECKING, Any
 
 import pytest
@@ -96,11 +95,11 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
             tests = claim_tests(items)
         config.stash[KNOWN] = {test.claim.id for test in tests.values()}
-        wanted = _wanted_claims(config, tests.values())
+        wanted = options.wanted_claims(config, tests.values())
     except UserError as error:
         _refuse(config, items, error)
         return
-    tiers = _wanted_tiers(config)
+    tiers = options.wanted_tiers(config)
     dropped = [
         item
         for item, test in tests.items()
@@ -109,25 +108,6 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     if dropped:
         config.hook.pytest_deselected(items=dropped)
         items[:] = [item for item in items if item not in set(dropped)]
-
-
-def _wanted_tiers(config: pytest.Config) -> set[str]:
-    """Return the tiers that the options select; "full" only when --claims-tier or -m names it positively."""
-    tier = config.getoption("claims_tier")
-    if tier is not None:
-        return {tier}
-    named = re.sub(r"\bnot\s+full\b", "", config.getoption("markexpr") or "")
-    return set(TIERS) if re.search(r"\bfull\b", named) else {"smoke"}
-
-
-def _wanted_claims(config: pytest.Config, tests: Iterable[ClaimTest]) -> set[str]:
-    """Return the ids, and the names with a case such as G1[n_parity], that --claims-only selects."""
-    option, ids = config.getoption("claims_only"), {test.claim.id for test in tests}
-    if option is None:
-        return ids
-    from evoclaims.claims.selection import selected
-
-    return selected(option, ids | {test.key[1] for test in tests})
 
 
 def _refuse(config: pytest.Config, items: list[pytest.Item], error: UserError) -> None:
@@ -297,7 +277,7 @@ def pytest_report_teststatus(
     from evoclaims.verdicts.claim_report import ClaimReport
 
     claimed = ClaimReport.from_json(plain)
-    outcome = Outcome(claimed.outcome)
+    outcome = claimed.outcome
     words = f"{outcome} (accepted)" if claimed.as_expected else str(outcome)
     colour = {"red": True} if report.failed else {"green": True} if outcome == Outcome.SUPPORTED else {"yellow": True}
     return words, outcome.symbol, (words.upper(), colour)

@@ -1,12 +1,17 @@
-"""The options of the pytest plugin, and the check of their values before anything is collected."""
+"""The options of the pytest plugin, the check of their values before anything is collected, and what they select."""
 
 from __future__ import annotations
 
-from typing import Final
+import re
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Final
 
 import pytest
 
 from evoclaims.core.errors import UnknownNameError, UserError
+
+if TYPE_CHECKING:
+    from evoclaims.claims.collected import ClaimTest
 
 TIERS: Final = ("smoke", "full")
 
@@ -71,6 +76,25 @@ def check(config: pytest.Config) -> None:
             )
     except UserError as error:
         raise pytest.UsageError(str(error)) from error
+
+
+def wanted_tiers(config: pytest.Config) -> set[str]:
+    """Return the tiers that the options select; "full" only when --claims-tier or -m names it positively."""
+    tier = config.getoption("claims_tier")
+    if tier is not None:
+        return {tier}
+    named = re.sub(r"\bnot\s+full\b", "", config.getoption("markexpr") or "")
+    return set(TIERS) if re.search(r"\bfull\b", named) else {"smoke"}
+
+
+def wanted_claims(config: pytest.Config, tests: Iterable[ClaimTest]) -> set[str]:
+    """Return the ids, and the names with a case such as G1[n_parity], that --claims-only selects."""
+    option, ids = config.getoption("claims_only"), {test.claim.id for test in tests}
+    if option is None:
+        return ids
+    from evoclaims.claims.selection import selected
+
+    return selected(option, ids | {test.key[1] for test in tests})
 
 
 def _check_changes(config: pytest.Config, changes: str) -> None:
