@@ -4,10 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import combinations
 from typing import Any, Final
 
+from scipy.stats import kruskal, mannwhitneyu
+
 from evoclaims.figures.style import INK, TEXT
-from evoclaims.judging.descriptive import ASTERISKS, kruskal_wallis, pairwise_mann_whitney
+
+ASTERISKS: Final = ((0.0005, "***"), (0.005, "**"), (0.05, "*"))
+"""The paper's thresholds: one, two and three asterisks for p below 0.05, 0.005 and 0.0005."""
 
 LEVEL: Final = ASTERISKS[-1][0]
 """Pairs are compared where the Kruskal-Wallis test of their family is below this."""
@@ -51,11 +56,23 @@ def compare(samples: Sequence[Sequence[float]], families: Sequence[Sequence[int]
         present = tuple(i for i in family if samples[i])
         if len(present) < 2:
             continue
-        overall = kruskal_wallis([samples[i] for i in present])
-        for pair in pairwise_mann_whitney({str(i): samples[i] for i in present}):
-            stars = pair.asterisks if overall < LEVEL else ""
-            found.append(PairTest(int(pair.left), int(pair.right), present, pair.p, overall, stars))
+        overall = _kruskal_wallis([samples[i] for i in present])
+        for left, right in combinations(present, 2):
+            p = _mann_whitney(samples[left], samples[right])
+            stars = next((stars for threshold, stars in ASTERISKS if p < threshold and overall < LEVEL), "")
+            found.append(PairTest(left, right, present, p, overall, stars))
     return tuple(found)
+
+
+def _kruskal_wallis(groups: Sequence[Sequence[float]]) -> float:
+    """Return the p of the Kruskal-Wallis test that all groups share a distribution (asymptotic, as in the paper)."""
+    constant = len({value for group in groups for value in group}) == 1  # scipy has no p for constant data
+    return 1.0 if constant else float(kruskal(*groups).pvalue)
+
+
+def _mann_whitney(a: Sequence[float], b: Sequence[float]) -> float:
+    """Return the p of the two-sided Mann-Whitney U test (scipy's default method, as in the paper)."""
+    return 1.0 if len({*a, *b}) == 1 else float(mannwhitneyu(a, b, alternative="two-sided").pvalue)
 
 
 def stack(spans: Sequence[tuple[float, float]], tops: Sequence[tuple[float, float]], row: float) -> list[float]:

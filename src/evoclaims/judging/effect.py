@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import statistics
 from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
+
+LEVEL = 0.95
+"""Of the intervals."""
 
 BOOTSTRAP_SEED = 20250714
 """Fixed, so that the same trials always give the same interval."""
@@ -34,20 +38,16 @@ def a12(a: Sequence[float], b: Sequence[float]) -> float:
 
 def median(values: Sequence[float]) -> float:
     """Return the median; infinities (failed trials) rank as such."""
-    ordered = sorted(values)
-    low, high = ordered[(len(ordered) - 1) // 2], ordered[len(ordered) // 2]
-    return float(low if low == high else (low + high) / 2)
+    return float(statistics.median(values))
 
 
-def _percentiles(statistics: Floats, level: float) -> tuple[float, float]:
-    """Return the ends of the middle `level` of bootstrap statistics; no interpolation, since inf - inf is NaN."""
-    low, high = np.quantile(statistics, [(1 - level) / 2, (1 + level) / 2], method="inverted_cdf")
+def _percentiles(resampled: Floats) -> tuple[float, float]:
+    """Return the ends of the middle 95% of bootstrap statistics; no interpolation, since inf - inf is NaN."""
+    low, high = np.quantile(resampled, [(1 - LEVEL) / 2, (1 + LEVEL) / 2], method="inverted_cdf")
     return float(low), float(high)
 
 
-def a12_interval(
-    a: Sequence[float], b: Sequence[float], level: float = 0.95, resamples: int = 1000
-) -> tuple[float, float]:
+def a12_interval(a: Sequence[float], b: Sequence[float], resamples: int = 1000) -> tuple[float, float]:
     """Return the percentile bootstrap interval of A12 (fixed seed).
 
     Percentile rather than BCa: BCa fails on constant data, which solved tasks give.
@@ -56,14 +56,14 @@ def a12_interval(
     left, right = np.asarray(a, np.float64), np.asarray(b, np.float64)
     drawn_left = left[rng.integers(0, len(left), (resamples, len(left)))]
     drawn_right = right[rng.integers(0, len(right), (resamples, len(right)))]
-    return _percentiles((_dominance(drawn_left, drawn_right) + 1) / 2, level)
+    return _percentiles((_dominance(drawn_left, drawn_right) + 1) / 2)
 
 
-def median_interval(values: Sequence[float], level: float = 0.95, resamples: int = 1000) -> tuple[float, float]:
+def median_interval(values: Sequence[float], resamples: int = 1000) -> tuple[float, float]:
     """Return the percentile bootstrap interval of the median (fixed seed)."""
     rng = np.random.default_rng(BOOTSTRAP_SEED)
     ordered = np.asarray(values, np.float64)
     drawn = np.sort(ordered[rng.integers(0, len(ordered), (resamples, len(ordered)))], axis=1)
     low, high = drawn[:, (len(ordered) - 1) // 2], drawn[:, len(ordered) // 2]
     medians = np.array([x if x == y else (x + y) / 2 for x, y in zip(low, high, strict=True)], np.float64)
-    return _percentiles(medians, level)
+    return _percentiles(medians)

@@ -54,8 +54,25 @@ class TrialReading(ABC):
         """
 
 
+class ScalarReading(TrialReading):
+    """One number per trial, or 1 and 0."""
+
+    @abstractmethod
+    def of(self, trial: TrialResult) -> float:
+        """Return what is read from one trial, of any status; raises as `TrialReading.of` does."""
+
+    def sample(self, trials: Trials) -> Sample:
+        """Read every trial of the condition.
+
+        Raises:
+            UnreadableTrialError: when a NaN is read from a finished trial.
+        """
+        mine = trials[self.source.fingerprint]
+        return sample(self.describe(), mine, list(map(self.of, mine)))
+
+
 @dataclass(frozen=True, eq=False)
-class NumberReading(TrialReading):
+class NumberReading(ScalarReading):
     """One number per trial.
 
     Attributes:
@@ -74,22 +91,13 @@ class NumberReading(TrialReading):
         """Return what the fingerprint hashes."""
         return {**super().plain(), "better": self.better}
 
-    def sample(self, trials: Trials) -> Sample:
-        """Read the number from every trial of the condition.
-
-        Raises:
-            UnreadableTrialError: when a NaN is read from a finished trial.
-        """
-        mine = trials[self.source.fingerprint]
-        return sample(self.describe(), mine, list(map(self.of, mine)))
-
     def of(self, trial: TrialResult) -> float:
         """Return the number of one trial; the worst value for a failed one."""
         return read_number(trial, self.describe(), self.read, _worst(self.better))
 
 
 @dataclass(frozen=True, eq=False)
-class EventReading(TrialReading):
+class EventReading(ScalarReading):
     """Something that holds in a trial or does not; it never holds in a failed trial.
 
     Attributes:
@@ -97,15 +105,6 @@ class EventReading(TrialReading):
     """
 
     holds: Callable[[TrialResult], bool]
-
-    def sample(self, trials: Trials) -> Sample:
-        """Return 1.0 for every trial in which the event holds, 0.0 for the others.
-
-        Raises:
-            UnreadableTrialError: when a NaN is read from a finished trial.
-        """
-        mine = trials[self.source.fingerprint]
-        return sample(self.describe(), mine, list(map(self.of, mine)))
 
     def of(self, trial: TrialResult) -> float:
         """Return 1.0 if the event holds in a trial, else 0.0."""
