@@ -136,7 +136,7 @@ def _work(session: Session, fetch: RunMissing, tier: str, group: TrialGroup, pla
     here, elsewhere = took(_made_here(session.store, condition, seeds), platform), None
     with suppress(UserError):  # what is wrong with the reference trials is told at the end of the run
         folder = session.reproduction.references_of(session.variant)
-        trials = references.load(references.path_of(folder, tier, group.method, group.task))
+        trials = references.committed(folder, tier, group.method, group.task)
         elsewhere = took((one for one in trials if one.condition == condition.id), platform)
     files = (session.store.record_path(TrialSpec(condition, seed).id, versions) for seed in missing)
     return Work(

@@ -19,9 +19,9 @@ from evoclaims.paper.spent import Spent, spent
 from evoclaims.report.console import PlainSpokenConsole
 from evoclaims.report.live_line import duration
 from evoclaims.trials import devices
-from evoclaims.trials.spec import Condition, TrialSpec
+from evoclaims.trials.batches import StoredTrials
+from evoclaims.trials.spec import Condition
 from evoclaims.trials.store import Store
-from evoclaims.trials.time_limit import answers
 from evoclaims.verdicts.claim_report import ClaimReport
 
 Costs = Mapping[tuple[str, str], Spent]
@@ -92,9 +92,7 @@ def _conditions(
     needed = {names: costs[names].core_seconds(tier.condition(*names).environment_steps * len(seeds)) for names in used}
     for names in used:
         condition = tier.condition(*names)
-        versions = condition.versions
-        stored = (store.made_with(TrialSpec(condition, seed).id, versions) for seed in seeds)
-        missing = sum(not answers(result, limit) for result in stored)
+        missing = sum(map(StoredTrials(store, condition, time_limit=limit).lacks, seeds))
         owed = missing * condition.environment_steps
         pace = paces[names]
         time = 0.0 if not missing else None if pace is None else pace.seconds(condition, missing)
@@ -123,9 +121,8 @@ def _conditions(
 
 def _has_run(store: Store, tier: Tier, names: tuple[str, str]) -> bool:
     """Whether the store has a trial of a condition, made with the installed versions."""
-    condition = tier.condition(*names)
-    seeds = tier.design.seeds(tier.design.last.n)
-    return any(store.made_with(TrialSpec(condition, seed).id, condition.versions) is not None for seed in seeds)
+    stored = StoredTrials(store, tier.condition(*names))
+    return any(map(stored.get, tier.design.seeds(tier.design.last.n)))
 
 
 def _kinds(costs: Costs) -> list[str]:

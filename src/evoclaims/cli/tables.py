@@ -41,10 +41,8 @@ def main(options: argparse.Namespace) -> int:
             path = Path(name)
             try:
                 before = path.read_text(encoding="utf-8")
-            except OSError as error:
-                raise UserError(f"Cannot read {path}: {error.strerror or error}.") from error
-            except UnicodeError as error:
-                raise UserError(f"Cannot read {path}: {error}.") from error
+            except (OSError, UnicodeError) as error:
+                raise UserError(f"Cannot read {path}: {getattr(error, 'strerror', None) or error}.") from error
             after = filled(before, project)
             print(f"{path}: {'changed' if after != before else 'as it was'}")
             if after != before:

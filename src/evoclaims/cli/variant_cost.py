@@ -11,9 +11,8 @@ from evoclaims.paper.variant import Names
 from evoclaims.report.formatting import plural
 from evoclaims.report.live_line import duration
 from evoclaims.trials import devices
+from evoclaims.trials.batches import StoredTrials
 from evoclaims.trials.result import COMPLETE
-from evoclaims.trials.spec import TrialSpec
-from evoclaims.trials.time_limit import answers
 
 
 def to_run(running: Running, names: Sequence[Names]) -> list[Names]:
@@ -33,9 +32,8 @@ def to_run(running: Running, names: Sequence[Names]) -> list[Names]:
     print(f"{variant}: {reproduction.variants[variant].says}")
     for method, task in names:
         condition = varied.condition(method, task)
-        here = (store.made_with(TrialSpec(condition, seed).id, condition.versions) for seed in seeds)
-        missing = sum(not answers(one, running.limit) for one in here)
-        committed = references.load(references.path_of(folder, tier, method, task))
+        missing = sum(map(StoredTrials(store, condition, time_limit=running.limit).lacks, seeds))
+        committed = references.committed(folder, tier, method, task)
         known = {one.seed for one in committed if one.condition == condition.id and one.status in COMPLETE}
         says = "stored"
         if missing and known >= set(seeds):

@@ -54,7 +54,7 @@ def known_pace(
     versions = condition.versions
     stored = (store.get(TrialSpec(condition, seed).id, versions) for seed in range(SEEDS_LOOKED_AT))
     trials = [trial for trial in stored if trial is not None and is_final(trial)]
-    committed = references.load(references.path_of(folder, tier, method, task))
+    committed = references.committed(folder, tier, method, task)
     trials += [trial for trial in committed if trial.condition == condition.id]
     batch = _largest_batch(trial for trial in trials if trial.device.get("kind") == kind)
     if not batch:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import statistics
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -62,8 +63,8 @@ class Missing:
 def committed(reproduction: Reproduction, tier: str, method: str, task: str) -> tuple[TrialResult, ...]:
     """Return the reference trials of a method on a task, those of `tier` first."""
     tiers = sorted(reproduction.tiers, key=lambda name: name != tier)
-    paths = (references.path_of(reproduction.references, name, method, task) for name in tiers)
-    return tuple(trial for path in paths for trial in references.load(path))
+    files = (references.committed(reproduction.references, name, method, task) for name in tiers)
+    return tuple(itertools.chain.from_iterable(files))
 
 
 def estimates(missing: Mapping[Key, Missing], platform: str) -> dict[Key, Estimate]:
@@ -74,7 +75,7 @@ def estimates(missing: Mapping[Key, Missing], platform: str) -> dict[Key, Estima
     """
     layout = layout_on(platform)
     known = {key: _known(one, platform, layout) for key, one in missing.items()}
-    of_others = [_pace(missing[key], found) for key, found in known.items() if found is not None]
+    of_others = [found.work / max(_steps(missing[key], layout), 1) for key, found in known.items() if found is not None]
     compiling = [found.compile for found in known.values() if found is not None]
     pace = statistics.median(of_others) if of_others else STEP_SECONDS
     compile_seconds = statistics.median(compiling) if compiling else COMPILE_SECONDS
@@ -87,11 +88,6 @@ def estimates(missing: Mapping[Key, Missing], platform: str) -> dict[Key, Estima
 def _steps(one: Missing, layout: str) -> int:
     """Return the environment steps that are run one after the other, at most."""
     return one.condition.environment_steps * (one.trials if layout == "alone" else 1)
-
-
-def _pace(one: Missing, found: Estimate) -> float:
-    """Return seconds per environment step of the budget."""
-    return found.work / max(_steps(one, found.layout), 1)
 
 
 def _known(one: Missing, platform: str, layout: str) -> Estimate | None:

@@ -6,6 +6,7 @@ Only the numbers that claims read are kept. The first line has what all trials s
 from __future__ import annotations
 
 import contextlib
+from collections import UserDict
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -122,22 +123,16 @@ def unfit(trials: Sequence[TrialResult], condition: Condition, design: Design, r
     return ""
 
 
-class _Noting(Mapping[str, Any]):
+class _Noting(UserDict[str, Any]):
     """Numbers by name that keeps those which are asked for."""
 
     def __init__(self, numbers: Mapping[str, Any]) -> None:
+        super().__init__(numbers)
         self.asked: dict[str, Any] = {}
-        self._numbers = numbers
 
     def __getitem__(self, name: str) -> Any:
-        self.asked[name] = self._numbers[name]
+        self.asked[name] = self.data[name]
         return self.asked[name]
-
-    def __iter__(self) -> Any:
-        return iter(self._numbers)
-
-    def __len__(self) -> int:
-        return len(self._numbers)
 
 
 def _kept(trial: TrialResult, readings: Iterable[TrialReading]) -> TrialResult:

@@ -12,7 +12,8 @@ from evoclaims.core.provenance import what_fixes_bits
 from evoclaims.judging.baseline import DriftCase, DriftReport, check_drift
 from evoclaims.judging.tripwire import DigestCheck, compare_digests
 from evoclaims.trials.result import TrialResult
-from evoclaims.trials.result_codec import RecordError, dump, parse
+from evoclaims.trials.result_codec import dump, parse
+from evoclaims.trials.result_schema import RecordError
 from evoclaims.trials.time_limit import is_final
 
 METRICS = ("mean_success", "last_fitness", "environment_steps")
@@ -33,7 +34,7 @@ def load(path: Path) -> tuple[TrialResult, ...]:
         UserError: when the file cannot be read, or a line is damaged or edited.
     """
     try:
-        lines = read_file(path).splitlines()
+        data = read_file(path)
     except FileNotFoundError as error:
         if path.is_symlink():
             raise UserError(f"The reference trials {path} are a link to a file that is not there. {_MEND}") from error
@@ -42,24 +43,35 @@ def load(path: Path) -> tuple[TrialResult, ...]:
         if error.errno == errno.ENAMETOOLONG:  # no file has such a name
             return ()
         raise UserError(f"The reference trials {path} cannot be read: {error.strerror or error}. {_MEND}") from error
+    return records(data, str(path), _MEND)
+
+
+def records(data: bytes, name: str, advice: str = "") -> tuple[TrialResult, ...]:
+    """Return the reference trials in the contents of a file called `name`; raises as `load` does."""
     results = []
-    for number, line in enumerate(lines, start=1):
+    for number, line in enumerate(data.splitlines(), start=1):
         try:
             results.append(parse(line))
         except RecordError as error:
-            raise UserError(f"Line {number} of {path} is no reference trial: {error.reason}. {_MEND}") from error
+            said = f"Line {number} of {name} is no reference trial: {error.reason}. {advice}"
+            raise UserError(said.rstrip()) from error
     return tuple(results)
+
+
+def committed(folder: Path, tier: str, method: str, task: str) -> tuple[TrialResult, ...]:
+    """Read the reference trials of a method on a task; raises as `load` does."""
+    return load(path_of(folder, tier, method, task))
 
 
 def write(path: Path, results: Iterable[TrialResult]) -> None:
     """Write reference trials in the order of seeds."""
     ordered = sorted(results, key=lambda result: result.seed)
-    write_atomically(path, b"".join(dump(result).rstrip(b"\n") + b"\n" for result in ordered))
+    write_atomically(path, b"".join(map(dump, ordered)))
 
 
 def drift_case(folder: Path, tier: str, method: str, task: str, new: Sequence[TrialResult]) -> DriftCase:
     """Pair new trials of one condition (at least one) with its reference trials."""
-    reference = load(path_of(folder, tier, method, task))
+    reference = committed(folder, tier, method, task)
     return DriftCase(f"{method} on {task} ({tier})", new[0].condition, tuple(new), reference, METRICS)
 
 
@@ -69,7 +81,7 @@ def compare(cases: Sequence[DriftCase]) -> tuple[DriftReport, DigestCheck]:
         compare_digests([trial], [old for old in case.reference if _bits_should_agree(trial, old)])
         for case in cases
         for trial in case.new
-        if _made_on_cpu(trial) and is_final(trial)
+        if trial.device.get("platform") == "cpu" and is_final(trial)
     ]
     changed = tuple(change for check in checks for change in check.changed)
     return check_drift(cases), DigestCheck(sum(check.compared for check in checks), changed)
@@ -79,8 +91,3 @@ def _bits_should_agree(one: TrialResult, other: TrialResult) -> bool:
     """Whether all settings that fix bits, and that both records contain, are equal; old records contain fewer."""
     ours, theirs = what_fixes_bits(one.provenance), what_fixes_bits(other.provenance)
     return all(ours[name] == theirs[name] for name in ours.keys() & theirs.keys())
-
-
-def _made_on_cpu(trial: TrialResult) -> bool:
-    """Whether a record says that it was made on a CPU; False if it names no device."""
-    return trial.device.get("platform") == "cpu"

@@ -39,20 +39,17 @@ def spent(reproduction: Reproduction, tier: str, method: str, task: str) -> Spen
         UserError: when a file of reference trials cannot be read.
     """
     condition = reproduction.tier(tier).condition(method, task)
-    trials = [trial for trial in _committed(reproduction, tier, method, task) if trial.condition == condition.id]
+    folder = reproduction.references
+    committed = references.committed(folder, tier, method, task)
+    trials = [trial for trial in committed if trial.condition == condition.id]
     seconds: dict[str, float] = defaultdict(float)
     for batch in _batches(trials):
         device = batch[0].device
         if device.get("platform") != "cpu":
             seconds[str(device.get("kind"))] += batch[0].timing["run"] + batch[0].timing["compile"]
-    others = (_committed(reproduction, name, method, task) for name in reproduction.tiers if name != tier)
+    others = (references.committed(folder, name, method, task) for name in reproduction.tiers if name != tier)
     paces = (_core_pace(found) for found in (trials, *others))
     return Spent(len(trials), dict(seconds), next((pace for pace in paces if pace is not None), None))
-
-
-def _committed(reproduction: Reproduction, tier: str, method: str, task: str) -> tuple[TrialResult, ...]:
-    """Read a file of reference trials."""
-    return references.load(references.path_of(reproduction.references, tier, method, task))
 
 
 def _core_pace(trials: Iterable[TrialResult]) -> float | None:

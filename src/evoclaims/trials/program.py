@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import Any
 
@@ -113,15 +113,13 @@ class Program:
             state, progress = method.step(key, task, trial.ascent.level, trial.method)
             steps = trial.steps + 1
             healthy = progress.healthy & jnp.isfinite(progress.fitness)
-            return TrialState(
-                seed=trial.seed,
+            return replace(
+                trial,
                 method=strong(state),
                 ascent=curriculum.climb(trial.ascent, jnp.where(healthy, progress.success, 0.0), steps),
                 steps=steps,
                 last=strong(progress),
                 diverged=~healthy,
-                idle=trial.idle,
-                numbers=trial.numbers,
             )
 
         trial = jax.lax.while_loop(running, step, trial)

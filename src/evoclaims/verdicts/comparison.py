@@ -17,14 +17,13 @@ from evoclaims.paper import references
 from evoclaims.paper.condition_names import names_of
 from evoclaims.paper.reproduction import Reproduction
 from evoclaims.trials.result import TrialResult
-from evoclaims.trials.result_codec import RecordError, parse
 from evoclaims.trials.store import DamagedFileError, Store, newest
 from evoclaims.verdicts import history, transitions
 from evoclaims.verdicts.claim_report import ClaimReport
 from evoclaims.verdicts.git_revision import GitRevision
 from evoclaims.verdicts.mixed_versions import listed
 from evoclaims.verdicts.transitions import Standings
-from evoclaims.verdicts.versions import found_in, in_words
+from evoclaims.verdicts.versions import found_in, moved
 
 Trials = Mapping[str, Sequence[TrialResult]]
 """Trials by condition, named like its file of reference trials: "smoke/cma_es-n_parity"."""
@@ -86,7 +85,10 @@ def revision(reproduction: Reproduction, at: GitRevision) -> Side:
             f"The revision {at.name} has neither {history.FILE} nor reference trials in {reproduction.folder}."
         )
     accepted = history.parse(verdicts, f"{history.FILE} at {at.name}") if verdicts is not None else {}
-    trials = {_named(PurePosixPath(path).relative_to(top)): _records(at, path) for path in files}
+    trials = {
+        _named(PurePosixPath(path).relative_to(top)): references.records(at.read(path) or b"", f"{path} at {at.name}")
+        for path in files
+    }
     return Side(f"the revision {at.name} ({at.sha[:12]})", transitions.accepted(accepted), trials)
 
 
@@ -160,28 +162,12 @@ def version_changes(old: Side, new: Side) -> list[str]:
     found: dict[str, list[str]] = defaultdict(list)
     for name in sorted(old.trials.keys() & new.trials.keys()):
         packages = tuple(sorted({one for trial in new.trials[name] for one in depends_on(trial.provenance) or ()}))
-        was, now = (found_in(side.trials[name], packages) for side in (old, new))
-        moved = [
-            f"{package} {in_words(was[package])} -> {in_words(now[package])}"
-            for package in packages
-            if was[package] != now[package]
-        ]
-        if moved:
-            found[", ".join(moved)].append(name)
-    return [f"versions changed: {moved}: {listed(names)}" for moved, names in found.items()]
+        change = moved(*(found_in(side.trials[name], packages) for side in (old, new)))
+        if change:
+            found[change].append(name)
+    return [f"versions changed: {change}: {listed(names)}" for change, names in found.items()]
 
 
 def _named(path: PurePosixPath | Path) -> str:
     """Return a condition's name from the path of its reference trials."""
     return path.with_suffix("").as_posix()
-
-
-def _records(at: GitRevision, path: str) -> tuple[TrialResult, ...]:
-    """Read the reference trials in a file of a revision."""
-    results = []
-    for number, line in enumerate((at.read(path) or b"").splitlines(), start=1):
-        try:
-            results.append(parse(line))
-        except RecordError as error:
-            raise UserError(f"Line {number} of {path} at {at.name} is no reference trial: {error.reason}.") from error
-    return tuple(results)

@@ -138,12 +138,7 @@ def verdict_changes(reports: Iterable[ClaimReport]) -> list[str]:
             continue
         if (before.fingerprint or "") != report.fingerprint:
             continue
-        was, now = before.versions, versions_of(report.sources)
-        moved = ", ".join(
-            f"{name} {versions.in_words(was[name])} -> {versions.in_words(now[name])}"
-            for name in sorted(was.keys() & now.keys())
-            if was[name] != now[name]
-        )
+        moved = versions.moved(before.versions, versions_of(report.sources))
         by = f" ({moved})" if moved else ""
         said.append(
             printable(f"verdict changed: {report.name} ({report.tier}): {before.outcome} -> {report.outcome}{by}")

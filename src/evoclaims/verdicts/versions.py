@@ -23,6 +23,12 @@ def change(old: Versions, new: Versions) -> str:
     return ", ".join(f"{name} {was or 'none'} -> {now or 'none'}" for name, (was, now) in moved)
 
 
+def moved(was: Several, now: Several) -> str:
+    """Describe which versions differ, such as "evosax 0.3.2 -> 0.3.3", of the packages that both have."""
+    names = [name for name in sorted(was.keys() & now.keys()) if was[name] != now[name]]
+    return ", ".join(f"{name} {in_words(was[name])} -> {in_words(now[name])}" for name in names)
+
+
 def in_words(versions: Iterable[str | None]) -> str:
     """Return versions as one text."""
     return " and ".join(version or "none" for version in versions)
