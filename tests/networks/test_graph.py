@@ -12,7 +12,7 @@ import pytest
 
 from evoclaims.core.errors import UnknownNameError
 from evoclaims.networks.genome import EMPTY, Connections, Genome, Nodes
-from evoclaims.networks.graph import BLOCK, Graph, GraphNetwork
+from evoclaims.networks.graph import GraphNetwork
 from evoclaims.networks.wiring import Wiring
 
 Gene = tuple[int, float, float, int]
@@ -143,32 +143,6 @@ def test_the_matrix_is_strictly_lower_triangular() -> None:
     assert linked.sum() == 4
     assert not np.triu(linked).any()
     assert (np.asarray(graph.weights)[~linked] == 0).all()
-
-
-def test_blocks_of_nodes_compute_what_one_node_after_the_other_computes() -> None:
-    """The accelerators' way, which platform_dependent hides from a CPU."""
-    inputs, size = 3, 3 * BLOCK + 2
-    draw = np.random.default_rng(0)
-    linked = np.tril(draw.random((size, size)) < 0.3, -1)
-    linked[:inputs] = False
-    network = GraphNetwork(inputs, 2, ("tanh", "sin"))
-    graph = Graph(
-        weights=jnp.where(linked, jnp.float32(draw.normal(size=(size, size))), 0.0),
-        linked=jnp.asarray(linked),
-        bias=jnp.float32(draw.normal(size=size)),
-        response=jnp.float32(draw.normal(size=size)),
-        activation=jnp.int32(draw.integers(0, 3, size)),
-        outputs=jnp.array([7, size - 1], jnp.int32),
-    )
-    present = np.ones((size, 6), bool)
-    present[inputs:] = False
-    present[0, 2] = present[1, 2] = present[:, 4] = False
-    values = np.where(present, draw.normal(size=(size, 6)), 0.0)
-    start = jnp.float32(values), jnp.asarray(present)
-    with jax.default_matmul_precision("highest"):
-        one, other = jax.jit(network._one_by_one)(graph, start), jax.jit(network._in_blocks)(graph, start)
-    np.testing.assert_array_equal(one[1], other[1])
-    np.testing.assert_allclose(one[0], other[0], atol=2e-5)
 
 
 @pytest.mark.parametrize("names", [{"activations": ("tanh", "step")}, {"output": "step"}])

@@ -12,8 +12,8 @@ Machines without the kernel compute the pass by matrices.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache, partial
-from typing import Any, Final
+from functools import cache
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -26,9 +26,6 @@ from evoclaims.networks.activations import ACTIVATIONS, apply_activation, check_
 from evoclaims.networks.genome import Genome
 from evoclaims.networks.network_kernel import network_kernel
 from evoclaims.networks.wiring import Wiring, wired
-
-BLOCK: Final = 16
-"""Nodes per matrix product on accelerators; 8 to 32 take about the same time there."""
 
 
 @pytree
@@ -103,90 +100,22 @@ class GraphNetwork:
         )
 
     def apply_rows(self, graph: Graph, rows: Float[Array, "rows inputs"]) -> Float[Array, "rows outputs"]:
-        """Map many observations at once."""
+        """Map many observations at once, node after node; slots are in topological order, so one pass is enough."""
         present = jnp.isfinite(rows).T
-        if rows.shape[0] == 1:
-            return self._propagate(graph, rows, present)
-        # All rows have the same emitting nodes, unless some lack an input.
-        return jax.lax.cond(
-            jnp.all(present),
-            lambda: self._propagate(graph, rows, jnp.ones((self.inputs, 1), bool)),
-            lambda: self._propagate(graph, rows, present),
-        )
-
-    def _propagate(
-        self, graph: Graph, rows: Float[Array, "rows inputs"], present: Bool[Array, "inputs rows_or_1"]
-    ) -> Float[Array, "rows outputs"]:
-        """Compute node after node; slots are in topological order, so one pass is enough."""
         rest = ((0, graph.bias.shape[0] - self.inputs), (0, 0))
-        given = jnp.pad(jnp.where(present, rows.T, 0.0), rest), jnp.pad(present, rest)
-        # A CPU's cache holds a genome's values. A GPU would read all of them from memory again for every node.
-        values, emits = jax.lax.platform_dependent(graph, given, cpu=self._one_by_one, default=self._in_blocks)
-        readings = ACTIVATIONS[self.output](values[graph.outputs])
-        return jnp.where(emits[graph.outputs], readings, 0.0).T
-
-    def _one_by_one(self, graph: Graph, state: tuple[Array, Array]) -> tuple[Array, Array]:
-        """Add every node's values [nodes, rows], and whether it emits."""
 
         def fire(slot: Array, state: tuple[Array, Array]) -> tuple[Array, Array]:
             values, emits = state
-            received = jnp.sum(graph.weights[slot][:, None] * values, axis=0)
-            value, fed = self.fire(graph, slot, received, emits)
+            fed = jnp.any(graph.linked[slot][:, None] & emits, axis=0)
+            z = graph.bias[slot] + graph.response[slot] * jnp.sum(graph.weights[slot][:, None] * values, axis=0)
+            value = apply_activation((*self.activations, "identity"), graph.activation[slot], z)
+            value = jnp.where(fed & jnp.isfinite(value), value, 0.0)
             return values.at[slot].set(value), emits.at[slot].set(fed)
 
-        return jax.lax.fori_loop(self.inputs, graph.bias.shape[0], fire, state)
-
-    def _in_blocks(self, graph: Graph, state: tuple[Array, Array]) -> tuple[Array, Array]:
-        """Do the same in blocks of nodes: input from earlier blocks is one matrix product."""
-        size = graph.bias.shape[0]
-        values, emits = state
-        done = values[: self.inputs]
-        for start in range(self.inputs, size, BLOCK):
-            end = min(start + BLOCK, size)
-            part = Graph(
-                weights=graph.weights[start:end, start:end],
-                linked=graph.linked[start:end],
-                bias=graph.bias[start:end],
-                response=graph.response[start:end],
-                activation=graph.activation[start:end],
-                outputs=graph.outputs,
-            )
-            earlier = graph.weights[start:end, :start] @ done
-            block, emits = _fire_block(self, part, jnp.asarray(start, jnp.int32), earlier, emits)
-            done = jnp.concatenate([done, block])
-        return done, emits
-
-    def fire(
-        self, graph: Graph, slot: Int[Array, ""], received: Float[Array, " rows"], emits: Bool[Array, "nodes rows_or_1"]
-    ) -> tuple[Float[Array, " rows"], Bool[Array, " rows_or_1"]]:
-        """Return what the node at `slot` emits, and whether it does."""
-        fed = jnp.any(graph.linked[slot][:, None] & emits, axis=0)
-        z = graph.bias[slot] + graph.response[slot] * received
-        value = apply_activation((*self.activations, "identity"), graph.activation[slot], z)
-        return jnp.where(fed & jnp.isfinite(value), value, 0.0), fed
-
-
-@partial(jax.jit, static_argnums=0)  # blocks of one size are traced once
-def _fire_block(
-    network: GraphNetwork,
-    part: Graph,
-    start: Int[Array, ""],
-    earlier: Float[Array, "block rows"],
-    emits: Bool[Array, "nodes rows_or_1"],
-) -> tuple[Array, Array]:
-    """Return a block's values and emitting nodes, given the input from earlier blocks.
-
-    `part` holds the block's rows of the graph; its weights have only the block's columns.
-    """
-
-    def fire(place: Array, state: tuple[Array, Array]) -> tuple[Array, Array]:
-        block, emits = state
-        received = earlier[place] + jnp.sum(part.weights[place][:, None] * block, axis=0)
-        value, fed = network.fire(part, place, received, emits)
-        return block.at[place].set(value), emits.at[start + place].set(fed)
-
-    made: tuple[Array, Array] = jax.lax.fori_loop(0, earlier.shape[0], fire, (jnp.zeros_like(earlier), emits))
-    return made
+        given = jnp.pad(jnp.where(present, rows.T, 0.0), rest), jnp.pad(present, rest)
+        values, emits = jax.lax.fori_loop(self.inputs, graph.bias.shape[0], fire, given)
+        readings = ACTIVATIONS[self.output](values[graph.outputs])
+        return jnp.where(emits[graph.outputs], readings, 0.0).T
 
 
 @cache

@@ -63,12 +63,12 @@ def test_rows_through_genomes(network: GraphNetwork, graphs: Any, wanted: Any) -
     np.testing.assert_allclose(answers, wanted, atol=TOLERANCE)
 
 
-def test_rows_without_gaps_through_genomes_as_matrices(network: GraphNetwork, graphs: Any, wanted: Any) -> None:
+def test_rows_through_genomes_as_matrices(network: GraphNetwork, graphs: Any, wanted: Any) -> None:
     def answers_of(wiring: Any) -> Any:
-        return network.apply_rows(network.matrices(wiring), WHOLE)
+        return network.apply_rows(network.matrices(wiring), ROWS)
 
     answers = jax.jit(jax.vmap(answers_of))(graphs)
-    np.testing.assert_allclose(answers, wanted[:, : len(WHOLE)], atol=TOLERANCE)
+    np.testing.assert_allclose(answers, wanted, atol=TOLERANCE)
 
 
 def test_genomes_over_rows(network: GraphNetwork, graphs: Any, wanted: Any) -> None:
@@ -88,21 +88,6 @@ def test_one_genome_and_one_row(network: GraphNetwork, graphs: Any, wanted: Any)
     for genome in range(0, len(wanted), 97):
         for row, answer in zip(ROWS, wanted[genome], strict=True):
             np.testing.assert_allclose(apply(at(graphs, genome), row), answer, atol=TOLERANCE)
-
-
-def test_genomes_in_blocks_of_nodes(network: GraphNetwork, graphs: Any, wanted: Any) -> None:
-    """The way that accelerators take, on the same genomes; 20 nodes are more than a block."""
-    present = np.zeros((20, len(ROWS)), bool)
-    present[:3] = ~np.isnan(ROWS).T
-    values = np.zeros((20, len(ROWS)), np.float32)
-    values[:3] = np.nan_to_num(ROWS).T
-
-    def answers(wiring: Any) -> Any:
-        graph = network.matrices(wiring)
-        made, emits = network._in_blocks(graph, (jax.numpy.asarray(values), jax.numpy.asarray(present)))
-        return jax.numpy.where(emits[graph.outputs], jax.numpy.tanh(made[graph.outputs]), 0.0).T
-
-    np.testing.assert_allclose(jax.jit(jax.vmap(answers))(graphs), wanted, atol=TOLERANCE)
 
 
 def test_the_graph_of_a_genome_does_not_depend_on_its_companions(
