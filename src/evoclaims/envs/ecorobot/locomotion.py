@@ -37,6 +37,7 @@ class Locomotion(RobotTask):
     name: ClassVar[str] = "locomotion"  # type: ignore[misc]
     revision: ClassVar[int] = 1
     packages: ClassVar[tuple[str, ...]] = ROBOT_PACKAGES
+    shows_place: ClassVar[bool] = False
 
     robot: Robot = HALF_CHEETAH
 
@@ -44,11 +45,6 @@ class Locomotion(RobotTask):
     def boxes(self) -> tuple[Box, ...]:
         """None."""
         return ()
-
-    @property
-    def shows_place(self) -> bool:
-        """False: the place does not matter."""
-        return False
 
     def rule(self, memory: Any, before: Pose, after: Pose, action: Float[Array, " action"]) -> Ruling:
         """Reward forward motion; end when the robot is no longer healthy."""

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from copy import copy
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache, partial
-from typing import Any, Final
+from typing import Any, ClassVar, Final
 
 import jax
 import jax.numpy as jnp
@@ -42,7 +42,11 @@ class RobotTask(ABC):
         episode_steps: environment steps after which an episode is truncated.
         examined_episodes: episodes, from different starts, over which an examination averages.
         places: the boxes' places, if a program takes them as data; None for the task's own.
+        shows_place: whether the policy sees the robot's place in the world.
     """
+
+    levels: ClassVar[int] = 1
+    shows_place: ClassVar[bool] = True
 
     robot: Robot = SIMPLE_ROB
     sensor: Sensor | None = None
@@ -96,16 +100,6 @@ class RobotTask(ABC):
     def path_measures(self, path: Float[Array, "steps 2"], alive: Bool[Array, " steps"]) -> Mapping[str, Array]:
         """Return metrics of an examined robot's path; `alive` marks the steps before the episode's end."""
         return {}
-
-    @property
-    def shows_place(self) -> bool:
-        """Whether the policy sees the robot's place in the world."""
-        return True
-
-    @property
-    def levels(self) -> int:
-        """One."""
-        return 1
 
     @property
     def horizon(self) -> int:
