@@ -139,8 +139,8 @@ def lay_out(one: Measured, width: float) -> Layout:
         slots.append(at)
         at += 1.0
     bars = [slot - ASIDE * one.shows_reported for slot in slots]
-    tops = [_top(bar, one) for bar in one.bars]
-    low = min([0.0, *(one.panel.limits or ()), *(_foot(bar, one) for bar in one.bars)])
+    feet, tops = zip(*(_ends(bar, one) for bar in one.bars), strict=True)
+    low = min([0.0, *(one.panel.limits or ()), *feet])
     high = max([*(one.panel.limits or ()), *tops])
     high = high if high > low else low + 1.0  # nothing has run
     span = high - low
@@ -194,7 +194,7 @@ def paint(axis: Any, layout: Layout) -> None:
 def _number(axis: Any, layout: Layout) -> None:
     """Put ticks on the vertical axis only up to the largest number: no success is 1.4, as high as the brackets."""
     one, (low, high) = layout.measured, layout.limits
-    top = max([*(one.panel.limits or ()), *(_top(bar, one) for bar in one.bars)])
+    top = max([*(one.panel.limits or ()), *(_ends(bar, one)[1] for bar in one.bars)])
     locator = optional("matplotlib.ticker").MaxNLocator(5, steps=[1, 2, 5, 10])
     ticks = [tick for tick in locator.tick_values(low, top) if low <= tick <= top * (1 + 1e-9)]
     axis.set_yticks(ticks if top > low else [])
@@ -244,7 +244,7 @@ def _paint_bar(axis: Any, filled: Filled, middle: float, width: float) -> None:
         axis.text(middle, 0.04, NOT_RUN, transform=foot, rotation=90, **words)
     elif readings.incomplete:
         count = f"{len(dots)}/{len(pairs)}"
-        top = (middle, _top_of_data(readings))
+        top = (middle, _ends_of_data(readings)[1])
         axis.annotate(count, top, xytext=(0, 1.5), textcoords="offset points", **words)
 
 
@@ -272,24 +272,18 @@ def _names(one: Measured) -> list[tuple[str, int, int]]:
     return names
 
 
-def _top_of_data(readings: Readings) -> float:
-    """Return the upper end of a bar with its dots and error bar; 0 for none."""
-    if not readings.values:
-        return 0.0
+def _ends_of_data(readings: Readings) -> tuple[float, float]:
+    """Return the lower and upper end of a bar, which begins at 0, with its dots and error bar."""
     deviation = readings.deviation if len(readings.values) > 1 else 0.0
-    return max(readings.mean + deviation, *readings.values, 0.0)
+    bar = [readings.mean - deviation, readings.mean + deviation] if readings.values else []
+    ends = [0.0, *bar, *readings.values]
+    return min(ends), max(ends)
 
 
-def _top(bar: Filled, one: Measured) -> float:
-    """Return the upper end of all that is drawn at a bar."""
-    reported = bar.reported if one.panel.beside else None
-    return max(_top_of_data(bar.readings), reported.value + (reported.error or 0.0) if reported else 0.0)
-
-
-def _foot(bar: Filled, one: Measured) -> float:
-    """Return the lower end of all that is drawn at a bar."""
-    values = bar.readings.values
-    deviation = bar.readings.deviation if len(values) > 1 else 0.0
-    reported = bar.reported if one.panel.beside else None
-    ends = [bar.readings.mean - deviation, *values] if values else []
-    return min([0.0, *ends, *([reported.value - (reported.error or 0.0)] if reported else [])])
+def _ends(bar: Filled, one: Measured) -> tuple[float, float]:
+    """Return the lower and upper end of all that is drawn at a bar."""
+    low, high = _ends_of_data(bar.readings)
+    if bar.reported is None or not one.panel.beside:
+        return low, high
+    error = bar.reported.error or 0.0
+    return min(low, bar.reported.value - error), max(high, bar.reported.value + error)
