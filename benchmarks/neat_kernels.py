@@ -48,7 +48,7 @@ def by_kernel(genome: Genome, rows: Any) -> Any:
 
 def by_matrices(genome: Genome, rows: Any) -> Any:
     """Return the same as machines without the kernel compute it."""
-    return NETWORK.apply_rows(NETWORK.matrices(NETWORK.express(genome)), rows)
+    return jax.vmap(partial(NETWORK.propagate, NETWORK.matrices(NETWORK.express(genome))))(rows)
 
 
 def cpu_ms(function: Callable[..., Any], *arguments: Any) -> float:

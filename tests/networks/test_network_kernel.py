@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
@@ -103,7 +104,7 @@ def test_the_kernel_is_the_walk_and_the_pass_by_matrices(seed: int, given_rows: 
         np.testing.assert_allclose(made[genome], wanted, rtol=1e-4, atol=2e-4)
 
     def by_matrices(genome: Genome) -> Any:
-        return NETWORK.apply_rows(NETWORK.matrices(NETWORK.express(genome)), jnp.asarray(rows))
+        return jax.vmap(partial(NETWORK.propagate, NETWORK.matrices(NETWORK.express(genome))))(jnp.asarray(rows))
 
     np.testing.assert_allclose(made, jax.jit(jax.vmap(by_matrices))(genomes), rtol=1e-4, atol=2e-4)
 

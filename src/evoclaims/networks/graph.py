@@ -13,11 +13,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cache
-from typing import Any
 
 import jax
 import jax.numpy as jnp
-from jax.custom_batching import custom_vmap
 from jaxtyping import Array, Bool, Float, Int
 
 from evoclaims.core.pytree import pytree
@@ -72,10 +70,9 @@ class GraphNetwork:
         return wiring if self._kernel_for(wiring).supported else self.matrices(wiring)
 
     def apply(self, network: Wiring | Graph, observation: Float[Array, " inputs"]) -> Float[Array, " outputs"]:
-        """Map one observation to one output; a vmap over only observations runs them through the network together."""
+        """Map one observation to one output; a vmap over only observations runs them through one kernel together."""
         if isinstance(network, Graph):
-            result: Array = _one_or_many(self)(network, observation)
-            return result
+            return self.propagate(network, observation)
         (result,) = self._kernel_for(network)(*jax.tree.leaves(network), observation)
         return result
 
@@ -99,23 +96,22 @@ class GraphNetwork:
             outputs=wiring.outputs,
         )
 
-    def apply_rows(self, graph: Graph, rows: Float[Array, "rows inputs"]) -> Float[Array, "rows outputs"]:
-        """Map many observations at once, node after node; slots are in topological order, so one pass is enough."""
-        present = jnp.isfinite(rows).T
-        rest = ((0, graph.bias.shape[0] - self.inputs), (0, 0))
+    def propagate(self, graph: Graph, observation: Float[Array, " inputs"]) -> Float[Array, " outputs"]:
+        """Map one observation by matrices, node after node; slots are in topological order, so one pass is enough."""
+        present = jnp.isfinite(observation)
+        rest = (0, graph.bias.shape[0] - self.inputs)
 
         def fire(slot: Array, state: tuple[Array, Array]) -> tuple[Array, Array]:
             values, emits = state
-            fed = jnp.any(graph.linked[slot][:, None] & emits, axis=0)
-            z = graph.bias[slot] + graph.response[slot] * jnp.sum(graph.weights[slot][:, None] * values, axis=0)
+            fed = jnp.any(graph.linked[slot] & emits)
+            z = graph.bias[slot] + graph.response[slot] * jnp.sum(graph.weights[slot] * values)
             value = apply_activation((*self.activations, "identity"), graph.activation[slot], z)
-            value = jnp.where(fed & jnp.isfinite(value), value, 0.0)
-            return values.at[slot].set(value), emits.at[slot].set(fed)
+            return values.at[slot].set(jnp.where(fed & jnp.isfinite(value), value, 0.0)), emits.at[slot].set(fed)
 
-        given = jnp.pad(jnp.where(present, rows.T, 0.0), rest), jnp.pad(present, rest)
+        given = jnp.pad(jnp.where(present, observation, 0.0), rest), jnp.pad(present, rest)
         values, emits = jax.lax.fori_loop(self.inputs, graph.bias.shape[0], fire, given)
         readings = ACTIVATIONS[self.output](values[graph.outputs])
-        return jnp.where(emits[graph.outputs], readings, 0.0).T
+        return jnp.where(emits[graph.outputs], readings, 0.0)
 
 
 @cache
@@ -124,26 +120,6 @@ def _kernel(network: GraphNetwork, capacity: tuple[int, int]) -> GroupKernel:
 
     def function(*leaves: Array) -> list[Array]:
         *genome, observation = leaves
-        return [_one_or_many(network)(network.matrices(Wiring(*genome)), observation)]
+        return [network.propagate(network.matrices(Wiring(*genome)), observation)]
 
     return network_kernel(network.inputs, network.outputs, network.activations, network.output, capacity, function)
-
-
-@cache
-def _one_or_many(network: GraphNetwork) -> Any:
-    """Return `network`'s forward pass of one observation, with its rule for a batch of observations."""
-
-    def alone(graph: Graph, observation: Array) -> Array:
-        return network.apply_rows(graph, observation[None])[0]
-
-    one = custom_vmap(alone)
-
-    @one.def_vmap
-    def many(size: int, batched: Any, graph: Graph, observations: Array) -> tuple[Array, bool]:
-        of_graph, of_observations = batched
-        if not any(jax.tree.leaves(of_graph)):
-            return network.apply_rows(graph, observations), True
-        axes = jax.tree.map(lambda leaf: 0 if leaf else None, of_graph)
-        return jax.vmap(alone, (axes, 0 if of_observations else None), axis_size=size)(graph, observations), True
-
-    return one

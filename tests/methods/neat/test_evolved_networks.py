@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import jax
@@ -65,7 +66,7 @@ def test_rows_through_genomes(network: GraphNetwork, graphs: Any, wanted: Any) -
 
 def test_rows_through_genomes_as_matrices(network: GraphNetwork, graphs: Any, wanted: Any) -> None:
     def answers_of(wiring: Any) -> Any:
-        return network.apply_rows(network.matrices(wiring), ROWS)
+        return jax.vmap(partial(network.propagate, network.matrices(wiring)))(ROWS)
 
     answers = jax.jit(jax.vmap(answers_of))(graphs)
     np.testing.assert_allclose(answers, wanted, atol=TOLERANCE)
