@@ -14,7 +14,7 @@ from small_paper import CONDITIONS, ONE, OTHER, collisions, told, words
 from evoclaims.figures.bar_panel import Series
 from evoclaims.figures.bars import BarChart, by_level, compared
 from evoclaims.figures.figure import Drawing
-from evoclaims.figures.files import contents, csv
+from evoclaims.figures.files import contents
 from evoclaims.paper.reported import Published
 from evoclaims.trials.spec import TrialSpec
 
@@ -181,7 +181,7 @@ def test_the_csv_reads_back_to_the_last_digit(paper: Any) -> None:
 
     paper.put("one", "small", [1 / 3, 2 / 7])
     drawing = paper.draw(_rewards())
-    again = pd.read_csv(io.StringIO(csv(drawing)))
+    again = pd.read_csv(io.StringIO(contents(drawing)["csv"].decode()))
     trials = again[(again["what"] == "trial") & (again["series"] == "The One")]
     assert list(trials["value"].dropna()) == [10 * (1 / 3), 10 * (2 / 7)]
 

@@ -14,20 +14,10 @@ def svg(drawing: Drawing) -> str:
     return _picture(drawing, "svg").decode()
 
 
-def png(drawing: Drawing) -> bytes:
-    """Return the drawing as a PNG file's contents, on white."""
-    return _picture(drawing, "png")
-
-
-def csv(drawing: Drawing) -> str:
-    """Return every number drawn as the text of a CSV file."""
-    text: str = drawing.table.to_csv(index=False, lineterminator="\n")
-    return text
-
-
 def contents(drawing: Drawing) -> dict[str, bytes]:
-    """Return the contents of the drawing's files by their endings."""
-    return {"png": png(drawing), "svg": svg(drawing).encode(), "csv": csv(drawing).encode()}
+    """Return the contents of the drawing's files by their endings: pictures, on white, and every number drawn."""
+    table: str = drawing.table.to_csv(index=False, lineterminator="\n")
+    return {"png": _picture(drawing, "png"), "svg": _picture(drawing, "svg"), "csv": table.encode()}
 
 
 def _picture(drawing: Drawing, file_format: Format) -> bytes:
