@@ -134,7 +134,7 @@ class _Unseeing(Rangefinders):
 
     def read(self, scene: Any, pose: Any) -> Any:
         """Return 1 for every ray."""
-        return jnp.ones(self.size)
+        return jnp.ones(self.count)
 
 
 class UnseeingRays(Fault):
