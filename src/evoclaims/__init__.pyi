@@ -16,5 +16,6 @@ from evoclaims.paper.trial_group import TrialGroup as TrialGroup
 from evoclaims.paper.variant import Variant as Variant
 from evoclaims.paper.variant import changed as changed
 from evoclaims.trials.budget import Budget as Budget
+from evoclaims.trials.imported import Imported as Imported
 from evoclaims.trials.spec import Condition as Condition
 from evoclaims.trials.spec import Progression as Progression

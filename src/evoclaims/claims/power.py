@@ -152,6 +152,8 @@ class Pilots:
         """Read a pilot, and whether it is one."""
         found = pilots.load(pilots.path_of(self._folder, self._tier, *names))
         self._unfit[names] = pilots.unfit(found, self.groups[names].condition, self._design, self._readings[names])
+        if self.groups[names].existing is not None:
+            self._unfit[names] = "its trials are imported, and there are no others"
         self.trials[names] = found
 
     def powers(self, claims: Sequence[Asserted], draws: int) -> list[ClaimPower]:

@@ -131,7 +131,7 @@ def _work(session: Session, fetch: RunMissing, tier: str, group: TrialGroup, pla
     condition, versions, design = group.condition, group.condition.versions, session.design(tier)
     seeds = design.seeds(design.last.n)
     stored = StoredTrials(session.store, condition, fetch.any_version, fetch.time_limit)
-    missing = [seed for seed in seeds if _lacks(stored, seed)]
+    missing = [seed for seed in seeds if condition.existing is None and _lacks(stored, seed)]
     timed = len(missing) or len(seeds)
     here, elsewhere = took(_made_here(session.store, condition, seeds), platform), None
     with suppress(UserError):  # what is wrong with the reference trials is told at the end of the run

@@ -47,6 +47,8 @@ def missing_batches(
     known: dict[Job, Missing] = {}
     reference: dict[Names, tuple[TrialResult, ...]] = {}
     for job, condition in wanted.items():
+        if condition.existing is not None:
+            continue
         found = [_looked_up(project.store, TrialSpec(condition, seed)) for seed in seeds]
         owed[job] = tuple(seed for seed, (here, _) in zip(seeds, found, strict=True) if not answers(here, limit))
         if owed[job]:

@@ -77,8 +77,13 @@ def _chosen(every: Sequence[Planted], options: argparse.Namespace) -> list[Plant
     """Return the requested faults.
 
     Raises:
-        UnknownNameError: for an unknown fault, method or task.
+        UserError: when no fault can be planted, or for an unknown fault, method or task.
     """
+    if not every:
+        raise UserError(
+            f"No fault can be planted: the trials that the {options.tier} tier's claims read are not run here, but "
+            "imported."
+        )
     for wanted, kind, known in (
         (options.mutant, "mutant", {one.mutant for one in every}),
         (options.of, "method or task", {one.target for one in every}),

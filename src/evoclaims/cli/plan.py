@@ -20,6 +20,7 @@ from evoclaims.report.console import PlainSpokenConsole
 from evoclaims.report.live_line import duration
 from evoclaims.trials import devices
 from evoclaims.trials.batches import StoredTrials
+from evoclaims.trials.imported import where_from
 from evoclaims.trials.spec import Condition
 from evoclaims.trials.store import Store
 from evoclaims.verdicts.claim_report import ClaimReport
@@ -39,14 +40,15 @@ def main(options: argparse.Namespace) -> int:
     chosen = devices.choose(options.device)
     kind = options.like or chosen[0].device_kind
     reports = project.judge(options.tier)
-    used = sorted({(source.method, source.task) for report in reports for source in report.sources})
+    read = sorted({(source.method, source.task) for report in reports for source in report.sources})
+    used = [names for names in read if tier.condition(*names).existing is None]
 
     def pace(condition: Condition, method: str, task: str) -> Pace | None:
         known = known_pace(condition, store, reproduction.references, options.tier, method, task, kind)
         return measured_pace(condition, chosen) if known is None and options.measure else known
 
     paces = {names: pace(tier.condition(*names), *names) for names in used}
-    costs = {names: spent(reproduction, options.tier, *names) for names in used}
+    costs = {names: spent(reproduction, options.tier, *names) for names in read}
     if options.like and not any(paces.values()):
         raise UserError(f"No trial of the {options.tier} tier at hand was made on a device called {options.like!r}.")
     console = PlainSpokenConsole(file=styled())
@@ -59,7 +61,13 @@ def main(options: argparse.Namespace) -> int:
             f"Times are by this store's own trials for {own} of {len(used)} conditions, for others by reference trials "
             "on such a device, perhaps of another machine. A trial that has solved every level stops earlier."
         )
-    for sentence in _about(costs, tier.design.last.n):
+    for names in read:
+        if names not in used:
+            condition, n = tier.condition(*names), tier.design.last.n
+            few = f", and the design looks at {n}" if len(condition.existing or ()) < n else ""
+            said = f"{' on '.join(names)}: nothing to run: {where_from(condition)}{few}"
+            console.print(escape(said), highlight=False)
+    for sentence in _about({names: costs[names] for names in used}, tier.design.last.n):
         console.print(escape(sentence))
     console.print(f"\nClaims: the smallest p that the design allows (n trials a side, α {tier.design.alpha:g})")
     console.print(_claims(reports, costs))

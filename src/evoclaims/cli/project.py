@@ -50,7 +50,8 @@ class Project:
     @cached_property
     def archive(self) -> Archive:
         """The trials of the store, found even if a claim test changes the folder, and the reference trials."""
-        return Archive(Store(self.store.root.absolute()), self.reproduction.references)
+        store, reproduction = Store(self.store.root.absolute()), self.reproduction
+        return Archive(store, reproduction.references, reproduction.imported)
 
     def tiers(self, name: str) -> tuple[str, ...]:
         """Return the tiers called `name`: one of them, or "all".

@@ -19,6 +19,7 @@ from evoclaims.mutants.conditions import Job
 from evoclaims.paper.reproduction import Reproduction, Tier
 from evoclaims.paper.variant import Names
 from evoclaims.report.live_line import LiveLine
+from evoclaims.trials.imported import where_from
 from evoclaims.trials.spec import Condition, TrialSpec
 from evoclaims.trials.store import Store
 from evoclaims.verdicts.robustness import matrix
@@ -45,6 +46,8 @@ def main(options: argparse.Namespace) -> int:
     if options.variant and not (options.method and options.on):
         chosen = to_run(running, chosen)
     wanted = {Job("", *names): tier.condition(*names) for names in chosen}
+    for job in [job for job, condition in wanted.items() if condition.existing is not None]:
+        print(f"{job.label} ({options.tier}): nothing to run: {where_from(wanted.pop(job))}")
     if options.retry:
         for condition in wanted.values():
             store.forget_timeouts((TrialSpec(condition, seed).id for seed in seeds), condition.versions)

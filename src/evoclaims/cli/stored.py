@@ -13,6 +13,7 @@ from evoclaims.core.files import write_atomically, write_once
 from evoclaims.paper.cost import known_pace
 from evoclaims.report.live_line import duration
 from evoclaims.trials import champions, devices
+from evoclaims.trials.imported import where_from
 from evoclaims.trials.result import COMPLETE, TrialResult
 from evoclaims.trials.spec import Condition, TrialSpec
 from evoclaims.trials.time_limit import time_allowed
@@ -52,6 +53,8 @@ def load(project: Project, tier: str, method: str, task: str, seed: int) -> Stor
     """
     reproduction, store = project.reproduction, project.store
     condition, title = reproduction.tier(tier).condition(method, task), f"{method} on {task} ({tier})"
+    if condition.existing is not None:
+        raise UserError(f"{title} has no champion: its {where_from(condition)}.")
     spec = TrialSpec(condition, seed)
     result = store.get(spec.id, condition.versions)
     if result is None:

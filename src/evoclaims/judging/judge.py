@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from bisect import bisect_left
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from evoclaims.judging.assertion import Assertion, Finding
 from evoclaims.judging.counting import MAX_TRIALS
 from evoclaims.judging.design import Design, Look
 from evoclaims.judging.fingerprint import fingerprint
 from evoclaims.judging.sample import Source, Trials, UnreadableTrialError
+from evoclaims.judging.shortage import shortage
 from evoclaims.judging.verdict import Outcome, PValues, Verdict
 from evoclaims.trials.result import TrialResult
 
@@ -86,7 +87,8 @@ def decide(
 ) -> Ending | None:
     """Follow the looks of a design to their end.
 
-    Each look first checks the smallest attainable p: if neither direction can be decided, no trial is fetched.
+    Each look first checks the smallest attainable p: if neither direction can be decided, no trial is fetched. Nor is
+    any where a source cannot have as many trials as the look asks for.
     Judging ends at the first decisive look, or when no outcome of the remaining trials could change the verdict
     (curtailment).
 
@@ -105,6 +107,8 @@ def decide(
     for index, look in enumerate(looks):
         if not _decidable(assertion.attainable(look.n, design), look.alpha):
             continue
+        if short := shortage(assertion, look, design):
+            return ending and replace(ending, note=f"{short}; ")
         trials = {source.fingerprint: fetch(source, design.seeds(look.n)) for source in assertion.sources()}
         crashed = _crashed(assertion, trials)
         if crashed:
@@ -221,9 +225,11 @@ def _needs(assertion: Assertion, design: Design) -> str:
 def _underpowered(assertion: Assertion, design: Design, mark: str) -> Verdict:
     """Return the verdict of a design in which no look can decide."""
     look, attainable = attainability(assertion, design)[-1]
+    decidable = (one for one in assertion.looks(design) if _decidable(assertion.attainable(one.n, design), one.alpha))
+    short = "".join(shortage(assertion, one, design) for one in list(decidable)[:1])
     return Verdict(
         outcome=Outcome.INCONCLUSIVE,
-        reason=f"underpowered: {_needs(assertion, design)}",
+        reason=short or f"underpowered: {_needs(assertion, design)}",
         describe=assertion.describe(),
         fingerprint=mark,
         alpha=look.alpha,

@@ -26,10 +26,12 @@ class Archive:
     Attributes:
         store: searched first; a trial that ran out of time there may be complete in `references`.
         references: folder of the committed reference trials, or None.
+        existing: conditions whose trials exist already (see `Condition.existing`).
     """
 
     store: Store
     references: Path | None = None
+    existing: tuple[Condition, ...] = ()
 
     def check(self) -> None:
         """Check before anything is judged that the store can be read, and every file of reference trials.
@@ -66,13 +68,15 @@ class Archive:
 
     @cached_property
     def _committed(self) -> dict[str, list[TrialResult]]:
-        """Reference trials by id."""
+        """Reference trials and imported ones by id."""
         found: dict[str, list[TrialResult]] = defaultdict(list)
         for trial in self._read():
             found[trial.id].append(trial)
         return dict(found)
 
     def _read(self) -> Iterator[TrialResult]:
-        """Read every file of reference trials."""
+        """Read every file of reference trials, and the trials that exist already."""
+        for condition in self.existing:
+            yield from condition.existing or ()
         for path in sorted(self.references.rglob("*.jsonl")) if self.references is not None else ():
             yield from references.load(path)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from evoclaims.core.errors import UserError
@@ -18,6 +19,9 @@ from evoclaims.trials.time_limit import is_final
 
 METRICS = ("mean_success", "last_fitness", "environment_steps")
 """Metrics that the drift check compares: final success, final reward, and environment steps."""
+
+OF_TABLE = {"file", "sha256", "by"}
+"""What a specification of imported trials says of their table, and not of how it is read."""
 
 _MEND = "Restore the file from version control, or write it anew with `evoclaims reference`."
 
@@ -71,8 +75,27 @@ def write(path: Path, results: Iterable[TrialResult]) -> None:
 
 def drift_case(folder: Path, tier: str, method: str, task: str, new: Sequence[TrialResult]) -> DriftCase:
     """Pair new trials of one condition (at least one) with its reference trials."""
-    reference = committed(folder, tier, method, task)
-    return DriftCase(f"{method} on {task} ({tier})", new[0].condition, tuple(new), reference, METRICS)
+    return paired(f"{method} on {task} ({tier})", new, committed(folder, tier, method, task))
+
+
+def paired(label: str, new: Sequence[TrialResult], reference: Sequence[TrialResult]) -> DriftCase:
+    """Pair new trials of one condition (at least one) with earlier ones.
+
+    Imported trials are compared in all their metrics, and with those of an earlier table that was read alike.
+    """
+    condition = new[0].condition
+    if "imported" not in new[0].spec:
+        return DriftCase(label, condition, tuple(new), tuple(reference), METRICS)
+    changed = any(old.condition != condition and _read_alike(old, new[0]) for old in reference)
+    earlier = tuple(replace(old, condition=condition) if _read_alike(old, new[0]) else old for old in reference)
+    metrics = sorted({name for trial in new for name in trial.metrics})
+    return DriftCase(label + ", another table" * changed, condition, tuple(new), earlier, tuple(metrics))
+
+
+def _read_alike(one: TrialResult, other: TrialResult) -> bool:
+    """Whether trials were imported alike, perhaps from different tables: the same columns of the same rows."""
+    ours, theirs = (dict(trial.spec.get("imported", {})) for trial in (one, other))
+    return all(ours.get(name) == theirs.get(name) for name in (ours.keys() | theirs.keys()) - OF_TABLE)
 
 
 def compare(cases: Sequence[DriftCase]) -> tuple[DriftReport, DigestCheck]:

@@ -10,7 +10,8 @@ from evoclaims.core.errors import UnknownNameError, UserError
 from evoclaims.judging.design import Design
 from evoclaims.paper.reported import FILE, Published, load_published
 from evoclaims.paper.trial_group import TrialGroup
-from evoclaims.paper.variant import Variant
+from evoclaims.paper.variant import Conditions, Names, Variant
+from evoclaims.trials.imported import Imported
 from evoclaims.trials.spec import Condition
 
 
@@ -54,6 +55,8 @@ class Reproduction:
         mutants: module with the paper's own planted faults; it holds MUTANTS, `evoclaims.mutants.Mutant` by name, and
             is imported only when they are tried.
 
+    Tables of imported trials are looked for in `folder`.
+
     Raises:
         UserError: when `trials` is neither.
     """
@@ -68,12 +71,34 @@ class Reproduction:
     mutants: str = ""
 
     def __post_init__(self) -> None:
-        """Check the class of the trials."""
+        """Check the class of the trials, and say where imported ones are."""
         if not (isinstance(self.trials, type) and issubclass(self.trials, TrialGroup)):
             raise UserError(
                 f"The reproduction {self.name!r} says trials={self.trials!r}: name a subclass of TrialGroup whose "
                 "properties are the paper's own measures, or leave it out."
             )
+        tiers = {name: replace(tier, conditions=self._found(tier.conditions)) for name, tier in self.tiers.items()}
+        object.__setattr__(self, "tiers", tiers)
+        variants = {
+            name: replace(one, conditions={tier: self._found(these) for tier, these in one.conditions.items()})
+            for name, one in self.variants.items()
+        }
+        object.__setattr__(self, "variants", variants)
+
+    def _found(self, conditions: Conditions) -> dict[Names, Condition]:
+        """Return conditions whose tables are looked for in the reproduction's folder."""
+        return {
+            names: replace(one, folder=self.folder) if isinstance(one, Imported) else one
+            for names, one in conditions.items()
+        }
+
+    @property
+    def imported(self) -> tuple[Condition, ...]:
+        """The conditions whose trials another program has run, of all tiers and variants."""
+        of_tiers = [tier.conditions for tier in self.tiers.values()]
+        of_variants = [these for variant in self.variants.values() for these in variant.conditions.values()]
+        found = (one for these in (*of_tiers, *of_variants) for one in these.values() if isinstance(one, Imported))
+        return tuple({one.id: one for one in found}.values())
 
     def tier(self, name: str, variant: str = "") -> Tier:
         """Return a tier, changed by a variant if one is named; an `UnknownNameError` lists the known ones."""

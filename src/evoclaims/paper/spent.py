@@ -64,5 +64,5 @@ def _core_pace(trials: Iterable[TrialResult]) -> float | None:
 
 
 def _batches(trials: Iterable[TrialResult]) -> list[list[TrialResult]]:
-    """Return trials by batch; those that did not end by themselves are left out."""
-    return by_batch(trial for trial in trials if trial.status == "done")
+    """Return trials by batch, without those that did not end by themselves or do not name their device."""
+    return by_batch(trial for trial in trials if trial.status == "done" and trial.device)

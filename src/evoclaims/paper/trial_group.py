@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from evoclaims.core.errors import UnknownNameError
 from evoclaims.judging.measure import Event, Measure, Profile
 from evoclaims.judging.reading import Better
-from evoclaims.judging.sample import Source
+from evoclaims.judging.shortage import Limited
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.spec import Condition
 
@@ -42,7 +42,7 @@ class TrialGroup:
 
         def __getattr__(self, name: str) -> Any:
             """Raise an error that lists the known measures."""
-            known = {known for known in dir(type(self)) if not known.startswith("_")} - set(dir(Source))
+            known = {known for known in dir(type(self)) if not known.startswith("_")} - set(dir(Limited))
             if name.startswith("_") or name in known:
                 return object.__getattribute__(self, name)  # raises what the measure itself has raised
             raise UnknownMeasureError("measure", name, known)
@@ -61,9 +61,26 @@ class TrialGroup:
         """Return one trial per seed."""
         return self.get(self.condition, seeds)
 
-    def measure(self, name: str, read: Callable[[TrialResult], float], better: Better = "higher") -> Measure:
-        """Return a measure of these trials, such as `measure("steps", lambda t: t.metrics["steps"], "lower")`."""
-        return Measure(self, name, read, better)
+    @property
+    def existing(self) -> int | None:
+        """How many trials there are, where no more can be run; None where missing ones are run."""
+        return None if self.condition.existing is None else len(self.condition.existing)
+
+    def measure(
+        self, name: str, read: Callable[[TrialResult], float] | None = None, better: Better = "higher"
+    ) -> Measure:
+        """Return a measure of these trials, such as `measure("steps", lambda t: t.metrics["steps"], "lower")`.
+
+        Without `read` it is the metric of that name: `measure("steps", better="lower")`.
+
+        Raises:
+            UnknownNameError: for a metric that imported trials do not have; of others it is known when they have run.
+        """
+        if read is None and self.condition.existing is not None:
+            known = self.condition.existing[0].metrics
+            if name not in known:
+                raise UnknownNameError(f"metric of {self.label}", name, known)
+        return Measure(self, name, read or (lambda t: t.metrics[name]), better)
 
     def event(self, name: str, holds: Callable[[TrialResult], bool]) -> Event:
         """Return an event, which holds in a trial or does not."""

@@ -43,7 +43,8 @@ def make_session(config: pytest.Config) -> Session:
     limit, any_version = project.seconds(config.getoption("claims_time_limit")), config.getoption("claims_any_version")
     run = RunMissing(store, config.getoption("claims_device"), progress_of(config) or ignore, limit, any_version)
     reproduction = load_reproduction(project)
-    read = StoredOnly(Archive(store, reproduction.references if config.getoption("claims_committed") else None))
+    folder = reproduction.references if config.getoption("claims_committed") else None
+    read = StoredOnly(Archive(store, folder, reproduction.imported))
     fetch = read if config.getoption("claims_stored") else run
     trials, variant = config.getoption("claims_trials"), config.getoption("claims_variant")
     made = Session(reproduction, store, fetch, trials, variant, run.again)

@@ -220,7 +220,7 @@ class Summary:
         from evoclaims.verdicts.reasons import reason
 
         session = make_session(self._config)
-        archive = Archive(session.store, session.reproduction.references)
+        archive = Archive(session.store, session.reproduction.references, session.reproduction.imported)
         judged = {key_of(report): report for report in self.reports if report.n}
         return {
             key: reason(judged[key], old, entry_of(judged[key], archive, ""), *self._drift)

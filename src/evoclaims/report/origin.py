@@ -41,9 +41,9 @@ class Origin:
         kind, platform = clean(device.get("kind") or ""), clean(device.get("platform") or "")
         known = " ".join([kind, f"({platform})" if platform not in ("", kind) else ""]).strip()
         dirty = git.get("dirty")
-        rest = provenance.keys() - {"device", "git", "machine", "versions", DEPENDS_ON}
+        rest = provenance.keys() - {"device", "git", "machine", "versions", "seed_in_table", DEPENDS_ON}
         return Origin(
-            device=known or "unknown device",
+            device=known or _imported(_mapping(provenance.get("imported"))) or "unknown device",
             machine=clean(provenance.get("machine") or "unknown machine"),
             revision=clean(git.get("sha") or ""),
             dirty=dirty if isinstance(dirty, bool) else None,
@@ -89,6 +89,14 @@ def warnings(made: Sequence[Made]) -> tuple[str, ...]:
     if unknown:
         found.append(f"{plural(unknown, 'trial')} of {len(every)} ran code of unknown revision.")
     return tuple(found)
+
+
+def _imported(table: Mapping[str, Any]) -> str:
+    """Say where imported trials come from; empty for others."""
+    if not table:
+        return ""
+    digits = str(table.get("sha256", ""))[:SHORT]
+    return clean(f"an unknown device (imported from {table.get('file')}, sha256 {digits}, by {table.get('by')})")
 
 
 def _mapping(value: object) -> Mapping[str, Any]:

@@ -99,6 +99,7 @@ class Spec(Struct):
 
     method: Table | None = None
     task: Table | None = None
+    imported: Table | None = None
 
 
 class Provenance(Struct):
@@ -138,7 +139,7 @@ def check(plain: dict[str, Any]) -> Record:
     _fitted(record.spec, Spec, "spec")
     _fitted(record.timing, Timing, "timing")
     _fitted(record.provenance, Provenance, "provenance")
-    if record.status in COMPLETE:
+    if record.status in COMPLETE and "imported" not in record.spec:  # another program has its own metrics
         _fitted(record.metrics, Metrics, "metrics")
         _fitted(record.levels, Levels, "levels")
     if len({len(curve) for curve in record.curves.values()}) > 1:

@@ -19,6 +19,7 @@ from evoclaims.trials.batches import Batch, Run, StoredTrials, batches, drop_fin
 from evoclaims.trials.checkpoint import Header
 from evoclaims.trials.devices import single_threaded_linear_algebra
 from evoclaims.trials.halving import halved, is_exhausted
+from evoclaims.trials.imported import into_store
 from evoclaims.trials.lanes import Lanes
 from evoclaims.trials.notice import announced
 from evoclaims.trials.pacing import Rhythm, Strides
@@ -62,9 +63,13 @@ def run(
 
     A batch that the device's memory does not hold goes on in two halves (see `halving`).
 
+    Of a condition whose trials exist already, there may be fewer than seeds.
+
     Raises:
         UserError: when the store is damaged or cannot be written, or the device's memory does not hold one trial.
     """
+    if condition.existing is not None:
+        return into_store(condition, seeds, store)
     stored = StoredTrials(store, condition, any_version, time_limit)
     wanted = list(dict.fromkeys(seeds))
     most = len(wanted)

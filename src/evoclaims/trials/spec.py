@@ -12,6 +12,7 @@ from evoclaims.core.packages import ALWAYS, installed, packages_of
 from evoclaims.envs.base import Task
 from evoclaims.methods.base import Method
 from evoclaims.trials.budget import Budget
+from evoclaims.trials.result import TrialResult
 
 Progression = Literal["curriculum", "direct", "whole_budget"]
 
@@ -81,6 +82,11 @@ class Condition:
         task = self.task
         kind = type(task).__qualname__, task.action_size, task.levels, task.horizon
         return str((self.plain["method"], self.progression, self.budget, kind))
+
+    @property
+    def existing(self) -> tuple[TrialResult, ...] | None:
+        """All trials that there can be, by seed from 0, where no more can be run; None for what the harness runs."""
+        return None
 
     @property
     def label(self) -> str:

@@ -10,7 +10,7 @@ from pathlib import Path, PurePosixPath
 
 from evoclaims.core.errors import UserError
 from evoclaims.core.packages import Versions, agree, depends_on
-from evoclaims.judging.baseline import DriftCase, DriftReport
+from evoclaims.judging.baseline import DriftReport
 from evoclaims.judging.tripwire import DigestCheck
 from evoclaims.judging.verdict import Outcome
 from evoclaims.paper import references
@@ -140,18 +140,7 @@ def _one_of_each(records: Iterable[TrialResult], versions: Mapping[str, Versions
 def compare_trials(old: Side, new: Side) -> tuple[DriftReport, DigestCheck]:
     """Check the conditions that both sides have for drift, and CPU trials for bit-identical results."""
     both = sorted(name for name in old.trials.keys() & new.trials.keys() if new.trials[name])
-    return references.compare(
-        [
-            DriftCase(
-                name,
-                new.trials[name][0].condition,
-                tuple(new.trials[name]),
-                tuple(old.trials[name]),
-                references.METRICS,
-            )
-            for name in both
-        ]
-    )
+    return references.compare([references.paired(name, new.trials[name], old.trials[name]) for name in both])
 
 
 def version_changes(old: Side, new: Side) -> list[str]:

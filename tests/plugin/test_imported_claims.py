@@ -1,0 +1,195 @@
+"""Claims about imported trials: judged as others are, beside trials that the harness runs, and by every command."""
+
+from __future__ import annotations
+
+import csv
+import io
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from tiny_project import Project
+
+from evoclaims import cli
+from evoclaims.trials.store import Store
+
+PAPER = """
+from pathlib import Path
+import tiny_paper
+from evoclaims import Design, Imported, Look, Reproduction, Tier
+
+def imported(method, **settings):
+    metric = {"mean_success": "success"}
+    return Imported("runs.csv", seed="seed", metric=metric, where={"algo": method}, by="Ada", **settings)
+
+CONDITIONS = {
+    ("theirs", "parity"): imported("good"),
+    ("worse", "parity"): imported("bad"),
+    ("right", "parity"): tiny_paper.conditions(1)["right", "parity"],
+}
+DESIGNS = {"smoke": Design.fixed(10), "full": Design(looks=(Look(5, 0.01), Look(10, 0.04)))}
+REPRODUCTION = Reproduction(
+    "ours", "Ours", Path(__file__).parent, {name: Tier(CONDITIONS, design) for name, design in DESIGNS.items()}
+)
+"""
+
+BETTER = "verdict(trials('theirs', on='parity').mean_success > trials('worse', on='parity').mean_success)"
+
+
+def _table(good: list[str], bad: list[str]) -> str:
+    rows = [f"{algo},{10 + 3 * k},{x}\n" for algo, found in (("good", good), ("bad", bad)) for k, x in enumerate(found)]
+    return "algo,seed,success\n" + "".join(rows)
+
+
+def _numbers(first: float, count: int = 10) -> list[str]:
+    return [f"{first + k / 1000:.3f}" for k in range(count)]
+
+
+@pytest.fixture
+def ours(project: Project) -> Project:
+    """A paper with two imported conditions and one that is run; `theirs` is better than `worse`."""
+    (project.path / "pyproject.toml").write_text(
+        (project.path / "pyproject.toml").read_text().replace("tiny_paper", "our_paper")
+    )
+    (project.path / "our_paper.py").write_text(PAPER)
+    (project.path / "runs.csv").write_text(_table(_numbers(0.8), _numbers(0.3)))
+    project.write(a=BETTER)
+    return project
+
+
+def _judged(project: Project, *arguments: str) -> tuple[str, str]:
+    """Return the outcome of the claim and the reason."""
+    (claim,) = project.json(*arguments)["claims"]
+    return claim["outcome"], claim["reason"]
+
+
+def test_imported_trials_are_judged_and_their_record_says_where_they_are_from(ours: Project) -> None:
+    assert _judged(ours) == ("supported", "p = 5.41e-06 <= alpha = 0.05 at n = 10")
+
+
+def test_they_are_compared_with_trials_that_the_harness_runs(ours: Project) -> None:
+    ours.write(a="verdict(trials('right', on='parity').mean_success > trials('theirs', on='parity').mean_success)")
+    assert _judged(ours)[0] == "supported"
+
+
+@pytest.mark.parametrize(
+    ("tier", "count", "said"),
+    [
+        ("smoke", 9, "underpowered: needs n = 10 trials of theirs on parity, and there are 9"),
+        ("full", 4, "underpowered: needs n = 5 trials of theirs on parity, and there are 4"),
+        ("full", 9, "underpowered: needs n = 10 trials of theirs on parity, and there are 9; the evidence: p = "),
+    ],
+)
+def test_too_few_trials_are_inconclusive_and_say_how_many_it_needs(
+    ours: Project, tier: str, count: int, said: str
+) -> None:
+    (ours.path / "runs.csv").write_text(_table(_numbers(0.3, count), _numbers(0.3)))
+    outcome, reason = _judged(ours, f"--claims-tier={tier}")
+    assert outcome == "inconclusive"
+    assert reason.startswith(said)
+
+
+def test_plan_says_beforehand_that_a_table_is_too_short(ours: Project, capsys: pytest.CaptureFixture[str]) -> None:
+    (ours.path / "runs.csv").write_text(_table(_numbers(0.3, 9), _numbers(0.3)))
+    assert cli.main(["plan"]) == 0
+    said = capsys.readouterr().out
+    assert "theirs on parity: nothing to run: 9 trials are imported from runs.csv (algo good), sha256 " in said
+    assert said.count(", and the design looks at 10") == 1
+
+
+def test_no_other_trial_is_run_for_a_claim_that_lacks_imported_ones(ours: Project) -> None:
+    (ours.path / "runs.csv").write_text(_table(_numbers(0.3, 4), _numbers(0.3)))
+    ours.write(a="verdict(trials('right', on='parity').mean_success > trials('theirs', on='parity').mean_success)")
+    result = ours.run("-m", "smoke", own_store=True)
+    result.assert_outcomes(passed=0)
+    assert Store(ours.path / ".evoclaims").ids() == ()
+
+
+def test_diverged_trials_take_the_worst_rank(ours: Project) -> None:
+    (ours.path / "runs.csv").write_text(_table(["nan"] * 10, _numbers(0.3)))
+    assert _judged(ours)[0] == "refuted"
+    ours.run().stdout.fnmatch_lines(["*10 of 10 trials of theirs on parity diverged*"])
+
+
+@pytest.mark.parametrize(
+    ("body", "said"),
+    [
+        (
+            "verdict(trials('theirs', on='parity').measure('sucess').between(0, 1))",
+            "There is no metric of theirs on parity named 'sucess'. Did you mean 'mean_success'? Known: mean_success.",
+        ),
+        (
+            "verdict(trials('theirs', on='parity').last_success.between(0, 1))",
+            "There is no 'last_success' in the finished trial of seed 0",
+        ),
+    ],
+)
+def test_a_measure_that_the_table_lacks_is_an_error_with_those_that_it_has(ours: Project, body: str, said: str) -> None:
+    ours.write(a=body)
+    outcome, reason = _judged(ours)
+    assert outcome == "error"
+    assert said in reason
+
+
+def test_a_metric_is_measured_by_its_name(ours: Project) -> None:
+    ours.write(a="verdict(trials('theirs', on='parity').measure('mean_success', better='lower').between(0.7, 0.9))")
+    assert _judged(ours)[0] == "supported"
+
+
+def test_a_missing_table_is_a_sentence(ours: Project, sentence: Callable[[pytest.RunResult, str], None]) -> None:
+    (ours.path / "runs.csv").unlink()
+    sentence(ours.run(), "runs.csv cannot be read: No such file or directory.")
+
+
+def test_exported_trials_give_the_verdict_that_they_gave_before(ours: Project, trials_of_both: Path) -> None:
+    table = io.StringIO()
+    writer = csv.writer(table)
+    writer.writerow(["algo", "seed", "success"])
+    for trial in Store(trials_of_both).results([]):
+        algo = "bad" if trial.spec["method"]["parameters"]["negated"] else "good"
+        writer.writerow([algo, trial.seed, trial.metrics["mean_success"]])
+    (ours.path / "runs.csv").write_text(table.getvalue())
+    ours.write(a=BETTER, b=BETTER.replace("theirs", "right"))
+    one, other = ours.json()["claims"]
+    assert [one["outcome"], one["reason"]] == [other["outcome"], other["reason"]] == ["supported", other["reason"]]
+
+
+def test_a_changed_table_is_compared_with_the_reference_trials_of_the_one_before(
+    ours: Project, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    ours.run(own_store=True)
+    assert cli.main(["reference"]) == 0
+    ours.run(own_store=True).stdout.fnmatch_lines(["reference trials: 2 comparisons, 0 drifted*"])
+    (ours.path / "runs.csv").write_text(_table(_numbers(0.6), _numbers(0.3)))
+    monkeypatch.delitem(sys.modules, "our_paper")  # which has read the table
+    result = ours.run(own_store=True)
+    result.stdout.fnmatch_lines(
+        [
+            "reference trials: 2 comparisons, 1 drifted*",
+            "DRIFT in theirs on parity (smoke), another table: mean_success is lower now: median 0.8045 -> 0.6045*",
+        ]
+    )
+
+
+def test_commands_read_the_table_where_no_trial_is_stored_and_say_that_there_is_nothing_to_run(
+    ours: Project, capsys: pytest.CaptureFixture[str]
+) -> None:
+    said = {}
+    commands = ["status", "plan", "run theirs", "submit --dry-run --cluster=local", "champion theirs --on parity"]
+    for command in [*commands, "run theirs --numprocesses=2", "mutants", "power", "report"]:
+        cli.main(command.split())
+        out, err = capsys.readouterr()
+        said[command] = out + err
+        assert "Traceback" not in said[command]
+    count = "10 trials are imported from runs.csv (algo good), sha256 "
+    assert "✓ supported  10  1.00" in said["status"]
+    assert f"theirs on parity: nothing to run: {count}" in said["plan"]
+    assert f"theirs on parity (smoke): nothing to run: {count}" in said["run theirs"]
+    assert f"theirs on parity (smoke): nothing to run: {count}" in said["run theirs --numprocesses=2"]
+    assert f"theirs on parity (smoke) has no champion: its {count}" in said["champion theirs --on parity"]
+    assert "theirs on parity (its trials are imported, and there are no others)" in said["power"]
+    assert "No fault can be planted: the trials that the smoke tier's claims read are not run here" in said["mutants"]
+    report = (ours.path / "report" / "index.html").read_text()
+    assert "imported from runs.csv, sha256 " in report
+    assert "by Ada" in report

@@ -1,0 +1,240 @@
+"""Tables of results that another program has made, read as trials: what is taken, and what is refused."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pyarrow
+import pyarrow.parquet
+import pytest
+
+from evoclaims.core.errors import UserError
+from evoclaims.trials.imported import Imported
+from evoclaims.trials.result_codec import dump, parse
+from evoclaims.trials.runner import run
+from evoclaims.trials.store import Store
+
+TABLE = """\
+seed,algo,lr,return,length
+42,sac,0.001,30.5,100
+7,sac,0.001,10.5,90
+1337,sac,1e-3,20.5,80
+7,ppo,0.01,-4,70
+"""
+SAC = {"algo": "sac"}
+
+
+@pytest.fixture
+def table(tmp_path: Path) -> Callable[..., Imported]:
+    """A function that writes a table and returns the condition that reads it."""
+
+    def make(text: str = TABLE, name: str = "runs.csv", **settings: Any) -> Imported:
+        (tmp_path / name).write_text(text, encoding="utf-8")
+        return Imported(name, **{"seed": "seed", "metric": "return", "folder": tmp_path, **settings})
+
+    return make
+
+
+def _values(condition: Imported, metric: str = "return") -> list[float]:
+    return [trial.metrics[metric] for trial in condition.existing]
+
+
+def test_the_trial_of_seed_k_is_that_of_the_table_s_kth_smallest_seed(table: Callable[..., Imported]) -> None:
+    trials = table(where=SAC).existing
+    assert [trial.seed for trial in trials] == [0, 1, 2]
+    assert [trial.provenance["seed_in_table"] for trial in trials] == [7, 42, 1337]
+    assert [trial.metrics for trial in trials] == [{"return": 10.5}, {"return": 30.5}, {"return": 20.5}]
+
+
+def test_a_record_says_what_was_imported_by_whom_and_from_which_file(table: Callable[..., Imported]) -> None:
+    condition = table(where=SAC, by="Ada, with CleanRL 1.0")
+    for trial in condition.existing:
+        assert parse(dump(trial)) == trial
+        assert trial.provenance["imported"] == {
+            "file": "runs.csv",
+            "sha256": condition.table.sha256,
+            "by": "Ada, with CleanRL 1.0",
+        }
+        assert trial.device == {}
+    assert condition.packages == ()
+
+
+@pytest.mark.parametrize("lr", [0.001, "0.001"])
+def test_filters_know_numbers_and_texts(table: Callable[..., Imported], lr: object) -> None:
+    assert _values(table(where={"lr": lr})) == ([10.5, 30.5, 20.5] if lr == 0.001 else [10.5, 30.5])
+
+
+def test_metrics_are_named_as_columns_or_as_measures_read_them(table: Callable[..., Imported]) -> None:
+    assert _values(table(metric=["return", "length"], where=SAC), "length") == [90, 100, 80]
+    assert _values(table(metric={"last_fitness": "return"}, where=SAC), "last_fitness") == [10.5, 30.5, 20.5]
+
+
+def _rows() -> list[dict[str, Any]]:
+    head, *lines = (line.split(",") for line in TABLE.splitlines())
+    texts = [dict(zip(head, line, strict=True)) for line in lines]
+    return [{name: cell if name == "algo" else float(cell) for name, cell in row.items()} for row in texts]
+
+
+@pytest.mark.parametrize("form", ["tsv", "json", "jsonl", "parquet"])
+def test_every_form_of_a_table_gives_the_same_trials(table: Callable[..., Imported], form: str) -> None:
+    condition = table(where=SAC)
+    texts = {
+        "tsv": TABLE.replace(",", "\t"),
+        "json": json.dumps(_rows()),
+        "jsonl": "\n".join(map(json.dumps, _rows())),
+        "parquet": "",
+    }
+    other = table(texts[form], f"runs.{form}", where=SAC)
+    if form == "parquet":
+        pyarrow.parquet.write_table(pyarrow.Table.from_pylist(_rows()), other.folder / other.path)
+    assert [trial.metrics for trial in other.existing] == [trial.metrics for trial in condition.existing]
+    assert [trial.digest for trial in other.existing] == [trial.digest for trial in condition.existing]
+
+
+@pytest.mark.parametrize("value", ["nan", "inf", "-Infinity"])
+def test_a_trial_whose_number_is_not_finite_has_diverged(table: Callable[..., Imported], value: str) -> None:
+    trials = table(TABLE.replace("30.5", value), where=SAC).existing
+    assert [trial.status for trial in trials] == ["done", "diverged", "done"]
+    parse(dump(trials[1]))
+
+
+def test_an_empty_cell_is_refused_unless_it_is_said_to_mean_divergence(table: Callable[..., Imported]) -> None:
+    text = TABLE.replace("30.5", "")
+    with pytest.raises(UserError, match=r"runs\.csv has no number in row 1 of the column 'return': write nan"):
+        _ = table(text, where=SAC).existing
+    trials = table(text, where=SAC, empty_means_diverged=True).existing
+    assert [trial.status for trial in trials] == ["done", "diverged", "done"]
+
+
+@pytest.mark.parametrize("value", [math.nan, None])
+def test_parquet_tells_nan_from_an_empty_cell(table: Callable[..., Imported], value: float | None) -> None:
+    condition = table("", "runs.parquet")
+    columns = {"seed": [1], "return": pyarrow.array([value], pyarrow.float64(), from_pandas=False)}
+    pyarrow.parquet.write_table(pyarrow.table(columns), condition.folder / condition.path)
+    if value is not None:
+        assert [trial.status for trial in condition.existing] == ["diverged"]
+        return
+    with pytest.raises(UserError, match=r"runs\.parquet has no number in row 1 of the column 'return'"):
+        _ = condition.existing
+
+
+CURVES = """\
+seed,global_step,return,loss
+3,200,5.0,0.1
+3,100,2.0,0.2
+1,100,1.0,0.3
+1,300,,0.4
+1,200,4.0,
+"""
+
+
+def test_rows_with_steps_are_a_curve_whose_last_number_counts(table: Callable[..., Imported]) -> None:
+    one, three = table(CURVES, metric=["return", "loss"], step="global_step").existing
+    assert three.metrics == {"return": 5.0, "loss": 0.1, "environment_steps": 200}
+    assert one.metrics == {"return": 4.0, "loss": 0.4, "environment_steps": 300}
+    assert three.curves == {"environment_steps": (100, 200), "return": (2.0, 5.0), "loss": (0.2, 0.1)}
+    assert one.curves["return"][:2] == (1.0, 4.0)
+    assert math.isnan(one.curves["return"][2])
+    assert parse(dump(one)).digest == one.digest
+
+
+def test_the_budget_of_curves_is_the_longest_and_its_reports_are_as_far_apart_as_they_ever_are(
+    table: Callable[..., Imported],
+) -> None:
+    condition = table(CURVES.replace("3,100", "3,150"), step="global_step")
+    assert condition.environment_steps == 300
+    assert condition.budget.chunk(condition.method.cost(condition.task)) == 150
+    assert table(where=SAC).environment_steps == 0
+
+
+def test_another_table_or_another_reading_of_it_is_another_condition(table: Callable[..., Imported]) -> None:
+    ids = [
+        table(where=SAC).id,
+        table(where=SAC, by="Ada").id,
+        table(metric="length", where=SAC).id,
+        table(where={"algo": "ppo"}).id,
+        table(TABLE.replace("30.5", "30.6"), where=SAC).id,
+    ]
+    assert len(set(ids)) == len(ids)
+    assert table(where=SAC).id == ids[0]
+
+
+def test_where_the_folder_is_does_not_matter(table: Callable[..., Imported], tmp_path: Path) -> None:
+    here = table(where=SAC)
+    (tmp_path / "deep").mkdir()
+    (tmp_path / "deep" / "runs.csv").write_text(TABLE)
+    there = Imported(tmp_path / "deep" / "runs.csv", "seed", "return", where=SAC)
+    assert here.id == there.id
+
+
+@pytest.mark.parametrize(
+    ("settings", "said"),
+    [
+        ({"seed": "sed"}, r"There is no column in runs\.csv \(the seeds\) named 'sed'\. Did you mean 'seed'\? Known: "),
+        ({"metric": "retrun", "where": SAC}, r"\(a metric\) named 'retrun'\. Did you mean 'return'\?"),
+        ({"where": {"alg": "sac"}}, r"named 'alg'\. Did you mean 'algo'\?"),
+        (
+            {"where": {"algo": "sca"}},
+            r"runs\.csv has no row whose algo is 'sca'\. Did you mean 'sac'\? Known: ppo,",
+        ),
+        ({"where": {"algo": "ppo", "lr": 0.001}}, r"runs\.csv has no row with algo 'ppo' and lr 0\.001\."),
+        ({}, r"runs\.csv has 2 rows of seed 7 \(rows 2 and 4\), and a row is a trial: choose among them by where="),
+        ({"metric": "algo", "where": SAC}, r"runs\.csv holds 'sac' in row 2 of the column 'algo', which is no number"),
+        ({"seed": "lr"}, r"Row 1 of runs\.csv has the seed 0\.001 in the column 'lr': each trial has a whole number"),
+        ({"path": "gone.csv"}, r"The table .*gone\.csv cannot be read: No such file"),
+        ({"path": "runs.xlsx"}, r"runs\.xlsx is no table that can be read: its name ends in \.csv, "),
+        ({"metric": ""}, r"Imported\('runs\.csv'\) names no metric"),
+    ],
+)
+def test_what_does_not_fit_is_a_sentence_with_the_file_and_what_is_there(
+    table: Callable[..., Imported], settings: dict[str, Any], said: str
+) -> None:
+    usual = {"path": "runs.csv", "seed": "seed", "metric": "return", "folder": table().folder}
+    (table().folder / "runs.xlsx").touch()
+    with pytest.raises(UserError, match=said):
+        _ = Imported(**usual | settings).existing
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "said"),
+    [
+        ("a.csv", "", "it has no first line with the columns' names"),
+        ("b.csv", "seed,return\n1\n", "row 1 has 1 cells, and its first line names 2 columns"),
+        ("c.csv", "seed,seed\n1,2\n", r"two of its columns have one name \(seed, seed\)"),
+        ("d.json", "[1, 2]", "it is neither a JSON list of objects nor one object a line"),
+        ("e.json", "{", "it is neither a JSON list of objects nor one object a line"),
+        ("f.parquet", "PAR", "it is no Parquet file"),
+    ],
+)
+def test_a_file_without_a_table_is_a_sentence(table: Callable[..., Imported], name: str, text: str, said: str) -> None:
+    with pytest.raises(UserError, match=rf"{name} is no table that can be read: {said}"):
+        _ = table(text, name).existing
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (
+            CURVES.replace("3,100", "3,200"),
+            r"two rows of seed 3 and global_step 200 \(rows 1 and 2\): if there are several",
+        ),
+        (CURVES.replace("3,100", "3,"), "Row 2 of .* has no step in the column 'global_step'"),
+    ],
+)
+def test_each_row_of_a_curve_has_a_step_of_its_own(table: Callable[..., Imported], text: str, said: str) -> None:
+    with pytest.raises(UserError, match=said):
+        _ = table(text, step="global_step").existing
+
+
+def test_the_runner_stores_them_once_and_runs_nothing(table: Callable[..., Imported], store: Store) -> None:
+    condition = table(where=SAC)
+    found = run(condition, range(10), store, [])
+    assert [trial.metrics["return"] for trial in found] == [10.5, 30.5, 20.5]
+    assert set(store.ids()) == {trial.id for trial in found}
+    before = [path.stat().st_mtime_ns for path in store.record_paths()]
+    run(condition, [1], store, [])
+    assert [path.stat().st_mtime_ns for path in store.record_paths()] == before
