@@ -21,7 +21,9 @@ PACKAGES = (
     "evoclaims.mutants",
 )
 PYTHON = [
-    path.relative_to(ROOT) for folder in ("claims", "reproductions") for path in sorted((ROOT / folder).rglob("*.py"))
+    path.relative_to(ROOT)
+    for folder in ("claims", "reproductions", "src/evoclaims/projects")
+    for path in sorted((ROOT / folder).rglob("*.py"))
 ]
 GUIDES = [Path("README.md"), *(path.relative_to(ROOT) for path in sorted((ROOT / "docs").glob("*.md")))]
 

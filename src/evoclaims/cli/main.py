@@ -88,6 +88,12 @@ def _parser() -> argparse.ArgumentParser:
             "as keep the cores busy",
         )
 
+    text = "write a project that runs, with a method, a task and two claims; or, with --from, that of a paper"
+    new = commands.add_parser("new", help=text, description=text)
+    new.set_defaults(storage=None)  # it reads no trials
+    new.add_argument("folder", metavar="DIR", help="where to: a folder that is new or empty")
+    new.add_argument("--from", dest="project", metavar="PAPER", default="skeleton", help="a paper, such as nisioti2025")
+
     plan = add("plan", "say what a tier would run, what it costs here, and what its verdicts can show")
     tier(plan)
     device(plan)

@@ -1,0 +1,1 @@
+"""The papers that are tested here."""

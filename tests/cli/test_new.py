@@ -1,0 +1,127 @@
+"""`evoclaims new`: what it writes runs, from a checkout and from a wheel, and nothing is overwritten."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from evoclaims import cli
+
+ROOT = Path(__file__).parents[2]
+SKELETON = ROOT / "src" / "evoclaims" / "projects" / "skeleton"
+
+
+def _new(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str, str]:
+    status = cli.main(["new", *arguments])
+    return status, *capsys.readouterr()
+
+
+def _files(folder: Path) -> dict[str, bytes]:
+    paths = (path for path in folder.rglob("*") if path.is_file() and "__pycache__" not in path.parts)
+    return {path.relative_to(folder).as_posix(): path.read_bytes() for path in paths}
+
+
+def _run(folder: Path, *command: str, site: Path | None = None) -> subprocess.CompletedProcess[str]:
+    """Run Python in a folder, as a user does, with the packages of `site` before the installed ones."""
+    path = [str(site)] * (site is not None) + [entry for entry in sys.path if entry and Path(entry) != ROOT]
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(path), "COLUMNS": "160"}
+    command = (sys.executable, *command)
+    return subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, check=False)
+
+
+def test_the_skeleton_is_a_project_whose_smoke_tier_is_green(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    status, said, _ = _new(capsys, str(tmp_path / "mine"))
+    assert status == 0
+    assert f"wrote 6 files to {tmp_path / 'mine'}; next:" in said
+    assert "pytest -m smoke " in said
+    ran = _run(tmp_path / "mine", "-m", "pytest", "-m", "smoke", "--strict-markers", "-W", "error", "--claims-json=o")
+    assert ran.returncode == 0, ran.stdout + ran.stderr
+    claims = json.loads((tmp_path / "mine" / "o").read_text())["claims"]
+    assert [(claim["claim"], claim["outcome"]) for claim in claims] == [("H1", "supported"), ("H2", "supported")]
+
+
+def test_a_paper_is_unpacked_whole(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    status, said, _ = _new(capsys, str(tmp_path / "paper"), "--from", "nisioti2025")
+    assert status == 0
+    assert "evoclaims status --tier full" in said
+    for part in ("claims", "reproductions"):
+        assert _files(tmp_path / "paper" / part) == _files(ROOT / part)
+    assert "[tool.evoclaims]" in (tmp_path / "paper" / "pyproject.toml").read_text()
+
+
+def test_nothing_is_overwritten(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "claims").mkdir()
+    status, _, said = _new(capsys, str(tmp_path))
+    assert (status, said) == (
+        2,
+        f"evoclaims: {tmp_path} is not empty: claims is in it. Nothing was written; name a new folder.\n",
+    )
+    assert list(tmp_path.rglob("*")) == [tmp_path / "claims"]
+
+
+def test_a_new_repository_is_a_place_for_a_project(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / ".git").mkdir()
+    monkeypatch.chdir(tmp_path)
+    status, said, _ = _new(capsys, ".")
+    assert status == 0
+    assert "\ncd " not in said
+    assert (tmp_path / "pyproject.toml").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("mine", "--from", "nisoti"), "There is no project named 'nisoti'. Did you mean 'nisioti2025'? Known: "),
+        (("file",), "Cannot write a project to file: Not a directory. Name a new folder."),
+        (("file/mine",), "Cannot write a project to file/mine: Not a directory."),
+    ],
+)
+def test_what_cannot_be_written_is_a_sentence(
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+    arguments: tuple[str, ...],
+    said: str,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "file").touch()
+    status, _, error = _new(capsys, *arguments)
+    assert (status, said in error) == (2, True)
+
+
+def test_a_wheel_is_enough_to_judge_the_paper_s_claims(tmp_path: Path) -> None:
+    pytest.importorskip("hatchling")
+    site, paper = tmp_path / "site", tmp_path / "paper"
+    build = ("-m", "hatchling", "build", "-t", "wheel", "-d", str(tmp_path))
+    install = (
+        "-m",
+        "pip",
+        "install",
+        "--no-index",
+        "--no-deps",
+        f"--find-links={tmp_path}",
+        "-t",
+        str(site),
+        "evoclaims",
+    )
+    for command in (build, install):
+        done = _run(ROOT, *command)
+        assert done.returncode == 0, done.stdout + done.stderr
+    done = _run(tmp_path, "-m", "evoclaims", "new", "paper", "--from", "nisioti2025", site=site)
+    assert done.returncode == 0, done.stderr
+    where = _run(paper, "-c", "import evoclaims; print(evoclaims.__file__)", site=site)
+    assert Path(where.stdout.strip()).is_relative_to(site)
+    assert _files(paper / "reproductions") == _files(ROOT / "reproductions")
+    assert _files(site / "evoclaims" / "projects" / "skeleton") == _files(SKELETON)
+
+    shown = _run(paper, "-m", "evoclaims", "status", "--tier", "full", "--only", "C2", site=site)
+    assert "claims (full): 2 supported" in shown.stdout
