@@ -9,6 +9,11 @@ import pytest
 from evoclaims.judging.design import FIXED_10, Look
 from evoclaims.judging.fingerprint import fingerprint
 from evoclaims.judging.judge import judge
+from evoclaims.judging.kinds.omnibus import any_differ
+from evoclaims.judging.window import Window
+
+FROM_BEFORE = "98f6447e90c39098dd9ad0ee969147e07239d1f729256d7c75b8cd4331aae07b"
+"""Of a claim under the first rules: a change of it would start new histories everywhere."""
 
 
 def test_everything_that_decides_is_in_the_fingerprint(source) -> None:
@@ -35,6 +40,19 @@ def test_everything_that_decides_is_in_the_fingerprint(source) -> None:
                 a.score("lower") > b.score("lower"),
                 a.success(3).at(1) > b.success(3).at(1),
                 a.score() > source("c", []).score(),
+                a.score() > 1,
+                a.score() < 1,
+                a.score() > 2,
+                a.score() * 2 > b.score(),
+                a.score() * 2.0000001 > b.score(),
+                a.score() > b.score() * 2,
+                any_differ(a.score(), b.score(), source("c", []).score()),
+                any_differ(b.score(), a.score(), source("c", []).score()),
+                any_differ(a.score(), b.score(), source("c", []).score(), margin=1),
+                any_differ(a.score(), b.score(), source("c", []).score(), margin=2),
+                a.score("lower").seen_through(Window(10.0)) > b.score("lower").seen_through(Window(10.0)),
+                a.score("lower").seen_through(Window(9.0)) > b.score("lower").seen_through(Window(9.0)),
+                a.score("lower").seen_through(Window(10.0, 5.0)) > b.score("lower").seen_through(Window(10.0, 5.0)),
                 a.score().between(1, 2),
                 a.score().between(1, 3),
                 a.score().between(0, 2),
@@ -72,3 +90,14 @@ def test_the_judging_revision_is_in_the_fingerprint(source, monkeypatch: pytest.
     before = fingerprint(assertion, FIXED_10)
     monkeypatch.setattr(module, "JUDGING_REVISION", module.JUDGING_REVISION + 1)
     assert fingerprint(assertion, FIXED_10) != before
+
+
+def test_the_fingerprints_of_claims_made_before_are_what_they_were(source) -> None:
+    a, b = source("a", []), source("b", [])
+    assert (a.score() > b.score()).plain() == {
+        "kind": "greater",
+        "above": {"condition": "id of a", "name": "score", "better": "higher"},
+        "below": {"condition": "id of b", "name": "score", "better": "higher"},
+    }
+    joined = a.score().between(1, 2) & a.solved().stays() | a.success(3).falls()
+    assert fingerprint(joined, FIXED_10, claim="G1", tier="full") == FROM_BEFORE

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
@@ -9,6 +10,8 @@ from typing import Any
 import pytest
 
 from evoclaims.judging.measure import Event, Measure
+from evoclaims.judging.window import Window
+from evoclaims.paper import references
 from reproductions.nisioti2025 import REPRODUCTION
 from reproductions.nisioti2025.measures import PaperTrials
 
@@ -63,3 +66,16 @@ def test_a_measure_reads_its_own_number(read: Any, what: Any, name: str) -> None
 )
 def test_an_event_holds_where_its_name_says(read: Any, what: Any, name: str, given: Any, held: Any) -> None:
     assert read(what, name, given) == held
+
+
+def test_steps_to_a_success_of_1_are_those_after_which_the_papers_direct_trials_end() -> None:
+    condition = REPRODUCTION.tier("smoke").condition("cma_es", "n_parity_direct")
+    trials = references.load(references.path_of(REPRODUCTION.references, "smoke", "cma_es", "n_parity_direct"))
+    measure = PaperTrials("cma_es", "n_parity_direct", condition, lambda *_: trials).steps_to("success", 1.0)
+    every = condition.budget.chunk(1) * condition.method.cost(condition.task)
+    assert measure.window == Window(condition.environment_steps, every)
+    assert len(trials) >= 10
+    for trial in trials:
+        spent = trial.metrics["environment_steps"]
+        is_solved = trial.metrics["furthest_solved"] == condition.task.levels - 1
+        assert measure.of(trial) == (math.ceil(spent / every) * every if is_solved else math.inf)

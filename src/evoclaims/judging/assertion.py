@@ -6,11 +6,13 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
+from itertools import chain
 from typing import Any, ClassVar, NoReturn
 
 from evoclaims.core.errors import UserError
 from evoclaims.judging.design import Design, Look
 from evoclaims.judging.effect import a12, a12_interval, cliffs_delta
+from evoclaims.judging.entry import Entry
 from evoclaims.judging.multiplicity import holm
 from evoclaims.judging.reading import TrialReading
 from evoclaims.judging.sample import Sample, Source, Trials
@@ -43,11 +45,16 @@ class Finding:
 class Assertion(ABC):
     """One checkable sentence about trials.
 
-    Each kind is a frozen dataclass that implements the abstract methods. Its fields are readings of trials, and numbers
-    and words that are fixed beforehand; the claim's fingerprint includes all of them.
+    Each kind is a frozen dataclass that implements the abstract methods. Its fields are readings of trials, tuples of
+    them, and numbers and words that are fixed beforehand; the claim's fingerprint includes all of them.
+
+    Attributes:
+        kind: a name for tables.
+        entry: what the vocabulary says of it; a kind of one's own may have none.
     """
 
     kind: ClassVar[str]
+    entry: ClassVar[Entry | None] = None
 
     @abstractmethod
     def describe(self) -> str:
@@ -59,8 +66,9 @@ class Assertion(ABC):
 
     def readings(self) -> tuple[TrialReading, ...]:
         """Return what it reads from trials."""
-        values = (getattr(self, field.name) for field in fields(self))
-        return tuple(value for value in values if isinstance(value, TrialReading))
+        values = [getattr(self, field.name) for field in fields(self)]
+        each = chain.from_iterable(value if isinstance(value, tuple) else (value,) for value in values)
+        return tuple(value for value in each if isinstance(value, TrialReading))
 
     def plain(self) -> dict[str, Any]:
         """Return the canonical description that the claim's fingerprint hashes, with the conditions' ids."""
@@ -177,6 +185,8 @@ def _plain(value: object) -> object:
     """Return a kind's field as the fingerprint hashes it: 1 and 1.0 are equal."""
     if isinstance(value, TrialReading):
         return value.plain()
+    if isinstance(value, tuple):
+        return [_plain(one) for one in value]
     return float(value) if isinstance(value, int) else value
 
 

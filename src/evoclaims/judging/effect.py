@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import rankdata, trim_mean
 
 Floats = NDArray[np.float64]
 
@@ -36,6 +37,38 @@ def a12(a: Sequence[float], b: Sequence[float]) -> float:
     return (cliffs_delta(a, b) + 1) / 2
 
 
+def epsilon_squared(groups: Sequence[Sequence[float]]) -> float:
+    """Return the share of the variance of ranks that lies between groups, in [0, 1]; 0 for constant data."""
+    ranks = rankdata(np.concatenate(groups))
+    parts = np.split(ranks - ranks.mean(), np.cumsum(list(map(len, groups)))[:-1])
+    total = sum(float((part**2).sum()) for part in parts)
+    return sum(len(part) * float(part.mean()) ** 2 for part in parts) / total if total else 0.0
+
+
+def iqm(values: Sequence[float]) -> float:
+    """Return the mean of the middle half of values (interquartile mean), as rliable does; NaN for inf - inf."""
+    return float(_iqm(np.asarray(values, np.float64)))
+
+
+def _iqm(values: Floats) -> Floats:
+    """Return the interquartile means of the last axis."""
+    with np.errstate(invalid="ignore"):
+        means: Floats = trim_mean(values, 0.25, axis=-1)
+    return means
+
+
+def performance_profile(values: Sequence[float]) -> tuple[tuple[float, float], ...]:
+    """Return the performance profile of trials (Agarwal et al. 2021): the share of values above each threshold.
+
+    Returns:
+        (threshold, share): -inf and each distinct finite value, rising, which is where the share changes.
+    """
+    ordered = np.sort(np.asarray(values, np.float64))
+    thresholds = np.unique([-np.inf, *ordered[np.isfinite(ordered)]])
+    above = 1 - np.searchsorted(ordered, thresholds, side="right") / len(ordered)
+    return tuple(zip(thresholds.tolist(), above.tolist(), strict=True))
+
+
 def median(values: Sequence[float]) -> float:
     """Return the median; infinities (failed trials) rank as such."""
     return float(statistics.median(values))
@@ -57,6 +90,20 @@ def a12_interval(a: Sequence[float], b: Sequence[float], resamples: int = 1000) 
     drawn_left = left[rng.integers(0, len(left), (resamples, len(left)))]
     drawn_right = right[rng.integers(0, len(right), (resamples, len(right)))]
     return _percentiles((_dominance(drawn_left, drawn_right) + 1) / 2)
+
+
+def iqm_interval(*strata: Sequence[float], resamples: int = 1000) -> tuple[float, float]:
+    """Return the stratified percentile bootstrap interval of the interquartile mean of all strata (fixed seed).
+
+    Args:
+        strata: the trials of a condition each; each is resampled by itself (Agarwal et al. 2021).
+        resamples: number of bootstrap samples.
+    """
+    rng = np.random.default_rng(BOOTSTRAP_SEED)
+    drawn = [
+        np.asarray(stratum, np.float64)[rng.integers(0, len(stratum), (resamples, len(stratum)))] for stratum in strata
+    ]
+    return _percentiles(_iqm(np.concatenate(drawn, axis=1)))
 
 
 def median_interval(values: Sequence[float], resamples: int = 1000) -> tuple[float, float]:

@@ -5,8 +5,11 @@ A kind of assertion needs no method here: `verdict(Kind(measure, ...))` also wor
 
 from __future__ import annotations
 
+import math
 from functools import reduce
+from numbers import Real
 from operator import and_
+from typing import TypeGuard
 
 from evoclaims.core.errors import UserError
 from evoclaims.judging.assertion import Assertion
@@ -16,20 +19,47 @@ from evoclaims.judging.kinds.every_trial import EveryTrial
 from evoclaims.judging.kinds.greater import Greater
 from evoclaims.judging.kinds.most_trials import Solves, Stays
 from evoclaims.judging.kinds.self_comparison import SelfComparison
+from evoclaims.judging.kinds.threshold import Threshold
 from evoclaims.judging.kinds.trend import Trend
-from evoclaims.judging.reading import EventReading, LevelsReading, NumberReading
+from evoclaims.judging.reading import EventReading, LevelsReading, NumberReading, comparable
+from evoclaims.judging.sample import UnreadableTrialError
+from evoclaims.trials.result import TrialResult
 
 
 class Measure(NumberReading):
     """One number per trial, and assertions about it."""
 
-    def __gt__(self, other: Measure) -> Greater:
-        """Assert that this measure is above `other`."""
-        return Greater(self, self._comparable(other))
+    def __gt__(self, other: Measure | float) -> Greater | Threshold:
+        """Assert that this measure is above `other`, or its median above a number."""
+        if _is_number(other):
+            return Threshold(self, "above", float(other))
+        above, below = comparable(self, self._measure(other))
+        return Greater(above, below)
 
-    def __lt__(self, other: Measure) -> Greater:
-        """Assert that this measure is below `other`."""
-        return Greater(self._comparable(other), self)
+    def __lt__(self, other: Measure | float) -> Greater | Threshold:
+        """Assert that this measure is below `other`, or its median below a number."""
+        return Threshold(self, "below", float(other)) if _is_number(other) else self._measure(other) > self
+
+    def __mul__(self, factor: float) -> Measure:
+        """Return this measure times a number above 0, for ratios: `2 * a.steps < b.steps`.
+
+        Every value must be 0 or above: twice a loss would be worse, and not twice as good.
+
+        Raises:
+            UserError: when `factor` is no finite number above 0.
+        """
+        if not _is_number(factor) or not 0 < factor < math.inf:
+            raise UserError(f"{self.describe()!r} is multiplied by a finite number above 0, not by {factor!r}.")
+        written = repr(float(factor)).removesuffix(".0")
+        return Measure(
+            self.source,
+            f"{written} × {self.name}",
+            lambda trial: factor * self._at_least_0(trial),
+            self.better,
+            self.window.scaled(factor),
+        )
+
+    __rmul__ = __mul__
 
     def between(self, lo: float, hi: float) -> Band:
         """Assert that the median is in [lo, hi]."""
@@ -37,29 +67,41 @@ class Measure(NumberReading):
 
     def equivalent_to(self, other: Measure, *, margin: float) -> Equivalent:
         """Assert that this measure is within `margin` of `other`."""
-        return Equivalent(self, self._comparable(other), margin)
+        left, right = comparable(self, self._measure(other))
+        return Equivalent(left, right, margin)
 
     def never_above_itself(self) -> SelfComparison:
         """Assert, as a control, that the judge finds no difference between halves of these trials."""
         return SelfComparison(self)
 
-    def _comparable(self, other: object) -> Measure:
-        """Return `other` if the two can be compared.
+    def _measure(self, other: object) -> Measure:
+        """Return `other` if it is a measure.
 
         Raises:
-            UserError: when it is not a measure, or its `better` differs.
+            UserError: when it is not.
         """
         if not isinstance(other, Measure):
-            raise UserError(
-                f"{self.describe()!r} is compared with another measure, not with {other!r}: "
-                "for numbers use between(lo, hi), or an event."
-            )
-        if other.better != self.better:
-            raise UserError(
-                f"{self.describe()!r} is better when {self.better}, {other.describe()!r} when {other.better}: "
-                "compare measures of one direction."
-            )
+            raise UserError(f"{self.describe()!r} is compared with another measure or a number, not with {other!r}.")
         return other
+
+    def _at_least_0(self, trial: TrialResult) -> float:
+        """Return the number of a finished trial.
+
+        Raises:
+            UnreadableTrialError: when it is below 0.
+        """
+        value = self.read(trial)
+        if value < 0:
+            raise UnreadableTrialError(
+                f"{self.describe()} is {value:g} in the trial of seed {trial.seed}: "
+                "a measure that can be below 0 has no ratios."
+            )
+        return value
+
+
+def _is_number(value: object) -> TypeGuard[float]:
+    """Whether a value is a number, of Python or of numpy."""
+    return isinstance(value, Real) and not isinstance(value, bool)
 
 
 class Event(EventReading):

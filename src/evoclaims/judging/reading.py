@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Any, Literal, get_args
+from dataclasses import dataclass, replace
+from itertools import combinations
+from typing import Any, Literal, Self, TypeVar, get_args
 
 from evoclaims.core.errors import UnknownNameError, UserError
 from evoclaims.judging.sample import (
@@ -20,6 +21,7 @@ from evoclaims.judging.sample import (
     read_number,
     sample,
 )
+from evoclaims.judging.window import EVERYTHING, Window, shared
 from evoclaims.trials.result import TrialResult
 
 Better = Literal["higher", "lower"]
@@ -78,22 +80,92 @@ class NumberReading(ScalarReading):
     Attributes:
         read: reads the number from a finished trial.
         better: "higher" or "lower"; a failed trial gets the worst value, -inf or +inf.
+        window: how far and how finely values are observed.
     """
 
     read: Callable[[TrialResult], float]
     better: Better = "higher"
+    window: Window = EVERYTHING
 
     def __post_init__(self) -> None:
         """Reject an unknown direction."""
         _worst(self.better)
 
+    @property
+    def is_censored(self) -> bool:
+        """Whether large values are only known to be large."""
+        return math.isfinite(self.window.limit)
+
+    def describe(self) -> str:
+        """Return "condition: name", and how far values are observed."""
+        return super().describe() + f", within {self.window.limit:,.12g}" * self.is_censored
+
     def plain(self) -> dict[str, Any]:
         """Return what the fingerprint hashes."""
-        return {**super().plain(), "better": self.better}
+        seen = {} if self.window == EVERYTHING else {"limit": self.window.limit, "every": self.window.every}
+        return {**super().plain(), "better": self.better, **seen}
+
+    def seen_through(self, window: Window) -> Self:
+        """Return this reading as it is observed through a window no wider and no finer than its own."""
+        return self if window == self.window else replace(self, window=window)
+
+    def require_seen(self, number: float) -> None:
+        """Reject an assertion about a number beyond what is observed.
+
+        Raises:
+            UserError: when there is a limit, and the number is above it.
+        """
+        if number > self.window.limit:
+            raise UserError(
+                f"{self.describe()!r} is not observed beyond that, so no trial says anything about {number:,.12g}: "
+                "name a smaller number, or raise the budget."
+            )
+
+    def sample(self, trials: Trials) -> Sample:
+        """Read every trial of the condition, as far as its numbers are observed."""
+        return replace(super().sample(trials), limit=self.window.limit if self.is_censored else None)
 
     def of(self, trial: TrialResult) -> float:
-        """Return the number of one trial; the worst value for a failed one."""
-        return read_number(trial, self.describe(), self.read, _worst(self.better))
+        """Return the number of one trial, as far as it is observed; the worst value for a failed one."""
+        return self.window.seen(read_number(trial, self.describe(), self.read, _worst(self.better)))
+
+
+AnyNumber = TypeVar("AnyNumber", bound=NumberReading)
+
+
+def comparable(*readings: AnyNumber) -> tuple[AnyNumber, ...]:
+    """Return readings whose values can be ranked together: seen as far and as finely as all of them are.
+
+    Raises:
+        UserError: when one is better higher and another lower, or they see nothing in common.
+    """
+    first = readings[0]
+    for other in readings[1:]:
+        if other.better != first.better:
+            raise UserError(
+                f"{first.describe()!r} is better when {first.better}, {other.describe()!r} when {other.better}: "
+                "compare measures of one direction."
+            )
+    window = shared([reading.window for reading in readings])
+    return tuple(reading.seen_through(window) for reading in readings)
+
+
+def require_independent(*readings: NumberReading) -> None:
+    """Reject measures that no rank test may compare: it assumes independent samples that are observed alike.
+
+    Raises:
+        UserError: when two read the same condition, or are not observed equally far and finely.
+    """
+    for one, other in combinations(readings, 2):
+        if one.source.fingerprint == other.source.fingerprint:
+            raise UserError(
+                f"{one.describe()!r} and {other.describe()!r} read the same trials, which no rank test may compare: "
+                "use a profile's falls() or rises() for levels, never_above_itself() for a control."
+            )
+        if one.window != other.window:
+            raise UserError(
+                f"{one.describe()!r} and {other.describe()!r} are not observed alike: write a < b, which sees to that."
+            )
 
 
 @dataclass(frozen=True, eq=False)

@@ -57,6 +57,7 @@ class Sample:
         median: median of `values`.
         failed: seeds of the diverged or timed-out trials.
         endings: how each of these ended, such as "diverged".
+        limit: an infinite value of a trial that has not failed is only known to be larger than this; None without one.
     """
 
     label: str
@@ -65,6 +66,12 @@ class Sample:
     median: float
     failed: tuple[int, ...]
     endings: tuple[str, ...] = ()
+    limit: float | None = None
+
+    @property
+    def capped(self) -> tuple[float, ...]:
+        """The values, with the limit in place of those beyond it: the least that they can be."""
+        return self.values if self.limit is None else tuple(min(value, self.limit) for value in self.values)
 
 
 def is_failed(trial: TrialResult) -> bool:
@@ -135,8 +142,8 @@ def ranked(value: float, trial: TrialResult, what: str) -> float:
     return value
 
 
-def sample(label: str, trials: Sequence[TrialResult], values: Sequence[float]) -> Sample:
-    """Return the sample of `values`, one for each of `trials`."""
+def sample(label: str, trials: Sequence[TrialResult], values: Sequence[float], limit: float | None = None) -> Sample:
+    """Return the sample of `values`, one for each of `trials`; see `Sample` for the limit."""
     failed = [trial for trial in trials if is_failed(trial)]
     return Sample(
         label=label,
@@ -145,4 +152,5 @@ def sample(label: str, trials: Sequence[TrialResult], values: Sequence[float]) -
         median=median(values),
         failed=tuple(trial.seed for trial in failed),
         endings=tuple(trial.status for trial in failed),
+        limit=limit,
     )

@@ -10,6 +10,7 @@ from evoclaims.core.errors import UnknownNameError
 from evoclaims.judging.measure import Event, Measure, Profile
 from evoclaims.judging.reading import Better
 from evoclaims.judging.shortage import Limited
+from evoclaims.paper.sample_efficiency import steps_to
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.spec import Condition
 
@@ -115,6 +116,18 @@ class TrialGroup:
     def furthest_reached(self) -> Measure:
         """Highest level trained on."""
         return self.measure("furthest level reached", lambda t: t.metrics["furthest_reached"])
+
+    @property
+    def environment_steps(self) -> Measure:
+        """Environment steps that the trial has spent; fewer than the budget where it ends once all is solved."""
+        return self.measure("environment steps", lambda t: t.metrics["environment_steps"], "lower")
+
+    def steps_to(self, curve: str, value: float, level: int | None = None) -> Measure:
+        """Environment steps at the first report with at least `value` in a training curve; censored where never.
+
+        Only reports count in which the trial trains on `level`, counted from 0 (default: the last).
+        """
+        return steps_to(self, self.condition, curve, value, level)
 
     @property
     def solves_every_level(self) -> Event:

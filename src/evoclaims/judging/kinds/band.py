@@ -13,7 +13,7 @@ from evoclaims.judging.design import Design
 from evoclaims.judging.effect import median_interval
 from evoclaims.judging.exact import sign_test
 from evoclaims.judging.reading import NumberReading
-from evoclaims.judging.sample import Trials
+from evoclaims.judging.sample import Sample, Trials
 from evoclaims.judging.verdict import Bound, Interval, PValues
 
 
@@ -35,8 +35,9 @@ class Band(Assertion):
         if not -math.inf < self.lo <= self.hi < math.inf:
             raise UserError(
                 f"A band runs from a finite lower end to a finite higher one, unlike [{self.lo}, {self.hi}]: "
-                "state a one-sided bound as an event that stays()."
+                "compare the measure with a number (m > 90), or state a bound as an event that stays()."
             )
+        self.measure.require_seen(self.hi)
 
     def describe(self) -> str:
         """Return "the median of A lies in [lo, hi]"."""
@@ -70,9 +71,7 @@ class Band(Assertion):
             (sample,),
             detail=f"{below} below, {n - below - above} inside, {above} above",
             bounds=(Bound("lowest", float(self.lo)), Bound("highest", float(self.hi))),
-            intervals=lambda: (
-                Interval("median, 95% percentile bootstrap", *median_interval(sample.values), on_axis=True),
-            ),
+            intervals=lambda: (span_of_median(sample),),
         )
 
     def _outside(self, values: Sequence[float]) -> tuple[int, int]:
@@ -85,3 +84,9 @@ def _p(below: int, above: int, n: int) -> PValues:
     inside = max(sign_test(n - below, n).p, sign_test(n - above, n).p)
     outside = min(sign_test(below, n).p, sign_test(above, n).p)
     return PValues(inside, min(1.0, 2 * outside))
+
+
+def span_of_median(sample: Sample) -> Interval:
+    """Return the interval of a sample's median, for description; values beyond a limit count as the limit."""
+    limited = "" if sample.limit is None else f", nothing beyond {sample.limit:,.12g}"
+    return Interval(f"median, 95% percentile bootstrap{limited}", *median_interval(sample.capped), on_axis=True)

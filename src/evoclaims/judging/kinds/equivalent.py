@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
 from evoclaims.core.errors import UserError
 from evoclaims.judging.assertion import Assertion, Finding
 from evoclaims.judging.design import Design
-from evoclaims.judging.exact import rank_attainable, rank_test
-from evoclaims.judging.kinds.greater import require_independent
-from evoclaims.judging.reading import NumberReading
+from evoclaims.judging.exact import ExactTest, rank_attainable, rank_test
+from evoclaims.judging.reading import NumberReading, require_independent
 from evoclaims.judging.sample import Trials
 from evoclaims.judging.verdict import Bound, PValues
 
@@ -30,10 +30,15 @@ class Equivalent(Assertion):
     kind: ClassVar[str] = "equivalent"
 
     def __post_init__(self) -> None:
-        """Reject an impossible margin, and two measures of the same trials."""
+        """Reject an impossible margin, and measures that cannot be ranked together at a distance."""
         if not (math.isfinite(self.margin) and self.margin > 0):
             raise UserError(f"The margin of an equivalence is a finite number above 0, unlike {self.margin}.")
         require_independent(self.left, self.right)
+        if self.left.is_censored:
+            raise UserError(
+                f"{self.left.describe()!r} is not observed beyond that, and nobody knows how far two trials beyond it "
+                "are apart: compare it with <, or with a number."
+            )
 
     def describe(self) -> str:
         """Return "A is within m of B"."""
@@ -50,7 +55,7 @@ class Equivalent(Assertion):
         a, b = left.values, right.values
         raised = tuple(value + self.margin for value in a)
         lowered = tuple(value - self.margin for value in a)
-        inside = (rank_test(raised, b), rank_test(b, lowered))
+        inside = equivalence_tests(a, b, self.margin)
         outside = (rank_test(b, raised), rank_test(lowered, b))
         p = PValues(max(test.p for test in inside), min(1.0, 2 * min(test.p for test in outside)))
         attainable = PValues(
@@ -59,3 +64,8 @@ class Equivalent(Assertion):
         )
         bounds = (Bound("margin", float(self.margin), on_axis=False),)
         return self.found(p, attainable, alpha, (left, right), bounds=bounds, effect=True)
+
+
+def equivalence_tests(a: Sequence[float], b: Sequence[float], margin: float) -> tuple[ExactTest, ExactTest]:
+    """Return the rank tests that both have to reject: A + margin above B, and B above A - margin."""
+    return rank_test([value + margin for value in a], b), rank_test(b, [value - margin for value in a])

@@ -8,11 +8,10 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import ClassVar
 
-from evoclaims.core.errors import UserError
 from evoclaims.judging.assertion import Assertion, Finding
 from evoclaims.judging.design import Design
 from evoclaims.judging.exact import ExactTest, binomial_test, rank_attainable, rank_test
-from evoclaims.judging.reading import NumberReading
+from evoclaims.judging.reading import NumberReading, require_independent
 from evoclaims.judging.sample import Trials
 from evoclaims.judging.verdict import Bound, Outcome, PValues
 
@@ -77,19 +76,6 @@ class GreaterTests:
         return self.above.p <= alpha and self.p.outcome(alpha) is Outcome.SUPPORTED
 
 
-def require_independent(left: NumberReading, right: NumberReading) -> None:
-    """Reject two measures of the same trials: a rank test assumes independent samples.
-
-    Raises:
-        UserError: when both read the same condition.
-    """
-    if left.source.fingerprint == right.source.fingerprint:
-        raise UserError(
-            f"{left.describe()!r} and {right.describe()!r} read the same trials, which no rank test may compare: "
-            "use a profile's falls() or rises() for levels, never_above_itself() for a control."
-        )
-
-
 @dataclass(frozen=True)
 class Greater(Assertion):
     """`above` is above `below`: supported by the rank test.
@@ -103,7 +89,7 @@ class Greater(Assertion):
     kind: ClassVar[str] = "greater"
 
     def __post_init__(self) -> None:
-        """Reject two measures of the same trials."""
+        """Reject measures that cannot be ranked together."""
         require_independent(self.above, self.below)
 
     def describe(self) -> str:

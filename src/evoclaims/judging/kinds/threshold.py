@@ -1,0 +1,96 @@
+"""threshold: the median of a measure is above, or below, a number."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar, Literal
+
+from evoclaims.core.errors import UnknownNameError, UserError
+from evoclaims.judging.assertion import Assertion, Finding
+from evoclaims.judging.design import Design
+from evoclaims.judging.entry import Entry
+from evoclaims.judging.exact import sign_test
+from evoclaims.judging.kinds.band import span_of_median
+from evoclaims.judging.reading import NumberReading
+from evoclaims.judging.sample import Sample, Trials
+from evoclaims.judging.verdict import Bound, PValues
+
+Side = Literal["above", "below"]
+
+_OPPOSITE: dict[Side, Side] = {"above": "below", "below": "above"}
+
+
+@dataclass(frozen=True)
+class Threshold(Assertion):
+    """The median is above a number, or below it: an exact sign test each way.
+
+    A trial at the number counts for neither direction, so that ties decide nothing. A trial without a result has the
+    worst value, which may count against the claim and never counts for it.
+    """
+
+    measure: NumberReading
+    side: Side
+    number: float
+    kind: ClassVar[str] = "threshold"
+    entry: ClassVar[Entry] = Entry(
+        syntax=("a.reward > 90", "a.reward < 90"),
+        null="A trial is on the claimed side of the number with probability 1/2 at most, so that the median is not.",
+        supported="The sign test rejects that; a trial at the number counts as not on the claimed side.",
+        refuted="The sign test rejects the same of the other side; a trial at the number is not on that one either.",
+        source="Dixon and Mood 1946 (sign test)",
+    )
+
+    def __post_init__(self) -> None:
+        """Reject an unknown side, and a number that is not finite or beyond what is observed."""
+        if self.side not in _OPPOSITE:
+            raise UnknownNameError("side", self.side, _OPPOSITE)
+        if not math.isfinite(self.number):
+            raise UserError(f"{self.measure.describe()!r} is compared with a finite number, unlike {self.number}.")
+        self.measure.require_seen(self.number)
+
+    def describe(self) -> str:
+        """Return "the median of A is above 90"."""
+        return f"the median of {self.measure.describe()} is {self.side} {self.number:.12g}"
+
+    def attainable(self, n: int, design: Design) -> PValues:
+        """Return the p of all trials on one side."""
+        return _p(n, n, n)
+
+    def bounds(self, trials: Trials, n: int, design: Design) -> tuple[PValues, PValues]:
+        """Bound p by new trials that are all on one side."""
+        sample = self.measure.sample(trials)
+        toward, away = self._counts(sample)
+        new = n - len(sample.values)
+        return _p(toward + new, away + new, n), _p(toward, away, n)
+
+    def find(self, trials: Trials, design: Design, alpha: float) -> Finding:
+        """Run both sign tests."""
+        sample = self.measure.sample(trials)
+        toward, away = self._counts(sample)
+        n = len(sample.values)
+        decided = toward + away
+        undecided = f", {n - decided} at it or without a result, which count for neither" if n > decided else ""
+        return self.found(
+            _p(toward, away, n),
+            _p(decided, decided, n),
+            alpha,
+            (sample,),
+            detail=f"{toward} of {n} {self.side} {self.number:.12g}, {away} {_OPPOSITE[self.side]}{undecided}",
+            bounds=(Bound("number", float(self.number)),),
+            intervals=lambda: (span_of_median(sample),),
+        )
+
+    def _counts(self, sample: Sample) -> tuple[int, int]:
+        """Return how many trials count for the claim, and how many against it."""
+        sign = 1 if self.side == "above" else -1
+        distances = [sign * (value - self.number) for value in sample.values]
+        toward = sum(
+            distance > 0 and seed not in sample.failed for seed, distance in zip(sample.seeds, distances, strict=True)
+        )
+        return toward, sum(distance < 0 for distance in distances)
+
+
+def _p(toward: int, away: int, n: int) -> PValues:
+    """Return the sign tests' p for and against."""
+    return PValues(sign_test(toward, n).p, sign_test(away, n).p)

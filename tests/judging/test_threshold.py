@@ -1,0 +1,118 @@
+"""A measure against a number: the sign test, ties at the number, and what is not observed."""
+
+from __future__ import annotations
+
+import math
+from itertools import product
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from evoclaims.core.errors import UserError
+from evoclaims.judging.design import FIXED_10, SEQUENTIAL, Design
+from evoclaims.judging.exact import sign_test
+from evoclaims.judging.judge import judge
+from evoclaims.judging.kinds.threshold import Threshold
+from evoclaims.judging.verdict import Outcome
+
+SUPPORTED, REFUTED, INCONCLUSIVE = Outcome.SUPPORTED, Outcome.REFUTED, Outcome.INCONCLUSIVE
+
+
+@given(st.integers(1, 9), st.data())
+def test_the_sign_test_is_the_share_of_all_sign_patterns(n: int, data: st.DataObject) -> None:
+    k = data.draw(st.integers(0, n))
+    patterns = [sum(signs) for signs in product((0, 1), repeat=n)]
+    assert sign_test(k, n).p == pytest.approx(sum(count >= k for count in patterns) / 2**n, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("values", "above", "below"),
+    [
+        ([91.0] * 10, SUPPORTED, REFUTED),
+        ([91.0] * 9 + [0.0], SUPPORTED, REFUTED),
+        ([91.0] * 8 + [0.0] * 2, INCONCLUSIVE, INCONCLUSIVE),
+        ([89.0] * 10, REFUTED, SUPPORTED),
+        ([91.0] * 9 + [90.0], SUPPORTED, REFUTED),  # p = 11 / 1024: a tie is not above
+        ([91.0] * 8 + [90.0] * 2, INCONCLUSIVE, INCONCLUSIVE),
+        ([90.0] * 10, INCONCLUSIVE, INCONCLUSIVE),
+        ([91.0] * 9 + ["diverged"], SUPPORTED, REFUTED),
+        (["diverged"] * 10, REFUTED, INCONCLUSIVE),  # a broken run supports nothing
+    ],
+)
+def test_a_median_against_a_number(source, values, above, below) -> None:
+    score = source("a", values).score()
+    assert judge(score > 90, FIXED_10).outcome is above
+    assert judge(score < 90, FIXED_10).outcome is below
+
+
+def test_the_evidence_says_which_trials_decide_nothing(source) -> None:
+    score = source("a", [91.0] * 6 + [90.0] + [80.0] * 2 + ["diverged"]).score()
+    (above,), (below,) = judge(score > 90, FIXED_10).evidence, judge(score < 90, FIXED_10).evidence
+    assert above.detail == "6 of 10 above 90, 3 below, 1 at it or without a result, which count for neither"
+    assert below.detail == "2 of 10 below 90, 6 above, 2 at it or without a result, which count for neither"
+    assert [(bound.name, bound.value) for bound in above.bounds] == [("number", 90.0)]
+    assert above.describe == "the median of a: score is above 90"
+
+
+def test_where_all_trials_are_at_the_number_nothing_was_attainable(source) -> None:
+    verdict = judge(source("a", [90.0] * 10).score() > 90, FIXED_10)
+    assert verdict.reason == "underpowered: with these ties the smallest attainable p is 1 > alpha = 0.05 at n = 10"
+
+
+def test_too_few_trials_are_not_looked_at(source) -> None:
+    few = source("a", [91.0] * 4)
+    verdict = judge(few.score() > 90, Design.fixed(4))
+    assert (verdict.outcome, few.asked) == (INCONCLUSIVE, [])
+    assert verdict.reason == "underpowered: needs n = 5 at alpha = 0.05"
+
+
+@pytest.mark.parametrize(("n", "alpha"), [(5, 0.05), (6, 0.05), (7, 0.01)])
+@pytest.mark.parametrize("at", [0.0, 0.1, 0.5])
+def test_no_median_at_the_number_is_called_above_or_below_more_often_than_alpha(
+    source: Any, n: int, alpha: float, at: float
+) -> None:
+    chances = {91.0: 0.5, 90.0: at, 89.0: 0.5 - at}  # the edge of the null: a median at the number
+    errors = dict.fromkeys(Outcome, 0.0)
+    for counts in product(range(n + 1), repeat=2):
+        if sum(counts) <= n:
+            above, tied = counts
+            values = [91.0] * above + [90.0] * tied + [89.0] * (n - above - tied)
+            ways = math.comb(n, above) * math.comb(n - above, tied)
+            chance = ways * math.prod(chances[value] for value in values)
+            errors[judge(source("a", values).score() > 90, Design.fixed(n, alpha)).outcome] += chance
+    assert errors[SUPPORTED] <= alpha
+    assert errors[REFUTED] <= alpha
+
+
+@given(st.lists(st.sampled_from([89.0, 90.0, 91.0]), min_size=10, max_size=10), st.sampled_from(["above", "below"]))
+def test_a_verdict_at_five_that_is_final_is_that_of_ten(values: list[float], side: Any) -> None:
+    from conftest import StoredSource, make_trial
+
+    trials = {seed: make_trial(seed, value, "a") for seed, value in enumerate(values)}
+    claim = Threshold(StoredSource("a", trials).score(), side, 90.0)
+    early, all_ten = judge(claim, SEQUENTIAL), judge(claim, Design.fixed(10, 0.04))
+    assert early.outcome is all_ten.outcome  # five trials are too few for alpha = 0.01: they can only be curtailed
+    assert early.n == 10 or "stopped early" in early.reason
+
+
+@pytest.mark.parametrize("number", [math.inf, -math.inf, math.nan])
+def test_a_number_is_finite(source, number) -> None:
+    with pytest.raises(UserError, match="finite number"):
+        _ = source("a", []).score() > number
+
+
+def test_numbers_of_numpy_are_numbers_and_truth_values_are_not(source) -> None:
+    score = source("a", []).score()
+    assert (score > np.float32(2)).plain() == (score > 2).plain() == (2 < score).plain()  # noqa: SIM300
+    with pytest.raises(UserError, match="not with True"):
+        _ = score > True
+    with pytest.raises(UserError, match="another measure or a number, not with '90'"):
+        _ = score < "90"
+
+
+def test_an_unknown_side_lists_the_known_ones(source) -> None:
+    with pytest.raises(UserError, match="above, below"):
+        Threshold(source("a", []).score(), "over", 1.0)  # type: ignore[arg-type]

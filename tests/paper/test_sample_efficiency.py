@@ -1,0 +1,155 @@
+"""Environment steps until a curve reaches a value: reached, never, or nobody knows."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import pytest
+from hand_made_paper import CONDITIONS
+from made_trials import trial_of
+
+from evoclaims.core.errors import UserError
+from evoclaims.judging.design import Design
+from evoclaims.judging.judge import judge
+from evoclaims.judging.sample import UnreadableTrialError
+from evoclaims.judging.verdict import Outcome
+from evoclaims.judging.window import Window
+from evoclaims.paper.trial_group import TrialGroup
+from evoclaims.trials.budget import Budget
+from evoclaims.trials.result import TrialResult
+from evoclaims.trials.spec import Condition
+
+PLAIN = CONDITIONS["better", "small"]
+COST = PLAIN.method.cost(PLAIN.task)
+LAST = PLAIN.task.levels - 1
+
+
+def curves_of(success: Sequence[float], levels: Sequence[int] | None = None, chunk: int = 1) -> dict[str, Any]:
+    """Return curves with one report after each `chunk` steps."""
+    steps = [chunk * (index + 1.0) for index in range(len(success))]
+    return {
+        "environment_steps": tuple(COST * step for step in steps),
+        "success": tuple(success),
+        "level": tuple(map(float, levels or [LAST] * len(success))),
+    }
+
+
+def made(condition: Condition, curves: Mapping[str, Any], seed: int = 0, **changes: Any) -> TrialResult:
+    return trial_of(condition, seed, 1.0, curves=curves, **changes)
+
+
+@pytest.fixture
+def group() -> Callable[..., TrialGroup]:
+    """A function that makes trials with these curves of success, of a condition with a report after each step."""
+
+    def make(*successes: Sequence[float], method: str = "better", generations: int = 4) -> TrialGroup:
+        budget = Budget(generations=generations, reports=generations)
+        condition = replace(CONDITIONS[method, "small"], budget=budget, progression="whole_budget")
+
+        def get(asked: Condition, seeds: Sequence[int]) -> list[TrialResult]:
+            return [made(asked, curves_of(successes[seed]), seed) for seed in seeds]
+
+        return TrialGroup(method, "small", condition, get)
+
+    return make
+
+
+def read(group: TrialGroup, value: float = 0.9, n: int = 1, **options: Any) -> tuple[float, ...]:
+    measure = group.steps_to("success", value, **options)
+    return measure.sample({group.fingerprint: tuple(group.fetch(range(n)))}).values
+
+
+def test_it_is_the_first_report_with_the_value_and_never_is_beyond_the_budget(group: Any) -> None:
+    trials = group([0.1, 0.9, 0.2, 1.0], [0.1, 0.2, 0.3, 0.4], [1.0, 0.0, 0.0, 0.0])
+    assert read(trials, n=3) == (2 * COST, math.inf, COST)
+    measure = trials.steps_to("success", 0.9)
+    assert measure.window == Window(4.0 * COST, 0.0)
+    assert measure.better == "lower"
+    within = f", within {4 * COST:,}"
+    assert measure.describe() == f"better on small: environment steps until success is 0.9 on level {LAST}{within}"
+
+
+def test_only_reports_on_the_level_count(group: Any) -> None:
+    trials = group([0.0] * 4)
+    curves = curves_of([1.0, 1.0, 0.5, 1.0], [0, 0, LAST, LAST])
+    trial = made(trials.condition, curves)
+    assert trials.steps_to("success", 0.9).of(trial) == 4 * COST
+    assert trials.steps_to("success", 0.9, level=0).of(trial) == COST
+    assert trials.steps_to("level", LAST).of(trial) == 3 * COST
+    with pytest.raises(UserError, match=f"better on small has levels 0 to {LAST}, not {LAST + 1}"):
+        trials.steps_to("success", 0.9, level=LAST + 1)
+
+
+def test_between_reports_nothing_is_known() -> None:
+    condition = replace(PLAIN, budget=Budget(generations=5, reports=2))  # after three steps, and after five
+    trials = TrialGroup("better", "small", condition, lambda *_: [])
+    measure = trials.steps_to("success", 0.9)
+    assert measure.window == Window(5.0 * COST, 3.0 * COST)
+    solved_at_2 = {**curves_of([1.0]), "environment_steps": (2.0 * COST,)}  # a trial that ends once it has solved all
+    assert measure.of(made(condition, solved_at_2)) == 3 * COST
+    solved_at_4 = {**curves_of([0.0, 1.0]), "environment_steps": (3.0 * COST, 4.0 * COST)}
+    assert measure.of(made(condition, solved_at_4)) == 5 * COST
+
+
+def test_when_a_trial_ends_early_without_the_value_nobody_knows(group: Any) -> None:
+    trials = group(*[[0.1, 0.5]] * 5)
+    with pytest.raises(
+        UnreadableTrialError, match=f"ended after {2 * COST} of {4 * COST} .*progression 'whole_budget'"
+    ):
+        read(trials)
+    verdict = judge(trials.steps_to("success", 0.9) < 4 * COST, Design.fixed(5))
+    assert verdict.outcome is Outcome.ERROR
+
+
+def test_a_failed_trial_has_the_worst_rank_as_one_that_never_reaches_it(group: Any) -> None:
+    trials = group([0.0] * 4)
+    curves = curves_of([1.0, 1.0])
+    assert trials.steps_to("success", 0.9).of(made(trials.condition, curves, status="diverged")) == math.inf
+
+
+def test_a_misspelt_curve_says_which_there_are(group: Any) -> None:
+    trials = group([0.0] * 4)
+    with pytest.raises(UnreadableTrialError, match="Did you mean 'success'"):
+        trials.steps_to("sucess", 0.9).of(trials.fetch([0])[0])
+    with pytest.raises(UserError, match="finite value, unlike nan"):
+        trials.steps_to("success", math.nan)
+
+
+FAST, SLOW, NEVER = [1.0] * 4, [0.0, 0.0, 1.0, 1.0], [0.0] * 4
+
+
+@pytest.mark.parametrize(
+    ("a", "b", "outcome"),
+    [
+        (FAST, SLOW, Outcome.SUPPORTED),
+        (SLOW, NEVER, Outcome.SUPPORTED),
+        (NEVER, SLOW, Outcome.REFUTED),
+        (NEVER, NEVER, Outcome.INCONCLUSIVE),
+    ],
+)
+def test_sample_efficiency_is_judged(group: Any, a: Any, b: Any, outcome: Outcome) -> None:
+    left, right = group(*[a] * 6), group(*[b] * 6, method="worse")
+    claim = left.steps_to("success", 0.9) < right.steps_to("success", 0.9)
+    assert judge(claim, Design.fixed(6)).outcome is outcome
+
+
+def test_budgets_of_two_lengths_are_compared_up_to_the_shorter(group: Any) -> None:
+    long = group(*[[0.0, 0.0, 1.0, 1.0]] * 6)
+    short = group(*[[0.0, 0.0]] * 6, method="worse", generations=2)
+    claim = long.steps_to("success", 0.9) < short.steps_to("success", 0.9)
+    verdict = judge(claim, Design.fixed(6))
+    assert verdict.outcome is Outcome.INCONCLUSIVE  # within the shorter budget neither has reached it
+    assert {sample.limit for sample in verdict.evidence[0].samples} == {2.0 * COST}
+
+
+def test_twice_as_sample_efficient_is_a_ratio(group: Any) -> None:
+    fast, slow = group(*[FAST] * 6), group(*[SLOW] * 6, method="worse")
+    assert (
+        judge(2 * fast.steps_to("success", 0.9) < slow.steps_to("success", 0.9), Design.fixed(6)).outcome == "supported"
+    )
+    assert (
+        judge(3 * fast.steps_to("success", 0.9) < slow.steps_to("success", 0.9), Design.fixed(6)).outcome != "supported"
+    )
