@@ -26,6 +26,9 @@ MOST: Final = 1e300
 LEAST: Final = 1e-300
 """The smallest difference that ticks tell apart: below, floats run out of digits."""
 
+_DASHES: Final = ("none", "6 3", "2 2", "8 2 2 2")
+"""How the lines of several conditions are told apart."""
+
 DOT, BLOCK = 7.0, 44.0
 """Width of a dot, and of the widest block of close values, which fits into the edges."""
 
@@ -71,7 +74,7 @@ def strip_svg(part: Part, strip: Strip) -> Markup:
     if _right(part) < WIDTH - EDGE:
         pieces.append(Markup('<path class="wall" d="M{0} 1V{1}"/>').format(WIDTH - APART + 3, HEIGHT))
         pieces += _apart(strip.apart)
-    name = f"{strip.label}, {plural(strip.n, 'trial')}, median {number(strip.median)}"
+    name = f"{strip.label}, {plural(strip.n, 'trial')}, median {strip.middle}"
     return _svg(WIDTH, HEIGHT, pieces, name)
 
 
@@ -90,6 +93,26 @@ def axis_svg(part: Part) -> Markup:
     if _right(part) < WIDTH - EDGE:
         pieces.append(_text("tick", WIDTH - APART / 2, 14, "no number"))
     return _svg(WIDTH, AXIS if part.bounds else 18.0, pieces, "")
+
+
+def profile_svg(part: Part) -> Markup:
+    """Draw the performance profiles of a part's strips on their axis: the share of trials above each value."""
+    strips = [strip for strip in part.strips if strip.dots and strip.profile]
+    if len(strips) < 2:
+        return Markup("")
+    scale, top = _Scale(*part_scale(part), right=_right(part)), 11.0 * len(strips) + 4
+    share = _Scale(0.0, 1.0, top + HEIGHT, top)
+    pieces = [Markup('<path class="rule" d="M{0} {1}V{2}H{3}"/>').format(EDGE, top, top + HEIGHT, scale.right)]
+    for value, label in ((1.0, "100 %"), (0.0, "0 %")):
+        pieces.append(_text("small", EDGE - 3, share(value) + 3, label, "end"))
+    for index, strip in enumerate(strips):
+        (_, first), *steps = strip.profile
+        path = f"M{EDGE} {_at(share(first))}" + "".join(f"H{_at(scale(at))}V{_at(share(up))}" for at, up in steps)
+        key = f"M{EDGE} {11 * index + 6}h20"
+        drawn = Markup('<path class="line" stroke-dasharray="{}" d="{}H{}{}"><title>{}</title></path>')
+        pieces.append(drawn.format(_DASHES[index % len(_DASHES)], path, _at(scale.right), key, strip.label))
+        pieces.append(_text("small", EDGE + 24, 11 * index + 9, strip.label, "start"))
+    return _svg(WIDTH, top + HEIGHT + 4, pieces, "performance profiles: the share of trials above each value")
 
 
 def curve_symbol(panel: CurvePanel, name: str) -> Markup:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from statistics import median
 from typing import Final
 
+from evoclaims.judging.effect import iqm, iqm_interval, performance_profile
 from evoclaims.judging.sample import Sample
 from evoclaims.judging.verdict import Bound, Direction, Evidence, Interval, Outcome, Verdict
 from evoclaims.report.formatting import clean, number, p_value
@@ -34,17 +35,26 @@ class Strip:
         dots: trials with a finite value.
         apart: trials without one, as (seed, why): "diverged", "NaN".
         median: of all values that the judge used; None if there are none.
+        least: what the median is at least, where values beyond a limit are not observed and it is one of them.
+        profile: thresholds and the share of trials above each (`performance_profile`); empty for events.
     """
 
     label: str
     dots: tuple[Dot, ...]
     apart: tuple[tuple[int, str], ...]
     median: float | None
+    least: float | None = None
+    profile: tuple[tuple[float, float], ...] = ()
 
     @property
     def n(self) -> int:
         """Number of trials."""
         return len(self.dots) + len(self.apart)
+
+    @property
+    def middle(self) -> str:
+        """The median as text."""
+        return number(self.median) if self.least is None else f"> {number(self.least)}"
 
 
 @dataclass(frozen=True)
@@ -101,7 +111,7 @@ def _judged_part(evidence: Evidence) -> Part:
         numbers=_numbers(evidence),
         detail=evidence.detail,
         event=evidence.events,
-        strips=tuple(map(_strip, evidence.samples)),
+        strips=tuple(_strip(sample, evidence.events) for sample in evidence.samples),
         bounds=tuple(bound for bound in evidence.bounds if bound.on_axis),
         spans=tuple(interval for interval in evidence.intervals if interval.on_axis),
     )
@@ -124,14 +134,31 @@ def _why(trial: TrialSummary) -> str:
     return "no mean success" if trial.score is None else number(trial.score)
 
 
-def _strip(sample: Sample) -> Strip:
-    """Return a sample with failed trials set apart."""
+def _strip(sample: Sample, events: bool) -> Strip:
+    """Return a sample with failed trials, and those beyond a limit, set apart."""
     failed = dict(zip(sample.failed, sample.endings, strict=True))
     pairs = list(zip(sample.seeds, sample.values, strict=True))
     dots = tuple(Dot(seed, value) for seed, value in pairs if seed not in failed and math.isfinite(value))
     shown = {dot.seed for dot in dots}
-    apart = tuple((seed, failed.get(seed, number(value))) for seed, value in pairs if seed not in shown)
-    return Strip(clean(sample.label), dots, apart, sample.median)
+    beyond = "" if sample.limit is None else f"> {number(sample.limit)}"
+    apart = tuple((seed, failed.get(seed, beyond or number(value))) for seed, value in pairs if seed not in shown)
+    profile = () if events else performance_profile(sample.values)
+    return Strip(clean(sample.label), dots, apart, sample.median, _least(sample, median), profile)
+
+
+def _least(sample: Sample, statistic: Callable[[Sequence[float]], float]) -> float | None:
+    """Return what a statistic is at least, where values beyond a limit make it infinite; else None."""
+    return statistic(sample.capped) if sample.limit is not None and math.isinf(statistic(sample.values)) else None
+
+
+def _iqm(sample: Sample) -> tuple[str, str]:
+    """Return the interquartile mean of a sample, and its interval, as rliable has them: description only."""
+    least = _least(sample, iqm)
+    mean = number(iqm(sample.values)) if least is None else f"> {number(least)}"
+    low, high = map(number, iqm_interval(sample.capped))
+    ends = f"95% stratified bootstrap {low} to {high}"
+    limited = "" if sample.limit is None else f", nothing beyond {number(sample.limit)}"
+    return f"IQM of {clean(sample.label)}", f"{mean} ({ends}{limited})"
 
 
 def _numbers(evidence: Evidence) -> tuple[tuple[str, str], ...]:
@@ -150,4 +177,5 @@ def _numbers(evidence: Evidence) -> tuple[tuple[str, str], ...]:
         *((name, number(value)) for name, value in effects if value is not None),
         *((interval.of, f"{number(interval.low)} to {number(interval.high)}") for interval in evidence.intervals),
         *((bound.name, number(bound.value)) for bound in evidence.bounds if not bound.on_axis),
+        *(() if evidence.events else map(_iqm, evidence.samples)),
     )

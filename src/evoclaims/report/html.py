@@ -80,7 +80,7 @@ def _environment() -> Environment:
         "data_uri": data_uri,
     }
     environment.globals |= {"strip_svg": charts.strip_svg, "axis_svg": charts.axis_svg, "plural": formatting.plural}
-    environment.globals |= {"replication": replication_cells}
+    environment.globals |= {"replication": replication_cells, "profile_svg": charts.profile_svg}
     return environment
 
 
