@@ -1,9 +1,11 @@
-"""`evoclaims tables`: tables in Markdown files, written anew from the committed reference trials alone.
+"""`evoclaims tables`: tables in Markdown files, written anew from the committed reference trials and the code alone.
 
 A table is between two comments, the first of which says what it shows:
 
     <!-- evoclaims: verdicts full full:published smoke -->    verdicts by tier, or by tier and variant of the protocol
     <!-- evoclaims: numbers full all -->                      published numbers and ours, under all variants
+    <!-- evoclaims: measures -->                              what claims can read from trials
+    <!-- evoclaims: assertions -->                            what they can say of it, and how it is judged
     <!-- evoclaims: end -->
 """
 
@@ -20,7 +22,7 @@ from evoclaims.cli.project import Project, open_project
 from evoclaims.cli.stored import write
 from evoclaims.core.errors import UnknownNameError, UserError
 from evoclaims.figures.replication import replications
-from evoclaims.report import replication_cells
+from evoclaims.report import replication_cells, vocabulary
 from evoclaims.report.markdown import numbers
 from evoclaims.report.markdown_text import literal
 from evoclaims.report.trial_summary import Reader
@@ -95,5 +97,10 @@ def _numbers(project: Project, words: list[str]) -> str:
     return "\n\n".join((numbers(found), "\n".join(f"* {literal(line)}" for line in said)))
 
 
-_KINDS: Final[Mapping[str, Callable[[Project, list[str]], str]]] = {"verdicts": _verdicts, "numbers": _numbers}
+_KINDS: Final[Mapping[str, Callable[[Project, list[str]], str]]] = {
+    "verdicts": _verdicts,
+    "numbers": _numbers,
+    "measures": lambda project, _: vocabulary.measures(project.reproduction.trials),
+    "assertions": lambda *_: vocabulary.assertions(),
+}
 """What makes each kind of table."""

@@ -256,6 +256,16 @@ class AllOf(Compound):
     """Supported when every part is (intersection-union: no correction), refuted when any part is."""
 
     kind: ClassVar[str] = "all of"
+    entry: ClassVar[Entry] = Entry(
+        syntax=("(a.reward > b.reward) & (a.reward > c.reward)",),
+        null="One of the parts does not hold.",
+        supported=(
+            "Each part is, at the same α: the intersection–union test needs no correction. A test of several "
+            "conditions before pairs of them (any_differ) is one more part."
+        ),
+        refuted="One of the parts is.",
+        source="Berger 1982 (intersection–union test)",
+    )
     joint: ClassVar[str] = "and"
     weakest: ClassVar[Direction] = Direction.FOR
 
@@ -270,6 +280,13 @@ class AnyOf(Compound):
     """Supported when some part is after Holm's correction, refuted when every part is."""
 
     kind: ClassVar[str] = "any of"
+    entry: ClassVar[Entry] = Entry(
+        syntax=("(a.reward > b.reward) | (a.reward > c.reward)",),
+        null="None of the parts holds.",
+        supported="One of the parts is after Holm's correction.",
+        refuted="Each part is.",
+        source="Holm 1979",
+    )
     joint: ClassVar[str] = "or"
     weakest: ClassVar[Direction] = Direction.AGAINST
 

@@ -41,7 +41,7 @@ class Measure(NumberReading):
         return Threshold(self, "below", float(other)) if _is_number(other) else self._measure(other) > self
 
     def __mul__(self, factor: float) -> Measure:
-        """Return this measure times a number above 0, for ratios: `2 * a.steps < b.steps`.
+        """Return this measure times a number above 0, for ratios: `2 * a.environment_steps < b.environment_steps`.
 
         Every value must be 0 or above: twice a loss would be worse, and not twice as good.
 

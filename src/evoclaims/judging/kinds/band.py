@@ -11,6 +11,7 @@ from evoclaims.core.errors import UserError
 from evoclaims.judging.assertion import Assertion, Finding
 from evoclaims.judging.design import Design
 from evoclaims.judging.effect import median_interval
+from evoclaims.judging.entry import Entry
 from evoclaims.judging.exact import sign_test
 from evoclaims.judging.reading import NumberReading
 from evoclaims.judging.sample import Sample, Trials
@@ -29,6 +30,16 @@ class Band(Assertion):
     lo: float
     hi: float
     kind: ClassVar[str] = "band"
+    entry: ClassVar[Entry] = Entry(
+        syntax=("a.furthest_reached.between(4, 6)",),
+        null=(
+            "A trial is below the highest value, or above the lowest, with probability 1/2 at most: so the "
+            "median is outside."
+        ),
+        supported="Two sign tests reject both; a trial at an end counts as inside.",
+        refuted="A sign test, at α/2 for each end, finds the median beyond one.",
+        source="Dixon and Mood 1946 (sign test); both tests have to reject: Schuirmann 1987",
+    )
 
     def __post_init__(self) -> None:
         """Reject an empty or infinite band."""

@@ -10,6 +10,7 @@ from typing import ClassVar
 from evoclaims.core.errors import UserError
 from evoclaims.judging.assertion import Assertion, Finding
 from evoclaims.judging.design import Design
+from evoclaims.judging.entry import Entry
 from evoclaims.judging.exact import ExactTest, rank_attainable, rank_test
 from evoclaims.judging.reading import NumberReading, require_independent
 from evoclaims.judging.sample import Trials
@@ -28,6 +29,13 @@ class Equivalent(Assertion):
     right: NumberReading
     margin: float
     kind: ClassVar[str] = "equivalent"
+    entry: ClassVar[Entry] = Entry(
+        syntax=("a.reward.equivalent_to(b.reward, margin=5)",),
+        null="One of the two is beyond the other by at least the margin.",
+        supported="Two rank tests reject, each with the margin added on one side.",
+        refuted="A rank test, at α/2 for each direction, finds one beyond the other by more than the margin.",
+        source="Schuirmann 1987 (two one-sided tests), with the rank test",
+    )
 
     def __post_init__(self) -> None:
         """Reject an impossible margin, and measures that cannot be ranked together at a distance."""

@@ -7,6 +7,7 @@ from typing import ClassVar
 
 from evoclaims.judging.assertion import Assertion, Finding
 from evoclaims.judging.design import Design, Look
+from evoclaims.judging.entry import Entry
 from evoclaims.judging.reading import EventReading
 from evoclaims.judging.sample import Trials
 from evoclaims.judging.verdict import PValues
@@ -18,6 +19,13 @@ class EveryTrial(Assertion):
 
     event: EventReading
     kind: ClassVar[str] = "exact"
+    entry: ClassVar[Entry] = Entry(
+        syntax=("a.solves_every_level.in_every_trial()",),
+        null="None: this is a fact about trials without chance, such as those of a control.",
+        supported="It holds in each trial of the last look.",
+        refuted="It fails in one.",
+        source="No test",
+    )
 
     def describe(self) -> str:
         """Return "E in every trial"."""

@@ -10,6 +10,7 @@ from typing import ClassVar
 
 from evoclaims.judging.assertion import Assertion, Finding
 from evoclaims.judging.design import Design
+from evoclaims.judging.entry import Entry
 from evoclaims.judging.exact import ExactTest, binomial_test, rank_attainable, rank_test
 from evoclaims.judging.reading import NumberReading, require_independent
 from evoclaims.judging.sample import Trials
@@ -87,6 +88,27 @@ class Greater(Assertion):
     above: NumberReading
     below: NumberReading
     kind: ClassVar[str] = "greater"
+    entry: ClassVar[Entry] = Entry(
+        syntax=(
+            "a.reward > b.reward",
+            "a.steps_to('success', 0.9) < b.steps_to('success', 0.9)",
+            "2 * a.environment_steps < b.environment_steps",
+        ),
+        null=(
+            "The first is stochastically no larger than the second: each split of the pooled trials is equally likely."
+        ),
+        supported=(
+            "The rank test rejects that: the share of splits with a sum of ranks as large, ties counted exactly."
+        ),
+        refuted=(
+            "The rank test rejects the reverse; or a binomial test over pairs of trials by seed, ties counted "
+            "as wins, rejects the design's effect (A12 of at least 0.71)."
+        ),
+        source=(
+            "Mann and Whitney 1947, as a permutation test on mid-ranks; A12: Vargha and Delaney 2000; where "
+            "values are censored: Gehan 1965"
+        ),
+    )
 
     def __post_init__(self) -> None:
         """Reject measures that cannot be ranked together."""

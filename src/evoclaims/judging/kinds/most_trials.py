@@ -8,6 +8,7 @@ from typing import ClassVar
 from evoclaims.core.errors import UserError
 from evoclaims.judging.assertion import Assertion, Finding
 from evoclaims.judging.design import Design
+from evoclaims.judging.entry import Entry
 from evoclaims.judging.exact import binomial_test, clopper_pearson
 from evoclaims.judging.reading import EventReading
 from evoclaims.judging.sample import Trials
@@ -79,6 +80,16 @@ class Solves(MostTrials):
     """A goal that most trials reach."""
 
     kind: ClassVar[str] = "solves"
+    entry: ClassVar[Entry] = Entry(
+        syntax=(
+            "a.solves_every_level.in_most_trials()",
+            "a.solves_every_level.in_most_trials(p0=0.5)",
+        ),
+        null="It holds with a probability of p0 (0.7) at most.",
+        supported="The binomial test rejects that; in a trial without a result it does not hold.",
+        refuted="The binomial test rejects that it holds with a probability of at least p0.",
+        source="Clopper and Pearson 1934 (binomial test)",
+    )
 
 
 @dataclass(frozen=True)
@@ -86,3 +97,10 @@ class Stays(MostTrials):
     """A bound that most trials keep."""
 
     kind: ClassVar[str] = "stays"
+    entry: ClassVar[Entry] = Entry(
+        syntax=("a.solves_no_level_beyond(0).stays()",),
+        null="The bound is kept with a probability of p0 (0.7) at most.",
+        supported="The binomial test rejects that; a trial without a result has not kept it.",
+        refuted="The binomial test rejects that it is kept with a probability of at least p0.",
+        source="Clopper and Pearson 1934 (binomial test)",
+    )

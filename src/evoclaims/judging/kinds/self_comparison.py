@@ -12,6 +12,7 @@ import numpy as np
 
 from evoclaims.judging.assertion import Assertion, Finding
 from evoclaims.judging.design import Design, Look
+from evoclaims.judging.entry import Entry
 from evoclaims.judging.exact import binomial_test, rank_attainable
 from evoclaims.judging.kinds.greater import GreaterTests
 from evoclaims.judging.reading import NumberReading
@@ -34,6 +35,16 @@ class SelfComparison(Assertion):
 
     measure: NumberReading
     kind: ClassVar[str] = "self-comparison"
+    entry: ClassVar[Entry] = Entry(
+        syntax=("a.reward.never_above_itself()",),
+        null="None: a control of the judge, which compares halves of the same trials as greater does.",
+        supported=(
+            "At most a share of α of the splits into halves is found different: all splits of up to ten trials,"
+            " else 252 drawn once."
+        ),
+        refuted="More are; where splits are drawn, an exact binomial test at α has to say so.",
+        source="By construction of the rank test",
+    )
 
     def describe(self) -> str:
         """Return "A is never judged above itself"."""

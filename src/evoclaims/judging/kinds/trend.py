@@ -8,6 +8,7 @@ from typing import ClassVar
 from evoclaims.core.errors import UnknownNameError
 from evoclaims.judging.assertion import Assertion, Finding
 from evoclaims.judging.design import Design
+from evoclaims.judging.entry import Entry
 from evoclaims.judging.kendall import Slope, trend_attainable, trend_test
 from evoclaims.judging.reading import LevelsReading
 from evoclaims.judging.sample import Trials
@@ -26,6 +27,16 @@ class Trend(Assertion):
     profile: LevelsReading
     direction: Slope
     kind: ClassVar[str] = "trend"
+    entry: ClassVar[Entry] = Entry(
+        syntax=(
+            "a.success.falls()",
+            "a.success.rises()",
+        ),
+        null="Within a trial, each order of its values over the levels is equally likely.",
+        supported="The permutation test of the sum over trials of Kendall's S rejects that, ties counted exactly.",
+        refuted="The same test does in the other direction.",
+        source="Kendall 1938; its distribution with ties: MacMahon 1913",
+    )
 
     def __post_init__(self) -> None:
         """Reject an unknown direction."""
