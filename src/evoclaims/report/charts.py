@@ -107,8 +107,8 @@ def profile_svg(part: Part) -> Markup:
         pieces.append(_text("small", EDGE - 3, share(value) + 3, label, "end"))
     for index, strip in enumerate(strips):
         (_, first), *steps = strip.profile
-        path = f"M{EDGE} {_at(share(first))}" + "".join(f"H{_at(scale(at))}V{_at(share(up))}" for at, up in steps)
-        key = f"M{EDGE} {11 * index + 6}h20"
+        path = f"M{_at(EDGE)} {_at(share(first))}" + "".join(f"H{_at(scale(at))}V{_at(share(up))}" for at, up in steps)
+        key = f"M{_at(EDGE)} {11 * index + 6}h20"
         drawn = Markup('<path class="line" stroke-dasharray="{}" d="{}H{}{}"><title>{}</title></path>')
         pieces.append(drawn.format(_DASHES[index % len(_DASHES)], path, _at(scale.right), key, strip.label))
         pieces.append(_text("small", EDGE + 24, 11 * index + 9, strip.label, "start"))

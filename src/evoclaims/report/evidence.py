@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from statistics import median
 from typing import Final
@@ -151,14 +151,22 @@ def _least(sample: Sample, statistic: Callable[[Sequence[float]], float]) -> flo
     return statistic(sample.capped) if sample.limit is not None and math.isinf(statistic(sample.values)) else None
 
 
-def _iqm(sample: Sample) -> tuple[str, str]:
+def _iqms(samples: Sequence[Sample]) -> Iterator[tuple[str, str]]:
+    """Yield the interquartile mean of each sample, named by its condition alone if that tells them apart."""
+    labels = [clean(sample.label) for sample in samples]
+    conditions = [label.partition(":")[0] for label in labels]
+    names = conditions if len(set(conditions)) == len(labels) else labels
+    yield from ((f"IQM of {name}", _iqm(sample)) for name, sample in zip(names, samples, strict=True))
+
+
+def _iqm(sample: Sample) -> str:
     """Return the interquartile mean of a sample, and its interval, as rliable has them: description only."""
     least = _least(sample, iqm)
     mean = number(iqm(sample.values)) if least is None else f"> {number(least)}"
     low, high = map(number, iqm_interval(sample.capped))
     ends = f"95% stratified bootstrap {low} to {high}"
     limited = "" if sample.limit is None else f", nothing beyond {number(sample.limit)}"
-    return f"IQM of {clean(sample.label)}", f"{mean} ({ends}{limited})"
+    return f"{mean} ({ends}{limited})"
 
 
 def _numbers(evidence: Evidence) -> tuple[tuple[str, str], ...]:
@@ -177,5 +185,5 @@ def _numbers(evidence: Evidence) -> tuple[tuple[str, str], ...]:
         *((name, number(value)) for name, value in effects if value is not None),
         *((interval.of, f"{number(interval.low)} to {number(interval.high)}") for interval in evidence.intervals),
         *((bound.name, number(bound.value)) for bound in evidence.bounds if not bound.on_axis),
-        *(() if evidence.events else map(_iqm, evidence.samples)),
+        *(() if evidence.events else _iqms(evidence.samples)),
     )

@@ -88,6 +88,7 @@ class Omnibus(Assertion):
         groups = [sample.values for sample in samples]
         differ, alike = kruskal_wallis_test(groups), self._alike(groups)
         exact = _count(tuple(map(len, groups))) <= MOST_SPLITS
+        small = max(differ.p, alike.p) <= alpha
         return self.found(
             PValues(differ.p, alike.p),
             PValues(differ.attainable_p, alike.attainable_p),
@@ -97,6 +98,7 @@ class Omnibus(Assertion):
                 f"conditions explain {epsilon_squared(groups):.0%} of the ranks' variance; p over "
                 + ("all splits" if exact else f"{DRAWN:,} drawn splits")
                 + "; without a margin nothing can refute it" * (self.margin is None)
+                + "; they differ, and by less than the margin" * small
             ),
             bounds=() if self.margin is None else (Bound("margin", float(self.margin), on_axis=False),),
         )

@@ -1,0 +1,106 @@
+"""What describes trials beside the tests: interquartile means, performance profiles, and how far one has looked."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Any
+from xml.etree import ElementTree
+
+import pytest
+from hand_made_verdicts import evidence, verdict
+from laboratory import Laboratory, better_wins
+
+from evoclaims.judging.sample import Sample
+from evoclaims.report.charts import profile_svg, strip_svg
+from evoclaims.report.evidence import Part, judged_parts
+from evoclaims.report.html import html
+from evoclaims.report.markdown import markdown
+
+INF = math.inf
+
+
+def part_of(*samples: Sample, **changes: Any) -> Part:
+    (part,) = judged_parts(verdict(evidence=(evidence(samples=samples, **changes),), deciding=0))
+    return part
+
+
+def sample(label: str, *values: float, limit: float | None = None, median: float | None = None) -> Sample:
+    middle = sorted(values)[len(values) // 2] if median is None else median
+    return Sample(label, tuple(range(len(values))), values, middle, (), (), limit)
+
+
+def numbers(part: Part) -> dict[str, str]:
+    return dict(part.numbers)
+
+
+def test_each_condition_has_its_interquartile_mean() -> None:
+    part = part_of(sample("a on t: x", 0.0, 1.0, 2.0, 9.0), sample("b on t: x", 3.0, 3.0, 3.0, 3.0))
+    assert numbers(part)["IQM of a on t"].startswith("1.5 (95% stratified bootstrap 0")
+    assert numbers(part)["IQM of b on t"] == "3 (95% stratified bootstrap 3 to 3)"
+
+
+def test_levels_of_one_condition_are_told_apart() -> None:
+    part = part_of(sample("a on t: x at level 0", 0.0, 1.0), sample("a on t: x at level 1", 1.0, 1.0))
+    assert {"IQM of a on t: x at level 0", "IQM of a on t: x at level 1"} < set(numbers(part))
+
+
+def test_events_have_neither() -> None:
+    part = part_of(sample("a on t: x", 0.0, 1.0), sample("b on t: x", 1.0, 1.0), events=True)
+    assert not any("IQM" in name for name in numbers(part))
+    assert profile_svg(part) == ""
+
+
+@pytest.mark.parametrize(
+    ("values", "said", "mean"),
+    [
+        ((10.0, 20.0, 30.0, INF), "25", "25"),
+        ((10.0, 20.0, INF, INF), "> 60", "> 60"),  # the third is above 100, and so the middle above (20 + 100) / 2
+        ((10.0, INF, INF, INF), "> 100", "> 100"),
+    ],
+)
+def test_what_is_not_observed_is_said_to_be_more(values: tuple[float, ...], said: str, mean: str) -> None:
+    median = (sorted(values)[1] + sorted(values)[2]) / 2
+    part = part_of(sample("a on t: x, within 100", *values, limit=100.0, median=median))
+    (strip,) = part.strips
+    assert strip.middle == said
+    assert f"median {said}" in str(strip_svg(part, strip)).replace("&gt;", ">")
+    assert dict(strip.apart) == {seed: "> 100" for seed, value in enumerate(values) if value == INF}
+    assert numbers(part)["IQM of a on t"].startswith(f"{mean} (95% stratified bootstrap ")
+    assert numbers(part)["IQM of a on t"].endswith(", nothing beyond 100)")
+
+
+def test_a_trial_that_failed_is_no_trial_that_never_got_there() -> None:
+    broken = replace(sample("a: x", 1.0, INF, INF, limit=9.0), failed=(2,), endings=("diverged",))
+    assert dict(part_of(broken).strips[0].apart) == {1: "> 9", 2: "diverged"}
+
+
+def test_performance_profiles_step_down_where_trials_are() -> None:
+    part = part_of(sample("a on t: x", 0.0, 0.5, 1.0, 1.0), sample("b on t: x", -INF, -INF, 0.5, 0.5))
+    svg = ElementTree.fromstring(profile_svg(part))
+    lines = [path for path in svg.iter("path") if path.get("class") == "line"]
+    assert [path.findtext("title") for path in lines] == ["a on t: x", "b on t: x"]
+    assert len({path.get("stroke-dasharray") for path in lines}) == 2
+    drawn = [path.get("d") or "" for path in lines]
+    assert drawn[0].startswith(
+        "M24 26H24V37H135V48H246V70"
+    )  # from 26, where all trials are above, to 70, where none is
+    assert drawn[1].startswith("M24 48H135V70")  # two without a number are above nothing
+    assert profile_svg(part_of(sample("a on t: x", 0.0, 1.0))) == ""
+
+
+def test_a_claims_evidence_shows_both(filled: Laboratory) -> None:
+    page = filled.page(filled.judge(better_wins))
+    assert "IQM of better on small 0.85 (95% stratified bootstrap" in markdown(page)
+    assert "IQM of worse on small" in html(page)
+
+
+def test_description_decides_nothing(filled: Laboratory, monkeypatch: pytest.MonkeyPatch) -> None:
+    before = filled.judge(better_wins)
+
+    def broken(*_: Any, **__: Any) -> Any:
+        raise AssertionError("used by the judge")
+
+    for name in ("iqm", "iqm_interval", "performance_profile"):
+        monkeypatch.setattr(f"evoclaims.judging.effect.{name}", broken)
+    assert filled.judge(better_wins) == before
