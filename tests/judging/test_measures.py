@@ -113,7 +113,7 @@ def test_no_assertion_is_true_or_false_without_a_judge(source) -> None:
     cma, ppo = source("cma_es", []), source("ppo", [])
     greater = cma.score() > ppo.score()
     for assertion in (greater, cma.solved().stays(), greater & greater, greater | greater, cma.success(2).falls()):
-        with pytest.raises(TypeError, match=r"Write verdict\(a > b\)"):
+        with pytest.raises(TypeError, match=r"Write verdict\(a > b\), and a\.between\(low, high\)"):
             assert assertion
     with pytest.raises(TypeError, match="bare assert"):
         assert cma.score() > ppo.score() > cma.score()

@@ -171,7 +171,10 @@ class Assertion(ABC):
         Raises:
             TypeError: always.
         """
-        raise TypeError("Write verdict(a > b); a bare assert would skip the exact judging.")
+        raise TypeError(
+            "Write verdict(a > b), and a.between(low, high) for low < a < high; "
+            "a bare assert would skip the exact judging."
+        )
 
 
 def _parts(value: object, joined_by: type[Compound]) -> tuple[Assertion, ...]:

@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 from markupsafe import Markup, escape
 
-from evoclaims.report.evidence import Dot, Part, Strip
+from evoclaims.report.evidence import Dot, Part, Strip, in_short
 from evoclaims.report.formatting import large, number, plural
 from evoclaims.report.training_curves import CurvePanel, Line
 
@@ -105,13 +105,13 @@ def profile_svg(part: Part) -> Markup:
     pieces = [Markup('<path class="rule" d="M{0} {1}V{2}H{3}"/>').format(EDGE, top, top + HEIGHT, scale.right)]
     for value, label in ((1.0, "100 %"), (0.0, "0 %")):
         pieces.append(_text("small", EDGE - 3, share(value) + 3, label, "end"))
-    for index, strip in enumerate(strips):
+    for index, (name, strip) in enumerate(zip(in_short([strip.label for strip in strips]), strips, strict=True)):
         (_, first), *steps = strip.profile
         path = f"M{_at(EDGE)} {_at(share(first))}" + "".join(f"H{_at(scale(at))}V{_at(share(up))}" for at, up in steps)
         key = f"M{_at(EDGE)} {11 * index + 6}h20"
         drawn = Markup('<path class="line" stroke-dasharray="{}" d="{}H{}{}"><title>{}</title></path>')
         pieces.append(drawn.format(_DASHES[index % len(_DASHES)], path, _at(scale.right), key, strip.label))
-        pieces.append(_text("small", EDGE + 24, 11 * index + 9, strip.label, "start"))
+        pieces.append(_text("small", EDGE + 24, 11 * index + 9, name, "start"))
     return _svg(WIDTH, top + HEIGHT + 4, pieces, "performance profiles: the share of trials above each value")
 
 

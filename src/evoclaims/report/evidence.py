@@ -103,6 +103,12 @@ def judged_parts(verdict: Verdict) -> tuple[Part, ...]:
     )
 
 
+def in_short(labels: Sequence[str]) -> list[str]:
+    """Return the conditions of labels such as "cma_es on n_parity: reward" if they tell them apart, else the labels."""
+    conditions = [label.partition(":")[0] for label in labels]
+    return conditions if len(set(conditions)) == len(conditions) else list(labels)
+
+
 def _judged_part(evidence: Evidence) -> Part:
     """Return one part as it is shown."""
     return Part(
@@ -152,10 +158,8 @@ def _least(sample: Sample, statistic: Callable[[Sequence[float]], float]) -> flo
 
 
 def _iqms(samples: Sequence[Sample]) -> Iterator[tuple[str, str]]:
-    """Yield the interquartile mean of each sample, named by its condition alone if that tells them apart."""
-    labels = [clean(sample.label) for sample in samples]
-    conditions = [label.partition(":")[0] for label in labels]
-    names = conditions if len(set(conditions)) == len(labels) else labels
+    """Yield the interquartile mean of each sample."""
+    names = in_short([clean(sample.label) for sample in samples])
     yield from ((f"IQM of {name}", _iqm(sample)) for name, sample in zip(names, samples, strict=True))
 
 
