@@ -180,5 +180,5 @@ def test_three_or_more_measures_of_different_trials_are_compared(source) -> None
 def test_the_sentence_names_every_condition(source) -> None:
     a, b, c = (source(name, []).score() for name in "abc")
     assert any_differ(a, b, c).describe() == "at least two of a: score, b: score and c: score differ"
-    assert any_differ(a, b, c, margin=5).describe().endswith("differ, and are not all within 5 of one another")
+    assert any_differ(a, b, c, margin=5).describe().endswith("c: score differ (it does not matter by less than 5)")
     assert [s.label for s in any_differ(a, b, c).sources()] == ["a", "b", "c"]

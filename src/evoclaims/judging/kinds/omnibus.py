@@ -72,8 +72,8 @@ class Omnibus(Assertion):
     def describe(self) -> str:
         """Return "at least two of A, B and C differ"."""
         *first, last = (measure.describe() for measure in self.measures)
-        else_ = "" if self.margin is None else f", and are not all within {self.margin:g} of one another"
-        return f"at least two of {', '.join(first)} and {last} differ{else_}"
+        margin = "" if self.margin is None else f" (it does not matter by less than {self.margin:g})"
+        return f"at least two of {', '.join(first)} and {last} differ{margin}"
 
     def attainable(self, n: int, design: Design) -> PValues:
         """Return the p of complete separation; against, of pairs that are all equivalent."""
