@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from evoclaims.core.errors import UserError
-from evoclaims.judging.design import FIXED_10, SEQUENTIAL, Design
+from evoclaims.judging.design import FIXED_10, Design, Look
 from evoclaims.judging.exact import sign_test
 from evoclaims.judging.judge import judge
 from evoclaims.judging.kinds.threshold import Threshold
@@ -87,15 +87,16 @@ def test_no_median_at_the_number_is_called_above_or_below_more_often_than_alpha(
     assert errors[REFUTED] <= alpha
 
 
-@given(st.lists(st.sampled_from([89.0, 90.0, 91.0]), min_size=10, max_size=10), st.sampled_from(["above", "below"]))
-def test_a_verdict_at_five_that_is_final_is_that_of_ten(values: list[float], side: Any) -> None:
-    from conftest import StoredSource, make_trial
-
-    trials = {seed: make_trial(seed, value, "a") for seed, value in enumerate(values)}
-    claim = Threshold(StoredSource("a", trials).score(), side, 90.0)
-    early, all_ten = judge(claim, SEQUENTIAL), judge(claim, Design.fixed(10, 0.04))
-    assert early.outcome is all_ten.outcome  # five trials are too few for alpha = 0.01: they can only be curtailed
-    assert early.n == 10 or "stopped early" in early.reason
+@pytest.mark.parametrize("side", ["above", "below"])
+def test_a_verdict_that_comes_early_is_that_of_all_trials(source: Any, side: Any) -> None:
+    ends = set()
+    for values in np.random.default_rng(0).choice([89.0, 90.0, 91.0, 92.0], size=(60, 10)).tolist():
+        claim = Threshold(source("a", values).score(), side, 90.0)
+        early, all_ten = judge(claim, Design((Look(7, 0.01), Look(10, 0.04)))), judge(claim, Design.fixed(10, 0.04))
+        ends.add(early.n)
+        if early.n == 10 or "stopped early" in early.reason:
+            assert early.outcome is all_ten.outcome
+    assert ends == {7, 10}
 
 
 @pytest.mark.parametrize("number", [math.inf, -math.inf, math.nan])
