@@ -91,7 +91,7 @@ class Greater(Assertion):
     entry: ClassVar[Entry] = Entry(
         syntax=(
             "a.reward > b.reward",
-            "a.steps_to('success', 0.9) < b.steps_to('success', 0.9)",
+            'a.steps_to("success", 0.9) < b.steps_to("success", 0.9)',
             "2 * a.environment_steps < b.environment_steps",
         ),
         null=(
