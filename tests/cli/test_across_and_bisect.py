@@ -100,6 +100,8 @@ def test_the_table_is_printed_and_written_and_the_status_says_that_something_cha
     assert Path("t.csv").read_text().startswith("environment,claim,outcome,n,")
     assert Path(".evoclaims-releases/.gitignore").read_text() == "*\n"
     assert not Path(".evoclaims").exists()
+    assert evoclaims("report")[0] == 0
+    assert "pebble 1.3 has no verdicts." in Path("report/index.html").read_text(encoding="utf-8")
 
 
 def test_nothing_is_judged_where_the_newest_release_is_installed(

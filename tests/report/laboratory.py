@@ -25,6 +25,7 @@ from evoclaims.methods.neat.neat import Neat
 from evoclaims.methods.neat.settings import Settings, Species
 from evoclaims.paper.archive import Archive
 from evoclaims.paper.reproduction import Reproduction, Tier
+from evoclaims.report.across_shown import AcrossShown
 from evoclaims.report.build import gather
 from evoclaims.report.model import Page, PaperFigure, Section
 from evoclaims.trials.budget import Budget
@@ -115,6 +116,7 @@ class Laboratory:
         figures: Sequence[PaperFigure] = (),
         mutants: Matrix | None = None,
         sentences: dict[str, str] | None = None,
+        across: AcrossShown | None = None,
     ) -> Page:
         """Gather reports by their tiers."""
         verdicts = {tier: [r for r in reports if r.tier == tier] for tier in ("full", "smoke")}
@@ -126,6 +128,7 @@ class Laboratory:
             sentences=sentences or {},
             figures=figures,
             mutants=mutants,
+            across=across,
             generated="Written by a test.",
         )
 

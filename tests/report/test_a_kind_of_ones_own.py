@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from laboratory import Laboratory
+from unpacked import whole
 
 from evoclaims.judging.assertion import Assertion, Finding
 from evoclaims.judging.design import Design
@@ -13,7 +14,6 @@ from evoclaims.judging.exact import sign_test
 from evoclaims.judging.reading import NumberReading
 from evoclaims.judging.sample import Trials
 from evoclaims.judging.verdict import Bound, PValues
-from evoclaims.report.html import html
 from evoclaims.report.markdown import markdown
 from evoclaims.report.run_summary import run_summary
 from evoclaims.report.terminal_table import verdict_table
@@ -52,7 +52,7 @@ def test_a_new_kind_is_judged_and_shown_in_every_form(filled: Laboratory) -> Non
     assert [bound.value for bound in page.sections[1].parts[0].bounds] == [0.6]
     for text in (verdict_table([refuted], 160, False), run_summary([refuted]), markdown(page)):
         assert "against 0.016" in text
-    shown = html(page)
+    shown = whole(page)
     assert "the median of better on small: mean success over levels is at least 0.6" in shown
     assert "least: 0.6" in shown
     assert "<dt>p against the claim</dt><dd>0.016</dd>" in shown

@@ -14,7 +14,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from evoclaims.judging.verdict import Bound, Interval
-from evoclaims.report.charts import MOST_DOTS, WIDTH, axis_svg, curve_symbol, strip_svg, ticks
+from evoclaims.report.charts import MOST_DOTS, WIDTH, axis_svg, curves_svg, strip_svg, ticks
 from evoclaims.report.evidence import Dot, Part, Strip
 from evoclaims.report.training_curves import CurvePanel, Line
 
@@ -119,7 +119,7 @@ def test_ticks_are_few_rising_and_within_the_axis(one: float, other: float) -> N
 def test_a_curve_has_a_gap_where_it_has_no_value_and_two_points_for_a_flat_stretch() -> None:
     x = np.arange(7.0)
     line = Line("seed <0>", x, np.array([0, 1, np.nan, 1, 1, 1, 0]))
-    svg = ElementTree.fromstring(curve_symbol(CurvePanel("success", (line,), None, 1), "curves-0-0"))
+    svg = ElementTree.fromstring(curves_svg(CurvePanel("success", (line,), None, 1), "success over training"))
     (path,) = [path for path in svg.iter("path") if path.get("class") == "line"]
     d = path.get("d", "")
     assert (d.count("M"), d.count("L")) == (2, 3)
@@ -131,4 +131,4 @@ def test_a_curve_has_a_gap_where_it_has_no_value_and_two_points_for_a_flat_stret
 def test_any_curve_makes_a_sound_drawing(values: list[float]) -> None:
     line = Line("seed 0", np.arange(len(values), dtype=float), np.array(values))
     ends = Line("low", line.x, line.y), Line("high", line.x, line.y)
-    ElementTree.fromstring(curve_symbol(CurvePanel("success", (line,), ends, 0), "curves-0-0"))
+    ElementTree.fromstring(curves_svg(CurvePanel("success", (line,), ends, 0), "success over training"))

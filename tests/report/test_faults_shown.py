@@ -7,12 +7,12 @@ from dataclasses import replace
 import pytest
 from hand_made_verdicts import report, verdict
 from laboratory import Laboratory, better_solves, better_wins
+from unpacked import whole
 
 from evoclaims.judging.verdict import Outcome
 from evoclaims.report import table_cells
 from evoclaims.report.badge import BLUE, GREEN, colour_of, message_of
 from evoclaims.report.fault_grid import fault_grid
-from evoclaims.report.html import html
 from evoclaims.report.markdown import markdown
 from evoclaims.report.model import Board, Page, Section
 from evoclaims.report.run_summary import run_summary
@@ -98,7 +98,7 @@ def page(filled: Laboratory) -> Page:
 
 
 def test_the_report_shows_the_grid_and_the_score(filled: Laboratory) -> None:
-    text = html(page(filled))
+    text = whole(page(filled))
     assert "Which planted faults do the claims notice?" in text
     assert "1 of 2 planted faults change a verdict, 1 more are found by the drift check" in text
     assert '<td title="m0: killed by the verdict">●</td>' in text
@@ -131,12 +131,12 @@ def test_a_scoreboard_counts_insensitive_support_apart(filled: Laboratory) -> No
     shown = Page(title="A Paper", name="paper", boards=(board,))
     assert "| tier | supported | supported but insensitive | refuted |" in markdown(shown)
     assert "| smoke | 2 | 1 | 1 |" in markdown(shown)
-    assert '<li class="is-insensitive"><b>1</b> <span class="symbol" aria-hidden="true">✓</span>' in html(shown)
+    assert '<li class="is-insensitive"><b>1</b> <span class="symbol" aria-hidden="true">✓</span>' in whole(shown)
 
 
 def test_without_a_matrix_no_claim_is_called_sensitive(filled: Laboratory) -> None:
     found = filled.page(filled.judge(better_wins))
-    for text in (html(found), markdown(found)):
+    for text in (whole(found), markdown(found)):
         assert "Planted faults: not tried." in text
         assert "Mutation score" in text
         assert "sensitive" not in text.replace("insensitive", "")

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
+from urllib.parse import urlsplit
 
 import pytest
 from chromium import NAMES, Chromium, found
@@ -67,21 +69,29 @@ def address(tmp_path_factory: pytest.TempPathFactory) -> str:
     ]
     empty = Laboratory(folder / "empty")
     reports.append(empty.judge(better_solves, id="C1", where="control"))
-    page = lab.page(*reports, figures=[PaperFigure("Fig. 3", "says", PLATE)])
+    sentences = {report.name: report.statement for report in reports if report.tier == "full"}
+    page = lab.page(*reports, figures=[PaperFigure("Fig. 3", "says", PLATE)], sentences=sentences)
     path = folder / "index.html"
     path.write_text(html(page), encoding="utf-8")
     return path.as_uri()
 
 
 def _visible(browser: Chromium) -> list[str]:
-    """Return the ids of the claims that are shown."""
+    """Return the ids of the claims whose verdicts are seen in the lines that the page opens with."""
     shown: list[str] = browser.evaluate(
-        "[...document.querySelectorAll('section.claim')].filter(s => s.checkVisibility()).map(s => s.id)"
+        "[...document.querySelectorAll('.chip:not(.faint)')].filter(s => s.checkVisibility()).map(s => s.dataset.for)"
     )
     return shown
 
 
-ALL = ["G1-full", "G2-full", "S1-full", "S2-full", "C1-full", "G1-smoke", "G2-smoke", "S1-smoke", "S2-smoke"]
+def _open_all(browser: Chromium) -> None:
+    """Open everything that can be opened, and wait until it is unpacked."""
+    for _ in range(3):  # what is unpacked has parts that open, too
+        browser.evaluate("document.querySelectorAll('details').forEach(one => { one.open = true })")
+        browser.evaluate("new Promise(done => setTimeout(done, 50))")
+
+
+ALL = ["G1-full", "G1-smoke", "G2-full", "G2-smoke", "S1-full", "S1-smoke", "S2-full", "S2-smoke", "C1-full"]
 
 
 def test_the_page_loads_without_a_complaint_or_a_request(browser: Chromium, address: str) -> None:
@@ -92,18 +102,50 @@ def test_the_page_loads_without_a_complaint_or_a_request(browser: Chromium, addr
     assert browser.evaluate("document.getElementById('shown').textContent") == "9 of 9 claims"
 
 
-def test_evidence_is_shown_on_demand_and_by_a_link_to_its_claim(browser: Chromium, address: str) -> None:
+def test_the_page_opens_with_a_line_for_each_sentence_and_evidence_is_unpacked_on_demand(
+    browser: Chromium, address: str
+) -> None:
     shown = "[...document.querySelectorAll('.claim')].filter(s => s.querySelector('.parts')?.checkVisibility())"
     browser.open(address)
-    assert browser.evaluate(f"{shown}.length") == 0
+    assert browser.evaluate("[...document.querySelectorAll('.entry .id')].map(one => one.textContent)") == [
+        *("G1", "G2", "S1", "S2", "C1")
+    ]
+    assert browser.evaluate("document.querySelectorAll('.entry').length") == 5
+    assert browser.evaluate("document.querySelectorAll('.parts, .curves, .settings').length") == 0
+    assert browser.evaluate("[...document.querySelectorAll('.claim')].some(s => s.checkVisibility())") is False
+    browser.evaluate("document.querySelectorAll('.entry > summary')[2].click()")
     browser.evaluate("document.querySelector('#S1-full summary').click()")
     browser.evaluate("location.hash = '#G1-full'")
-    assert browser.evaluate(f"new Promise(done => setTimeout(() => done({shown}.map(s => s.id))))") == [
+    assert browser.evaluate(f"new Promise(done => setTimeout(() => done({shown}.map(s => s.id)), 50))") == [
         "G1-full",
         "S1-full",
     ]
     browser.evaluate("dispatchEvent(new Event('beforeprint'))")
+    assert browser.evaluate(f"{shown}.length") == 8  # C1 has no trials
     assert browser.evaluate("[...document.querySelectorAll('.evidence')].every(one => one.open)")
+
+
+def test_without_a_script_the_sentences_verdicts_and_reasons_are_there_and_the_evidence_is_said_to_be_packed(
+    browser: Chromium, address: str
+) -> None:
+    browser.send("Emulation.setScriptExecutionDisabled", value=True)
+    try:
+        browser.open(f"{address}#G1-full")
+    finally:
+        browser.send("Emulation.setScriptExecutionDisabled", value=False)
+    assert "report.md" in browser.evaluate("document.querySelector('noscript').textContent")
+    assert browser.evaluate("document.querySelector('noscript').checkVisibility()")
+    assert browser.evaluate("document.querySelector('#G1-full .reason').checkVisibility()")
+    assert browser.evaluate("document.querySelector('#unpackable').checkVisibility()") is False
+
+
+def test_a_page_whose_pieces_are_damaged_says_so(browser: Chromium, address: str, tmp_path: Path) -> None:
+    text = Path(urlsplit(address).path).read_text(encoding="utf-8")
+    torn = tmp_path / "torn.html"
+    torn.write_text(text.replace('<template id="pieces">', '<template id="pieces">AAAA'), encoding="utf-8")
+    browser.open(torn.as_uri())
+    assert browser.evaluate("new Promise(done => setTimeout(done, 50))") is None
+    assert browser.evaluate("document.querySelector('#unpackable').checkVisibility()")
 
 
 def test_hostile_text_runs_nothing(browser: Chromium, address: str) -> None:
@@ -122,41 +164,37 @@ def test_a_script_that_is_not_the_pages_own_is_refused(browser: Chromium, addres
 
 
 def test_every_image_loads(browser: Chromium, address: str) -> None:
-    browser.open(address)
+    browser.open(f"{address}#figures")
+    _open_all(browser)
     images = browser.evaluate(
-        """Promise.all([
-          ...[...document.images].map((image) => image.decode().then(() => [image.complete, image.naturalWidth])),
-          ...[...document.querySelectorAll('svg image')].map((image) => {
-            const copy = new Image();
-            copy.src = image.href.baseVal;
-            return copy.decode().then(() => [copy.complete, copy.naturalWidth]);
-          }),
-        ])"""
+        """Promise.all([...document.images].map(
+          (image) => image.decode().then(() => [image.className, image.complete, image.naturalWidth])
+        ))"""
     )
-    assert len(images) == 2
-    assert all(complete and width > 0 for complete, width in images)
-    assert images[0] == [True, 40]
+    assert [name for name, *_ in images] == ["champion"] * 4 + [""]
+    assert all(complete and width > 0 for _, complete, width in images)
+    assert images[-1] == ["", True, 40]
 
 
-def test_shared_drawings_are_drawn_where_they_are_used(browser: Chromium, address: str) -> None:
+def test_curves_are_drawn_for_every_claim_that_shows_them(browser: Chromium, address: str) -> None:
     browser.open(f"{address}#G1-full")
-    browser.evaluate("document.querySelectorAll('#G1-full details').forEach(one => { one.open = true })")
-    boxes = browser.evaluate(
-        "[...document.querySelectorAll('#G1-full use')].map(use => use.getBoundingClientRect().width > 50)"
-    )
-    assert boxes == [True] * 3
+    _open_all(browser)
+    for claim in ("G1-full", "G2-smoke"):
+        curves = f"[...document.querySelectorAll('#{claim} .curves svg')]"
+        assert browser.evaluate(f"{curves}.map(one => one.getBoundingClientRect().width > 50)") == [True] * 2
 
 
 @pytest.mark.parametrize(
     ("query", "expected"),
     [
         ("verdict=supported", ["G1-full", "G1-smoke"]),
-        ("verdict=refuted&verdict=error", ["G2-full", "S1-full", "G2-smoke", "S1-smoke"]),
+        ("verdict=refuted&verdict=error", ["G2-full", "G2-smoke", "S1-full", "S1-smoke"]),
         ("verdict=not+run", ["C1-full"]),
         ("tier=smoke&section=%C2%A75.2", ["S1-smoke", "S2-smoke"]),
         ("section=control", ["C1-full"]),
         ("method=neat&tier=full", ["G1-full", "G2-full"]),
-        ("words=SENTENCE+g2", ["G2-full"]),
+        ("words=SENTENCE+g2", ["G2-full", "G2-smoke"]),
+        ("words=g2+small", ["G2-smoke"]),
         ("words=no+such+words", []),
     ],
 )
@@ -208,7 +246,8 @@ def test_the_page_fits_its_window_and_follows_the_colour_scheme(
     browser: Chromium, address: str, width: int, dark: bool
 ) -> None:
     browser.open(address, width=width, dark=dark)
-    browser.evaluate("document.querySelectorAll('details').forEach(one => { one.open = true })")
+    assert browser.evaluate("document.documentElement.scrollWidth") <= width
+    _open_all(browser)
     assert browser.evaluate("document.documentElement.scrollWidth") <= width
     paper, ink = browser.evaluate(
         "['backgroundColor', 'color'].map(name => Number(getComputedStyle(document.body)[name].match(/\\d+/)[0]))"

@@ -18,6 +18,7 @@ from evoclaims.envs.gates.parity import NParity
 from evoclaims.methods.hand_built import HandBuilt
 from evoclaims.report import across_table
 from evoclaims.report.charts_of_verdicts import across_chart
+from evoclaims.report.verdict_chart import svg
 from evoclaims.trials.budget import Budget
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.spec import Condition
@@ -130,7 +131,7 @@ def test_the_text_of_an_issue_begins_with_what_changed_and_ends_with_the_command
 
 
 def test_the_chart_marks_each_cell_as_high_as_its_effect_and_drift_by_a_ring(found: Across) -> None:
-    drawing = ElementTree.fromstring(across_chart(found))
+    drawing = ElementTree.fromstring(svg(across_chart(found)))
     marks = {
         mark.findtext(f"{SVG}title"): mark for mark in drawing.iter() if mark.tag in (f"{SVG}circle", f"{SVG}path")
     }

@@ -7,6 +7,7 @@ import itertools
 import shlex
 import sys
 from collections.abc import Callable, Mapping, Sequence
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Final
 
@@ -21,17 +22,18 @@ from evoclaims.core.errors import UnknownNameError, UserError
 from evoclaims.core.releases import released
 from evoclaims.paper.config import find_root, load_config
 from evoclaims.plugin.options import TIERS
-from evoclaims.report import across_table
+from evoclaims.report import across_shown, across_table
 from evoclaims.report.charts_of_verdicts import across_chart
 from evoclaims.report.console import PlainSpokenConsole
+from evoclaims.report.verdict_chart import svg
 from evoclaims.verdicts import export
 from evoclaims.verdicts.across import Across, across
 
 FORMS: Final[Mapping[str, Callable[[Across], bytes]]] = {
-    "markdown": lambda found: across_table.markdown(found, shlex.join(["evoclaims", *sys.argv[1:]])).encode(),
+    "markdown": lambda found: across_table.markdown(found, _command()).encode(),
     "csv": lambda found: export.as_csv(across_table.rows(found)),
     "json": lambda found: export.as_json(across_table.rows(found)),
-    "svg": lambda found: across_chart(found).encode(),
+    "svg": lambda found: svg(across_chart(found)).encode(),
 }
 """Writers by the names of their forms."""
 
@@ -48,6 +50,7 @@ def main(options: argparse.Namespace) -> int:
     found = across([elsewhere.judge(recipe) for recipe in recipes])
     if not found.claims:
         raise UserError("No claim was judged in any of these environments; the reasons are above.")
+    across_shown.keep(found, elsewhere.store.root, datetime.now(UTC).isoformat(" ", "minutes"), _command())
     console = PlainSpokenConsole(file=styled())
     for part in across_table.terminal(found, console.width):
         console.print()
@@ -74,6 +77,11 @@ def opened(options: argparse.Namespace, only: str | None) -> Elsewhere:
     store = open_store(options.storage)
     store.check_writable()
     return Elsewhere(config.root, config.root / config.claims, store, options.tier, only, options.device)
+
+
+def _command() -> str:
+    """Return the command that runs."""
+    return shlex.join(["evoclaims", *sys.argv[1:]])
 
 
 def _recipes(options: argparse.Namespace) -> list[Recipe]:

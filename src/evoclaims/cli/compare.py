@@ -16,6 +16,7 @@ from evoclaims.core.errors import UserError
 from evoclaims.judging.baseline import DriftReport
 from evoclaims.judging.tripwire import DigestCheck
 from evoclaims.report.charts_of_verdicts import timeline_chart
+from evoclaims.report.verdict_chart import svg
 from evoclaims.trials.store import Store
 from evoclaims.verdicts import comparison, history, transitions
 from evoclaims.verdicts.comparison import Side
@@ -42,7 +43,7 @@ def main(options: argparse.Namespace) -> int:
         asked = {key: entries for key, entries in kept.items() if key[0] in tiers}
         print(timeline(asked, options.timeline))
         if options.out is not None:
-            write(Path(options.out), timeline_chart(asked, options.timeline).encode())
+            write(Path(options.out), svg(timeline_chart(asked, options.timeline)).encode())
         return 0
     if options.out is not None:
         raise UserError("--out draws what --timeline lists: add --timeline.")

@@ -10,11 +10,12 @@ from typing import Any
 
 from evoclaims.cli.episodes import run_again
 from evoclaims.cli.project import ALL_TIERS, Project, open_project
+from evoclaims.cli.storage import APART
 from evoclaims.cli.stored import REPORT, Stored, write
 from evoclaims.envs.ecorobot.robot_task import RobotTask
 from evoclaims.envs.ecorobot.views import pictures
 from evoclaims.figures.replication import replications
-from evoclaims.report import table_cells
+from evoclaims.report import across_shown, table_cells
 from evoclaims.report.build import gather
 from evoclaims.report.champion import network
 from evoclaims.report.html import html
@@ -59,6 +60,7 @@ def main(options: argparse.Namespace) -> int:
         numbers=replications(archive, reproduction, tiers[0], ("", *reproduction.variants)),
         put_to_the_paper=by_the_paper,
         mutants=mutation_matrix.load(reproduction.folder / mutation_matrix.FILE),
+        across=across_shown.last({project.store.root.absolute(), project.config.root / APART["across"]}),
         generated=f"Written on {datetime.now(UTC):%Y-%m-%d %H:%M} UTC by evoclaims {metadata.version('evoclaims')}.",
     )
     folder = Path(options.out or REPORT)

@@ -13,7 +13,9 @@ from evoclaims.judging.verdict import Outcome
 from evoclaims.paper.archive import Archive
 from evoclaims.paper.reproduction import Reproduction
 from evoclaims.report import origin, replication_cells, table_cells, training_curves
+from evoclaims.report.across_shown import AcrossShown
 from evoclaims.report.champion import Draw, champion_of, network
+from evoclaims.report.charts_of_verdicts import timeline_chart
 from evoclaims.report.evidence import Part, judged_parts, unjudged_part
 from evoclaims.report.fault_grid import fault_grid
 from evoclaims.report.formatting import Anchors, clean, counted, listed, places, plural
@@ -44,6 +46,7 @@ def gather(
     numbers: Sequence[Replication] = (),
     put_to_the_paper: Sequence[ClaimReport] = (),
     mutants: Matrix | None = None,
+    across: AcrossShown | None = None,
     generated: str = "",
 ) -> Page:
     """Return the data of a whole report.
@@ -61,6 +64,7 @@ def gather(
         numbers: published ones beside ours.
         put_to_the_paper: reports of claims that were judged from the paper's own numbers.
         mutants: the committed matrix of planted faults; None for none.
+        across: what `evoclaims across` has last found; None for nothing.
         generated: when, and by which version.
     """
     tried = mutants or {}
@@ -82,8 +86,16 @@ def gather(
         numbers=tuple(numbers),
         put_to_the_paper=tuple(replication_cells.put_to_the_paper(put_to_the_paper)),
         faults=tuple(fault_grid(tried, tier, reports) for tier, reports in verdicts.items() if reports),
+        across=across,
+        history=timeline_chart(shown) if (shown := _shown(history, verdicts)) else None,
         generated=generated,
     )
+
+
+def _shown(history: History, verdicts: Verdicts) -> History:
+    """Return the accepted verdicts of the claims that are shown."""
+    keys = {key_of(report) for reports in verdicts.values() for report in reports}
+    return {key: entries for key, entries in history.items() if key in keys}
 
 
 def _notices(boards: Sequence[Board], reader: Reader) -> list[str]:

@@ -115,8 +115,8 @@ def profile_svg(part: Part) -> Markup:
     return _svg(WIDTH, top + HEIGHT + 4, pieces, "performance profiles: the share of trials above each value")
 
 
-def curve_symbol(panel: CurvePanel, name: str) -> Markup:
-    """Draw a panel of training curves as a symbol that is put on the page under `name`."""
+def curves_svg(panel: CurvePanel, name: str) -> Markup:
+    """Draw a panel of training curves; `name` says what it shows."""
     width, height = PANEL
     lines = [*panel.lines, *(panel.band or ())]
     xs = _ends([line.x for line in lines])
@@ -131,8 +131,7 @@ def curve_symbol(panel: CurvePanel, name: str) -> Markup:
     if panel.band is not None:
         pieces += _band(*panel.band, x, y)
     pieces += [_mark("line", path, line.label) for line in panel.lines if (path := _path(line, x, y))]
-    inside = Markup("").join(pieces)
-    return Markup('<symbol id="{}" viewBox="0 0 {} {}">{}</symbol>').format(name, width, height, inside)
+    return _svg(width, height, pieces, name)
 
 
 def ticks(low: float, high: float, most: int = 5) -> list[float]:

@@ -3,23 +3,23 @@
 from __future__ import annotations
 
 from evoclaims.report import across_table
-from evoclaims.report.verdict_chart import Mark, svg
+from evoclaims.report.verdict_chart import Mark, VerdictChart
 from evoclaims.verdicts import timeline
 from evoclaims.verdicts.across import Across, Cell
 from evoclaims.verdicts.history import History
 
 
-def across_chart(found: Across) -> str:
+def across_chart(found: Across) -> VerdictChart:
     """Return a chart in which marks are as high as A12 against the first environment."""
     rows = {
         claim: {one.label: _mark(found.cells.get((claim, one.label)), one.trouble) for one in found.environments}
         for claim in found.claims
     }
     labels = {one.label: one.label for one in found.environments}
-    return svg(across_table.headline(found), "height: A12; ring: drift", labels, rows)
+    return VerdictChart(across_table.headline(found), "height: A12; ring: drift", labels, rows)
 
 
-def timeline_chart(history: History, claim: str = "") -> str:
+def timeline_chart(history: History, claim: str = "") -> VerdictChart:
     """Return a chart of accepted verdicts by date and versions; a ring is a verdict under other rules than before.
 
     Raises:
@@ -37,7 +37,8 @@ def timeline_chart(history: History, claim: str = "") -> str:
             ringed = before is not None and before.fingerprint != entry.fingerprint
             marks[column] = Mark(entry.outcome, timeline.described(before, entry), ringed=ringed)
             before = entry
-    return svg("Accepted verdicts by date", "ring: other rules than before", dict(sorted(columns.items())), rows)
+    title, note = "Accepted verdicts by date", "ring: other rules than before"
+    return VerdictChart(title, note, dict(sorted(columns.items())), rows)
 
 
 def _mark(cell: Cell | None, trouble: str) -> Mark:

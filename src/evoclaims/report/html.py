@@ -2,64 +2,94 @@
 
 from __future__ import annotations
 
-import base64
 import functools
 import json
-import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
 from importlib import resources
-from typing import Final
+from urllib.parse import quote
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from evoclaims.core.content_policy import exactly
 from evoclaims.judging.verdict import Outcome
-from evoclaims.report import charts, formatting, replication_cells
+from evoclaims.report import across_table, charts, formatting, replication_cells, verdict_chart
+from evoclaims.report.charts_of_verdicts import timeline_chart
 from evoclaims.report.fault_grid import LEGEND
-from evoclaims.report.model import Page
-
-_VIEW_BOX: Final = re.compile(rb'viewBox="[-\d.]+ [-\d.]+ ([\d.]+) ([\d.]+)"')
+from evoclaims.report.model import Page, Section
+from evoclaims.report.opening_lines import opening_lines
+from evoclaims.report.packed_pieces import packed
+from evoclaims.report.spark import spark_svg
+from evoclaims.report.verdict_chart import VerdictChart
+from evoclaims.verdicts.history import key_of
 
 
 @dataclass(frozen=True)
-class Shown:
-    """A drawing that is kept once and shown in several places.
+class Chapter:
+    """A part of the page below the claims.
 
     Attributes:
         name: its id in the page.
-        width, height: in the drawing's own units.
-        label: in words.
+        short: what leads there.
+        title: its heading.
+        template: writes it.
     """
 
     name: str
-    width: float
-    height: float
-    label: str
+    short: str
+    title: str
+    template: str
 
 
 def html(page: Page) -> str:
     """Return the whole page."""
     style, script = _asset("report.css"), _asset("report.js")
-    shelf, curves, champions = _shelf(page)
     return (
         _environment()
         .get_template("page.html.j2")
         .render(
             page=page,
+            lines=opening_lines(page),
+            chapters=list(_chapters(page)),
+            pieces=packed(dict(_pieces(page))),
             outcomes=list(Outcome),
             legend=LEGEND,
             style=style,
             script=script,
             policy=policy(style, script),
-            shelf=shelf,
-            curves=curves,
-            champions=champions,
             places=_choices(place for section in page.sections for place in section.places),
             methods=_choices(method for section in page.sections for method in section.methods),
         )
     )
+
+
+def _chapters(page: Page) -> Iterator[Chapter]:
+    """Yield the parts below the claims that have something to show."""
+    if page.robustness:
+        yield Chapter("robustness", "Robustness", "Which conclusions hang on a detail?", "robustness.html.j2")
+    if page.numbers:
+        yield Chapter("numbers", "Numbers", "Do the numbers replicate?", "replication.html.j2")
+    if page.faults:
+        yield Chapter("faults", "Planted faults", "Which planted faults do the claims notice?", "faults.html.j2")
+    if page.across:
+        yield Chapter("across", "Releases", "Do other releases change a verdict?", "across.html.j2")
+    if page.history:
+        yield Chapter("history", "History", "Accepted verdicts by date and versions", "history.html.j2")
+    if page.figures or page.missing:
+        yield Chapter("figures", "Figures", "Figures of the paper, redrawn", "paper_figures.html.j2")
+
+
+def _pieces(page: Page) -> Iterator[tuple[str, str]]:
+    """Yield what is shown on demand, by names of which no two are alike: a claim's anchor has no space."""
+    render = _environment().get_template
+    names = {key: str(number) for number, key in enumerate(page.conditions)}
+    for section in page.sections:
+        yield section.anchor, render("evidence.html.j2").render(claim=section, names=names)
+    for key, condition in page.conditions.items():
+        yield f"trials {names[key]}", render("trials.html.j2").render(condition=condition)
+        yield f"settings {names[key]}", render("settings.html.j2").render(condition=condition)
+    yield "all figures", render("drawn_figures.html.j2").render(figures=page.figures)
 
 
 @functools.cache
@@ -74,19 +104,33 @@ def _environment() -> Environment:
         lstrip_blocks=True,
     )
     environment.filters |= {
+        "clean": formatting.clean,
         "number": formatting.number,
         "p_value": formatting.p_value,
         "json": _json,
         "data_uri": data_uri,
     }
-    environment.globals |= {"strip_svg": charts.strip_svg, "axis_svg": charts.axis_svg, "plural": formatting.plural}
-    environment.globals |= {"replication": replication_cells, "profile_svg": charts.profile_svg}
+    environment.globals |= {"strip_svg": charts.strip_svg, "axis_svg": charts.axis_svg, "curves_svg": charts.curves_svg}
+    environment.globals |= {"spark_svg": spark_svg, "plural": formatting.plural}
+    environment.globals |= {"history_svg": history_svg, "chart_svg": chart_svg, "profile_svg": charts.profile_svg}
+    environment.globals |= {"replication": replication_cells, "across_legend": across_table.LEGEND}
     return environment
 
 
 def _cleaned(value: object) -> object:
     """Return what a template shows without control characters; markup is unchanged."""
     return formatting.clean(value) if isinstance(value, str) and not isinstance(value, Markup) else value
+
+
+def history_svg(section: Section) -> Markup:
+    """Draw the accepted verdicts of one claim over dates and versions."""
+    entries = tuple(entry for era in section.history for entry in era)
+    return chart_svg(timeline_chart({key_of(section.report): entries}))
+
+
+def chart_svg(chart: VerdictChart) -> Markup:
+    """Draw a chart, whose texts are escaped there."""
+    return Markup(verdict_chart.svg(chart))  # noqa: S704
 
 
 def policy(style: str, script: str) -> str:
@@ -98,32 +142,11 @@ def policy(style: str, script: str) -> str:
 
 
 def data_uri(svg: bytes) -> str:
-    """Return an SVG as a data URI; as an image it can neither run scripts nor load anything."""
-    return f"data:image/svg+xml;base64,{base64.b64encode(svg).decode()}"
+    """Return an SVG as a data URI; as an image it can neither run scripts nor load anything.
 
-
-def _shelf(page: Page) -> tuple[Markup, Mapping[str, list[Shown]], Mapping[str, Shown]]:
-    """Return all drawings that sections share, and which of them belong to each condition."""
-    kept: list[Markup] = []
-    curves: dict[str, list[Shown]] = {}
-    champions: dict[str, Shown] = {}
-    for number, (key, condition) in enumerate(page.conditions.items()):
-        curves[key] = []
-        for index, panel in enumerate(condition.curves):
-            name = f"curves-{number}-{index}"
-            kept.append(charts.curve_symbol(panel, name))
-            curves[key].append(Shown(name, *charts.PANEL, f"{panel.name} over training, {condition.label}"))
-        picture = condition.champion.picture
-        size = _VIEW_BOX.search(picture)
-        if size is not None:
-            shown = Shown(f"champion-{number}", float(size[1]), float(size[2]), condition.champion.says)
-            champions[key] = shown
-            kept.append(
-                Markup('<image id="{}" width="{}" height="{}" href="{}"/>').format(
-                    shown.name, shown.width, shown.height, data_uri(picture)
-                )
-            )
-    return Markup("\n").join(kept), curves, champions
+    Its text stays as it is, apart from the signs that no URI may have: so pictures that are alike are packed well.
+    """
+    return f"data:image/svg+xml,{quote(svg, safe=' !$&()*+,-./:;=?@_~')}"
 
 
 def _choices(values: Iterator[str]) -> list[str]:

@@ -8,11 +8,13 @@ from dataclasses import dataclass, field
 from evoclaims.figures.replication import Replication
 from evoclaims.judging.verdict import Outcome
 from evoclaims.report import table_cells
+from evoclaims.report.across_shown import AcrossShown
 from evoclaims.report.evidence import Part
 from evoclaims.report.fault_grid import FaultGrid
-from evoclaims.report.formatting import counted, place_key
+from evoclaims.report.formatting import counted
 from evoclaims.report.origin import Made
 from evoclaims.report.training_curves import CurvePanel
+from evoclaims.report.verdict_chart import VerdictChart
 from evoclaims.verdicts.claim_report import ClaimReport
 from evoclaims.verdicts.history import Entry
 from evoclaims.verdicts.robustness import Robustness
@@ -115,12 +117,6 @@ class Board:
         reports = [section.report for section in self.sections]
         return sum(report.as_expected and report.outcome is not Outcome.SUPPORTED for report in reports)
 
-    @property
-    def by_place(self) -> Mapping[str, tuple[Section, ...]]:
-        """Claims by the first section of the paper that they name."""
-        names = sorted({section.places[0] for section in self.sections}, key=place_key)
-        return {name: tuple(s for s in self.sections if s.places[0] == name) for name in names}
-
 
 @dataclass(frozen=True)
 class PaperFigure:
@@ -153,6 +149,8 @@ class Page:
         numbers: published ones beside ours.
         put_to_the_paper: what the claims' assertions make of the published numbers, in sentences.
         faults: which planted faults the claims notice, by tier.
+        across: what `evoclaims across` has last found; None if it has not run.
+        history: accepted verdicts over dates and versions; None without any.
         generated: when, and by which version; free text.
     """
 
@@ -168,6 +166,8 @@ class Page:
     numbers: tuple[Replication, ...] = ()
     put_to_the_paper: tuple[str, ...] = ()
     faults: tuple[FaultGrid, ...] = ()
+    across: AcrossShown | None = None
+    history: VerdictChart | None = None
     generated: str = ""
 
     @property

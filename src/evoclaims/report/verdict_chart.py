@@ -11,8 +11,12 @@ from evoclaims.core.printable import printable
 from evoclaims.judging.verdict import Outcome
 from evoclaims.report.badge import BLUE, GREEN, GREY, RED
 
-ROW, COLUMN, LEFT, TOP, KEY = 56, 150, 220, 58, 95
-"""Sizes in units: height of a row, width of a column, room left of and above the marks, width of a part of the key."""
+ROW, FLAT_ROW, COLUMN, LEFT, TOP, KEY = 56, 22, 150, 220, 58, 95
+"""Sizes in units: height of a row, also where all marks are on its line, width of a column, room left of and above the
+marks, width of a part of the key."""
+
+LEVEL: Final = 0.5
+"""The height of a mark on its line."""
 
 _COLOURS: Final = {
     Outcome.SUPPORTED: GREEN,
@@ -36,43 +40,62 @@ class Mark:
 
     outcome: Outcome | None
     said: str
-    height: float = 0.5
+    height: float = LEVEL
     ringed: bool = False
 
 
-def svg(title: str, note: str, columns: Mapping[str, str], rows: Mapping[str, Mapping[str, Mark]]) -> str:
-    """Return the chart.
+@dataclass(frozen=True)
+class VerdictChart:
+    """What a chart shows.
 
-    Args:
+    Attributes:
         title: of the picture.
         note: what heights and rings mean, on top.
         columns: headings by the names of columns, which are told to whom points at them.
         rows: by claim, the mark in each column that has one.
     """
-    width = LEFT + max(COLUMN * len(columns), KEY * len(Outcome))
-    height = TOP + ROW * len(rows) + 10
-    drawn = "\n".join(_pieces(note, columns, rows, width))
+
+    title: str
+    note: str
+    columns: Mapping[str, str]
+    rows: Mapping[str, Mapping[str, Mark]]
+
+    @property
+    def row(self) -> int:
+        """The height of its rows."""
+        flat = all(mark.height == LEVEL for marks in self.rows.values() for mark in marks.values())
+        return FLAT_ROW if flat else ROW
+
+
+def svg(chart: VerdictChart) -> str:
+    """Return the chart as SVG."""
+    width = LEFT + max(COLUMN * len(chart.columns), KEY * len(Outcome))
+    height = TOP + chart.row * len(chart.rows) + 10
+    drawn = "\n".join(_pieces(chart, width))
     return (
         f'<svg xmlns="http://www.w3.org/2000/svg" width="{width}" height="{height}" role="img" '
-        f'font-family="Verdana,DejaVu Sans,sans-serif" font-size="11">\n<title>{_text(title)}</title>\n'
+        f'font-family="Verdana,DejaVu Sans,sans-serif" font-size="11">\n<title>{_text(chart.title)}</title>\n'
         f'<rect width="{width}" height="{height}" fill="#fff"/>\n{drawn}\n</svg>\n'
     )
 
 
-def _pieces(note: str, columns: Mapping[str, str], rows: Mapping[str, Mapping[str, Mark]], width: int) -> Iterator[str]:
+def _pieces(chart: VerdictChart, width: int) -> Iterator[str]:
     """Yield key, headings and rows."""
     for place, outcome in enumerate(Outcome):
         at = LEFT + KEY * place + 10
         yield f'<circle cx="{at}" cy="14" r="5" fill="{_COLOURS[outcome]}"/><text x="{at + 9}" y="18">{outcome}</text>'
-    yield f'<text x="8" y="18">{_text(note)}</text>'
-    for column, (name, heading) in enumerate(columns.items()):
+    yield f'<text x="8" y="18">{_text(chart.note)}</text>'
+    for column, (name, heading) in enumerate(chart.columns.items()):
         title = f"<title>{_text(name)}</title>"
-        yield f'<text x="{_x(column)}" y="{TOP - 8}" text-anchor="middle">{_text(heading)}{title}</text>'
-    for row, (claim, marks) in enumerate(rows.items()):
-        middle = TOP + ROW * row + ROW / 2
+        for line, text in enumerate(heading.split(", ", 1)):
+            yield f'<text x="{_x(column)}" y="{TOP - 20 + 12 * line}" text-anchor="middle">{_text(text)}{title}</text>'
+    for row, (claim, marks) in enumerate(chart.rows.items()):
+        middle = TOP + chart.row * (row + 0.5)
         yield f'<line x1="{LEFT}" x2="{width}" y1="{middle:g}" y2="{middle:g}" stroke="#bdbdbd"/>'
         yield f'<text x="8" y="{middle + 4:g}">{_text(claim)}</text>'
-        yield from (_drawn(marks[name], _x(column), middle) for column, name in enumerate(columns) if name in marks)
+        yield from (
+            _drawn(marks[name], _x(column), middle) for column, name in enumerate(chart.columns) if name in marks
+        )
 
 
 def _drawn(mark: Mark, x: float, middle: float) -> str:
@@ -80,7 +103,7 @@ def _drawn(mark: Mark, x: float, middle: float) -> str:
     title = f"<title>{_text(mark.said)}</title>"
     if mark.outcome is None:
         return f'<path d="M{x - 4:g} {middle - 4:g}l8 8m0-8l-8 8" stroke="{GREY}">{title}</path>'
-    y = middle + (0.5 - mark.height) * (ROW - 16)
+    y = middle + (LEVEL - mark.height) * (ROW - 16)
     ring = f'<circle cx="{x:g}" cy="{y:g}" r="8" fill="none" stroke="#000"/>' if mark.ringed else ""
     return f'{ring}<circle cx="{x:g}" cy="{y:g}" r="5" fill="{_COLOURS[mark.outcome]}">{title}</circle>'
 

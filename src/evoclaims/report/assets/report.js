@@ -1,24 +1,66 @@
-// Filters: they are kept in the address after "#?", so that a view can be shared and restored.
+// Evidence is unpacked where it is asked for. Filters are kept in the address after "#?", so that a view can be shared.
 (() => {
   "use strict";
+  const within = (element, selector) => [...element.querySelectorAll(selector)];
+
+  // Pieces of the page by name: JSON, compressed, in base64.
+  let pieces = null;
+  const unpacking = (async () => {
+    const text = atob(document.getElementById("pieces").content.textContent);
+    const bytes = Uint8Array.from(text, (letter) => letter.charCodeAt(0));
+    const plain = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"));
+    pieces = await new Response(plain).json();
+  })();
+  unpacking.catch(() => {
+    document.getElementById("unpackable").hidden = false;
+  });
+
+  // Puts the pieces that belong to an open element in their places; those in closed ones wait.
+  const fill = (details) => {
+    if (!pieces) return;
+    for (const place of within(details, "[data-piece]")) {
+      if (place.closest("details") !== details) continue;
+      place.innerHTML = pieces[place.dataset.piece];
+      place.removeAttribute("data-piece");
+    }
+  };
+  const open = (details) => {
+    details.open = true;
+    fill(details);
+  };
+  document.addEventListener("toggle", (event) => event.target.open && unpacking.then(() => fill(event.target)), true);
+
+  // A link to a claim or to a part of the page opens what it is in, and a claim's evidence.
+  const target = () => {
+    const found = location.hash.startsWith("#?") ? null : document.getElementById(location.hash.slice(1));
+    if (!found) return null;
+    for (let around = found.closest("details"); around; around = around.parentElement.closest("details")) open(around);
+    found.querySelectorAll(":scope > details.evidence").forEach(open);
+    return found;
+  };
+
+  addEventListener("beforeprint", () => {
+    // paper has no clicks
+    for (const details of within(document, "details.entry, details.chapter, details.evidence")) open(details);
+  });
+
   const form = document.getElementById("filters");
-  if (!form) return;
+  if (!form) return; // a page without claims
   const names = ["verdict", "tier", "section", "method", "words"];
   const nothing = document.getElementById("nothing");
   const shown = document.getElementById("shown");
-  const claims = [...document.querySelectorAll("section.claim")].map((element) => ({
+  const claims = within(document, "section.claim").map((element) => ({
     element,
     verdict: element.dataset.verdict,
     tier: element.dataset.tier,
     sections: JSON.parse(element.dataset.places),
     methods: JSON.parse(element.dataset.methods),
-    text: [...element.querySelectorAll("h3, blockquote, .judged, .reason, .because, .where")]
+    text: within(element, "h3, blockquote, .judged, .reason, .because, .where")
       .map((part) => part.textContent)
       .join(" ")
       .toLowerCase(),
   }));
-  const chips = new Map();
-  for (const chip of document.querySelectorAll("[data-for]")) chips.set(chip.dataset.for, chip);
+  const chips = new Map(within(document, "[data-for]").map((chip) => [chip.dataset.for, chip]));
 
   const chosen = () => {
     const query = new URLSearchParams();
@@ -43,8 +85,7 @@
       chips.get(claim.element.id)?.classList.toggle("faint", !kept);
       count += kept;
     }
-    for (const tier of document.querySelectorAll("section.tier"))
-      tier.hidden = !tier.querySelector("section.claim:not([hidden])");
+    for (const line of within(document, "details.entry")) line.hidden = !line.querySelector("section.claim:not([hidden])");
     nothing.hidden = count > 0;
     shown.textContent = `${count} of ${claims.length} claims`;
   };
@@ -60,13 +101,9 @@
 
   const follow = () => {
     if (location.hash.startsWith("#?")) return set(new URLSearchParams(location.hash.slice(2)));
-    const target = document.getElementById(location.hash.slice(1));
-    const evidence = target?.querySelector("details.evidence");
-    if (evidence) evidence.open = true;
-    if (target?.hidden) {
-      set(new URLSearchParams()); // a link to a claim shows it, whatever the filters say
-      target.scrollIntoView();
-    }
+    const found = target();
+    if (found?.hidden || found?.closest("[hidden]")) set(new URLSearchParams()); // a link shows it, whatever the filters say
+    found?.scrollIntoView();
     return undefined;
   };
 
@@ -81,9 +118,10 @@
   form.addEventListener("submit", (event) => event.preventDefault());
   form.addEventListener("reset", () => setTimeout(change));
   addEventListener("hashchange", follow);
-  addEventListener("beforeprint", () => {
-    for (const evidence of document.querySelectorAll("details.evidence")) evidence.open = true; // paper has no clicks
-  });
   apply();
   follow();
+  unpacking.then(() => {
+    within(document, "details[open]").forEach(fill);
+    target()?.scrollIntoView(); // what stands above it has grown
+  });
 })();

@@ -1,0 +1,79 @@
+"""What the page opens with: one line a sentence, its verdicts on every reading, and small pictures of the trials."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from xml.etree import ElementTree
+
+import numpy as np
+from laboratory import Laboratory, better_solves, better_wins
+
+from evoclaims.judging.verdict import Bound, Outcome
+from evoclaims.report.evidence import Dot, Part, Strip
+from evoclaims.report.opening_lines import UnderVariant, opening_lines
+from evoclaims.report.spark import MOST_DOTS, WIDTH, spark_svg
+from evoclaims.verdicts.robustness import Robustness
+
+
+def _part(*samples: list[float], **changes: object) -> Part:
+    strips = tuple(Strip("x", tuple(Dot(i, v) for i, v in enumerate(values)), (), None) for values in samples)
+    return replace(Part("a", None, (), "", False, strips), **changes)  # type: ignore[arg-type]
+
+
+def _paths(*parts: Part) -> dict[str, list[str]]:
+    """Return the drawn paths by their class."""
+    found: dict[str, list[str]] = {}
+    for path in ElementTree.fromstring(spark_svg(parts)).iter("path"):
+        found.setdefault(path.get("class", ""), []).append(path.get("d", ""))
+    return found
+
+
+def test_a_sentence_has_one_line_with_its_cases_at_every_tier(filled: Laboratory) -> None:
+    reports = [
+        filled.judge(better_wins, tier=tier, case=case, id="T1", says="Better wins", smoke="Better wins in small")
+        for tier in ("full", "smoke")
+        for case in ("a", "b")
+    ]
+    other = filled.judge(better_solves, id="T2", says="Better solves")
+    page = filled.page(*reports, other, sentences={"T1[a]": "Better wins", "T1[b]": "Better wins"})
+    first, second = opening_lines(page)
+    assert (first.claim, first.sentence, first.place) == ("T1", "Better wins", "§1.2")
+    assert [section.report.name for section in first.at("smoke")] == ["T1[a]", "T1[b]"]
+    assert len(first.cases) == 4
+    assert (second.claim, second.place, len(second.cases)) == ("T2", "", 1)
+
+
+def test_a_line_tells_what_came_of_each_case_under_each_variant(filled: Laboratory) -> None:
+    page = filled.page(filled.judge(better_wins), filled.judge(better_solves, id="T2"))
+    row = Robustness("T1", "full", Outcome.SUPPORTED, {"network": Outcome.REFUTED, "rows": Outcome.SUPPORTED})
+    first, second = opening_lines(replace(page, robustness=(row,), variants={"network": "x", "rows": "y", "z": "z"}))
+    assert first.variants == {
+        "network": (UnderVariant("T1 (full): refuted", Outcome.REFUTED, True),),
+        "rows": (UnderVariant("T1 (full): supported", Outcome.SUPPORTED, False),),
+    }
+    assert second.variants == {"network": (), "rows": ()}
+
+
+def test_the_trials_of_the_part_that_decided_are_a_row_of_dots_each() -> None:
+    found = _paths(_part([0.0, 1.0]), _part([0.0, 0.5, 1.0], [0.5], bounds=(Bound("low", 0.5),), decided=True))
+    upper, lower = found["trials"]
+    assert upper == "M2.5 3.5h0M18 3.5h0M33.5 3.5h0"
+    assert lower == "M18 10.5h0"
+    assert found["compared"] == ["M18 0V14"]
+
+
+def test_an_event_is_a_bar_as_long_as_the_share_of_trials_in_which_it_holds() -> None:
+    assert _paths(_part([1.0, 0.0, 1.0, 0.0], event=True)) == {"all": ["M2.5 7.0h31"], "held": ["M2.5 7.0h15.5"]}
+
+
+def test_many_trials_are_a_span_and_many_samples_their_medians() -> None:
+    found = _paths(_part(list(np.linspace(0, 1, MOST_DOTS + 1))))
+    assert found == {"middle": ["M4.05 7H32"], "trials": ["M18 7h0"]}
+    many = _part(*[[0.5]] * 9)
+    medians = replace(many, strips=tuple(replace(strip, median=0.5) for strip in many.strips))
+    assert len(_paths(medians)["trials"]) == 9
+
+
+def test_without_trials_there_is_no_picture() -> None:
+    assert spark_svg(()) == spark_svg((_part([]),)) == ""
+    assert all(0 <= float(place[1:].split()[0]) <= WIDTH for place in _paths(_part([-1e308, 1e308]))["trials"])
