@@ -14,8 +14,9 @@ from evoclaims.cli.main import _parser
 from evoclaims.verdicts.transitions import parse_patterns
 
 ROOT = Path(__file__).parents[1]
-TEXT, WEEKLY = (
-    (ROOT / ".github" / "workflows" / name).read_text(encoding="utf-8") for name in ("claims.yml", "releases.yml")
+TEXT, WEEKLY, SITE = (
+    (ROOT / ".github" / "workflows" / name).read_text(encoding="utf-8")
+    for name in ("claims.yml", "releases.yml", "site.yml")
 )
 COMMANDS = [shlex.split(line)[1:] for line in re.findall(r"\.tox/smoke/bin/(evoclaims .*)", TEXT)]
 (ACROSS,) = (line.replace("${{ matrix.package }}", "jax") for line in re.findall(r"run: evoclaims (.*)", WEEKLY))
@@ -61,7 +62,7 @@ def test_the_text_of_an_issue_is_kept_where_something_changed_and_only_there() -
     assert kept == [("${{ failure() && hashFiles('issue.md') != '' }}", options.out)]
 
 
-@pytest.mark.parametrize("text", [TEXT, WEEKLY], ids=["claims", "releases"])
+@pytest.mark.parametrize("text", [TEXT, WEEKLY, SITE], ids=["claims", "releases", "site"])
 def test_the_workflow_reads_and_changes_nothing_and_knows_no_secret(text: str) -> None:
     assert re.search(r"\npermissions:\n  contents: read\n\n", text)
     assert text.count("permissions:") == 1
@@ -70,11 +71,28 @@ def test_the_workflow_reads_and_changes_nothing_and_knows_no_secret(text: str) -
     assert "evoclaims accept" not in text
 
 
-@pytest.mark.parametrize(("text", "count"), [(TEXT, 5), (WEEKLY, 3)], ids=["claims", "releases"])
+@pytest.mark.parametrize(("text", "count"), [(TEXT, 5), (WEEKLY, 3), (SITE, 3)], ids=["claims", "releases", "site"])
 def test_every_action_is_held_to_a_major_version(text: str, count: int) -> None:
     actions = re.findall(r"uses: (\S+)", text)
     assert len(actions) == count
     assert all(re.fullmatch(r"actions/[a-z-]+@v\d+", action) for action in actions)
+
+
+def test_the_site_is_built_where_it_is_kept_and_its_packages_are_pinned() -> None:
+    tox = ConfigParser(interpolation=None)
+    tox.read(ROOT / "tox.ini")
+    (environment,) = re.findall(r"run: tox run -e (\w+)\n", SITE)
+    command = tox[f"testenv:{environment}"]["commands"]
+    assert "--strict" in command
+    assert "--quiet" not in command  # which would keep warnings from being counted
+    config = ROOT / "docs" / "site" / "mkdocs.yml"
+    (folder,) = re.findall(r"^site_dir: (.*)$", config.read_text(encoding="utf-8"), re.MULTILINE)
+    assert (config.parent / folder).resolve() == ROOT / "build" / "site"
+    assert re.findall(r"\n          path: (\S+/)\n", SITE) == ["build/site/"]
+    needed = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["dependency-groups"]["docs"]
+    for pins in (ROOT / "constraints").glob("python?.??.txt"):
+        pinned = {line.partition("==")[0] for line in pins.read_text(encoding="utf-8").splitlines()}
+        assert pinned.issuperset(re.split(r"[\[<>=]", line)[0] for line in needed)
 
 
 def test_every_supported_python_is_run_with_constraints_of_its_own() -> None:
