@@ -22,7 +22,7 @@ ROOT: Final = Path(__file__).parents[2]
 OF_THE_ROOT: Final = {"README.md": "index.md", "CONTRIBUTING.md": "contributing.md", "CHANGELOG.md": "changelog.md"}
 """Pages by the files that they are."""
 
-_LINK: Final = re.compile(r"```.*?```|(!?\[[^\]]*\])\(([^)\s#]+)(#[^)\s]*)?\)", re.DOTALL)
+_LINK: Final = re.compile(r"```.*?```|<!--.*?-->|(!?\[[^\]]*\])\(([^)\s#]+)(#[^)\s]*)?\)", re.DOTALL)
 _PACKAGE: Final = re.compile(r"^## `([\w.]+)`$", re.MULTILINE)
 
 
@@ -57,7 +57,7 @@ def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Fil
 
 
 def _mended(page: str, link: re.Match[str]) -> str:
-    """Return a link of a page as the site needs it; blocks of code and links to elsewhere stay as they are."""
+    """Return a link of a page as the site needs it; code, comments and links to elsewhere stay as they are."""
     text, target, anchor = link[1], link[2], link[3] or ""
     if text is None or "://" in target or target.startswith("mailto:"):
         return link[0]
