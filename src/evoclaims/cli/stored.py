@@ -10,10 +10,12 @@ from typing import Any, Final
 from evoclaims.cli.project import Project
 from evoclaims.core.errors import UserError
 from evoclaims.core.files import write_atomically, write_once
+from evoclaims.core.printable import printable
 from evoclaims.paper.cost import known_pace
 from evoclaims.report.live_line import duration
 from evoclaims.trials import champions, devices
 from evoclaims.trials.imported import where_from
+from evoclaims.trials.crashes import why
 from evoclaims.trials.result import COMPLETE, TrialResult
 from evoclaims.trials.spec import Condition, TrialSpec
 from evoclaims.trials.time_limit import time_allowed
@@ -78,7 +80,8 @@ def describe(result: TrialResult) -> str:
         limit = duration(time_allowed(result))
         return f"{spent}: its batch had {limit}; more by --time-limit, as much again by --retry {took}"
     if result.status not in COMPLETE:
-        return f"{spent} {took}"
+        reason = why(result)
+        return f"{spent}{': ' * bool(reason)}{printable(reason)} {took}"
     success = " ".join(f"{value:.3f}" for value in result.levels["success"])
     return f"{spent}, success by level {success} {took}"
 

@@ -21,6 +21,11 @@ from evoclaims.envs.ecorobot.sensors import PieSlices as PieSlices
 from evoclaims.envs.ecorobot.sensors import Rangefinders as Rangefinders
 from evoclaims.envs.ecorobot.stones import STONES as STONES
 from evoclaims.envs.ecorobot.stones import SteppingStones as SteppingStones
+from evoclaims.envs.foreign.brax_task import BraxTask as BraxTask
+from evoclaims.envs.foreign.gymnasium_env import GymnasiumEnv as GymnasiumEnv
+from evoclaims.envs.foreign.gymnasium_task import GymnasiumTask as GymnasiumTask
+from evoclaims.envs.foreign.gymnax_task import GymnaxTask as GymnaxTask
+from evoclaims.envs.foreign.jax_task import Descriptor as Descriptor
 from evoclaims.envs.gates.alu import SimpleAlu as SimpleAlu
 from evoclaims.envs.gates.circuit import Circuit as Circuit
 from evoclaims.envs.gates.circuit import Sampling as Sampling

@@ -13,6 +13,7 @@ from evoclaims.judging.fingerprint import fingerprint
 from evoclaims.judging.sample import Source, Trials, UnreadableTrialError
 from evoclaims.judging.shortage import shortage
 from evoclaims.judging.verdict import Outcome, PValues, Verdict
+from evoclaims.trials.crashes import why
 from evoclaims.trials.result import TrialResult
 
 
@@ -148,13 +149,14 @@ def _decidable(attainable: PValues, alpha: float) -> bool:
 
 def _crashed(assertion: Assertion, trials: Trials) -> str:
     """Return a sentence that names the crashed trials, or nothing."""
-    crashes = [
-        f"{source.label} (seed {trial.seed})"
+    crashed = [
+        (f"{source.label} (seed {trial.seed})", why(trial))
         for source in assertion.sources()
         for trial in trials[source.fingerprint]
         if trial.status == "crashed"
     ]
-    return f"trials crashed: {', '.join(crashes)}" if crashes else ""
+    reason = next((f"; the first: {said}" for _, said in crashed if said), "")
+    return f"trials crashed: {', '.join(name for name, _ in crashed)}{reason}" if crashed else ""
 
 
 def _without_result(assertion: Assertion, trials: Trials) -> str:

@@ -72,14 +72,15 @@ class LiveLine:
 
 def describe(progress: RunProgress) -> str:
     """Return the line: condition, trials, step, level, best, time left; safe to print, whatever the names contain."""
-    if progress.best is None:
+    if not progress.total_steps:
         count = f" ({progress.trials} trials)" if progress.trials else ""
         return printable(f"{progress.condition}: {progress.phase}{count}")
     left = "" if progress.seconds_left is None else f", {duration(progress.seconds_left)} left"
+    best = "" if progress.best is None else f", best {progress.best:.3f}"
+    level = f", level {progress.level} of {progress.levels - 1}" if progress.levels else ""
     return printable(
         f"{progress.condition}: {progress.ended}/{progress.trials} trials ended, "
-        f"step {progress.steps:,}/{progress.total_steps:,}, "
-        f"level {progress.level} of {progress.levels - 1}, best {progress.best:.3f}{left}"
+        f"step {progress.steps:,}/{progress.total_steps:,}{level}{best}{left}"
     )
 
 
@@ -97,7 +98,7 @@ def describe_all(overview: Overview) -> str:
 
 def _briefly(progress: RunProgress) -> str:
     """Return condition, trials and step."""
-    if progress.best is None:
+    if not progress.total_steps:
         return printable(f"{progress.condition}: {progress.phase}")
     done = f"{progress.ended}/{progress.trials}, step {progress.steps:,}/{progress.total_steps:,}"
     return printable(f"{progress.condition}: {done}")

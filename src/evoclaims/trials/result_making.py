@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
+from types import MappingProxyType
 from typing import Any
 
 import jax
@@ -78,13 +79,20 @@ def make_result(
     champion = named_leaves(parameters)
     healthy = not report.diverged[lane] and is_sound(spec.condition.method, parameters) and are_finite(success, fitness)
     status: Status = "done" if healthy else "diverged"
-    return _record(spec, status, metrics, levels, curves, pack(champion), timing, devices), champion
+    return make_record(spec, status, metrics, levels, curves, pack(champion), timing, devices), champion
 
 
-def make_timeout(
-    spec: TrialSpec, curves: Mapping[str, Sequence[float]], timing: Mapping[str, Any], devices: Sequence[jax.Device]
+def make_unfinished(
+    spec: TrialSpec,
+    status: Status,
+    curves: Mapping[str, Sequence[float]],
+    timing: Mapping[str, Any],
+    devices: Sequence[jax.Device],
+    reason: str = "",
 ) -> TrialResult:
-    """Return the record of a timed-out trial: its curves so far, and metrics from them; it has no champion.
+    """Return the record of a timed-out or crashed trial: its curves so far, and metrics from them; no champion.
+
+    Its `reason`, if there is one, is part of its digest, and is kept in the provenance as "crash".
 
     Metrics are "steps", "environment_steps" and "furthest_reached", at the curve's last point.
     """
@@ -92,10 +100,11 @@ def make_timeout(
     metrics = {"steps": last.get("steps", 0.0), "environment_steps": last.get("environment_steps", 0.0)}
     if "level" in last:
         metrics["furthest_reached"] = last["level"]
-    return _record(spec, "timeout", metrics, {}, curves, b"", timing, devices)
+    said = {"crash": reason} if reason else {}
+    return make_record(spec, status, metrics, {}, curves, reason.encode(), timing, devices, said)
 
 
-def _record(
+def make_record(
     spec: TrialSpec,
     status: Status,
     metrics: Mapping[str, float],
@@ -104,8 +113,9 @@ def _record(
     champion: bytes,
     timing: Mapping[str, Any],
     devices: Sequence[jax.Device],
+    origin: Mapping[str, Any] = MappingProxyType({}),
 ) -> TrialResult:
-    """Return the record; `champion` is its packed parameters."""
+    """Return the record; `champion` is its packed parameters, and `origin` goes into its provenance, too."""
     plain_curves = {name: tuple(map(float, values)) for name, values in curves.items()}
     return TrialResult(
         id=spec.id,
@@ -118,7 +128,7 @@ def _record(
         curves=plain_curves,
         digest=digest(status, metrics, levels, plain_curves, champion),
         timing={**timing, "ended": datetime.now(UTC).isoformat(timespec="seconds")},
-        provenance=provenance(devices, spec.condition),
+        provenance={**provenance(devices, spec.condition), **origin},
     )
 
 

@@ -6,11 +6,10 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import PRNGKeyArray
 
-from evoclaims.envs.base import Episode, Task
-from evoclaims.methods.base import Policy
+from evoclaims.envs.base import Episode, PolicyFn, Task
 
 
-def score_every_level(task: Task, policy: Policy, key: PRNGKeyArray) -> Episode:
+def score_every_level(task: Task, policy: PolicyFn, key: PRNGKeyArray) -> Episode:
     """Examine a policy on each level separately; the leaves of the result have shape [levels].
 
     The key must come from the trial's evaluation stream, which training never draws from.

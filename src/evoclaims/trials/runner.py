@@ -13,6 +13,7 @@ from typing import Any, Final
 import jax
 import numpy as np
 
+from evoclaims.methods.training_loop import TrainingLoop
 from evoclaims.trials import checkpoint
 from evoclaims.trials.allowance import Allowance, OutOfTimeError
 from evoclaims.trials.batches import Batch, Run, StoredTrials, batches, drop_finished_checkpoints
@@ -21,12 +22,13 @@ from evoclaims.trials.devices import single_threaded_linear_algebra
 from evoclaims.trials.halving import halved, is_exhausted
 from evoclaims.trials.imported import into_store
 from evoclaims.trials.lanes import Lanes
+from evoclaims.trials.loop_trials import LoopTrials
 from evoclaims.trials.notice import announced
 from evoclaims.trials.pacing import Rhythm, Strides
 from evoclaims.trials.program import Report
 from evoclaims.trials.progress import RunProgress, Watcher, ignore
 from evoclaims.trials.result import TrialResult
-from evoclaims.trials.result_making import curve_point, make_result, make_timeout
+from evoclaims.trials.result_making import curve_point, make_result, make_unfinished
 from evoclaims.trials.running import shared
 from evoclaims.trials.spec import Condition, TrialSpec
 from evoclaims.trials.stopping import postponed
@@ -72,19 +74,48 @@ def run(
         return into_store(condition, seeds, store)
     stored = StoredTrials(store, condition, any_version, time_limit)
     wanted = list(dict.fromkeys(seeds))
-    most = len(wanted)
+    make = _maker(stored, devices, checkpoint_seconds, len(wanted))
     while not stored.answer(found := [stored.get(seed) for seed in wanted]):
         store.check_writable()
         waits = partial(_tell_of_waiting, condition, len(seeds), watch)
         with announced(store.root, condition.id, waits), shared(store.root, condition.id, watch) as tell:
             owed = [seed for seed in wanted if stored.lacks(seed)]  # another process may have stored some meanwhile
-            one = Run(Lanes(condition, devices), stored, tell, checkpoint_seconds, time_limit, most)
-            with single_threaded_linear_algebra():
-                too_large = _finish_all(one, owed)
-            if too_large is not None:
-                most = halved(one, too_large)
+            make(owed, tell)
     drop_finished_checkpoints(stored)
     return [result for result in found if result is not None]
+
+
+Maker = Callable[[Sequence[int], Watcher], None]
+"""Makes trials of a condition by their seeds, and stores each as it ends; it is called again if any is left."""
+
+
+def _maker(stored: StoredTrials, devices: Sequence[jax.Device], checkpoint_seconds: float, most: int) -> Maker:
+    """Return what makes a condition's trials: a process for each, or the compiled programs of all."""
+    if isinstance(stored.condition.method, TrainingLoop):
+        return LoopTrials(stored, devices).make
+    return CompiledTrials(stored, devices, checkpoint_seconds, most).make
+
+
+class CompiledTrials:
+    """Makes trials of methods and tasks that are compiled together."""
+
+    def __init__(
+        self, stored: StoredTrials, devices: Sequence[jax.Device], checkpoint_seconds: float, most: int
+    ) -> None:
+        """Compile nothing yet; `most` is how many trials a batch has at first."""
+        self._stored = stored
+        self._devices = devices
+        self._checkpoint_seconds = checkpoint_seconds
+        self._most = most
+
+    def make(self, owed: Sequence[int], tell: Watcher) -> None:
+        """Run batches until all trials are stored, or one turns out too large for the device's memory."""
+        lanes = Lanes(self._stored.condition, self._devices)
+        one = Run(lanes, self._stored, tell, self._checkpoint_seconds, self._stored.time_limit, self._most)
+        with single_threaded_linear_algebra():
+            too_large = _finish_all(one, owed)
+        if too_large is not None:
+            self._most = halved(one, too_large)
 
 
 def _tell_of_waiting(condition: Condition, trials: int, watch: Watcher, text: str) -> None:
@@ -208,7 +239,8 @@ def _give_up(run: Run, header: Header) -> None:
         if seed is not None and not is_final(run.stored.get(seed))
     ]
     for spec in owed:
-        run.store.put(make_timeout(spec, header.curves[str(spec.seed)], timing, run.lanes.devices), {})
+        curves = header.curves[str(spec.seed)]
+        run.store.put(make_unfinished(spec, "timeout", curves, timing, run.lanes.devices), {})
     run.watch(RunProgress(run.condition.label, f"out of time after {run.time_limit:g} s", len(owed), remark=True))
 
 

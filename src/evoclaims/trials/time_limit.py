@@ -7,6 +7,7 @@ import re
 from typing import Final
 
 from evoclaims.core.errors import UserError
+from evoclaims.trials import crashes
 from evoclaims.trials.result import TrialResult
 
 DEFAULT_LIMIT: Final = "24h"
@@ -30,8 +31,8 @@ def seconds_of(text: str) -> float:
 
 
 def is_final(result: TrialResult | None) -> bool:
-    """Whether there is a trial, and it did not time out."""
-    return result is not None and result.status != "timeout"
+    """Whether there is a trial, which did not time out, nor crash in another process: this one tries that again."""
+    return result is not None and result.status != "timeout" and not crashes.is_of_another_process(result)
 
 
 def answers(result: TrialResult | None, limit: float) -> bool:

@@ -1,0 +1,1 @@
+"""Environments of other libraries as tasks, and tasks as environments of another library."""

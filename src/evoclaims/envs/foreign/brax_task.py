@@ -1,0 +1,90 @@
+"""Environments of Brax as tasks."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import warnings
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any, ClassVar
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, PRNGKeyArray
+
+from evoclaims.core.errors import UnknownNameError, UserError
+from evoclaims.envs.foreign.actions import Range
+from evoclaims.envs.foreign.jax_task import JaxTask, Moment
+
+
+@dataclass(frozen=True, kw_only=True)
+class BraxTask(JaxTask):
+    """A registered environment of Brax, such as `BraxTask("inverted_pendulum", settings={"backend": "positional"})`.
+
+    `BraxEnv` is the other way round: a task of ours as a Brax environment.
+
+    Attributes:
+        environment_id: as `brax.envs.get_environment` takes it.
+        settings: its further arguments.
+    """
+
+    revision: ClassVar[int] = 1
+    packages: ClassVar[tuple[str, ...]] = ("brax", "mujoco", "mujoco-mjx")
+
+    environment_id: str = field(kw_only=False)
+    settings: Mapping[str, Any] = field(default_factory=dict, hash=False)
+
+    @property
+    def name(self) -> str:
+        """The environment's name."""
+        return self.environment_id
+
+    def make(self) -> Any:
+        """Return Brax's environment, which neither truncates episodes nor resets itself.
+
+        Raises:
+            UserError: when Brax does not know the environment, or a setting.
+        """
+        # MJX, which Brax imports, prints two lines when NVIDIA's warp is not installed; nothing here uses warp.
+        with contextlib.redirect_stdout(io.StringIO()), warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            from brax import envs
+
+            if self.environment_id not in envs._envs:
+                raise UnknownNameError("environment of Brax", self.environment_id, envs._envs)
+            try:
+                return envs.get_environment(self.environment_id, **self.settings)
+            except (TypeError, ValueError) as error:
+                raise UserError(f"Brax makes no {self.environment_id} with {dict(self.settings)}: {error}.") from error
+
+    @cached_property
+    def actions(self) -> Range:
+        """Each number is in [-1, 1], as Brax has it."""
+        size = int(self._made.action_size)
+        return Range((-1.0,) * size, (1.0,) * size, (size,))
+
+    def begin(self, key: PRNGKeyArray) -> Moment:
+        """Start an episode."""
+        return _moment(self._made.reset(key))
+
+    def advance(self, key: PRNGKeyArray, state: Any, action: Array) -> Moment:
+        """Act once; Brax's steps are not random."""
+        return _moment(self._made.step(state, action))
+
+    @cached_property
+    def _made(self) -> Any:
+        """The environment."""
+        with jax.ensure_compile_time_eval():  # its arrays are numbers, also where a function is being traced
+            return self.make()
+
+
+def _moment(state: Any) -> Moment:
+    """Return what Brax's state says."""
+    return Moment(
+        state=state,
+        observation=state.obs,
+        reward=jnp.asarray(state.reward, jnp.float32),
+        terminated=jnp.asarray(state.done) > 0,
+    )

@@ -1,0 +1,136 @@
+"""Environments of Gymnasium as tasks, for training loops: they run on the host."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any, ClassVar, NoReturn
+
+import numpy as np
+
+from evoclaims.core.errors import UserError
+from evoclaims.envs.foreign.actions import actions_of
+from evoclaims.envs.foreign.scoring import Examination
+
+
+@dataclass(frozen=True, kw_only=True)
+class GymnasiumTask(Examination):
+    """An environment of Gymnasium, such as `GymnasiumTask("CartPole-v1", solved_at=475)`, with one level.
+
+    Training loops train on what `make` returns. Methods of ours are compiled with their task, which this cannot be.
+
+    Attributes:
+        environment_id: as `gymnasium.make` takes it; "module:Name-v0" imports the module that registers it.
+        settings: its further arguments.
+        episode_steps: environment steps after which an episode is truncated; None for its own limit.
+        providers: distributions other than Gymnasium that compute the environment, such as ("ale-py",).
+    """
+
+    revision: ClassVar[int] = 1
+
+    environment_id: str = field(kw_only=False)
+    settings: Mapping[str, Any] = field(default_factory=dict, hash=False)
+    episode_steps: int | None = None
+    providers: tuple[str, ...] = field(default=(), metadata={"canonical": False})
+
+    @property
+    def name(self) -> str:
+        """The environment's name."""
+        return self.environment_id.rpartition(":")[2]
+
+    @property
+    def packages(self) -> tuple[str, ...]:
+        """The distributions that compute it."""
+        return ("gymnasium", *self.providers)
+
+    def make(self) -> Any:
+        """Return a new environment; seed it by its `reset(seed=...)`.
+
+        Raises:
+            UserError: when Gymnasium is not installed, or does not make the environment.
+        """
+        try:
+            import gymnasium
+        except ImportError as error:
+            raise UserError(f"{self.name} is an environment of Gymnasium: pip install gymnasium ({error}).") from error
+        try:
+            return gymnasium.make(self.environment_id, max_episode_steps=self.episode_steps, **self.settings)
+        except (gymnasium.error.Error, TypeError, ModuleNotFoundError) as error:
+            raise UserError(
+                f"Gymnasium makes no {self.environment_id!r} with {dict(self.settings)}: {error}"
+            ) from error
+
+    @property
+    def levels(self) -> int:
+        """One."""
+        return 1
+
+    @cached_property
+    def observation_size(self) -> int:
+        """How many numbers an observation has."""
+        return int(np.prod(self._spaces[0].shape))
+
+    @cached_property
+    def action_size(self) -> int:
+        """How many numbers choose an action."""
+        return actions_of(self._spaces[1], self.name).size
+
+    @cached_property
+    def horizon(self) -> int:
+        """Environment steps of the longest episode.
+
+        Raises:
+            UserError: when nothing limits it.
+        """
+        limit = self.episode_steps or self._spaces[2]
+        if limit is None:
+            raise UserError(f"Episodes of {self.name} may never end: say episode_steps=.")
+        return int(limit)
+
+    @cached_property
+    def _spaces(self) -> tuple[Any, Any, int | None]:
+        """The spaces of observations and actions, and the limit of steps if there is one."""
+        with contextlib.closing(self.make()) as environment:
+            return environment.observation_space, environment.action_space, environment.spec.max_episode_steps
+
+    def examine_natively(self, policy: Callable[[Any], Any], seed: int) -> tuple[float, float, Mapping[str, float]]:
+        """Run `examined_episodes` from different starts and average; success is the share that is solved."""
+        # Training with the seeds 0, 1, 2, … has other starts than these.
+        seeds = np.random.SeedSequence(seed, spawn_key=(0,)).generate_state(self.examined_episodes)
+        with contextlib.closing(self.make()) as environment:
+
+            def played(start: Any) -> tuple[float, int]:
+                observation, _ = environment.reset(seed=int(start))
+                total = 0.0
+                for step in range(1, self.horizon + 1):
+                    observation, reward, terminated, truncated, _ = environment.step(policy(observation))
+                    total += float(reward)
+                    if terminated or truncated:
+                        return total, step
+                return total, self.horizon
+
+            return self.scores(map(played, seeds))
+
+    def reset(self, key: object, level: object) -> NoReturn:
+        """Raise a `UserError`."""
+        raise self._on_the_host()
+
+    def step(self, state: object, action: object) -> NoReturn:
+        """Raise a `UserError`."""
+        raise self._on_the_host()
+
+    def episode(self, policy: object, key: object, level: object) -> NoReturn:
+        """Raise a `UserError`."""
+        raise self._on_the_host()
+
+    def examine(self, policy: object, key: object, level: object) -> NoReturn:
+        """Raise a `UserError`."""
+        raise self._on_the_host()
+
+    def _on_the_host(self) -> UserError:
+        return UserError(
+            f"{self.name} is an environment of Gymnasium, which runs on the host: train on it by a TrainingLoop, or "
+            "take the same environment from gymnax or Brax (GymnaxTask, BraxTask), on which every method trains."
+        )

@@ -1,0 +1,85 @@
+"""Environments of gymnax as tasks."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any, ClassVar
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, PRNGKeyArray
+
+from evoclaims.core.errors import UserError
+from evoclaims.envs.foreign.actions import Choice, Range, actions_of
+from evoclaims.envs.foreign.jax_task import JaxTask, Moment
+
+
+@dataclass(frozen=True, kw_only=True)
+class GymnaxTask(JaxTask):
+    """An environment of gymnax (1.0 or newer), such as `GymnaxTask("CartPole-v1", episode_steps=500)`.
+
+    Attributes:
+        environment_id: as `gymnax.make` takes it.
+        parameters: fields of the environment's parameters that differ from the default.
+    """
+
+    revision: ClassVar[int] = 1
+    packages: ClassVar[tuple[str, ...]] = ("gymnax",)
+
+    environment_id: str = field(kw_only=False)
+    parameters: Mapping[str, Any] = field(default_factory=dict, hash=False)
+
+    @property
+    def name(self) -> str:
+        """The environment's name."""
+        return self.environment_id
+
+    def make(self) -> tuple[Any, Any]:
+        """Return gymnax's environment and its parameters.
+
+        Raises:
+            UserError: when gymnax is not installed, or does not know the environment or a parameter.
+        """
+        try:
+            import gymnax
+        except ImportError as error:
+            raise UserError(f"{self.name} is an environment of gymnax: pip install gymnax ({error}).") from error
+        try:
+            environment, parameters = gymnax.make(self.environment_id)
+            return environment, parameters.replace(**self.parameters)
+        except (ValueError, TypeError) as error:
+            raise UserError(
+                f"gymnax makes no {self.environment_id!r} with {dict(self.parameters)}: {error}."
+            ) from error
+
+    @cached_property
+    def actions(self) -> Choice | Range:
+        """How actions are chosen."""
+        environment, parameters = self._made
+        return actions_of(environment.action_space(parameters), self.name)
+
+    def begin(self, key: PRNGKeyArray) -> Moment:
+        """Start an episode."""
+        environment, parameters = self._made
+        observation, state = environment.reset_env(key, parameters)
+        no = jnp.zeros((), bool)
+        return Moment(state=state, observation=observation, reward=jnp.zeros(()), terminated=no)
+
+    def advance(self, key: PRNGKeyArray, state: Any, action: Array) -> Moment:
+        """Act once; the environment's own limit of steps, if lower than `episode_steps`, ends the episode too."""
+        environment, parameters = self._made
+        observation, state, reward, terminated, _ = environment.step_env(key, state, action, parameters)
+        return Moment(
+            state=state,
+            observation=observation,
+            reward=jnp.asarray(reward, jnp.float32),
+            terminated=jnp.asarray(terminated, bool),
+        )
+
+    @cached_property
+    def _made(self) -> tuple[Any, Any]:
+        """The environment and its parameters."""
+        with jax.ensure_compile_time_eval():  # its arrays are numbers, also where a function is being traced
+            return self.make()

@@ -1,0 +1,231 @@
+"""The base of tasks made of other libraries' environments in jax, which every method trains on."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Bool, Float, Int, PRNGKeyArray
+from numpy.typing import NDArray
+
+from evoclaims.core.errors import UserError
+from evoclaims.core.foreign import implicit_promotions
+from evoclaims.core.keys import EVALUATION, streams, trial_key
+from evoclaims.core.pytree import pytree, select, strong
+from evoclaims.envs.base import Episode, PolicyFn, TaskState, fitting
+from evoclaims.envs.foreign.actions import Choice, Range
+from evoclaims.envs.foreign.scoring import Examination
+
+
+@pytree
+class Moment:
+    """What an environment is at after a step.
+
+    Attributes:
+        state: its own.
+        observation: its own, of any shape.
+        reward: of the step.
+        terminated: whether it has ended the episode.
+    """
+
+    state: Any
+    observation: Array
+    reward: Float[Array, ""]
+    terminated: Bool[Array, ""]
+
+
+@pytree
+class Inner:
+    """The inner state of an episode.
+
+    Attributes:
+        state: the environment's own.
+        key: data of the key that the next step's key derives from; keys themselves are no arrays.
+        time: environment steps made.
+    """
+
+    state: Any
+    key: Array
+    time: Int[Array, ""]
+
+
+@dataclass(frozen=True)
+class Descriptor:
+    """What MAP-Elites maps an episode by: two numbers of its last observation.
+
+    Attributes:
+        places: of the two in the observation, counted from 0.
+        area: lowest and highest value of the first, and of the second.
+    """
+
+    places: tuple[int, int]
+    area: tuple[tuple[float, float], tuple[float, float]]
+
+
+@dataclass(frozen=True, kw_only=True)
+class JaxTask(Examination, ABC):
+    """An environment as a task with one level. A subclass has name, revision, `begin`, `advance` and the sizes.
+
+    A step after which a number is not finite is undone: no reward, and the episode ends.
+
+    Attributes:
+        episode_steps: environment steps after which an episode is truncated.
+        descriptor: needed by MAP-Elites alone.
+    """
+
+    episode_steps: int = 1000
+    descriptor: Descriptor | None = None
+
+    def __post_init__(self) -> None:
+        """Check the counts."""
+        super().__post_init__()
+        if self.episode_steps < 1:
+            raise UserError(f"An episode has at least 1 step, not {self.episode_steps}.")
+
+    @property
+    @abstractmethod
+    def name(self) -> str:
+        """The registered name."""
+
+    @property
+    @abstractmethod
+    def actions(self) -> Choice | Range:
+        """How actions are chosen."""
+
+    @abstractmethod
+    def begin(self, key: PRNGKeyArray) -> Moment:
+        """Start an episode."""
+
+    @abstractmethod
+    def advance(self, key: PRNGKeyArray, state: Any, action: Array) -> Moment:
+        """Act once, by an action of the environment's own."""
+
+    @property
+    def levels(self) -> int:
+        """One."""
+        return 1
+
+    @property
+    def horizon(self) -> int:
+        """Environment steps of the longest episode."""
+        return self.episode_steps
+
+    @property
+    def action_size(self) -> int:
+        """How many numbers choose an action."""
+        return self.actions.size
+
+    @cached_property
+    def observation_size(self) -> int:
+        """How many numbers an observation has."""
+        return int(jax.eval_shape(lambda: self.reset(jax.random.key(0), jnp.zeros((), jnp.int32))).observation.size)
+
+    def reset(self, key: PRNGKeyArray, level: Int[Array, ""]) -> TaskState:
+        """Start an episode."""
+        begin_key, later_key = streams(key, "begin", "later")
+        with implicit_promotions():
+            moment = self.begin(begin_key)
+        no = jnp.zeros((), bool)
+        inner = Inner(state=moment.state, key=jax.random.key_data(later_key), time=jnp.zeros((), jnp.int32))
+        return TaskState(
+            observation=_flat(moment.observation),
+            reward=jnp.zeros(()),
+            terminated=no,
+            truncated=no,
+            inner=strong(inner),
+        )
+
+    def step(self, state: TaskState, action: Float[Array, " action"]) -> TaskState:
+        """Act once."""
+        inner: Inner = state.inner
+        step_key, later_key = streams(jax.random.wrap_key_data(inner.key), "step", "later")
+        with implicit_promotions():
+            moment = self.advance(step_key, inner.state, self.actions.chosen(fitting(self, action)))
+        observation = _flat(moment.observation)
+        sound = jnp.all(jnp.isfinite(observation)) & jnp.isfinite(moment.reward)
+        reached = strong(Inner(state=moment.state, key=jax.random.key_data(later_key), time=inner.time + 1))
+        terminated = moment.terminated | ~sound
+        return TaskState(
+            observation=jnp.where(sound, observation, state.observation),
+            reward=jnp.where(sound, moment.reward, 0.0),
+            terminated=terminated,
+            truncated=(reached.time >= self.episode_steps) & ~terminated,
+            inner=reached,
+        )
+
+    def episode(self, policy: PolicyFn, key: PRNGKeyArray, level: Int[Array, ""]) -> Episode:
+        """Run one episode: fitness is its return, success whether that is `solved_at` or more."""
+        start = self.reset(key, level), jnp.zeros(()), jnp.ones((), bool)
+
+        def step(carry: tuple[TaskState, Array, Array], _: None) -> tuple[tuple[TaskState, Array, Array], None]:
+            state, total, alive = carry
+            following = self.step(state, policy(state.observation))
+            ended = following.terminated | following.truncated
+            return (
+                select(alive, following, state),
+                total + jnp.where(alive, following.reward, 0.0),
+                alive & ~ended,
+            ), None
+
+        (state, total, _), _ = jax.lax.scan(step, start, None, length=self.episode_steps)
+        return Episode(
+            fitness=total,
+            success=(total >= self.threshold).astype(jnp.float32),
+            metrics={"episode_steps": state.inner.time.astype(jnp.float32), **self._place(state.observation)},
+        )
+
+    def examine(self, policy: PolicyFn, key: PRNGKeyArray, level: Int[Array, ""]) -> Episode:
+        """Run `examined_episodes` from different starts and average; success is the share that is solved."""
+        keys = jax.random.split(key, self.examined_episodes)
+        episodes: Episode = jax.vmap(lambda k: self.episode(policy, k, level))(keys)
+        return jax.tree.map(jnp.mean, episodes)
+
+    @property
+    def area(self) -> tuple[tuple[float, float], tuple[float, float]]:
+        """What MAP-Elites maps; raises a `UserError` where nothing is said of it."""
+        if self.descriptor is None:
+            raise UserError(
+                f"MAP-Elites maps how episodes end, and nothing says by what of {self.name}: give the task a "
+                "descriptor, such as descriptor=Descriptor(places=(0, 1), area=((-1, 1), (-1, 1)))."
+            )
+        return self.descriptor.area
+
+    def reachable(self, cells: tuple[int, int]) -> NDArray[np.bool_]:
+        """Return that any cell may be reached: nobody knows."""
+        return np.ones(cells, bool)
+
+    def examine_natively(self, policy: Callable[[Any], Any], seed: int) -> tuple[float, float, Mapping[str, float]]:
+        """Run `examined_episodes` of a policy that acts as the environment wants it, on the host, and average."""
+        begin, advance = jax.jit(self.begin), jax.jit(self.advance)
+
+        def played(key: Array) -> tuple[float, int]:
+            key, begin_key = jax.random.split(key)
+            moment, total = begin(begin_key), 0.0
+            for step in range(1, self.episode_steps + 1):
+                key, step_key = jax.random.split(key)
+                moment = advance(step_key, moment.state, jnp.asarray(policy(np.asarray(moment.observation))))
+                total += float(moment.reward)
+                if moment.terminated:
+                    return total, step
+            return total, self.episode_steps
+
+        with implicit_promotions():
+            return self.scores(map(played, jax.random.split(trial_key(seed, EVALUATION), self.examined_episodes)))
+
+    def _place(self, observation: Float[Array, " observation"]) -> Mapping[str, Float[Array, ""]]:
+        """Return where an episode has ended, as MAP-Elites wants it."""
+        if self.descriptor is None:
+            return {}
+        first, second = self.descriptor.places
+        return {"x": observation[first], "y": observation[second]}
+
+
+def _flat(observation: Array) -> Float[Array, " observation"]:
+    """Return an observation as our methods take it."""
+    return jnp.ravel(jnp.asarray(observation)).astype(jnp.float32)

@@ -1,0 +1,102 @@
+"""A training loop that is not ours, such as that of Stable-Baselines3, where a method stands."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, Final, NoReturn
+
+from evoclaims.core.errors import UserError
+from evoclaims.core.portable import reference, to_plain
+
+_NOT_HASHED: Final[Mapping[str, Any]] = {"canonical": False}
+
+
+@dataclass(frozen=True)
+class TrainingLoop:
+    """A function that trains, run once for each trial, in a process of its own.
+
+    It is called as `function(task, seed, budget, **settings)`, with `report=` too if it has a parameter of that name,
+    and returns its metrics (a table of numbers by name) or `(metrics, policy)`. See docs/foreign.md.
+
+    * `task` is the condition's: one of ours, or another library's environment, which `task.make()` returns.
+    * `seed` is the trial's; the function derives all randomness from it.
+    * `budget` is the condition's `Budget`, such as `Budget(environment_steps=100_000)`.
+    * `report(step, **numbers)` tells how far training is; the numbers become curves, about `budget.reports` points.
+    * `policy` maps an observation to an action, deterministically. It is examined on the task as every method's is.
+      Without one, the metrics are what the function says, and the trial's provenance says so.
+
+    Attributes:
+        function: the function, which a module defines, or its place, "module:name".
+        settings: further arguments, by name; they are part of the trial's id.
+        packages: the distributions that compute it, such as ("stable-baselines3", "torch"); another version runs its
+            trials again.
+        name: of the method; the function's if empty.
+        revision: raise it when the function computes something else.
+    """
+
+    function: Callable[..., Any] | str
+    settings: Mapping[str, Any] = field(default_factory=dict, hash=False)
+    packages: tuple[str, ...] = field(kw_only=True, metadata=_NOT_HASHED)
+    name: str = field(default="", kw_only=True, metadata=_NOT_HASHED)
+    revision: int = field(default=1, kw_only=True, metadata=_NOT_HASHED)
+
+    def __post_init__(self) -> None:
+        """Replace the function by its place, after checking that it takes the settings."""
+        object.__setattr__(self, "settings", dict(self.settings))
+        to_plain(self.settings)  # what another process cannot be given is said at once
+        if callable(self.function):
+            place = reference(self.function)
+            check_arguments(self.function, self.settings)
+            object.__setattr__(self, "function", place)
+        if not self.name:
+            object.__setattr__(self, "name", self.place.rpartition(":")[2])
+
+    @property
+    def place(self) -> str:
+        """Where the function is: "module:name"."""
+        return str(self.function)
+
+    def cost(self, task: object) -> int:
+        """Return 1: a budget's environment steps are the function's own to count."""
+        return 1
+
+    def init(self, key: object, task: object) -> NoReturn:
+        """Raise a `UserError`: there is no state."""
+        raise self._no_steps()
+
+    def step(self, key: object, task: object, level: object, state: object) -> NoReturn:
+        """Raise a `UserError`: the function trains, not steps that the engine compiles."""
+        raise self._no_steps()
+
+    def best(self, task: object, state: object) -> NoReturn:
+        """Raise a `UserError`: the policy stays in the process that trained it."""
+        raise self._no_steps()
+
+    def _no_steps(self) -> UserError:
+        return UserError(
+            f"{self.name!r} is a training loop of its own: it is run whole, and its policies are examined where they "
+            "are trained and are not kept, so there is no champion."
+        )
+
+
+def wants_report(function: Callable[..., Any]) -> bool:
+    """Whether a training function has a parameter `report`."""
+    return "report" in inspect.signature(function).parameters
+
+
+def check_arguments(function: Callable[..., Any], settings: Mapping[str, Any]) -> None:
+    """Check that a training function takes what it is called with.
+
+    Raises:
+        UserError: when it does not.
+    """
+    told = {"report": None} if wants_report(function) else {}
+    try:
+        inspect.signature(function).bind(None, 0, None, **{**settings, **told})
+    except TypeError as error:
+        raise UserError(
+            f"The training function {function.__qualname__} does not take (task, seed, budget) and the settings "
+            f"{', '.join(settings) or 'none'}: {error}."
+        ) from error

@@ -1,0 +1,27 @@
+"""Crashes that this process has seen: it does not run these trials again, and any other process does, once.
+
+A crash is no outcome of a method: what was wrong has probably been mended before the next process asks for the trial.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+from evoclaims.trials.result import TrialResult
+
+_seen: Final = set[str]()
+
+
+def remember(result: TrialResult) -> None:
+    """Note that a trial has crashed here."""
+    _seen.add(result.id)
+
+
+def is_of_another_process(result: TrialResult) -> bool:
+    """Whether a trial has crashed, and not here."""
+    return result.status == "crashed" and result.id not in _seen
+
+
+def why(result: TrialResult) -> str:
+    """Return why a trial has crashed, in one line: the last that its process said; empty where nothing is known."""
+    return str(result.provenance.get("crash") or "").rpartition("\n")[2]

@@ -1,0 +1,66 @@
+"""The examination of a policy that a training loop returns, in the process that trained it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Int
+
+from evoclaims.core.keys import EVALUATION, trial_key
+from evoclaims.envs.base import Episode, NativelyExamined, Task
+from evoclaims.trials.devices import MATMUL_PRECISION
+from evoclaims.trials.loop_messages import Scores
+from evoclaims.trials.rollout import score_every_level
+
+
+def examined(task: Task, policy: Callable[[Any], Any], seed: int) -> Scores:
+    """Return the scores of a policy, with keys that training has no way to.
+
+    On a task of ours it is examined as all methods' policies are: observations [observation_size] in, actions
+    [action_size] out. On another library's environment it plays with that environment's observations and actions.
+    """
+    if isinstance(task, NativelyExamined):
+        fitness, success, metrics = task.examine_natively(policy, seed)
+        return Scores(success=(success,), fitness=(fitness,), metrics=dict(metrics))
+    fitted = _fitted(task, policy)
+
+    def score(number: Int[Array, ""]) -> Episode:
+        return score_every_level(task, fitted, trial_key(number, EVALUATION))
+
+    with jax.default_matmul_precision(MATMUL_PRECISION):
+        final: Episode = jax.device_get(jax.jit(score)(np.int32(seed)))
+    return Scores(
+        success=tuple(map(float, final.success)),
+        fitness=tuple(map(float, final.fitness)),
+        metrics=_last(final.metrics),
+    )
+
+
+def _last(metrics: Mapping[str, Any]) -> dict[str, Any]:
+    """Return metrics [levels] of the last level."""
+    return {name: float(values[-1]) for name, values in metrics.items()}
+
+
+def _fitted(task: Task, policy: Callable[[Any], Any]) -> Callable[[Array], Array]:
+    """Return a policy that jax can trace: the given one, or else one that calls it on the host."""
+
+    def traced(observation: Array) -> Array:
+        return jnp.asarray(policy(observation), jnp.float32)
+
+    def host(observation: Array) -> Any:
+        return np.asarray(policy(np.asarray(observation)), np.float32)
+
+    def called(observation: Array) -> Array:
+        acted: Array = jax.pure_callback(host, action, observation, vmap_method="sequential")
+        return acted
+
+    action = jax.ShapeDtypeStruct((task.action_size,), jnp.float32)
+    try:
+        jax.eval_shape(traced, jax.ShapeDtypeStruct((task.observation_size,), jnp.float32))
+    except Exception:  # PyTorch and NumPy each have their own way to refuse what jax traces
+        return called
+    return traced

@@ -1,0 +1,89 @@
+"""What a training loop's process is asked, and what it answers: lines of JSON."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from typing import Any, Final
+
+import msgspec
+
+from evoclaims.core.canonical import as_plain
+from evoclaims.trials.result_schema import Number, Vector
+
+LAST_LINES: Final = 8
+"""How much of a traceback, or of what a process said last, is kept as the reason of a crash."""
+
+Numbers = dict[str, Number]
+"""Numbers by name; NaN and the infinities are words, as in records."""
+
+
+class Request(msgspec.Struct, frozen=True):
+    """One trial.
+
+    Attributes:
+        function: place of the training function, "module:name".
+        task, budget, settings: its arguments (`core.portable`).
+        seed: of the trial.
+    """
+
+    function: str
+    task: Any
+    budget: Any
+    settings: Any
+    seed: int
+
+
+class Reported(msgspec.Struct, frozen=True, tag=True):
+    """How far training is; `kept` says whether this is a point of the training curve."""
+
+    step: int
+    numbers: Numbers
+    kept: bool
+
+
+class Scores(msgspec.Struct, frozen=True):
+    """An examination of the final policy: success and fitness on each level, and the task's metrics on the last."""
+
+    success: Vector
+    fitness: Vector
+    metrics: Numbers
+
+
+class Trained(msgspec.Struct, frozen=True, tag=True):
+    """The trial's end.
+
+    Attributes:
+        metrics: as the function returned them.
+        scores: None if it returned no policy.
+        seconds: that training and examination took.
+    """
+
+    metrics: Numbers
+    scores: Scores | None
+    seconds: float
+
+
+class Failed(msgspec.Struct, frozen=True, tag=True):
+    """The function has raised an exception; `reason` is the end of its traceback."""
+
+    reason: str
+
+
+Answer = Reported | Trained | Failed
+
+
+def encode(message: Request | Answer) -> bytes:
+    """Return a message as one line of JSON."""
+    return json.dumps(as_plain(msgspec.to_builtins(message)), allow_nan=False).encode("ascii") + b"\n"
+
+
+def decode(line: bytes) -> Answer:
+    """Return the answer in a line; raise a `msgspec.MsgspecError` if it is torn."""
+    answer: Answer = msgspec.json.decode(line, type=Answer)
+    return answer
+
+
+def floats(numbers: Mapping[str, Number]) -> dict[str, float]:
+    """Return numbers with their words turned back."""
+    return {name: float(value) for name, value in numbers.items()}

@@ -1,0 +1,74 @@
+"""The record of a training loop's trial that has come to its end."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any, Final
+
+import jax
+
+from evoclaims.methods.training_loop import TrainingLoop
+from evoclaims.trials.loop_messages import Trained, floats
+from evoclaims.trials.result import Status, TrialResult
+from evoclaims.trials.result_making import make_record
+from evoclaims.trials.spec import TrialSpec
+
+SCORED_BY: Final = "scored_by"
+"""Key of a provenance that says who has scored the final policy: "examination", or the "training function" itself."""
+
+
+def trained_record(
+    spec: TrialSpec,
+    trained: Trained,
+    curves: Mapping[str, Sequence[float]],
+    timing: Mapping[str, Any],
+    devices: Sequence[jax.Device],
+) -> TrialResult:
+    """Return the record of a trial whose function has returned.
+
+    The metrics are those of the function, those of every method (see `result_making.make_result`) and the task's own.
+    What an examination says counts, whatever the function said. Without one, those that the function does not return
+    are NaN: a claim that reads such a number is an error. A trial has diverged when its function returned a NaN, or its
+    policy's scores are not finite.
+    """
+    assert isinstance(spec.condition.method, TrainingLoop)
+    returned = floats(trained.metrics)
+    broken = any(math.isnan(value) for value in returned.values())
+    levels = _told_levels(returned, spec.condition.task.levels)
+    if trained.scores is not None:
+        levels = {"success": _vector(trained.scores.success), "fitness": _vector(trained.scores.fitness)}
+        broken = broken or not all(map(math.isfinite, (*levels["success"], *levels["fitness"])))
+    steps = returned.get("environment_steps", curves["environment_steps"][-1] if curves else spec.condition.steps)
+    success = levels["success"]
+    solved = [level for level, value in enumerate(success) if value == 1.0]
+    metrics = {
+        "mean_success": math.fsum(success) / len(success),
+        "last_success": success[-1],
+        "last_fitness": levels["fitness"][-1],
+        "furthest_solved": math.nan if math.isnan(success[-1]) else float(max(solved, default=-1)),
+        "furthest_reached": math.nan,
+        "steps": float(returned.get("steps", steps)),
+        "environment_steps": float(steps),
+    }
+    if trained.scores is None:
+        metrics |= returned
+    else:
+        known = {name: value for name, value in metrics.items() if not math.isnan(value)}
+        metrics |= returned | known | floats(trained.scores.metrics)
+    status: Status = "diverged" if broken else "done"
+    origin = {
+        "trained_by": spec.condition.method.place,
+        SCORED_BY: "training function" if trained.scores is None else "examination",
+    }
+    return make_record(spec, status, metrics, levels, curves, b"", timing, devices, origin)
+
+
+def _told_levels(returned: Mapping[str, float], levels: int) -> dict[str, tuple[float, ...]]:
+    """Return the vectors over levels of a trial that nobody has examined: the last level at most is known."""
+    unknown = (math.nan,) * (levels - 1)
+    return {name: (*unknown, returned.get(f"last_{name}", math.nan)) for name in ("success", "fitness")}
+
+
+def _vector(values: Sequence[Any]) -> tuple[float, ...]:
+    return tuple(map(float, values))

@@ -1,0 +1,214 @@
+"""Trials of training loops: each in a process of its own, stored as it ends, several at a time on a processor."""
+
+from __future__ import annotations
+
+import os
+import queue
+import sys
+import threading
+import time
+from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from typing import Any, Final
+
+import jax
+
+from evoclaims.core.errors import UserError
+from evoclaims.core.portable import to_plain
+from evoclaims.methods.training_loop import TrainingLoop
+from evoclaims.trials import crashes
+from evoclaims.trials.allowance import Allowance, OutOfTimeError
+from evoclaims.trials.batches import StoredTrials
+from evoclaims.trials.devices import layout_for, usable_cores
+from evoclaims.trials.loop_child import Child
+from evoclaims.trials.loop_messages import Failed, Reported, Request, Trained
+from evoclaims.trials.loop_record import trained_record
+from evoclaims.trials.progress import RunProgress, Watcher
+from evoclaims.trials.result_making import make_unfinished
+from evoclaims.trials.spec import TrialSpec
+
+_ONE_THREAD: Final = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
+"""Each trial has a core, and sums that are split among threads would have other roundings on other machines."""
+
+
+@dataclass
+class Running:
+    """A trial that is running, as the thread that waits for it has heard.
+
+    Attributes:
+        spec: the trial.
+        began: when its process began, UTC.
+        points: of the training curve.
+        newest: the last report; None before the first.
+        trained: what it has come to; None until then.
+        late: whether it has run out of time.
+        reason: why it crashed; empty if it did not.
+        seconds: that its process lived.
+        ended: whether all this is known.
+    """
+
+    spec: TrialSpec
+    began: str = ""
+    points: list[Reported] = field(default_factory=list)
+    newest: Reported | None = None
+    trained: Trained | None = None
+    late: bool = False
+    reason: str = ""
+    seconds: float = 0.0
+    ended: bool = False
+
+    @property
+    def curves(self) -> dict[str, list[float]]:
+        """The training curves; a number that a report left out is NaN there."""
+        names = dict.fromkeys(name for point in self.points for name in point.numbers)
+        steps = [float(point.step) for point in self.points]
+        told = {name: [float(point.numbers.get(name, "nan")) for point in self.points] for name in names}
+        return {**told, "steps": steps, "environment_steps": steps} if steps else {}
+
+
+class LoopTrials:
+    """Makes a training loop's trials."""
+
+    def __init__(self, stored: StoredTrials, devices: Sequence[jax.Device]) -> None:
+        """Start nothing yet.
+
+        Raises:
+            UserError: when a package is missing that the loop declares, or its arguments cannot be passed on.
+        """
+        self._stored = stored
+        self._devices = devices
+        self._method: TrainingLoop = stored.condition.method  # type: ignore[assignment]
+        missing = [name for name in self._method.packages if stored.condition.versions[name] is None]
+        if missing:
+            raise UserError(
+                f"The training loop {self._method.name!r} needs {', '.join(missing)}, not installed here: "
+                f"pip install {' '.join(missing)}"
+            )
+        self._request = {
+            "function": self._method.place,
+            "task": to_plain(stored.condition.task),
+            "budget": to_plain(stored.condition.budget),
+            "settings": to_plain(dict(self._method.settings)),
+        }
+        self._events: queue.SimpleQueue[Running | BaseException] = queue.SimpleQueue()
+        self._lock = threading.Lock()  # of what follows
+        self._children = set[Child]()
+        self._stopping = False
+
+    def make(self, owed: Sequence[int], tell: Watcher) -> None:
+        """Run trials and store each as it ends; those that have ended stay when anything is raised."""
+        at_a_time = usable_cores() if layout_for(list(self._devices)) == "alone" else 1
+        running = [Running(TrialSpec(self._stored.condition, seed)) for seed in owed]
+        began, stored = time.monotonic(), set[int]()
+        with ThreadPoolExecutor(at_a_time) as pool:
+            try:
+                for one in running:
+                    pool.submit(self._attend, one)
+                while len(stored) < len(running):
+                    heard = self._events.get()
+                    if isinstance(heard, BaseException):
+                        raise heard
+                    if heard.ended and heard.spec.seed not in stored:
+                        self._store(heard, tell)
+                        stored.add(heard.spec.seed)
+                    tell(self._progress(running, len(stored), time.monotonic() - began))
+            except BaseException:
+                pool.shutdown(wait=False, cancel_futures=True)
+                self._stop()
+                raise
+
+    def _attend(self, one: Running) -> None:
+        """Run a trial's process to its end, on a thread of its own; what happens becomes an event each."""
+        try:
+            began, one.began = time.monotonic(), datetime.now(UTC).isoformat(timespec="seconds")
+            child = Child(Request(seed=one.spec.seed, **self._request), self._environment())
+            with self._lock:
+                self._children.add(child)
+                if self._stopping:
+                    child.stop()
+            try:
+                Allowance(self._stored.time_limit).spend(lambda: self._listen(child, one))
+            except OutOfTimeError:
+                one.late = True
+            finally:
+                with self._lock:
+                    self._children.discard(child)
+                reason = child.close()
+            one.reason = one.reason or ("" if one.trained or one.late else reason)
+            one.seconds, one.ended = time.monotonic() - began, True
+            self._events.put(one)
+        except BaseException as error:
+            self._events.put(error)
+
+    def _listen(self, child: Child, one: Running) -> None:
+        """Note what a process answers."""
+        for answer in child.answers():
+            if isinstance(answer, Trained):
+                one.trained = answer
+            elif isinstance(answer, Failed):
+                one.reason = answer.reason
+            else:
+                one.newest = answer
+                one.points += [answer] * answer.kept
+                self._events.put(one)
+
+    def _environment(self) -> Mapping[str, str]:
+        """Return what a process's environment has besides this one's: its modules, one thread, and these devices."""
+        config: Any = jax.config
+        modules = os.pathsep.join(os.path.abspath(path) for path in sys.path)
+        chosen = {"PYTHONPATH": modules, "PYTHONHASHSEED": "0", **_ONE_THREAD}
+        if config.jax_compilation_cache_dir:  # what one trial has compiled serves the others
+            chosen["JAX_COMPILATION_CACHE_DIR"] = config.jax_compilation_cache_dir
+        if self._devices[0].platform == "cpu":
+            return {**chosen, "JAX_PLATFORMS": "cpu", "CUDA_VISIBLE_DEVICES": ""}
+        return {**chosen, "XLA_PYTHON_CLIENT_PREALLOCATE": "false"}  # this process has taken most of the memory
+
+    def _store(self, one: Running, tell: Watcher) -> None:
+        """Store a trial that has ended."""
+        timing = {"run": one.seconds, "compile": 0.0, "batch": 1, "started": one.began}
+        if one.trained is not None:
+            result = trained_record(one.spec, one.trained, one.curves, timing, self._devices)
+        elif one.late:
+            limited = {**timing, "limit": self._stored.time_limit}
+            result = make_unfinished(one.spec, "timeout", one.curves, limited, self._devices)
+            text = f"out of time after {self._stored.time_limit:g} s"
+            tell(RunProgress(one.spec.condition.label, text, 1, remark=True))
+        else:
+            result = make_unfinished(one.spec, "crashed", one.curves, timing, self._devices, one.reason)
+            crashes.remember(result)
+            text = f"seed {one.spec.seed} crashed: {crashes.why(result)}"
+            tell(RunProgress(one.spec.condition.label, text, 1, remark=True))
+        self._stored.store.put(result, {})
+
+    def _progress(self, running: Sequence[Running], ended: int, seconds: float) -> RunProgress:
+        """Return how far all trials are."""
+        condition = self._stored.condition
+        reached = [_step(one, condition.steps) for one in running]
+        done = sum(reached) / max(condition.steps * len(running), 1)
+        told = [one.newest.numbers["success"] for one in running if one.newest and "success" in one.newest.numbers]
+        return RunProgress(
+            condition=condition.label,
+            phase="training",
+            trials=len(running),
+            ended=ended,
+            steps=max(reached),
+            total_steps=condition.steps,
+            best=max(map(float, told), default=None),
+            seconds_left=seconds * (1 - done) / done if done else None,
+        )
+
+    def _stop(self) -> None:
+        """End all processes, and those that are being started."""
+        with self._lock:
+            self._stopping = True
+            for child in self._children:
+                child.stop()
+
+
+def _step(one: Running, whole: int) -> int:
+    """Return how far a trial is, of a whole budget."""
+    if one.ended:
+        return whole
+    return min(one.newest.step, whole) if one.newest else 0
