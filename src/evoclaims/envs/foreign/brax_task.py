@@ -34,7 +34,7 @@ class BraxTask(JaxTask):
     packages: ClassVar[tuple[str, ...]] = ("brax", "mujoco", "mujoco-mjx")
 
     environment_id: str = field(kw_only=False)
-    settings: Mapping[str, Any] = field(default_factory=dict, hash=False)
+    settings: Mapping[str, Any] = field(default_factory=dict, hash=False, kw_only=False)
 
     @property
     def name(self) -> str:

@@ -31,7 +31,7 @@ class GymnasiumTask(Examination):
     revision: ClassVar[int] = 1
 
     environment_id: str = field(kw_only=False)
-    settings: Mapping[str, Any] = field(default_factory=dict, hash=False)
+    settings: Mapping[str, Any] = field(default_factory=dict, hash=False, kw_only=False)
     episode_steps: int | None = None
     providers: tuple[str, ...] = field(default=(), metadata={"canonical": False})
 

@@ -29,7 +29,7 @@ class GymnaxTask(JaxTask):
     packages: ClassVar[tuple[str, ...]] = ("gymnax",)
 
     environment_id: str = field(kw_only=False)
-    parameters: Mapping[str, Any] = field(default_factory=dict, hash=False)
+    parameters: Mapping[str, Any] = field(default_factory=dict, hash=False, kw_only=False)
 
     @property
     def name(self) -> str:

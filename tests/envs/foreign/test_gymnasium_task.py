@@ -1,0 +1,92 @@
+"""Gymnasium's environments as tasks, and tasks as environments of Gymnasium."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+
+pytest.importorskip("gymnasium", reason="Gymnasium is not installed")
+
+import gymnasium
+import jax
+import numpy as np
+from gymnasium.utils.env_checker import check_env
+
+from evoclaims.core.errors import UserError
+from evoclaims.envs.base import NativelyExamined
+from evoclaims.envs.foreign.gymnasium_env import GymnasiumEnv
+from evoclaims.envs.foreign.gymnasium_task import GymnasiumTask
+from evoclaims.envs.gates.parity import NParity
+from evoclaims.methods.random_search import RandomSearch
+from evoclaims.networks.mlp import Mlp
+from evoclaims.trials.budget import Budget
+from evoclaims.trials.runner import run
+from evoclaims.trials.spec import Condition
+from evoclaims.trials.store import Store
+
+CART = GymnasiumTask("CartPole-v1", solved_at=100, examined_episodes=4)
+
+
+@pytest.fixture(autouse=True)
+def as_it_is() -> Iterator[None]:
+    """Gymnasium's own warnings about its environments are not ours to mend."""
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", module="gymnasium")
+        yield
+
+
+def leaning(observation: Any) -> int:
+    """Push the cart to where the pole falls: balances it for a few hundred steps."""
+    return int(observation[2] + observation[3] > 0)
+
+
+def test_a_policy_is_examined_on_the_host_from_its_own_starts() -> None:
+    assert isinstance(CART, NativelyExamined)
+    fitness, success, metrics = CART.examine_natively(leaning, 0)
+    assert fitness == metrics["episode_steps"] > 100
+    assert 0 < success <= 1
+    assert CART.examine_natively(leaning, 0) == (fitness, success, metrics)
+    assert CART.examine_natively(lambda observation: 0, 0)[0] < 20
+    assert CART.examine_natively(lambda observation: 0, 0) != CART.examine_natively(lambda observation: 0, 1)
+
+
+def test_it_has_the_environment_s_sizes_and_limit() -> None:
+    assert (CART.observation_size, CART.action_size, CART.horizon) == (4, 2, 500)
+    short = GymnasiumTask("Pendulum-v1", {"g": 9.81}, episode_steps=30, examined_episodes=1)
+    assert (short.observation_size, short.action_size, short.horizon) == (3, 1, 30)
+    assert short.examine_natively(lambda observation: np.zeros(1, np.float32), 3)[2] == {"episode_steps": 30.0}
+    assert short.make().unwrapped.g == 9.81
+
+
+def test_an_unknown_environment_or_setting_is_a_sentence() -> None:
+    with pytest.raises(UserError, match=r"Gymnasium makes no 'CartPole-v9' with {}"):
+        GymnasiumTask("CartPole-v9").make()
+    with pytest.raises(UserError, match="Gymnasium makes no 'CartPole-v1' with {'wheels': 4}"):
+        GymnasiumTask("CartPole-v1", {"wheels": 4}).make()
+
+
+def test_a_method_that_is_compiled_says_what_to_do_instead(store_of: Store) -> None:
+    search = RandomSearch(population=2, network=Mlp((2,)))
+    condition = Condition(search, CART, "direct", Budget(generations=1))
+    with pytest.raises(UserError, match="which runs on the host: train on it by a TrainingLoop, or take"):
+        run(condition, [0], store_of, jax.devices("cpu"))
+
+
+@pytest.fixture
+def store_of(tmp_path: Any) -> Store:
+    return Store(tmp_path / "store")
+
+
+def test_a_task_of_ours_is_an_environment_that_gymnasium_accepts() -> None:
+    environment = GymnasiumEnv(NParity(3))
+    check_env(environment, skip_render_check=True)
+    rewards = []
+    bits, _ = environment.reset(seed=1)
+    for _ in range(8):
+        bits, reward, terminated, truncated, _ = environment.step(np.where(bits.sum(keepdims=True) % 2, 1.0, -1.0))
+        rewards.append(reward)
+    assert (rewards, terminated, truncated) == ([0.0] * 8, True, False)
+    assert isinstance(environment.action_space, gymnasium.spaces.Box)

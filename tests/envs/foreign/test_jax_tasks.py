@@ -1,0 +1,157 @@
+"""Environments of gymnax and Brax as tasks, on which our methods train, and their policies act."""
+
+from __future__ import annotations
+
+import contextlib
+import importlib.util
+import io
+from pathlib import Path
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from evoclaims.core.errors import UnknownNameError, UserError
+from evoclaims.envs.foreign.actions import Choice, Range, actions_of
+from evoclaims.envs.foreign.brax_task import BraxTask
+from evoclaims.envs.foreign.gymnax_task import GymnaxTask
+from evoclaims.envs.foreign.jax_task import Descriptor
+from evoclaims.methods.cma_es import CmaEs
+from evoclaims.methods.map_elites import MapElites
+from evoclaims.methods.neat.neat import Neat
+from evoclaims.methods.neat.settings import Settings, Species
+from evoclaims.methods.ppo import Ppo
+from evoclaims.methods.random_search import RandomSearch
+from evoclaims.networks.mlp import Mlp
+from evoclaims.trials.budget import Budget
+from evoclaims.trials.compatibility import traced_progress
+from evoclaims.trials.result import TrialResult
+from evoclaims.trials.runner import run
+from evoclaims.trials.spec import Condition
+from evoclaims.trials.store import Store
+
+with_gymnax = pytest.mark.skipif(importlib.util.find_spec("gymnax") is None, reason="gymnax is not installed")
+
+SMALL = Mlp((2,))
+CART = GymnaxTask("CartPole-v1", episode_steps=200, solved_at=60, examined_episodes=3)
+FAST = BraxTask("fast", episode_steps=12, examined_episodes=2, solved_at=0.0)
+ALONG = Descriptor(places=(0, 1), area=((-5, 5), (-5, 5)))
+METHODS = {
+    "cma_es": CmaEs(population=4, network=SMALL),
+    "map_elites": MapElites(network=SMALL, batch=4, cells=(3, 3), initial=4),
+    "ppo": Ppo(policy_layers=(2,), value_layers=(2,), environments=4, batch_size=4, minibatches=1, unroll_length=2),
+    "neat": Neat(Settings(population=8, nodes=12, connections=24, species=Species(most=2))),
+}
+
+
+def one_trial(method: Any, task: Any, folder: Path, generations: int = 2) -> TrialResult:
+    condition = Condition(method, task, "direct", Budget(generations=generations, reports=1))
+    (result,) = run(condition, [0], Store(folder), jax.devices("cpu")[:1])
+    return result
+
+
+@pytest.mark.parametrize("name", METHODS)
+def test_every_method_fits_an_environment_of_brax(name: str) -> None:
+    traced_progress(METHODS[name], BraxTask("fast", episode_steps=12, descriptor=ALONG))
+
+
+@with_gymnax
+@pytest.mark.parametrize("name", METHODS)
+def test_every_method_fits_an_environment_of_gymnax(name: str) -> None:
+    traced_progress(METHODS[name], GymnaxTask("CartPole-v1", episode_steps=12, descriptor=ALONG))
+
+
+def test_a_trial_on_brax_is_trained_and_examined(tmp_path: Path) -> None:
+    result = one_trial(METHODS["cma_es"], FAST, tmp_path)
+    assert result.status == "done"
+    assert result.metrics["episode_steps"] == 12.0
+    assert result.metrics["last_success"] == 1.0  # of its second generation at the latest
+    assert {"brax", "mujoco"} <= set(result.provenance["depends_on"])
+    with contextlib.redirect_stdout(io.StringIO()):
+        played = FAST.examine_natively(lambda observation: np.zeros(1, np.float32), 0)
+    assert played[2] == {"episode_steps": 12.0}
+
+
+@with_gymnax
+def test_a_trial_on_gymnax_is_trained_and_examined(tmp_path: Path) -> None:
+    result = one_trial(RandomSearch(population=32, network=Mlp(())), CART, tmp_path, generations=4)
+    assert result.status == "done"
+    assert result.metrics["last_fitness"] == result.metrics["episode_steps"] > 40
+    assert "gymnax" in result.provenance["depends_on"]
+
+
+@with_gymnax
+def test_a_policy_of_a_training_loop_acts_as_the_environment_wants_it() -> None:
+    def leaning(observation: Any) -> int:
+        assert observation.shape == (4,)
+        return int(observation[2] + observation[3] > 0)
+
+    fitness, success, metrics = CART.examine_natively(leaning, 0)
+    assert fitness == metrics["episode_steps"] > 60
+    assert success == 1.0
+    assert CART.examine_natively(lambda observation: 1, 0)[0] < 20
+
+
+@with_gymnax
+def test_our_actions_choose_those_of_the_environment() -> None:
+    pendulum = GymnaxTask("Pendulum-v1", episode_steps=3)
+    state = jax.jit(pendulum.reset)(jax.random.key(0), jnp.int32(0))
+    ours = jax.jit(pendulum.step)(state, jnp.full(1, 0.5))
+    theirs = pendulum.advance(jax.random.key(0), state.inner.state, jnp.full(1, 1.0))  # of 2.0 at most
+    assert ours.reward == theirs.reward
+    assert (ours.terminated, ours.truncated) == (False, False)
+
+
+@with_gymnax
+@pytest.mark.slow
+def test_pictures_are_seen_as_vectors_and_an_environment_made_while_tracing_is_whole(tmp_path: Path) -> None:
+    breakout = GymnaxTask("Breakout-MinAtar", episode_steps=20, examined_episodes=1)
+    result = one_trial(RandomSearch(population=2, network=SMALL), breakout, tmp_path)
+    assert breakout.observation_size == 400
+    assert result.status == "done"
+
+
+@pytest.mark.slow
+def test_a_pendulum_of_brax_is_balanced(tmp_path: Path) -> None:
+    pendulum = BraxTask("inverted_pendulum", {"backend": "positional"}, episode_steps=60, solved_at=60)
+    result = one_trial(CmaEs(population=8, network=SMALL), pendulum, tmp_path, generations=8)
+    assert result.metrics["last_success"] > 0.5
+
+
+def test_actions_are_a_choice_or_a_range() -> None:
+    spaces = pytest.importorskip("gymnasium", reason="Gymnasium is not installed").spaces
+    assert actions_of(spaces.Discrete(3), "it") == Choice(3)
+    assert int(Choice(3).chosen(jnp.array([0.1, -2.0, 0.7]))) == 2
+    low, high = np.array([[-2.0, 0.0, -np.inf], [2.0, 10.0, np.inf]], np.float32)
+    box = actions_of(spaces.Box(low, high), "it")
+    assert isinstance(box, Range)
+    assert box.chosen(jnp.array([1.0, -5.0, 7.0])).tolist() == [2.0, 0.0, 7.0]
+    with pytest.raises(UserError, match="The actions of it are a MultiBinary"):
+        actions_of(spaces.MultiBinary(2), "it")
+
+
+def test_a_number_that_is_not_finite_ends_the_episode() -> None:
+    class Breaking(BraxTask):
+        def advance(self, key: Any, state: Any, action: Any) -> Any:
+            moment = super().advance(key, state, action)
+            return type(moment)(moment.state, moment.observation * jnp.nan, moment.reward, moment.terminated)
+
+    task = Breaking("fast", episode_steps=12)
+    start = task.reset(jax.random.key(0), jnp.int32(0))
+    broken = task.step(start, jnp.zeros(1))
+    assert broken.terminated
+    assert broken.reward == 0.0
+    assert (broken.observation == start.observation).all()
+
+
+def test_wrong_names_and_what_map_elites_needs_are_sentences() -> None:
+    with pytest.raises(UnknownNameError, match="no environment of Brax named 'antt'. Did you mean 'ant'"):
+        BraxTask("antt").make()
+    with pytest.raises(UserError, match="nothing says by what of fast: give the task a descriptor"):
+        traced_progress(METHODS["map_elites"], FAST)
+    with pytest.raises(UserError, match="at least 1 step, not 0"):
+        BraxTask("fast", episode_steps=0)
+    with pytest.raises(UserError, match="at least 1 episode, not 0"):
+        BraxTask("fast", examined_episodes=0)

@@ -1,0 +1,194 @@
+"""Trials of training loops that are not ours: each in a process of its own, whatever becomes of that."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import pytest
+import toy_loops
+from toy_loops import Nowhere
+
+from evoclaims.core.errors import UserError
+from evoclaims.envs.gates.parity import NParity
+from evoclaims.methods.training_loop import TrainingLoop
+from evoclaims.trials import crashes
+from evoclaims.trials.budget import Budget
+from evoclaims.trials.progress import RunProgress
+from evoclaims.trials.result import TrialResult
+from evoclaims.trials.runner import run
+from evoclaims.trials.spec import Condition, TrialSpec
+from evoclaims.trials.store import Store
+
+
+def condition(function: Any, task: Any = Nowhere(), packages: tuple[str, ...] = (), **settings: Any) -> Condition:  # noqa: B008
+    budget = Budget(environment_steps=100, reports=5)
+    return Condition(TrainingLoop(function, settings, packages=packages), task, "whole_budget", budget)
+
+
+IN_EVERY_WAY = condition(toy_loops.in_every_way)
+
+
+@pytest.fixture(scope="module")
+def all_ends(tmp_path_factory: pytest.TempPathFactory, cpus: list[Any]) -> tuple[Store, list[TrialResult], list[Any]]:
+    """Trials of a loop that ends in every way, and what was told meanwhile."""
+    store, told = Store(tmp_path_factory.mktemp("ends") / "store"), list[RunProgress]()
+    return store, run(IN_EVERY_WAY, range(4), store, cpus, told.append), told
+
+
+def test_each_trial_ends_as_its_process_does_and_the_others_go_on(all_ends: Any) -> None:
+    _, results, told = all_ends
+    assert [result.status for result in results] == ["done", "crashed", "crashed", "diverged"]
+    good = results[0]
+    assert good.metrics["last_fitness"] == 7.5
+    assert good.metrics["found"] == math.inf
+    assert good.metrics["environment_steps"] == 100
+    assert math.isnan(good.metrics["mean_success"])
+    assert good.provenance["scored_by"] == "training function"
+    assert good.provenance["trained_by"] == "toy_loops:in_every_way"
+    assert told[-1].ended == told[-1].trials == 4
+    assert told[-1].total_steps == 100
+
+
+def test_what_is_reported_becomes_curves_of_as_many_points_as_the_budget_says(all_ends: Any) -> None:
+    _, (good, crashed, *_), _ = all_ends
+    steps = (0.0, 20.0, 40.0, 60.0, 80.0, 100.0)
+    assert good.curves["environment_steps"] == good.curves["steps"] == steps
+    assert good.curves["fitness"] == tuple(step / 100 for step in steps)
+    assert crashed.curves["fitness"] == tuple(1 + step / 100 for step in steps)
+
+
+def test_a_crash_tells_the_last_words_of_its_process_safely(all_ends: Any) -> None:
+    _, (_, raised, killed, _), told = all_ends
+    assert crashes.why(raised) == "ValueError: the reactor is \\x1b[31mred"
+    assert "in in_every_way" in raised.provenance["crash"]
+    assert crashes.why(killed) == "its process ended with SIGSEGV"
+    assert "what it prints is no answer" in killed.provenance["crash"]
+    assert {one.phase for one in told if one.remark} == {
+        f"seed {one.seed} crashed: {crashes.why(one)}" for one in (raised, killed)
+    }
+
+
+def test_the_same_seed_gives_the_same_digest_and_another_process_tries_a_crash_again(
+    all_ends: Any, store: Store, cpus: list[Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    first, results, _ = all_ends
+    run(IN_EVERY_WAY, range(1), store, cpus)
+    assert store.get(results[0].id).digest == results[0].digest  # type: ignore[union-attr]
+    told = list[RunProgress]()
+    run(IN_EVERY_WAY, range(4), first, cpus, told.append)
+    assert told == []
+    monkeypatch.setattr(crashes, "_seen", set())  # as another process has it
+    run(IN_EVERY_WAY, range(4), first, cpus, told.append)
+    assert {one.trials for one in told if not one.remark} == {2}
+
+
+def test_a_policy_is_examined_as_all_are_be_it_of_numpy_or_of_jax(store: Store, cpus: list[Any]) -> None:
+    right, wrong = run(condition(toy_loops.knows_parity, NParity(3)), range(2), store, cpus)
+    assert right.levels["success"] == (1.0, 1.0)
+    assert right.metrics["furthest_solved"] == 1.0
+    assert right.metrics["rows"] == 8.0
+    assert right.provenance["scored_by"] == "examination"
+    assert wrong.levels["success"] == (0.5, 0.5)
+    assert wrong.metrics["last_success"] == 0.5  # whatever the function has claimed
+    assert wrong.metrics["furthest_solved"] == -1.0
+
+
+def _is_alive(pid: int) -> bool:
+    """Whether a process is there, and no zombie that nobody has waited for."""
+    with contextlib.suppress(OSError):
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    return False
+
+
+def _wait_until_gone(pids: list[int]) -> None:
+    """Wait for the end of processes; a test that waits in vain fails."""
+    for _ in range(600):
+        if not any(map(_is_alive, pids)):
+            return
+        time.sleep(0.1)
+    pytest.fail(f"still there: {[pid for pid in pids if _is_alive(pid)]}")
+
+
+def test_a_loop_that_never_returns_is_out_of_time_with_its_curves_until_it_is_allowed_more(
+    tmp_path: Path, store: Store, cpus: list[Any]
+) -> None:
+    endless = condition(toy_loops.never_returns, file=str(tmp_path / "pids"))
+    (late,) = run(endless, [0], store, cpus, time_limit=3.0)
+    assert (late.status, late.curves["fitness"], late.timing["limit"]) == ("timeout", (3.0,), 3.0)
+    _wait_until_gone([int(pid) for pid in (tmp_path / "pids").read_text().split()])
+    (tmp_path / "pids").unlink()
+    run(endless, [0], store, cpus, time_limit=2.0)
+    assert not (tmp_path / "pids").exists()
+    (again,) = run(endless, [0], store, cpus, time_limit=3.5)
+    assert again.timing["limit"] == 3.5
+
+
+@pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="whether a process lives is read from /proc")
+def test_a_killed_parent_leaves_no_process_behind(tmp_path: Path) -> None:
+    script = f"""
+import jax
+from pathlib import Path
+from test_training_loops import condition, run, Store, toy_loops
+run(condition(toy_loops.never_returns, file={str(tmp_path / "pids")!r}), [0], Store(Path({str(tmp_path / "store")!r})),
+    jax.devices("cpu"))
+"""
+    path = os.pathsep.join([str(Path(__file__).parent), *sys.path])
+    parent = subprocess.Popen([sys.executable, "-c", script], env={**os.environ, "PYTHONPATH": path})
+    try:
+        for _ in range(1200):
+            if (tmp_path / "pids").exists() and len((tmp_path / "pids").read_text().split()) == 2:
+                break
+            assert parent.poll() is None
+            time.sleep(0.1)
+        pids = [int(pid) for pid in (tmp_path / "pids").read_text().split()]
+        assert all(map(_is_alive, pids))
+    finally:
+        parent.send_signal(signal.SIGKILL)
+        parent.wait()
+    _wait_until_gone(pids)
+
+
+def test_an_interrupted_run_goes_on_with_the_trials_that_it_lacks(
+    tmp_path: Path, store: Store, cpus: list[Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("evoclaims.trials.loop_trials.usable_cores", lambda: 1)
+    begun = tmp_path / "begun"
+    noting = condition(toy_loops.notes, file=str(begun))
+
+    def stop(progress: RunProgress) -> None:
+        if progress.ended == 2:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        run(noting, range(5), store, cpus, stop)
+    kept = [seed for seed in range(5) if store.get(TrialSpec(noting, seed).id) is not None]
+    assert kept == [0, 1]
+    begun.write_text("")
+    assert [result.status for result in run(noting, range(5), store, cpus)] == ["done"] * 5
+    assert sorted(begun.read_text().split()) == ["2", "3", "4"]
+
+
+def test_another_version_of_a_declared_package_runs_it_again(
+    tmp_path: Path, store: Store, cpus: list[Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    begun = tmp_path / "begun"
+    noting = condition(toy_loops.notes, packages=("pytest",), file=str(begun))
+    (first,) = run(noting, [0], store, cpus)
+    assert first.provenance["versions"]["pytest"] == pytest.__version__
+    monkeypatch.setattr("evoclaims.core.packages.version_of", lambda name: "2.0")
+    run(noting, [0], store, cpus)
+    assert begun.read_text().split() == ["0", "0"]
+
+
+def test_a_package_that_is_not_installed_is_named_before_anything_runs(store: Store, cpus: list[Any]) -> None:
+    with pytest.raises(UserError, match=r"needs no-such-thing, not installed here: pip install no-such-thing"):
+        run(condition(toy_loops.in_every_way, packages=("no-such-thing",)), [0], store, cpus)
+    assert not store.ids()
