@@ -13,6 +13,7 @@ from evoclaims.cli.project import open_project
 from evoclaims.cli.terminal import styled
 from evoclaims.core.errors import UserError
 from evoclaims.judging.verdict import Outcome
+from evoclaims.methods.training_loop import TrainingLoop
 from evoclaims.paper.cost import Pace, known_pace, measured_pace
 from evoclaims.paper.reproduction import Tier
 from evoclaims.paper.spent import Spent, spent
@@ -45,7 +46,8 @@ def main(options: argparse.Namespace) -> int:
 
     def pace(condition: Condition, method: str, task: str) -> Pace | None:
         known = known_pace(condition, store, reproduction.references, options.tier, method, task, kind)
-        return measured_pace(condition, chosen) if known is None and options.measure else known
+        compiled = not isinstance(condition.method, TrainingLoop)  # a loop has no steps that could be timed
+        return measured_pace(condition, chosen) if known is None and options.measure and compiled else known
 
     paces = {names: pace(tier.condition(*names), *names) for names in used}
     costs = {names: spent(reproduction, options.tier, *names) for names in read}

@@ -146,11 +146,3 @@ class Numbered(Protocol):
 
     def with_numbers(self, numbers: Any) -> Task:
         """Return the task with these numbers, which may be traced, instead of its own."""
-
-
-@runtime_checkable
-class NativelyExamined(Protocol):
-    """A task of another library's environment: what is trained on that acts in its own observations and actions."""
-
-    def examine_natively(self, policy: Callable[[Any], Any], seed: int) -> tuple[float, float, Mapping[str, float]]:
-        """Return the fitness, the success and the metrics of a policy on the host, as `examine` has them."""

@@ -11,21 +11,17 @@ import numpy as np
 from jaxtyping import Array, Int
 
 from evoclaims.core.keys import EVALUATION, trial_key
-from evoclaims.envs.base import Episode, NativelyExamined, Task
+from evoclaims.envs.base import Episode, Task
 from evoclaims.trials.devices import MATMUL_PRECISION
 from evoclaims.trials.loop_messages import Scores
 from evoclaims.trials.rollout import score_every_level
 
 
 def examined(task: Task, policy: Callable[[Any], Any], seed: int) -> Scores:
-    """Return the scores of a policy, with keys that training has no way to.
+    """Return the scores of a policy on a task of ours, with keys that training has no way to.
 
-    On a task of ours it is examined as all methods' policies are: observations [observation_size] in, actions
-    [action_size] out. On another library's environment it plays with that environment's observations and actions.
+    It is examined as all methods' policies are: observations [observation_size] in, actions [action_size] out.
     """
-    if isinstance(task, NativelyExamined):
-        fitness, success, metrics = task.examine_natively(policy, seed)
-        return Scores(success=(success,), fitness=(fitness,), metrics=dict(metrics))
     fitted = _fitted(task, policy)
 
     def score(number: Int[Array, ""]) -> Episode:

@@ -56,12 +56,10 @@ class Trained(msgspec.Struct, frozen=True, tag=True):
     Attributes:
         metrics: as the function returned them.
         scores: None if it returned no policy.
-        seconds: that training and examination took.
     """
 
     metrics: Numbers
     scores: Scores | None
-    seconds: float
 
 
 class Failed(msgspec.Struct, frozen=True, tag=True):

@@ -22,8 +22,9 @@ import msgspec
 from evoclaims.core.errors import UserError
 from evoclaims.core.portable import from_plain, resolve
 from evoclaims.core.printable import printable
+from evoclaims.envs.foreign.scoring import NativelyExamined
 from evoclaims.methods.training_loop import wants_report
-from evoclaims.trials.loop_messages import LAST_LINES, Answer, Failed, Reported, Request, Trained, encode
+from evoclaims.trials.loop_messages import LAST_LINES, Answer, Failed, Reported, Request, Scores, Trained, encode
 
 COUNTS: Final = ("steps", "environment_steps")
 """Metrics that are counts; all others are any numbers."""
@@ -74,17 +75,22 @@ def numbers(values: Mapping[str, Any]) -> dict[str, Any]:
 
 def train(request: Request, answer: Callable[[Answer], None]) -> Trained:
     """Call the function, and examine its policy."""
-    began = time.perf_counter()
     function, task, budget = resolve(request.function), from_plain(request.task), from_plain(request.budget)
     told = {"report": Reporter(budget.chunk(1), answer)} if wants_report(function) else {}
     returned = function(task, request.seed, budget, **from_plain(request.settings), **told)
     metrics, policy = returned if isinstance(returned, tuple) and len(returned) == 2 else (returned, None)
-    scores = None
-    if policy is not None:
-        from evoclaims.trials.loop_examination import examined  # not before: many loops need no jax
+    scores = None if policy is None else examined(task, policy, request.seed)
+    return Trained(numbers(metrics), scores)
 
-        scores = examined(task, policy, request.seed)
-    return Trained(numbers(metrics), scores, time.perf_counter() - began)
+
+def examined(task: Any, policy: Callable[[Any], Any], seed: int) -> Scores:
+    """Return the scores of a policy, which acts on another library's environment as that wants it."""
+    if isinstance(task, NativelyExamined):
+        fitness, success, metrics = task.examine_natively(policy, seed)
+        return Scores(success=(success,), fitness=(fitness,), metrics=dict(metrics))
+    from evoclaims.trials import loop_examination  # not before: many loops need no jax
+
+    return loop_examination.examined(task, policy, seed)
 
 
 def main() -> None:

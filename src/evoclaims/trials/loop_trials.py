@@ -196,7 +196,7 @@ class LoopTrials:
             steps=max(reached),
             total_steps=condition.steps,
             best=max(map(float, told), default=None),
-            seconds_left=seconds * (1 - done) / done if done else None,
+            seconds_left=seconds * (1 - done) / done if done > 0.01 else None,
         )
 
     def _stop(self) -> None:

@@ -16,9 +16,9 @@ import numpy as np
 from gymnasium.utils.env_checker import check_env
 
 from evoclaims.core.errors import UserError
-from evoclaims.envs.base import NativelyExamined
 from evoclaims.envs.foreign.gymnasium_env import GymnasiumEnv
 from evoclaims.envs.foreign.gymnasium_task import GymnasiumTask
+from evoclaims.envs.foreign.scoring import NativelyExamined
 from evoclaims.envs.gates.parity import NParity
 from evoclaims.methods.random_search import RandomSearch
 from evoclaims.networks.mlp import Mlp
@@ -50,7 +50,10 @@ def test_a_policy_is_examined_on_the_host_from_its_own_starts() -> None:
     assert 0 < success <= 1
     assert CART.examine_natively(leaning, 0) == (fitness, success, metrics)
     assert CART.examine_natively(lambda observation: 0, 0)[0] < 20
-    assert CART.examine_natively(lambda observation: 0, 0) != CART.examine_natively(lambda observation: 0, 1)
+    starts = [list[tuple[float, ...]](), list[tuple[float, ...]]()]
+    for seed, seen in enumerate(starts):
+        CART.examine_natively(lambda observation, seen=seen: seen.append(tuple(observation)) or 0, seed)
+    assert set(starts[0]).isdisjoint(starts[1])
 
 
 def test_it_has_the_environment_s_sizes_and_limit() -> None:

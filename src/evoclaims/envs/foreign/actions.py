@@ -58,7 +58,7 @@ def actions_of(space: Any, what: str) -> Choice | Range:
     Raises:
         UserError: for spaces that are neither a choice nor an array.
     """
-    if hasattr(space, "n") and getattr(space, "start", 0) == 0 and np.ndim(space.n) == 0:
+    if hasattr(space, "n") and space.shape == () and getattr(space, "start", 0) == 0:
         return Choice(int(space.n))
     if hasattr(space, "low") and hasattr(space, "high"):
         low, high = (np.broadcast_to(np.asarray(x, np.float64), space.shape) for x in (space.low, space.high))

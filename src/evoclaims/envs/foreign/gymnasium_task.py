@@ -11,8 +11,7 @@ from typing import Any, ClassVar, NoReturn
 import numpy as np
 
 from evoclaims.core.errors import UserError
-from evoclaims.envs.foreign.actions import actions_of
-from evoclaims.envs.foreign.scoring import Examination
+from evoclaims.envs.foreign.scoring import Examination, Scored
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -75,7 +74,8 @@ class GymnasiumTask(Examination):
     @cached_property
     def action_size(self) -> int:
         """How many numbers choose an action."""
-        return actions_of(self._spaces[1], self.name).size
+        space = self._spaces[1]
+        return int(getattr(space, "n", 0) or np.prod(space.shape))
 
     @cached_property
     def horizon(self) -> int:
@@ -95,7 +95,7 @@ class GymnasiumTask(Examination):
         with contextlib.closing(self.make()) as environment:
             return environment.observation_space, environment.action_space, environment.spec.max_episode_steps
 
-    def examine_natively(self, policy: Callable[[Any], Any], seed: int) -> tuple[float, float, Mapping[str, float]]:
+    def examine_natively(self, policy: Callable[[Any], Any], seed: int) -> Scored:
         """Run `examined_episodes` from different starts and average; success is the share that is solved."""
         # Training with the seeds 0, 1, 2, … has other starts than these.
         seeds = np.random.SeedSequence(seed, spawn_key=(0,)).generate_state(self.examined_episodes)

@@ -20,7 +20,7 @@ from evoclaims.core.keys import EVALUATION, streams, trial_key
 from evoclaims.core.pytree import pytree, select, strong
 from evoclaims.envs.base import Episode, PolicyFn, TaskState, fitting
 from evoclaims.envs.foreign.actions import Choice, Range
-from evoclaims.envs.foreign.scoring import Examination
+from evoclaims.envs.foreign.scoring import Examination, Scored
 
 
 @pytree
@@ -200,7 +200,7 @@ class JaxTask(Examination, ABC):
         """Return that any cell may be reached: nobody knows."""
         return np.ones(cells, bool)
 
-    def examine_natively(self, policy: Callable[[Any], Any], seed: int) -> tuple[float, float, Mapping[str, float]]:
+    def examine_natively(self, policy: Callable[[Any], Any], seed: int) -> Scored:
         """Run `examined_episodes` of a policy that acts as the environment wants it, on the host, and average."""
         begin, advance = jax.jit(self.begin), jax.jit(self.advance)
 
