@@ -7,7 +7,7 @@ from tiny_project import Evoclaims
 
 from evoclaims.cli.project import open_project
 from evoclaims.cli.run import named
-from evoclaims.trials.result_making import make_timeout
+from evoclaims.trials.result_making import make_unfinished
 from evoclaims.trials.spec import TrialSpec
 from reproductions.nisioti2025 import REPRODUCTION
 
@@ -24,7 +24,7 @@ def test_trials_of_a_variant_that_ran_out_of_less_time_are_counted_among_those_t
     project = open_project(".evoclaims")
     condition = project.reproduction.tier("smoke", "traded").condition("right", "parity")
     timing = {"run": 1.0, "compile": 0.0, "batch": 1, "started": "2025-01-01T00:00:00+00:00", "limit": 1.0}
-    project.store.put(make_timeout(TrialSpec(condition, 0), {}, timing, jax.devices("cpu")), {})
+    project.store.put(make_unfinished(TrialSpec(condition, 0), "timeout", {}, timing, jax.devices("cpu")), {})
     status, out, _ = evoclaims("run", "--variant=traded", "--trials=1")
     assert status == 0
     assert "  right on parity (smoke): 1 trial to run, time unknown\n" in out

@@ -58,7 +58,7 @@ def main(options: argparse.Namespace) -> int:
             failed += 1
             print(f"evoclaims: {name} failed: {ended.error}.", file=sys.stderr)
         else:
-            _print_trials(store, name, wanted[ended.job], seeds, ended.again)
+            failed += _print_trials(store, name, wanted[ended.job], seeds, ended.again)
     if failed and len(chosen) > 1:
         print(f"evoclaims: {failed} of {len(chosen)} conditions failed.", file=sys.stderr)
     if options.variant:
@@ -66,15 +66,15 @@ def main(options: argparse.Namespace) -> int:
     return int(failed > 0)
 
 
-def _print_trials(store: Store, name: str, condition: Condition, seeds: Sequence[int], again: int) -> None:
-    """List the trials of a condition."""
+def _print_trials(store: Store, name: str, condition: Condition, seeds: Sequence[int], again: int) -> bool:
+    """List the trials of a condition, and return whether one of them has crashed."""
     print(name)
     if again:
         print(f"  {again} of these were run again, since the stored ones were made with other versions")
-    for seed in seeds:
-        result = store.get(TrialSpec(condition, seed).id, condition.versions)
-        if result is not None:
-            print(f"  {describe(result)}")
+    results = [store.get(TrialSpec(condition, seed).id, condition.versions) for seed in seeds]
+    for result in filter(None, results):
+        print(f"  {describe(result)}")
+    return any(result.status == "crashed" for result in filter(None, results))
 
 
 def _print_matrix(project: Project, tier: str, variant: str) -> None:

@@ -173,14 +173,16 @@ class LoopTrials:
         elif one.late:
             limited = {**timing, "limit": self._stored.time_limit}
             result = make_unfinished(one.spec, "timeout", one.curves, limited, self._devices)
-            text = f"out of time after {self._stored.time_limit:g} s"
-            tell(RunProgress(one.spec.condition.label, text, 1, remark=True))
+            self._remark(f"seed {one.spec.seed} is out of time after {self._stored.time_limit:g} s", tell)
         else:
             result = make_unfinished(one.spec, "crashed", one.curves, timing, self._devices, one.reason)
             crashes.remember(result)
-            text = f"seed {one.spec.seed} crashed: {crashes.why(result)}"
-            tell(RunProgress(one.spec.condition.label, text, 1, remark=True))
+            self._remark(f"seed {one.spec.seed} crashed: {crashes.why(result)}", tell)
         self._stored.store.put(result, {})
+
+    def _remark(self, text: str, tell: Watcher) -> None:
+        """Say how a trial has failed."""
+        tell(RunProgress(self._stored.condition.label, text, 0, remark=True))
 
     def _progress(self, running: Sequence[Running], ended: int, seconds: float) -> RunProgress:
         """Return how far all trials are."""
