@@ -106,6 +106,12 @@ def test_a_project_with_a_training_loop_comes_to_a_verdict_and_all_commands_know
     assert "seed 9: done after 2," in told
     assert cli.main(["champion", "hill_climbing", "--on", "cart"]) == 2
     assert "'hill_climbing' is a training loop of its own" in capsys.readouterr().err
+    assert cli.main(["mutants"]) == 2  # instead of faults that change nothing, and a claim that is called insensitive
+    assert "training loops are not ours to change" in capsys.readouterr().err
+    broken = "def hill_climbing(task, seed, budget, spread):\n    return 1 / seed\n"
+    (pytester.path / "numpy_loops.py").write_text(broken)
+    assert cli.main(["run", "--tier=full", "--trials=1"]) == 1
+    assert "seed 0: crashed after 0 environment steps: ZeroDivisionError: division by zero" in capsys.readouterr().out
 
 
 @needs("stable_baselines3")

@@ -38,6 +38,11 @@ def main(options: argparse.Namespace) -> int:
     every = plantings(
         {names: one for names, one in tier.conditions.items() if names in used}, catalogue.load(project.reproduction)
     )
+    if not every:
+        raise UserError(
+            f"No fault can be planted in what claims of the {options.tier} tier read: training loops are not ours to "
+            "change. Your own can be, by `with_method` in a module that the reproduction names (mutants=...)."
+        )
     planted = _chosen(every, options)
     failed: frozenset[Job] = frozenset()
     if not options.stored:

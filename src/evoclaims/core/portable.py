@@ -24,7 +24,11 @@ def reference(value: Any) -> str:
             f"{name or value!r} cannot be imported by another process; define it under its own name in a module, not "
             "inside a function or in a script."
         )
-    return f"{module}:{name}"
+    try:
+        resolve(named := f"{module}:{name}")
+    except (ImportError, AttributeError) as error:  # a class that was made while the program ran
+        raise UserError(f"{named} cannot be imported by another process: {error}.") from error
+    return named
 
 
 def resolve(named: str) -> Any:

@@ -9,6 +9,7 @@ from typing import Any, Final
 from evoclaims.envs.gates.circuit import Circuit
 from evoclaims.methods.cma_es import CmaEs
 from evoclaims.methods.map_elites import MapElites
+from evoclaims.methods.training_loop import TrainingLoop
 from evoclaims.mutants import of_methods, of_tasks
 from evoclaims.mutants.planting import Fault, plant
 from evoclaims.paper.variant import Conditions, Names
@@ -46,7 +47,7 @@ class Mutant:
 
 def of_method(fault: type[Fault], only: type | tuple[type, ...] = object) -> Mutant:
     """Return the mutant that plants a fault in any method of a class."""
-    return with_method(fault.says, lambda method: plant(fault, method), only)
+    return _where_compiled(with_method(fault.says, lambda method: plant(fault, method), only))
 
 
 def with_method(says: str, change: Callable[[Any], Any], only: type | tuple[type, ...] = object) -> Mutant:
@@ -58,7 +59,7 @@ def with_method(says: str, change: Callable[[Any], Any], only: type | tuple[type
 
 def of_task(fault: type[Fault], only: type | tuple[type, ...] = object) -> Mutant:
     """Return the mutant that plants a fault in any task of a class."""
-    return with_task(fault.says, lambda task: plant(fault, task), only)
+    return _where_compiled(with_task(fault.says, lambda task: plant(fault, task), only))
 
 
 def with_task(says: str, change: Callable[[Any], Any], only: type | tuple[type, ...] = object) -> Mutant:
@@ -66,10 +67,17 @@ def with_task(says: str, change: Callable[[Any], Any], only: type | tuple[type, 
     return Mutant(says, "task", lambda one: replace(one, task=change(one.task)) if isinstance(one.task, only) else None)
 
 
+def _where_compiled(mutant: Mutant) -> Mutant:
+    """Leave out training loops: they call no function of a method of ours, and are given tasks as their modules are."""
+    return replace(mutant, change=lambda one: None if isinstance(one.method, TrainingLoop) else mutant.change(one))
+
+
 def _staying(one: Condition) -> Condition | None:
     """Training and examinations that stay at the first level of several."""
+    if one.task.levels == 1:
+        return None
     faulty: Any = plant(of_tasks.StaysAtFirstLevel, one.task)
-    return replace(one, task=faulty) if one.task.levels > 1 else None
+    return replace(one, task=faulty)
 
 
 MUTANTS: Final[Mapping[str, Mutant]] = {
@@ -85,7 +93,7 @@ MUTANTS: Final[Mapping[str, Mutant]] = {
     "pays-nothing": of_task(of_tasks.PaysNothing),
     "reverses-rewards": of_task(of_tasks.ReversesReward),
     "pays-at-random": of_task(of_tasks.PaysAtRandom),
-    "first-level-only": Mutant(of_tasks.StaysAtFirstLevel.says, "task", _staying),
+    "first-level-only": _where_compiled(Mutant(of_tasks.StaysAtFirstLevel.says, "task", _staying)),
     "ignores-an-input": of_task(of_tasks.IgnoresAnInput, Circuit),
     "wrong-row": of_task(of_tasks.HasAWrongRow, Circuit),
 }
