@@ -14,8 +14,8 @@ from evoclaims.core.printable import printable
 from evoclaims.paper.cost import known_pace
 from evoclaims.report.live_line import duration
 from evoclaims.trials import champions, devices
-from evoclaims.trials.imported import where_from
 from evoclaims.trials.crashes import why
+from evoclaims.trials.imported import where_from
 from evoclaims.trials.result import COMPLETE, TrialResult
 from evoclaims.trials.spec import Condition, TrialSpec
 from evoclaims.trials.time_limit import time_allowed
