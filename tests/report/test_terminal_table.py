@@ -125,17 +125,18 @@ def test_the_comparison_with_the_references_says_what_drifted_and_what_it_did_no
         DriftRow("a on b", "success", 10, 10, "no drift", 0.5, 1.0),
         DriftRow("c on d", "success", 3, 0, "no reference", detail="0 reference trials, 10 needed"),
     )
-    lines = drift_lines(DriftReport(rows, 0.01), changed=1, compared=4).splitlines()
+    changed = ["a on b", "c on d", "a on b"]
+    lines = drift_lines(DriftReport(rows, 0.01), changed, compared=4).splitlines()
     assert lines == [
         "reference trials: 2 comparisons, 1 drifted (exact rank tests, Holm, α = 0.01)",
         "DRIFT in a on b: steps is lower now: median 40.5 -> 30, A12 = 0.12, p = 0.0004 (Holm)",
         "not checked: c on d: 0 reference trials, 10 needed",
-        "to the bit: 4 trials compared with the same machine and versions, 1 changed",
+        "to the bit: 4 trials compared with the same machine and versions, 3 changed: a on b (2), c on d (1)",
     ]
 
 
 def test_where_nothing_could_be_compared_to_the_bit_nothing_is_said_to_be_unchanged() -> None:
-    assert drift_lines(DriftReport((), 0.01), changed=0, compared=0).splitlines()[-1] == (
+    assert drift_lines(DriftReport((), 0.01), changed=[], compared=0).splitlines()[-1] == (
         "to the bit: no trial could be compared, since none of the references has the same machine and versions"
     )
 

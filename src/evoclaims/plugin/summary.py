@@ -203,7 +203,9 @@ class Summary:
         notes = []
         if self._drift is not None:
             drift, digests = self._drift
-            notes += terminal_table.drift_lines(drift, len(digests.changed), digests.compared).splitlines()
+            labels = {source.condition: source.label for report in self.reports for source in report.sources}
+            changed = [labels.get(change.condition, change.condition) for change in digests.changed]
+            notes += terminal_table.drift_lines(drift, changed, digests.compared).splitlines()
         if self._upgrade is not None:
             notes += self._upgrade.lines
         notes += verdict_changes(self.reports)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import os
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -137,14 +138,15 @@ def explanations(reports: Sequence[ClaimReport], width: int, colour: bool) -> st
     return _rendered("\n".join(_literal(line) for line in lines), width, colour) if lines else ""
 
 
-def drift_lines(drift: DriftReport, changed: int, compared: int) -> str:
-    """Return what the comparison with the committed reference trials found."""
+def drift_lines(drift: DriftReport, changed: Sequence[str], compared: int) -> str:
+    """Return what the comparison with the committed reference trials found; `changed` has a label for each trial."""
     drifted = sum(row.drifted for row in drift.rows)
     head = (
         f"reference trials: {drift.tested} comparisons, {drifted} drifted (exact rank tests, Holm, α = {drift.alpha:g})"
     )
+    where = ": " * bool(changed) + ", ".join(f"{label} ({count})" for label, count in Counter(changed).items())
     bits = (
-        f"to the bit: {compared} trials compared with the same machine and versions, {changed} changed"
+        f"to the bit: {compared} trials compared with the same machine and versions, {len(changed)} changed{where}"
         if compared
         else "to the bit: no trial could be compared, since none of the references has the same machine and versions"
     )

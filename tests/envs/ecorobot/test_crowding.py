@@ -5,18 +5,22 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
+import jax
+import jax.numpy as jnp
 import mujoco
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from jaxtyping import Array
 
-from evoclaims.envs.ecorobot import deceptive, stones
+from evoclaims.envs.ecorobot import deceptive, physics, stones
 from evoclaims.envs.ecorobot.boxes import Box
 from evoclaims.envs.ecorobot.crowding import reach, touched_at_once
 from evoclaims.envs.ecorobot.obstacles import Obstacles
+from evoclaims.envs.ecorobot.pose import torso
 from evoclaims.envs.ecorobot.robots import ANT, HALF_CHEETAH, ROBOTS, SIMPLE_ROB, Robot
-from evoclaims.envs.ecorobot.scene import Scene
+from evoclaims.envs.ecorobot.scene import Scene, on_device
 
 ALONE = Scene(SIMPLE_ROB).model
 
@@ -106,3 +110,21 @@ def test_boxes_that_are_alike_differ_in_their_place_alone() -> None:
     assert list(Scene(HALF_CHEETAH, tuple(apart)).turns) == ["geom_pos"]
     apart[3] = replace(apart[3], angle=20.0)
     assert set(Scene(HALF_CHEETAH, tuple(apart)).turns) == {"geom_pos", "geom_quat"}
+
+
+def test_the_boxes_that_are_simulated_are_those_nearest_to_the_torso() -> None:
+    """Among the walls of the stones' maze, five of which are turned; distances by `Box`."""
+    task = stones.SteppingStones()
+    scene, random = task.scene, np.random.default_rng(1)
+    places = np.concatenate([random.uniform(low, high, (400, 1)) for low, high in task.area], axis=1)
+    starts = np.tile(scene.start, (400, 1))
+    starts[:, :2] += places - np.asarray(jax.vmap(lambda q: torso(scene, q).place[:2])(jnp.asarray(starts)))
+
+    def nearest(position: Array) -> Array:
+        body = physics.resting(position, jnp.zeros(scene.model.nv))
+        return physics._nearest(scene, on_device(scene.mjx), body, scene.turns)
+
+    found = np.asarray(jax.jit(jax.vmap(nearest))(jnp.asarray(starts)))
+    distances = np.stack([box.distance(places) for box in task.boxes], axis=1)
+    chosen = np.take_along_axis(distances, found, axis=1)
+    np.testing.assert_allclose(chosen, np.sort(distances, axis=1)[:, : scene.near], atol=1e-4)
