@@ -40,8 +40,8 @@ def main(options: argparse.Namespace) -> int:
     )
     if not every:
         raise UserError(
-            f"No fault can be planted in what claims of the {options.tier} tier read: training loops are not ours to "
-            "change. Your own can be, by `with_method` in a module that the reproduction names (mutants=...)."
+            f"No fault can be planted in what claims of the {options.tier} tier read: training loops and imported "
+            "trials are not ours to change."
         )
     planted = _chosen(every, options)
     failed: frozenset[Job] = frozenset()

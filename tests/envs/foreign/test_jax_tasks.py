@@ -52,12 +52,14 @@ def one_trial(method: Any, task: Any, folder: Path, generations: int = 2) -> Tri
     return result
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", METHODS)
 def test_every_method_fits_an_environment_of_brax(name: str) -> None:
     traced_progress(METHODS[name], BraxTask("fast", episode_steps=12, descriptor=ALONG))
 
 
 @with_gymnax
+@pytest.mark.slow
 @pytest.mark.parametrize("name", METHODS)
 def test_every_method_fits_an_environment_of_gymnax(name: str) -> None:
     traced_progress(METHODS[name], GymnaxTask("CartPole-v1", episode_steps=12, descriptor=ALONG))
@@ -95,6 +97,7 @@ def test_a_policy_of_a_training_loop_acts_as_the_environment_wants_it() -> None:
 
 
 @with_gymnax
+@pytest.mark.slow
 def test_our_actions_choose_those_of_the_environment() -> None:
     pendulum = GymnaxTask("Pendulum-v1", episode_steps=3)
     state = jax.jit(pendulum.reset)(jax.random.key(0), jnp.int32(0))
