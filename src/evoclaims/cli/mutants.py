@@ -38,11 +38,6 @@ def main(options: argparse.Namespace) -> int:
     every = plantings(
         {names: one for names, one in tier.conditions.items() if names in used}, catalogue.load(project.reproduction)
     )
-    if not every:
-        raise UserError(
-            f"No fault can be planted in what claims of the {options.tier} tier read: training loops and imported "
-            "trials are not ours to change."
-        )
     planted = _chosen(every, options)
     failed: frozenset[Job] = frozenset()
     if not options.stored:
@@ -86,8 +81,8 @@ def _chosen(every: Sequence[Planted], options: argparse.Namespace) -> list[Plant
     """
     if not every:
         raise UserError(
-            f"No fault can be planted: the trials that the {options.tier} tier's claims read are not run here, but "
-            "imported."
+            f"No fault can be planted: the trials that the {options.tier} tier's claims read are not run here but "
+            "imported, or come from training loops."
         )
     for wanted, kind, known in (
         (options.mutant, "mutant", {one.mutant for one in every}),
