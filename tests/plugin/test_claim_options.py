@@ -195,7 +195,9 @@ def test_trials_that_drifted_from_the_committed_ones_fail_the_run(project: Any) 
             "DRIFT in right on parity (smoke): mean_success is higher now: median 0.5 -> 1, A12 = 1.00, p = * (Holm)",
         ]
     )
-    result.stdout.fnmatch_lines(["to the bit: 10 trials compared with the same machine and versions, 10 changed: right on parity (10)"])
+    result.stdout.fnmatch_lines(
+        ["to the bit: 10 trials compared with the same machine and versions, 10 changed: right on parity (10)"]
+    )
     for options in (("--claims-stored",), ("--claims-stored", "--claims-committed")):
         result = project.run(*options, own_store=True)
         assert result.ret == 1

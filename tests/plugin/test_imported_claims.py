@@ -9,6 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+import unpacked
 from tiny_project import Project
 
 from evoclaims import cli
@@ -190,6 +191,6 @@ def test_commands_read_the_table_where_no_trial_is_stored_and_say_that_there_is_
     assert f"theirs on parity (smoke) has no champion: its {count}" in said["champion theirs --on parity"]
     assert "theirs on parity (its trials are imported, and there are no others)" in said["power"]
     assert "No fault can be planted: the trials that the smoke tier's claims read are not run here" in said["mutants"]
-    report = (ours.path / "report" / "index.html").read_text()
+    report = unpacked.read(ours.path / "report" / "index.html")
     assert "imported from runs.csv, sha256 " in report
     assert "by Ada" in report

@@ -6,6 +6,7 @@ import base64
 import gzip
 import json
 import re
+from pathlib import Path
 
 from evoclaims.report.html import html
 from evoclaims.report.model import Page
@@ -22,5 +23,15 @@ def pieces(text: str) -> dict[str, str]:
 
 def whole(page: Page) -> str:
     """Return the page with all its pieces at the end, each once."""
-    text = html(page)
+    return _unpacked(html(page))
+
+
+def read(path: Path) -> str:
+    """Return a written page in the same way; a Markdown file as it is."""
+    text = path.read_text()
+    return _unpacked(text) if path.suffix == ".html" else text
+
+
+def _unpacked(text: str) -> str:
+    """Put what is packed at the end."""
     return _PACKED.sub("", text) + "".join(pieces(text).values())
