@@ -10,11 +10,11 @@ from xml.etree import ElementTree
 import pytest
 from hand_made_verdicts import evidence, verdict
 from laboratory import Laboratory, better_wins
+from unpacked import whole
 
 from evoclaims.judging.sample import Sample
 from evoclaims.report.charts import profile_svg, strip_svg
 from evoclaims.report.evidence import Part, judged_parts
-from evoclaims.report.html import html
 from evoclaims.report.markdown import markdown
 
 INF = math.inf
@@ -92,7 +92,7 @@ def test_performance_profiles_step_down_where_trials_are() -> None:
 def test_a_claims_evidence_shows_both(filled: Laboratory) -> None:
     page = filled.page(filled.judge(better_wins))
     assert "IQM of better on small 0.85 (95% stratified bootstrap" in markdown(page)
-    assert "IQM of worse on small" in html(page)
+    assert "IQM of worse on small" in whole(page)
 
 
 def test_description_decides_nothing(filled: Laboratory, monkeypatch: pytest.MonkeyPatch) -> None:
