@@ -7,7 +7,6 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import rankdata, trim_mean
 
 Floats = NDArray[np.float64]
 
@@ -39,6 +38,8 @@ def a12(a: Sequence[float], b: Sequence[float]) -> float:
 
 def epsilon_squared(groups: Sequence[Sequence[float]]) -> float:
     """Return the share of the variance of ranks that lies between groups, in [0, 1]; 0 for constant data."""
+    from scipy.stats import rankdata  # its import takes longer than the collection of claims, which needs this module
+
     ranks = rankdata(np.concatenate(groups))
     parts = np.split(ranks - ranks.mean(), np.cumsum(list(map(len, groups)))[:-1])
     total = sum(float((part**2).sum()) for part in parts)
@@ -52,6 +53,8 @@ def iqm(values: Sequence[float]) -> float:
 
 def _iqm(values: Floats) -> Floats:
     """Return the interquartile means of the last axis."""
+    from scipy.stats import trim_mean  # as above
+
     with np.errstate(invalid="ignore"):
         means: Floats = trim_mean(values, 0.25, axis=-1)
     return means
