@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable
+from decimal import Decimal
 from pathlib import Path
 from typing import Any
 
@@ -46,7 +47,7 @@ def _values(condition: Imported, metric: str = "return") -> list[float]:
 def test_the_trial_of_seed_k_is_that_of_the_table_s_kth_smallest_seed(table: Callable[..., Imported]) -> None:
     trials = table(where=SAC).existing
     assert [trial.seed for trial in trials] == [0, 1, 2]
-    assert [trial.provenance["seed_in_table"] for trial in trials] == [7, 42, 1337]
+    assert [trial.provenance["seed_in_table"] for trial in trials] == ["7", "42", "1337"]
     assert [trial.metrics for trial in trials] == [{"return": 10.5}, {"return": 30.5}, {"return": 20.5}]
 
 
@@ -66,6 +67,31 @@ def test_a_record_says_what_was_imported_by_whom_and_from_which_file(table: Call
 @pytest.mark.parametrize("lr", [0.001, "0.001"])
 def test_filters_know_numbers_and_texts(table: Callable[..., Imported], lr: object) -> None:
     assert _values(table(where={"lr": lr})) == ([10.5, 30.5, 20.5] if lr == 0.001 else [10.5, 30.5])
+
+
+@pytest.mark.parametrize("said", ["true", "True", "TRUE", "1"])
+def test_filters_know_true_however_it_is_written(table: Callable[..., Imported], said: str) -> None:
+    assert _values(table(f"seed,return,done\n1,5,{said}\n2,6,no\n", where={"done": True})) == [5]
+
+
+@pytest.mark.parametrize(
+    "seeds", [[9007199254740992, 9007199254740993], [2**64 - 2, 2**64 - 1], [-(10**38), 310441253894826263190129434872]]
+)
+@pytest.mark.parametrize("form", ["csv", "json"])
+def test_seeds_of_any_size_are_told_apart_and_kept(table: Callable[..., Imported], seeds: list[int], form: str) -> None:
+    rows = [{"seed": seed, "return": k} for k, seed in enumerate(seeds)]
+    text = json.dumps(rows) if form == "json" else "seed,return\n" + "".join(f"{s},{k}\n" for k, s in enumerate(seeds))
+    trials = table(text, f"runs.{form}").existing
+    assert [trial.metrics["return"] for trial in trials] == [0, 1]
+    assert [trial.provenance["seed_in_table"] for trial in trials] == list(map(str, seeds))
+    assert [parse(dump(trial)) for trial in trials] == list(trials)
+
+
+def test_parquet_s_decimals_are_numbers(table: Callable[..., Imported]) -> None:
+    condition = table("", "runs.parquet")
+    columns = {"seed": [Decimal(7)], "return": [Decimal("1.5")]}
+    pyarrow.parquet.write_table(pyarrow.table(columns), condition.folder / condition.path)
+    assert _values(condition) == [1.5]
 
 
 def test_metrics_are_named_as_columns_or_as_measures_read_them(table: Callable[..., Imported]) -> None:
@@ -142,6 +168,15 @@ def test_rows_with_steps_are_a_curve_whose_last_number_counts(table: Callable[..
     assert parse(dump(one)).digest == one.digest
 
 
+def test_a_curve_that_ends_with_an_empty_cell_has_diverged_if_that_is_what_they_mean(
+    table: Callable[..., Imported],
+) -> None:
+    text = "seed,step,return\n1,10,90\n1,20,\n2,10,\n2,20,30\n"
+    assert _values(table(text, step="step")) == [90, 30]
+    trials = table(text, step="step", empty_means_diverged=True).existing
+    assert [trial.status for trial in trials] == ["diverged", "done"]
+
+
 def test_the_budget_of_curves_is_the_longest_and_its_reports_are_as_far_apart_as_they_ever_are(
     table: Callable[..., Imported],
 ) -> None:
@@ -186,8 +221,12 @@ def test_where_the_folder_is_does_not_matter(table: Callable[..., Imported], tmp
         ({"metric": "algo", "where": SAC}, r"runs\.csv holds 'sac' in row 2 of the column 'algo', which is no number"),
         ({"seed": "lr"}, r"Row 1 of runs\.csv has the seed 0\.001 in the column 'lr': each trial has a whole number"),
         ({"path": "gone.csv"}, r"The table .*gone\.csv cannot be read: No such file"),
-        ({"path": "runs.xlsx"}, r"runs\.xlsx is no table that can be read: its name ends in \.csv, "),
+        ({"path": "runs.xlsx"}, r"runs\.xlsx is no table that can be read: the name of one ends in \.csv, "),
         ({"metric": ""}, r"Imported\('runs\.csv'\) names no metric"),
+        (
+            {"metric": ["return", "environment_steps"], "step": "lr"},
+            r"Imported\('runs\.csv'\) has two columns of environment steps: 'environment_steps' and step='lr'",
+        ),
     ],
 )
 def test_what_does_not_fit_is_a_sentence_with_the_file_and_what_is_there(
@@ -208,11 +247,34 @@ def test_what_does_not_fit_is_a_sentence_with_the_file_and_what_is_there(
         ("d.json", "[1, 2]", "it is neither a JSON list of objects nor one object a line"),
         ("e.json", "{", "it is neither a JSON list of objects nor one object a line"),
         ("f.parquet", "PAR", "it is no Parquet file"),
+        ("g.json", '[{"seed": 1, "seed": 2, "return": 3}]', r"two of its columns have one name \(seed, seed, return"),
+        ("h.jsonl", '{"seed": 1, "return": 3, "return": 4}', r"two of its columns have one name \(seed, return, ret"),
     ],
 )
 def test_a_file_without_a_table_is_a_sentence(table: Callable[..., Imported], name: str, text: str, said: str) -> None:
     with pytest.raises(UserError, match=rf"{name} is no table that can be read: {said}"):
         _ = table(text, name).existing
+
+
+def test_a_parquet_file_with_two_columns_of_one_name_is_a_sentence(table: Callable[..., Imported]) -> None:
+    condition = table("", "runs.parquet")
+    twice = pyarrow.Table.from_arrays([[1], [2], [3]], names=["seed", "return", "return"])
+    pyarrow.parquet.write_table(twice, condition.folder / condition.path)
+    with pytest.raises(UserError, match=r"two of its columns have one name \(seed, return, return\)"):
+        _ = condition.existing
+
+
+def test_a_line_separator_within_a_text_ends_no_line_of_json(table: Callable[..., Imported]) -> None:
+    assert _values(table('{"seed":1,"return":2,"note":"a\u2028b"}\r\n{"seed":2,"return":3}\r\n', "runs.jsonl")) == [
+        2,
+        3,
+    ]
+
+
+@pytest.mark.parametrize("cell", ["1_0", '"1,000"', "0x1F", "1;5"])
+def test_what_only_some_programs_take_for_a_number_is_none(table: Callable[..., Imported], cell: str) -> None:
+    with pytest.raises(UserError, match=r"in row 1 of the column 'return', which is no number"):
+        _ = table(f"seed,return\n1,{cell}\n").existing
 
 
 @pytest.mark.parametrize(
@@ -222,7 +284,8 @@ def test_a_file_without_a_table_is_a_sentence(table: Callable[..., Imported], na
             CURVES.replace("3,100", "3,200"),
             r"two rows of seed 3 and global_step 200 \(rows 1 and 2\): if there are several",
         ),
-        (CURVES.replace("3,100", "3,"), "Row 2 of .* has no step in the column 'global_step'"),
+        (CURVES.replace("3,100", "3,"), "Row 2 of .* has no step, a number from 0 on, in the column 'global_step'"),
+        (CURVES.replace("3,100", "3,-1"), "Row 2 of .* has no step, a number from 0 on, in the column 'global_step'"),
     ],
 )
 def test_each_row_of_a_curve_has_a_step_of_its_own(table: Callable[..., Imported], text: str, said: str) -> None:

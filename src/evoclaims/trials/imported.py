@@ -72,7 +72,8 @@ class Imported(Condition):
         step: the column of environment steps, if a trial has several rows: its training curve. The last number of a
             metric counts.
         by: who has run the trials, and with what; the records and the report say so.
-        empty_means_diverged: an empty cell stands for a trial that diverged, as "nan" does; else it is an error.
+        empty_means_diverged: an empty cell, or one at the end of a curve, stands for a trial that diverged, as "nan"
+            does; else a trial without a number is an error.
         folder: where `path` is; the reproduction sets it.
     """
 
@@ -90,10 +91,15 @@ class Imported(Condition):
     budget: Any = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        """Reject a table from which no number is read."""
+        """Reject a table from which no number is read, and two axes of a curve."""
         object.__setattr__(self, "budget", _Reports(self))
         if not self.columns:
             raise UserError(f"Imported({str(self.path)!r}) names no metric: metric is the column of what was measured.")
+        if self.step and self.columns.get(STEPS, self.step) != self.step:
+            raise UserError(
+                f"Imported({str(self.path)!r}) has two columns of environment steps: {self.columns[STEPS]!r} and "
+                f"step={self.step!r}. Name the metric otherwise."
+            )
 
     @property
     def columns(self) -> Mapping[str, str]:
@@ -167,24 +173,35 @@ class Imported(Condition):
         Raises:
             UserError: when the table cannot be read, or lacks what it should have.
         """
-        rows = self.table.rows_where(self.where)
         by_seed: dict[int, list[int]] = {}
-        for row, seed in zip(rows, self._seeds(rows), strict=True):
+        for row, seed in zip(self._rows, self._seeds(), strict=True):
             by_seed.setdefault(seed, []).append(row)
         ordered = sorted(by_seed.items())
         return tuple(self._trial(k, seed, self._in_order(seed, found)) for k, (seed, found) in enumerate(ordered))
 
-    def _seeds(self, rows: Sequence[int]) -> list[int]:
-        """Return the table's seeds in some rows."""
-        found = self.table.numbers(self.seed, "the seeds", rows)
-        for row, seed in zip(rows, found, strict=True):
+    def shares_trials_with(self, other: Condition) -> bool:
+        """Whether both read a row of one table."""
+        if not isinstance(other, Imported) or other.table.sha256 != self.table.sha256:
+            return False
+        return not set(self._rows).isdisjoint(other._rows)
+
+    @cached_property
+    def _rows(self) -> list[int]:
+        """The rows of the table that are read."""
+        return self.table.rows_where(self.where)
+
+    def _seeds(self) -> list[int]:
+        """Return the table's seeds in the rows that are read."""
+        found = self.table.numbers(self.seed, "the seeds", self._rows)
+        for row, seed in zip(self._rows, found, strict=True):
             if seed is None or not seed.is_integer():
                 has = "no seed" if seed is None else f"the seed {seed!r}"
                 raise UserError(
                     f"Row {row + 1} of {self.table.name} has {has} in the column {self.seed!r}: each trial has a "
                     "whole number."
                 )
-        return [int(seed) for seed in found if seed is not None]
+        cells = self.table.column(self.seed, "the seeds")
+        return [_whole(cells[row], seed) for row, seed in zip(self._rows, found, strict=True) if seed is not None]
 
     def _in_order(self, seed: int, rows: list[int]) -> list[int]:
         """Return the rows of one trial in the order of steps.
@@ -214,8 +231,10 @@ class Imported(Condition):
         """Return the steps of some rows."""
         found = self.table.numbers(self.step, "the steps", rows)
         for row, step in zip(rows, found, strict=True):
-            if step is None or not math.isfinite(step):
-                raise UserError(f"Row {row + 1} of {self.table.name} has no step in the column {self.step!r}.")
+            if step is None or not 0 <= step < math.inf:
+                raise UserError(
+                    f"Row {row + 1} of {self.table.name} has no step, a number from 0 on, in the column {self.step!r}."
+                )
         return [step for step in found if step is not None]
 
     def _trial(self, number: int, seed: int, rows: Sequence[int]) -> TrialResult:
@@ -242,7 +261,7 @@ class Imported(Condition):
             timing={"run": 0.0, "compile": 0.0, "batch": 1, "started": ""},  # of which the table says nothing
             provenance={
                 "imported": {name: self.plain["imported"][name] for name in ("file", "sha256", "by")},
-                "seed_in_table": seed,
+                "seed_in_table": str(seed),  # a record's numbers have as many digits as a counter
                 "versions": {"evoclaims": version_of("evoclaims")},
                 DEPENDS_ON: [],
             },
@@ -250,15 +269,23 @@ class Imported(Condition):
 
     def _final(self, name: str, values: Sequence[float | None], row: int) -> float:
         """Return the last number of a metric; NaN for a trial that diverged."""
+        if self.empty_means_diverged and values[-1] is None:
+            return math.nan
         found = [value for value in values if value is not None]
         if found:
             return found[-1]
-        if self.empty_means_diverged:
-            return math.nan
         raise UserError(
             f"{self.table.name} has no number in row {row + 1} of the column {self.columns[name]!r}: write nan for a "
             "trial that diverged, or say empty_means_diverged=True if all empty cells mean that."
         )
+
+
+def _whole(cell: Any, number: float) -> int:
+    """Return the whole number in a cell that `number` is nearest to: a float has not the digits of large seeds."""
+    try:
+        return int(cell)
+    except ValueError:  # 1e3, 7.0
+        return int(number)
 
 
 def into_store(condition: Condition, seeds: Sequence[int], store: Store) -> list[TrialResult]:

@@ -84,9 +84,9 @@ class TableFile:
         if cell is None or (isinstance(cell, str) and not cell.strip()):
             return None
         try:
-            if isinstance(cell, int | float | str) and not isinstance(cell, bool):
+            if not isinstance(cell, bool) and "_" not in str(cell):  # Python alone takes 1_0 for ten
                 return float(cell)
-        except (ValueError, OverflowError):
+        except (TypeError, ValueError, OverflowError):
             pass
         raise UserError(f"{self.name} holds {cell!r} in row {row + 1} of the column {name!r}, which is no number.")
 
@@ -108,7 +108,7 @@ def read_table(path: Path) -> TableFile:
 def _read(path: Path, modified: int, size: int) -> TableFile:
     """Read a table; `modified` and `size` tell its versions apart."""
     if path.suffix.lower() not in READERS:
-        raise UserError(f"{path.name} is no table that can be read: its name ends in {', '.join(READERS)}.")
+        raise UserError(f"{path.name} is no table that can be read: the name of one ends in {', '.join(READERS)}.")
     data = read_file(path)
     try:
         columns = READERS[path.suffix.lower()](data)
@@ -120,8 +120,10 @@ def _read(path: Path, modified: int, size: int) -> TableFile:
 
 
 def _is(cell: Any, value: object) -> bool:
-    """Whether a cell holds a value: the same text, or the same number however it is written."""
+    """Whether a cell holds a value: the same text, or the same number or truth however it is written."""
     if cell == value or str(cell) == str(value):
+        return True
+    if isinstance(value, bool) and str(cell).lower() == str(value).lower():
         return True
     try:
         return isinstance(value, int | float) and float(cell) == value
@@ -145,8 +147,7 @@ def _csv(data: bytes, delimiter: str = ",") -> Columns:
         raise NoTableError(str(error)) from error
     except ValueError as error:
         raise NoTableError("it has no first line with the columns' names") from error
-    if len(set(head)) < len(head):
-        raise NoTableError(f"two of its columns have one name ({', '.join(head)})")
+    _unlike(head)
     for number, row in enumerate(rows, start=1):
         if len(row) != len(head):
             raise NoTableError(f"row {number} has {len(row)} cells, and its first line names {len(head)} columns")
@@ -158,9 +159,10 @@ def _json(data: bytes) -> Columns:
     text = _text(data)
     try:
         try:
-            rows = json.loads(text)
+            rows = json.loads(text, object_pairs_hook=_object)
         except ValueError:
-            rows = [json.loads(line) for line in text.splitlines() if line.strip()]
+            lines = text.split("\n")  # a text may hold other separators of lines
+            rows = [json.loads(line, object_pairs_hook=_object) for line in lines if line.strip()]
     except (ValueError, RecursionError):
         rows = None
     rows = [rows] if isinstance(rows, dict) else rows  # a file of one line
@@ -168,6 +170,18 @@ def _json(data: bytes) -> Columns:
         raise NoTableError("it is neither a JSON list of objects nor one object a line, each a row")
     names = dict.fromkeys(name for row in rows for name in row)
     return {name: [row.get(name) for row in rows] for name in names}
+
+
+def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """Return a JSON object."""
+    _unlike([name for name, _ in pairs])
+    return dict(pairs)
+
+
+def _unlike(names: Sequence[str]) -> None:
+    """Reject columns of one name, of which a reader would see one."""
+    if len(set(names)) < len(names):
+        raise NoTableError(f"two of its columns have one name ({', '.join(names)})")
 
 
 def _parquet(data: bytes) -> Columns:
@@ -178,7 +192,9 @@ def _parquet(data: bytes) -> Columns:
     except ImportError as error:
         raise NoTableError("pyarrow, which reads Parquet, is not installed: pip install evoclaims[parquet]") from error
     try:
-        columns: Columns = parquet.read_table(io.BytesIO(data)).to_pydict()
+        file = parquet.ParquetFile(io.BytesIO(data))
+        _unlike(file.schema_arrow.names)
+        columns: Columns = file.read().to_pydict()
     except (arrow.ArrowException, OSError) as error:
         raise NoTableError("it is no Parquet file") from error
     return columns
