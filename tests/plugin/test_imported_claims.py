@@ -74,6 +74,20 @@ def test_they_are_compared_with_trials_that_the_harness_runs(ours: Project) -> N
     assert _judged(ours)[0] == "supported"
 
 
+@pytest.mark.parametrize("settings", ["metric={'mean_success': 'seed'}", "by='Bob'", "where={}, step='success'"])
+def test_one_row_is_no_independent_trial_of_two_conditions(ours: Project, settings: str) -> None:
+    paper = (ours.path / "our_paper.py").read_text()
+    again = f"replace(imported('good'), {settings})"
+    (ours.path / "our_paper.py").write_text(
+        paper.replace("imported('bad')", again)
+        .replace('imported("bad")', again)
+        .replace("import tiny_paper", "import tiny_paper\nfrom dataclasses import replace")
+    )
+    outcome, reason = _judged(ours)
+    assert outcome == "error"
+    assert "read the same trials, which no rank test may compare" in reason
+
+
 @pytest.mark.parametrize(
     ("tier", "count", "said"),
     [

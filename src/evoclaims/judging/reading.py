@@ -11,6 +11,7 @@ from typing import Any, Literal, Self, TypeVar, get_args
 
 from evoclaims.core.errors import UnknownNameError, UserError
 from evoclaims.judging.sample import (
+    Limited,
     Sample,
     Source,
     Trials,
@@ -154,10 +155,11 @@ def require_independent(*readings: NumberReading) -> None:
     """Reject measures that no rank test may compare: it assumes independent samples that are observed alike.
 
     Raises:
-        UserError: when two read the same condition, or are not observed equally far and finely.
+        UserError: when two read the same trials, or are not observed equally far and finely.
     """
     for one, other in combinations(readings, 2):
-        if one.source.fingerprint == other.source.fingerprint:
+        a, b = one.source, other.source
+        if a.fingerprint == b.fingerprint or (isinstance(a, Limited) and a.shares_trials_with(b)):
             raise UserError(
                 f"{one.describe()!r} and {other.describe()!r} read the same trials, which no rank test may compare: "
                 "use a profile's falls() or rises() for levels, never_above_itself() for a control."

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 from evoclaims.core.errors import guess
 from evoclaims.judging.effect import median
@@ -30,6 +30,18 @@ class Source(Protocol):
 
     def fetch(self, seeds: Sequence[int]) -> Sequence[TrialResult]:
         """Return one trial per seed, in any order; run missing ones, or raise if nothing may run."""
+
+
+@runtime_checkable
+class Limited(Source, Protocol):
+    """A source that may be limited to existing trials, whose seeds count from 0."""
+
+    @property
+    def existing(self) -> int | None:
+        """How many trials there are; None where missing ones are run."""
+
+    def shares_trials_with(self, other: Source) -> bool:
+        """Whether another source, of another fingerprint, reads some of the same trials."""
 
 
 Trials = Mapping[str, tuple[TrialResult, ...]]

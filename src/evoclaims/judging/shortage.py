@@ -2,20 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Protocol, runtime_checkable
-
 from evoclaims.judging.assertion import Assertion
 from evoclaims.judging.design import Design, Look
-from evoclaims.judging.sample import Source
-
-
-@runtime_checkable
-class Limited(Source, Protocol):
-    """A source that may be limited to existing trials, whose seeds count from 0."""
-
-    @property
-    def existing(self) -> int | None:
-        """How many trials there are; None where missing ones are run."""
+from evoclaims.judging.sample import Limited
 
 
 def shortage(assertion: Assertion, look: Look, design: Design) -> str:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from evoclaims.core.errors import UnknownNameError
 from evoclaims.judging.measure import Event, Measure, Profile
 from evoclaims.judging.reading import Better
-from evoclaims.judging.shortage import Limited
+from evoclaims.judging.sample import Limited, Source
 from evoclaims.paper.sample_efficiency import steps_to
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.spec import Condition
@@ -66,6 +66,10 @@ class TrialGroup:
     def existing(self) -> int | None:
         """How many trials there are, where no more can be run; None where missing ones are run."""
         return None if self.condition.existing is None else len(self.condition.existing)
+
+    def shares_trials_with(self, other: Source) -> bool:
+        """Whether another group reads some of the same trials from a table."""
+        return isinstance(other, TrialGroup) and self.condition.shares_trials_with(other.condition)
 
     def measure(
         self, name: str, read: Callable[[TrialResult], float] | None = None, better: Better = "higher"

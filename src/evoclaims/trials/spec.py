@@ -88,6 +88,10 @@ class Condition:
         """All trials that there can be, by seed from 0, where no more can be run; None for what the harness runs."""
         return None
 
+    def shares_trials_with(self, other: Condition) -> bool:
+        """Whether some of the same trials have another id here; it is False for what the harness runs."""
+        return False
+
     @property
     def label(self) -> str:
         """A short name for progress lines and tables, such as "cma_es on n_parity"."""
