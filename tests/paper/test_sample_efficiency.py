@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -19,6 +20,7 @@ from evoclaims.judging.verdict import Outcome
 from evoclaims.judging.window import Window
 from evoclaims.paper.trial_group import TrialGroup
 from evoclaims.trials.budget import Budget
+from evoclaims.trials.imported import Imported
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.spec import Condition
 
@@ -152,4 +154,41 @@ def test_twice_as_sample_efficient_is_a_ratio(group: Any) -> None:
     )
     assert (
         judge(3 * fast.steps_to("success", 0.9) < slow.steps_to("success", 0.9), Design.fixed(6)).outcome != "supported"
+    )
+
+
+@pytest.fixture
+def imported(tmp_path: Path) -> Callable[[Sequence[int]], TrialGroup]:
+    """A function that imports ten trials with reports at these steps, which are above 5 from the last but one on."""
+
+    def make(steps: Sequence[int]) -> TrialGroup:
+        rows = [f"{seed},{at},{9 if at >= steps[-2] else 1}" for seed in range(10) for at in steps]
+        (tmp_path / "runs.csv").write_text("\n".join(["seed,step,return", *rows]))
+        condition = Imported("runs.csv", "seed", "return", step="step", folder=tmp_path)
+        return TrialGroup("theirs", "small", condition, lambda asked, seeds: [asked.existing[seed] for seed in seeds])
+
+    return make
+
+
+def test_steps_of_an_imported_curve_count_as_reported_however_uneven_its_reports(
+    imported: Callable[[Sequence[int]], TrialGroup],
+) -> None:
+    measure = imported([100, 950, 1000]).steps_to("return", 5)
+    assert judge(measure > 960, Design.fixed(10)).outcome is Outcome.REFUTED
+    assert judge(measure < 960, Design.fixed(10)).evidence[0].samples[0].median == 950
+
+
+def test_an_imported_trial_that_ended_early_is_not_advised_to_be_run_otherwise(
+    imported: Callable[[Sequence[int]], TrialGroup],
+) -> None:
+    group = imported([100, 950, 1000])
+    condition = group.condition
+    lines = (condition.folder / condition.path).read_text().splitlines()
+    (condition.folder / condition.path).write_text("\n".join(lines[:2] + lines[4:]))  # the first trial ends at 100
+    measure = replace(group, condition=replace(condition)).steps_to("return", 5)
+    verdict = judge(measure < 960, Design.fixed(10))
+    assert verdict.outcome is Outcome.ERROR
+    assert "ended after 100 of 1,000 environment steps" in verdict.reason
+    assert verdict.reason.endswith(
+        "nobody knows when it would have reached that: ask for a value that ended trials have reached"
     )

@@ -20,22 +20,24 @@ class Window:
     Attributes:
         limit: a larger value is only known to be larger (it is censored), and counts as infinite.
         every: a value is only known up to a multiple of this, and counts as the next one; 0 for exact values.
+        as_reported: a value that is no multiple counts as it is, unless a window that is shared makes it coarser.
     """
 
     limit: float = math.inf
     every: float = 0.0
+    as_reported: bool = False
 
     def seen(self, value: float) -> float:
         """Return what is known of a value."""
         if value > self.limit:
             return math.inf
-        if not self.every or math.isinf(value):
+        if not self.every or self.as_reported or math.isinf(value):
             return value
         return min(math.ceil(value / self.every - _ROUNDING) * self.every, self.limit)
 
     def scaled(self, factor: float) -> Window:
         """Return the window of values that are multiplied by a factor above 0."""
-        return Window(self.limit * factor, self.every * factor)
+        return Window(self.limit * factor, self.every * factor, self.as_reported)
 
 
 def shared(windows: Sequence[Window]) -> Window:

@@ -38,6 +38,8 @@ def steps_to(source: Source, condition: Condition, curve: str, value: float, lev
         raise UserError(f"{source.label} has levels 0 to {levels - 1}, not {wanted}.")
     cost, budget = condition.method.cost(condition.task), float(condition.environment_steps)
     chunk = condition.budget.chunk(cost)
+    imported = condition.existing is not None
+    advice = "" if imported else "give the condition the progression 'whole_budget', or "
     name = f"environment steps until {curve} is {float(value):.12g}" + f" on level {wanted}" * (levels > 1)
 
     def read(trial: TrialResult) -> float:
@@ -53,9 +55,10 @@ def steps_to(source: Source, condition: Condition, curve: str, value: float, lev
             raise UnreadableTrialError(
                 f"The trial of seed {trial.seed} of {source.label} ended after {max(steps, default=0.0):,.12g} of "
                 f"{budget:,.12g} environment steps with {curve!r} below {value:g}, and nobody knows when it would have "
-                "reached that: give the condition the progression 'whole_budget', or ask for a value that ended trials "
-                "have reached"
+                f"reached that: {advice}ask for a value that ended trials have reached"
             )
         return first
 
-    return Measure(source, name, read, "lower", Window(budget, float(chunk * cost) if chunk > 1 else 0.0))
+    # Reports of imported trials are perhaps unevenly far apart, at steps that are no multiples of the longest distance.
+    window = Window(budget, float(chunk * cost) if chunk > 1 else 0.0, as_reported=imported)
+    return Measure(source, name, read, "lower", window)
