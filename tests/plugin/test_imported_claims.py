@@ -187,6 +187,27 @@ def test_a_changed_table_is_compared_with_the_reference_trials_of_the_one_before
     )
 
 
+def test_a_table_without_some_of_the_reference_trials_is_told_even_if_no_test_finds_a_drift(
+    ours: Project, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    whole = _table(_numbers(0.8, 14), _numbers(0.3))
+
+    def judged(table: str) -> str:
+        (ours.path / "runs.csv").write_text(table)
+        monkeypatch.delitem(sys.modules, "our_paper", raising=False)  # which has read the table
+        return ours.run(own_store=True).stdout.str()
+
+    judged(whole)
+    assert cli.main(["reference"]) == 0
+    edited = judged(whole.replace("good,10,0.800\n", "").replace("good,16,0.802\n", "").replace("0.804", "0.814"))
+    assert "reference trials: 2 comparisons, 0 drifted" in edited
+    assert (
+        "EDITED theirs on parity (smoke), another table: reference trials that are judged no longer: seeds 10, 16 of "
+        "the table; with other numbers: seeds 22 of the table\n"
+    ) in edited
+    assert "EDITED" not in judged(whole + "good,1000,0.1\n")
+
+
 def test_commands_read_the_table_where_no_trial_is_stored_and_say_that_there_is_nothing_to_run(
     ours: Project, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -33,6 +33,7 @@ class DriftCase:
         new: new trials.
         reference: committed trials.
         metrics: names in `TrialResult.metrics`.
+        edited: what is not the same in the table that the trials were imported from, as a clause; empty if nothing.
     """
 
     label: str
@@ -40,6 +41,7 @@ class DriftCase:
     new: tuple[TrialResult, ...]
     reference: tuple[TrialResult, ...]
     metrics: tuple[str, ...]
+    edited: str = ""
 
 
 @dataclass(frozen=True)
@@ -90,10 +92,11 @@ class DriftRow:
 
 @dataclass(frozen=True)
 class DriftReport:
-    """One row per condition and metric, judged together at `alpha`."""
+    """One row per condition and metric, judged together at `alpha`, and edited tables, which need no test."""
 
     rows: tuple[DriftRow, ...]
     alpha: float
+    edited: tuple[str, ...] = ()
 
     @property
     def drifted(self) -> bool:
@@ -107,10 +110,11 @@ class DriftReport:
 
     @property
     def lines(self) -> list[str]:
-        """A line for each row that drifted, and one for each condition that could not be checked."""
+        """A line for each row that drifted, each edited table, and each condition that could not be checked."""
+        edited = [f"EDITED {said}" for said in self.edited]
         drifted = [f"DRIFT in {row.in_words}" for row in self.rows if row.drifted]
         unchecked = (f"not checked: {row.label}: {row.detail or row.status}" for row in self.unchecked)
-        return [*drifted, *dict.fromkeys(unchecked)]
+        return [*drifted, *edited, *dict.fromkeys(unchecked)]
 
     @property
     def unchecked(self) -> tuple[DriftRow, ...]:
@@ -137,7 +141,8 @@ def check_drift(cases: Sequence[DriftCase], alpha: float = ALPHA) -> DriftReport
     tested = [row.p for row in rows if row.p is not None]
     adjusted = iter(holm(tested))
     corrected = (row if row.p is None else _corrected(row, next(adjusted), len(tested), alpha) for row in rows)
-    return DriftReport(tuple(corrected), alpha)
+    edited = tuple(f"{case.label}: {case.edited}" for case in cases if case.edited)
+    return DriftReport(tuple(corrected), alpha, edited)
 
 
 def _test(case: DriftCase, metric: str) -> DriftRow:

@@ -86,10 +86,24 @@ def paired(label: str, new: Sequence[TrialResult], reference: Sequence[TrialResu
     condition = new[0].condition
     if "imported" not in new[0].spec:
         return DriftCase(label, condition, tuple(new), tuple(reference), METRICS)
-    changed = any(old.condition != condition and _read_alike(old, new[0]) for old in reference)
-    earlier = tuple(replace(old, condition=condition) if _read_alike(old, new[0]) else old for old in reference)
+    alike = [old for old in reference if _read_alike(old, new[0])]
+    others = [old for old in reference if not _read_alike(old, new[0])]
+    earlier = (*(replace(old, condition=condition) for old in alike), *others)
+    changed = any(old.condition != condition for old in alike)
     metrics = sorted({name for trial in new for name in trial.metrics})
-    return DriftCase(label + ", another table" * changed, condition, tuple(new), earlier, tuple(metrics))
+    return DriftCase(
+        label + ", another table" * changed, condition, tuple(new), earlier, tuple(metrics), _edited(new, alike)
+    )
+
+
+def _edited(new: Sequence[TrialResult], earlier: Sequence[TrialResult]) -> str:
+    """Say which earlier trials of a table are judged no longer, or have other numbers now; empty if none."""
+    now, before = ({str(trial.provenance["seed_in_table"]): trial.digest for trial in side} for side in (new, earlier))
+    found = {
+        "reference trials that are judged no longer": [seed for seed in before if seed not in now],
+        "with other numbers": [seed for seed, was in before.items() if now.get(seed, was) != was],
+    }
+    return "; ".join(f"{what}: seeds {', '.join(seeds)} of the table" for what, seeds in found.items() if seeds)
 
 
 def _read_alike(one: TrialResult, other: TrialResult) -> bool:
