@@ -14,7 +14,7 @@ from scipy.stats import kruskal
 
 from evoclaims.core.errors import UserError
 from evoclaims.judging.design import FIXED_10, Design
-from evoclaims.judging.exact import binomial_test
+from evoclaims.judging.exact import ExactTest, binomial_test
 from evoclaims.judging.judge import judge
 from evoclaims.judging.kinds import omnibus
 from evoclaims.judging.kinds.omnibus import any_differ, kruskal_wallis_test
@@ -182,3 +182,8 @@ def test_the_sentence_names_every_condition(source) -> None:
     assert any_differ(a, b, c).describe() == "at least two of a: score, b: score and c: score differ"
     assert any_differ(a, b, c, margin=5).describe().endswith("c: score differ (it does not matter by less than 5)")
     assert [s.label for s in any_differ(a, b, c).sources()] == ["a", "b", "c"]
+
+
+def test_many_conditions_are_compared_as_soon_as_few() -> None:
+    groups = [[3.0 * k, 3.0 * k + 1, 3.0 * k + 2] for k in range(12)]  # whose 12! orders nobody can try
+    assert kruskal_wallis_test(groups) == ExactTest(1e-4, 1e-4)

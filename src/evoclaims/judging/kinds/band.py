@@ -33,7 +33,7 @@ class Band(Assertion):
     entry: ClassVar[Entry] = Entry(
         syntax=("a.furthest_reached.between(4, 6)",),
         null=(
-            "A trial is below the highest value, or above the lowest, with probability 1/2 at most: so the "
+            "A trial is at most the highest value, or at least the lowest, with probability 1/2 at most: so the "
             "median is outside."
         ),
         supported="Two sign tests reject both; a trial at an end counts as inside.",

@@ -139,7 +139,8 @@ def kruskal_wallis_test(groups: Sequence[Sequence[float]]) -> ExactTest:
     observed = _spread(ranks, _splits_as_given(sizes), sizes)[0]
     ordered = np.sort(ranks)
     # Groups that follow one another in the order of values are as far apart as these values allow.
-    largest = max(_spread(ordered, _splits_as_given(order), order)[0] for order in {*permutations(sizes)})
+    orders = {*permutations(sizes)} if len({*sizes}) > 1 else {sizes}  # of equal groups, all orders are one
+    largest = max(_spread(ordered, _splits_as_given(order), order)[0] for order in orders)
     exact = _count(sizes) <= MOST_SPLITS
     spreads = _spread(ranks, _all_splits(sizes) if exact else _drawn_splits(sizes), sizes)
 
