@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import operator
 from itertools import product
 from typing import Any
 
@@ -112,6 +113,14 @@ def test_numbers_of_numpy_are_numbers_and_truth_values_are_not(source) -> None:
         _ = score > True
     with pytest.raises(UserError, match="another measure or a number, not with '90'"):
         _ = score < "90"
+
+
+def test_a_comparison_that_allows_ties_is_told_to_be_strict(source) -> None:
+    score = source("a", []).score()
+    for compare in (operator.ge, operator.le):
+        for other in (90, source("b", []).score()):
+            with pytest.raises(UserError, match="'a: score' is compared by > or <, and not by >= or <="):
+                compare(score, other)
 
 
 def test_an_unknown_side_lists_the_known_ones(source) -> None:

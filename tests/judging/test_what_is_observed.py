@@ -186,3 +186,18 @@ def test_a_factor_is_a_finite_number_above_0(source, factor) -> None:
 def test_an_exact_measure_is_described_and_hashed_as_ever(source) -> None:
     assert source("a", []).score().window == EVERYTHING
     assert "limit" not in source("a", []).score().plain()
+
+
+@pytest.mark.parametrize(("factor", "of_a", "of_b"), [(0.1, 3.0, 0.3), (1.1, 3.0, 3.3), (3, 0.1, 0.3)])
+def test_what_a_ratio_makes_equal_is_a_tie(source, factor, of_a, of_b) -> None:
+    a, b = source("a", [of_a] * 10).score(), source("b", [of_b] * 10).score()
+    for claim in (factor * a > b, b > factor * a, factor * a > of_b, factor * a < of_b):
+        assert judge(claim, FIXED_10).outcome is not SUPPORTED
+    assert factor * of_a != of_b  # as floats are multiplied
+
+
+def test_a_trial_at_the_limit_is_at_the_scaled_limit(source) -> None:
+    for tenths in range(1, 60):
+        a = 0.1 * until(source, "a", [tenths / 10], Window(tenths / 10))
+        trials = {a.source.fingerprint: tuple(a.source.fetch([0]))}
+        assert a.sample(trials).values == (a.window.limit,)

@@ -9,7 +9,7 @@ import math
 from functools import reduce
 from numbers import Real
 from operator import and_
-from typing import TypeGuard
+from typing import NoReturn, TypeGuard
 
 from evoclaims.core.errors import UserError
 from evoclaims.judging.assertion import Assertion
@@ -23,6 +23,7 @@ from evoclaims.judging.kinds.threshold import Threshold
 from evoclaims.judging.kinds.trend import Trend
 from evoclaims.judging.reading import EventReading, LevelsReading, NumberReading, comparable
 from evoclaims.judging.sample import UnreadableTrialError
+from evoclaims.judging.window import product
 from evoclaims.trials.result import TrialResult
 
 
@@ -40,6 +41,19 @@ class Measure(NumberReading):
         """Assert that this measure is below `other`, or its median below a number."""
         return Threshold(self, "below", float(other)) if _is_number(other) else self._measure(other) > self
 
+    def __ge__(self, other: object) -> NoReturn:
+        """Reject a comparison that holds for equal values, which decide nothing.
+
+        Raises:
+            UserError: always.
+        """
+        raise UserError(
+            f"{self.describe()!r} is compared by > or <, and not by >= or <=: equal values decide nothing. "
+            "Write m > 90, or m.between(90, 100), whose ends count as inside."
+        )
+
+    __le__ = __ge__
+
     def __mul__(self, factor: float) -> Measure:
         """Return this measure times a number above 0, for ratios: `2 * a.environment_steps < b.environment_steps`.
 
@@ -54,7 +68,7 @@ class Measure(NumberReading):
         return Measure(
             self.source,
             f"{written} × {self.name}",
-            lambda trial: factor * self._at_least_0(trial),
+            lambda trial: product(factor, self._at_least_0(trial)),
             self.better,
             self.window.scaled(factor),
         )
