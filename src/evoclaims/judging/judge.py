@@ -163,10 +163,10 @@ def _without_result(assertion: Assertion, trials: Trials) -> str:
     """Return a clause that names the trials which diverged or ran out of time, or nothing."""
     words = {"diverged": "diverged", "timeout": "ran out of time"}
     found = [
-        f"{len(seeds)} of {len(trials[mark])} trials of {label} {words[status]} (seeds {', '.join(map(str, seeds))})"
+        f"{len(seeds)} of {len(trials[mark])} trials of {label} {words[status]} (seeds {', '.join(seeds)})"
         for mark, label in {source.fingerprint: source.label for source in assertion.sources()}.items()
         for status in words
-        if (seeds := [trial.seed for trial in trials[mark] if trial.status == status])
+        if (seeds := [trial.seed_in_words for trial in trials[mark] if trial.status == status])
     ]
     return "; ".join(found)
 

@@ -107,7 +107,7 @@ class Measure(NumberReading):
         value = self.read(trial)
         if value < 0:
             raise UnreadableTrialError(
-                f"{self.describe()} is {value:g} in the trial of seed {trial.seed}: "
+                f"{self.describe()} is {value:g} in the trial of seed {trial.seed_in_words}: "
                 "a measure that can be below 0 has no ratios."
             )
         return value

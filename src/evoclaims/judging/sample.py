@@ -125,7 +125,7 @@ def checked(trial: TrialResult) -> TrialResult:
     """Return the trial with metrics and levels that raise `UnreadableTrialError` for NaN or missing names."""
     if isinstance(trial.metrics, _Numbers):  # it has been checked, as trials are that are judged again and again
         return trial
-    where = f"the finished trial of seed {trial.seed} (id {trial.id[:12]})"
+    where = f"the finished trial of seed {trial.seed_in_words} (id {trial.id[:12]})"
     return replace(
         trial,
         metrics=_Numbers(trial.metrics, where),

@@ -53,9 +53,10 @@ def steps_to(source: Source, condition: Condition, curve: str, value: float, lev
         first = next(reached, math.inf)
         if math.isinf(first) and max(steps, default=0.0) < budget:
             raise UnreadableTrialError(
-                f"The trial of seed {trial.seed} of {source.label} ended after {max(steps, default=0.0):,.12g} of "
-                f"{budget:,.12g} environment steps with {curve!r} below {value:g}, and nobody knows when it would have "
-                f"reached that: {advice}ask for a value that ended trials have reached"
+                f"The trial of seed {trial.seed_in_words} of {source.label} ended after "
+                f"{max(steps, default=0.0):,.12g} of {budget:,.12g} environment steps with {curve!r} below {value:g}, "
+                "and nobody knows when it would have reached that: "
+                f"{advice}ask for a value that ended trials have reached"
             )
         return first
 

@@ -54,6 +54,12 @@ class TrialResult:
         """Platform, kind and count of the devices that made the trial; empty in a record that does not say."""
         return self.provenance.get("device") or {}
 
+    @property
+    def seed_in_words(self) -> str:
+        """The seed, and that by which the trial is known in the table that it was imported from, if another."""
+        known = self.provenance.get("seed_in_table", str(self.seed))
+        return str(self.seed) if known == str(self.seed) else f"{self.seed} ({known} in the table)"
+
     def to_json(self) -> dict[str, Any]:
         """Return the record as plain JSON, sealed with a hash that detects torn or edited files."""
         plain: dict[str, Any] = {"schema": SCHEMA, **as_plain(self)}
