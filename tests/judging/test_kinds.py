@@ -140,6 +140,12 @@ def test_equivalent(source, a, outcome) -> None:
     assert judge(assertion, FIXED_10).outcome is outcome
 
 
+@pytest.mark.parametrize(("a", "b", "margin"), [(0.1, 0.3, 0.2), (0.75, 0.7, 0.05), (0.3, 0.1, 0.2)])
+def test_a_difference_as_large_as_the_margin_is_not_within_it(source, a, b, margin) -> None:
+    assertion = source("a", [a] * 10).score().equivalent_to(source("b", [b] * 10).score(), margin=margin)
+    assert judge(assertion, FIXED_10).outcome is INCONCLUSIVE
+
+
 def test_equivalence_is_refuted_at_half_of_alpha(source) -> None:
     # Three against three: a complete separation has p = 0.05, which alpha / 2 does not allow.
     assertion = source("a", shifted(30)).score().equivalent_to(source("b", RISING).score(), margin=8.0)

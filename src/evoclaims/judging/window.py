@@ -5,18 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from decimal import Decimal
 from typing import Final
 
 from evoclaims.core.errors import UserError
+from evoclaims.judging.as_written import product
 
 _ROUNDING: Final = 1e-9
 """A share of a step that floating-point numbers may be off by."""
-
-
-def product(factor: float, value: float) -> float:
-    """Return the product of two numbers as they are written: 0.1 times 3 is 0.3, and so a tie with 0.3."""
-    return float(Decimal(repr(float(factor))) * Decimal(repr(float(value))))
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from evoclaims.core.errors import UserError
+from evoclaims.judging.as_written import total
 from evoclaims.judging.assertion import Assertion, Finding
 from evoclaims.judging.design import Design
 from evoclaims.judging.entry import Entry
@@ -61,8 +62,7 @@ class Equivalent(Assertion):
         """Run the two tests for it and the two against it."""
         left, right = self.left.sample(trials), self.right.sample(trials)
         a, b = left.values, right.values
-        raised = tuple(value + self.margin for value in a)
-        lowered = tuple(value - self.margin for value in a)
+        raised, lowered = _shifted(a, self.margin), _shifted(a, -self.margin)
         inside = equivalence_tests(a, b, self.margin)
         outside = (rank_test(b, raised), rank_test(lowered, b))
         p = PValues(max(test.p for test in inside), min(1.0, 2 * min(test.p for test in outside)))
@@ -76,4 +76,9 @@ class Equivalent(Assertion):
 
 def equivalence_tests(a: Sequence[float], b: Sequence[float], margin: float) -> tuple[ExactTest, ExactTest]:
     """Return the rank tests that both have to reject: A + margin above B, and B above A - margin."""
-    return rank_test([value + margin for value in a], b), rank_test(b, [value - margin for value in a])
+    return rank_test(_shifted(a, margin), b), rank_test(b, _shifted(a, -margin))
+
+
+def _shifted(values: Sequence[float], by: float) -> list[float]:
+    """Return values that are all moved by a margin."""
+    return [total(value, by) for value in values]
