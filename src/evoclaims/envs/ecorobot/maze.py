@@ -12,7 +12,6 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float
 from numpy.typing import NDArray
-from scipy import ndimage
 
 from evoclaims.envs.ecorobot.boxes import Box
 from evoclaims.envs.ecorobot.robot_task import RobotTask
@@ -101,9 +100,15 @@ def _reachable(
     for box in boxes:
         free &= box.distance(points) >= radius
     first = tuple(int(np.argmin(np.abs(axis - at))) for axis, at in zip(axes, start, strict=True))
-    free[first] = True
-    areas, _ = ndimage.label(free)
-    flooded = areas == areas[first]
+    # By hand rather than by SciPy, whose versions trials in mazes would depend on.
+    flooded, edge = np.zeros_like(free), [first]
+    flooded[first] = True
+    while edge:
+        x, y = edge.pop()
+        for i, j in ((x + 1, y), (x - 1, y), (x, y + 1), (x, y - 1)):
+            if 0 <= i < free.shape[0] and 0 <= j < free.shape[1] and free[i, j] and not flooded[i, j]:
+                flooded[i, j] = True
+                edge.append((i, j))
     ground = flooded.reshape(cells[0], FINE, cells[1], FINE).any(axis=(1, 3))
     ground.setflags(write=False)
     return ground
