@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import math
 from typing import Any
 
 import pytest
@@ -20,6 +22,11 @@ from evoclaims.trials.spec import Condition
 
 def train(task: Any, seed: int, budget: Any, rate: float = 0.1) -> dict[str, float]:
     return {"last_fitness": rate}
+
+
+class Trainer:
+    def train(self, task: Any, seed: int, budget: Any) -> dict[str, float]:
+        return {}
 
 
 def _id(loop: TrainingLoop) -> str:
@@ -47,6 +54,10 @@ def test_what_another_process_cannot_call_is_a_sentence() -> None:
         TrainingLoop(train, {"speed": 1.0}, packages=())
     with pytest.raises(UserError, match="A set cannot be passed to another process"):
         TrainingLoop(train, {"rate": {1}}, packages=())
+    with pytest.raises(UserError, match="part of its trials' ids: ABCMeta has no canonical JSON form"):
+        TrainingLoop(train, {"rate": NParity}, packages=())
+    with pytest.raises(UserError, match=r"finds <function Trainer.train at .*, and not <bound method"):
+        TrainingLoop(Trainer().train, packages=())
 
 
 def test_it_has_no_champion_and_says_so() -> None:
@@ -62,10 +73,9 @@ def test_it_has_no_champion_and_says_so() -> None:
         NParity(4, sampling="sampled"),
         Obstacles(sensor=Rangefinders()),
         Mlp((4, 4)),
-        {"a": (1, [2.5, None]), "b": {1: "x"}, "c": train},
-        float("inf"),
+        {"a": (1, [2.5, None], -math.inf), "b": {1: "x"}, "c": train},
     ],
     ids=lambda value: type(value).__name__,
 )
 def test_another_process_makes_equal_values(value: Any) -> None:
-    assert from_plain(to_plain(value)) == value
+    assert from_plain(json.loads(json.dumps(to_plain(value), allow_nan=False))) == value

@@ -90,6 +90,42 @@ def test_the_same_seed_gives_the_same_digest_and_another_process_tries_a_crash_a
     assert {one.trials for one in told if not one.remark} == {2}
 
 
+def test_a_loop_may_fork_and_what_it_has_forked_ends_with_it(store: Store, cpus: list[Any]) -> None:
+    forked, killed = run(condition(toy_loops.with_processes), range(2), store, cpus, time_limit=30.0)
+    assert (forked.status, forked.metrics["last_fitness"]) == ("done", 1.0)
+    assert (killed.status, crashes.why(killed)) == ("crashed", "its process ended with SIGKILL")
+
+
+def test_what_a_loop_does_in_an_odd_way_is_understood_or_is_a_crash_that_says_what_it_was(
+    store: Store, cpus: list[Any]
+) -> None:
+    odd = condition(toy_loops.in_odd_ways, clip=math.inf)
+    good, *crashed = run(odd, range(5), store, cpus, time_limit=30.0)
+    assert (good.metrics["last_fitness"], good.metrics["clip"]) == (0.25, math.inf)
+    assert good.metrics["environment_steps"] == 55
+    assert [one.status for one in crashed] == ["crashed"] * 4
+    too_far, long, unnamed, reading = map(crashes.why, crashed)
+    assert too_far.endswith("UserError: A training function reports a number of steps, and not 1152921504606846976.")
+    assert long == "ValueError: " + "x" * 488
+    assert unnamed.endswith(r"'a name that is no \udc80 text' is 1.0.")
+    assert reading == "EOFError: EOF when reading a line"
+
+
+def test_threads_of_a_loop_report_without_mixing_their_lines(store: Store, cpus: list[Any]) -> None:
+    (told,) = run(condition(toy_loops.from_threads), [0], store, cpus)
+    assert told.status == "done"
+    assert told.curves["number 699"][-1] == 699.0
+
+
+def test_a_file_where_it_is_started_takes_the_place_of_no_module(
+    tmp_path: Path, store: Store, cpus: list[Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "traceback.py").write_text("raise SystemExit('not this one')")
+    monkeypatch.chdir(tmp_path)
+    (good,) = run(IN_EVERY_WAY, [0], store, cpus)
+    assert good.status == "done"
+
+
 def test_a_policy_is_examined_as_all_are_be_it_of_numpy_or_of_jax(store: Store, cpus: list[Any]) -> None:
     right, wrong = run(condition(toy_loops.knows_parity, NParity(3)), range(2), store, cpus)
     assert right.levels["success"] == (1.0, 1.0)

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import multiprocessing
 import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -38,6 +40,58 @@ def in_every_way(task: Any, seed: int, budget: Any, report: Callable[..., None])
     if seed == 2:
         os.kill(os.getpid(), signal.SIGSEGV)
     return {"last_fitness": float("nan") if seed == 3 else 7.5, "found": float("inf")}
+
+
+class Tensor:
+    """A number as PyTorch has it, whose size is a method."""
+
+    def size(self) -> tuple[int, ...]:
+        return ()
+
+    def item(self) -> float:
+        return 0.25
+
+
+def with_processes(task: Any, seed: int, budget: Any, report: Callable[..., None]) -> Mapping[str, float]:
+    """Train with a process that is a fork of this one (seed 0), and be killed while such a one lives on (1)."""
+    forks = multiprocessing.get_context("fork")
+    if seed == 0:
+        worker = forks.Process(target=os.getpid)
+        worker.start()
+        worker.join(10)
+        return {"last_fitness": float(worker.exitcode == 0)}
+    forks.Process(target=time.sleep, args=(600,)).start()
+    os.kill(os.getpid(), signal.SIGKILL)
+    return {}
+
+
+def in_odd_ways(task: Any, seed: int, budget: Any, report: Callable[..., None], clip: float = 0.0) -> Mapping[str, Any]:
+    """Return scalars of another library, after steps that are no point of the curve (seed 0); fail in odd ways."""
+    if seed == 0:
+        for step in (30, 50, 55):
+            report(step, fitness=Tensor())
+        return {"last_fitness": Tensor(), "clip": clip}
+    if seed == 1:
+        report(2**60, fitness=1.0)
+    if seed == 2:
+        raise ValueError("x" * 1_000_000)
+    return {"a name that is no \udc80 text": 1.0} if seed == 3 else {"read": float(input())}
+
+
+def from_threads(task: Any, seed: int, budget: Any, report: Callable[..., None]) -> Mapping[str, float]:
+    """Report long lines from several threads at once."""
+    numbers = {f"number {n}": float(n) for n in range(800)}
+
+    def told(first: int) -> None:
+        for step in range(first, first + 4000, 50):
+            report(step, **numbers)
+
+    threads = [threading.Thread(target=told, args=(1000 * n,)) for n in range(8)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    return {"last_fitness": 1.0}
 
 
 def notes(task: Any, seed: int, budget: Any, report: Callable[..., None], file: str) -> Mapping[str, float]:

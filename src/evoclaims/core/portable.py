@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import importlib
+import math
 from functools import reduce
 from typing import Any, Final
 
@@ -25,9 +26,11 @@ def reference(value: Any) -> str:
             "inside a function or in a script."
         )
     try:
-        resolve(named := f"{module}:{name}")
+        found = resolve(named := f"{module}:{name}")
     except (ImportError, AttributeError) as error:  # a class that was made while the program ran
         raise UserError(f"{named} cannot be imported by another process: {error}.") from error
+    if found != value:  # a method of one object, or a function that a decorator has replaced
+        raise UserError(f"Another process that imports {named} finds {found!r} there, and not {value!r}.")
     return named
 
 
@@ -43,6 +46,8 @@ def to_plain(value: Any) -> Any:
     Raises:
         UserError: for anything but dataclasses, classes, functions, tables, lists, tuples and plain values.
     """
+    if isinstance(value, float) and not math.isfinite(value):  # which JSON has no words for
+        return {"float": repr(float(value))}
     if isinstance(value, _PLAIN):
         return value
     if isinstance(value, list):
@@ -65,6 +70,8 @@ def from_plain(plain: Any) -> Any:
         return [from_plain(item) for item in plain]
     if not isinstance(plain, dict):
         return plain
+    if "float" in plain:
+        return float(plain["float"])
     if "tuple" in plain:
         return tuple(map(from_plain, plain["tuple"]))
     if "dict" in plain:

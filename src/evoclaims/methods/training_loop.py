@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Final, NoReturn
 
+from evoclaims.core.canonical import as_plain
 from evoclaims.core.errors import UserError
 from evoclaims.core.portable import reference, to_plain
 
@@ -46,6 +47,13 @@ class TrainingLoop:
         """Replace the function by its place, after checking that it takes the settings."""
         object.__setattr__(self, "settings", dict(self.settings))
         to_plain(self.settings)  # what another process cannot be given is said at once
+        try:
+            as_plain(self.settings)
+        except TypeError as error:
+            raise UserError(
+                f"Settings of a training loop are part of its trials' ids: {error}; give a word that the training "
+                "function understands."
+            ) from error
         if callable(self.function):
             place = reference(self.function)
             check_arguments(self.function, self.settings)

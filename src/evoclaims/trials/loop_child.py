@@ -13,8 +13,7 @@ from typing import Final
 
 import msgspec
 
-from evoclaims.core.printable import printable
-from evoclaims.trials.loop_messages import LAST_LINES, Answer, Reported, Request, decode, encode
+from evoclaims.trials.loop_messages import Answer, Reported, Request, decode, encode, last_lines
 
 _READ: Final = 4000
 
@@ -26,7 +25,7 @@ class Child:
         """Start it, as the leader of a group of its own, with these environment variables besides this process's."""
         self._said = tempfile.TemporaryFile()  # noqa: SIM115  (closed by `close`)
         self._process = subprocess.Popen(
-            [sys.executable, "-m", "evoclaims.trials.loop_process"],
+            [sys.executable, "-P", "-m", "evoclaims.trials.loop_process"],  # modules are where this process has them
             stdin=subprocess.PIPE,  # stays open as long as this process lives
             stdout=subprocess.PIPE,
             stderr=self._said,
@@ -65,6 +64,6 @@ class Child:
                 pipe.close()
         with self._said as said:
             said.seek(max(said.seek(0, os.SEEK_END) - _READ, 0))
-            lines = [line.rstrip() for line in said.read().decode(errors="replace").splitlines() if line.strip()]
+            last = last_lines(said.read().decode(errors="replace"))
         how = signal.Signals(-status).name if -status in set(signal.Signals) else f"status {status}"
-        return "\n".join([*map(printable, lines[-LAST_LINES:]), f"its process ended with {how}"])
+        return f"{last}\nits process ended with {how}".lstrip()

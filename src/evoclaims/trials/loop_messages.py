@@ -9,10 +9,11 @@ from typing import Any, Final
 import msgspec
 
 from evoclaims.core.canonical import as_plain
+from evoclaims.core.printable import printable
 from evoclaims.trials.result_schema import Number, Vector
 
-LAST_LINES: Final = 8
-"""How much of a traceback, or of what a process said last, is kept as the reason of a crash."""
+_LAST_LINES: Final = 8
+_LONGEST_LINE: Final = 500
 
 Numbers = dict[str, Number]
 """Numbers by name; NaN and the infinities are words, as in records."""
@@ -56,10 +57,12 @@ class Trained(msgspec.Struct, frozen=True, tag=True):
     Attributes:
         metrics: as the function returned them.
         scores: None if it returned no policy.
+        step: of its last report; None if it reported nothing.
     """
 
     metrics: Numbers
     scores: Scores | None
+    step: int | None
 
 
 class Failed(msgspec.Struct, frozen=True, tag=True):
@@ -80,6 +83,12 @@ def decode(line: bytes) -> Answer:
     """Return the answer in a line; raise a `msgspec.MsgspecError` if it is torn."""
     answer: Answer = msgspec.json.decode(line, type=Answer)
     return answer
+
+
+def last_lines(text: str) -> str:
+    """Return how much of a traceback, or of what a process said last, is kept as the reason of a crash."""
+    lines = [line.rstrip() for line in text.splitlines() if line.strip()]
+    return "\n".join(printable(line)[:_LONGEST_LINE] for line in lines[-_LAST_LINES:])
 
 
 def floats(numbers: Mapping[str, Number]) -> dict[str, float]:

@@ -6,10 +6,10 @@ its standard output. When its standard input ends, its parent is gone, and it en
 
 from __future__ import annotations
 
+import io
 import math
 import os
 import signal
-import sys
 import threading
 import time
 import traceback
@@ -21,10 +21,9 @@ import msgspec
 
 from evoclaims.core.errors import UserError
 from evoclaims.core.portable import from_plain, resolve
-from evoclaims.core.printable import printable
 from evoclaims.envs.foreign.scoring import NativelyExamined
 from evoclaims.methods.training_loop import wants_report
-from evoclaims.trials.loop_messages import LAST_LINES, Answer, Failed, Reported, Request, Scores, Trained, encode
+from evoclaims.trials.loop_messages import Answer, Failed, Reported, Request, Scores, Trained, encode, last_lines
 
 COUNTS: Final = ("steps", "environment_steps")
 """Metrics that are counts; all others are any numbers."""
@@ -32,9 +31,16 @@ COUNTS: Final = ("steps", "environment_steps")
 TOLD_SECONDS: Final = 0.2
 """Least time between two reports that are passed on, but for the points of the curve."""
 
+MOST_STEPS: Final = 2**53
+"""What a count may be at most, as in records: a float holds it exactly."""
+
 
 class Reporter:
-    """The function `report` of a trial."""
+    """The function `report` of a trial.
+
+    Attributes:
+        last: step of the last report, told or not; None before the first.
+    """
 
     def __init__(self, every: int, answer: Callable[[Answer], None]) -> None:
         """Keep about one point of the curve for each `every` steps: which ones depends on steps alone."""
@@ -42,10 +48,18 @@ class Reporter:
         self._answer = answer
         self._next = 0
         self._told = -math.inf
+        self.last: int | None = None
 
     def __call__(self, step: int, **values: Any) -> None:
-        """Tell how far training is, in the budget's unit, and numbers such as `fitness=12.5`."""
-        step, kept = int(step), int(step) >= self._next
+        """Tell how far training is, in the budget's unit, and numbers such as `fitness=12.5`.
+
+        Raises:
+            UserError: when the step is no count, or a number is none.
+        """
+        self.last = step = int(step)
+        if not 0 <= step <= MOST_STEPS:
+            raise UserError(f"A training function reports a number of steps, and not {step}.")
+        kept = step >= self._next
         if not kept and time.monotonic() - self._told < TOLD_SECONDS:
             return
         if kept:
@@ -64,23 +78,32 @@ def numbers(values: Mapping[str, Any]) -> dict[str, Any]:
         raise UserError(f"A training function returns a table of numbers by name, or (table, policy), not {values!r}.")
     found = {}
     for name, value in values.items():
-        number = value.item() if getattr(value, "size", 0) == 1 else value  # NumPy's, PyTorch's and jax's scalars
-        if not isinstance(name, str) or not isinstance(number, Real):
+        number = _scalar(value)
+        if not isinstance(name, str) or not name.isprintable() or not isinstance(number, Real):
             raise UserError(f"A training loop's metrics are numbers by name, and {name!r} is {value!r}.")
-        if name in COUNTS and not 0 <= float(number) <= 2**53:
+        if name in COUNTS and not 0 <= float(number) <= MOST_STEPS:
             raise UserError(f"A training loop's {name} is a number of steps, and not {value!r}.")
         found[name] = float(number)
     return found
 
 
+def _scalar(value: Any) -> Any:
+    """Return the number in an array of NumPy, PyTorch or jax that holds one; anything else as it is."""
+    try:
+        return value.item()
+    except (AttributeError, TypeError, ValueError, RuntimeError):  # as each of them refuses an array of several
+        return value
+
+
 def train(request: Request, answer: Callable[[Answer], None]) -> Trained:
     """Call the function, and examine its policy."""
     function, task, budget = resolve(request.function), from_plain(request.task), from_plain(request.budget)
-    told = {"report": Reporter(budget.chunk(1), answer)} if wants_report(function) else {}
+    report = Reporter(budget.chunk(1), answer)
+    told = {"report": report} if wants_report(function) else {}
     returned = function(task, request.seed, budget, **from_plain(request.settings), **told)
     metrics, policy = returned if isinstance(returned, tuple) and len(returned) == 2 else (returned, None)
     scores = None if policy is None else examined(task, policy, request.seed)
-    return Trained(numbers(metrics), scores)
+    return Trained(numbers(metrics), scores, report.last)
 
 
 def examined(task: Any, policy: Callable[[Any], Any], seed: int) -> Scores:
@@ -95,26 +118,39 @@ def examined(task: Any, policy: Callable[[Any], Any], seed: int) -> Scores:
 
 def main() -> None:
     """Run the trial that standard input asks for; an exception is an answer, too."""
-    replies = os.fdopen(os.dup(1), "wb", buffering=0)
+    asked, replies, one_at_a_time = _requests(), os.fdopen(os.dup(1), "wb", buffering=0), threading.Lock()
     os.dup2(2, 1)  # what the function prints is no answer
-    request = msgspec.json.decode(sys.stdin.buffer.readline(), type=Request)
-    threading.Thread(target=_end_with_parent, daemon=True).start()
+    os.register_at_fork(after_in_child=replies.close)  # else the pipe does not end with this process
+    request = msgspec.json.decode(asked.readline(), type=Request)
+    threading.Thread(target=_end_with_parent, args=(asked.detach(),), daemon=True).start()
 
     def answer(message: Answer) -> None:
-        replies.write(encode(message))
+        line = memoryview(encode(message))
+        with one_at_a_time:  # threads of the function may report, too
+            while line:
+                line = line[replies.write(line) :]
 
     try:
         answer(train(request, answer))
     except BaseException as error:
-        lines = "".join(traceback.format_exception(error)).splitlines()
-        answer(Failed("\n".join(map(printable, lines[-LAST_LINES:]))))
+        answer(Failed(last_lines("".join(traceback.format_exception(error)))))
         os._exit(1)
     os._exit(0)  # threads of the function do not keep the process
 
 
-def _end_with_parent() -> None:
-    """Wait for the end of standard input, and end the processes of this group: this one, and what it has started."""
-    sys.stdin.buffer.read()
+def _requests() -> io.BufferedReader:
+    """Return standard input, and leave the function an empty one, on which no thread waits and holds a lock."""
+    asked = os.fdopen(os.dup(0), "rb")
+    empty = os.open(os.devnull, os.O_RDONLY)
+    os.dup2(empty, 0)
+    os.close(empty)
+    return asked
+
+
+def _end_with_parent(asked: io.RawIOBase) -> None:
+    """Wait for the end of the requests, and end the processes of this group: this one, and what it has started."""
+    while asked.read(1):
+        pass
     os.killpg(os.getpgrp(), signal.SIGKILL)
 
 

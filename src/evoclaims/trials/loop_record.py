@@ -39,7 +39,7 @@ def trained_record(
     if trained.scores is not None:
         levels = {"success": _vector(trained.scores.success), "fitness": _vector(trained.scores.fitness)}
         broken = broken or not all(map(math.isfinite, (*levels["success"], *levels["fitness"])))
-    steps = returned.get("environment_steps", curves["environment_steps"][-1] if curves else spec.condition.steps)
+    steps = returned.get("environment_steps", spec.condition.steps if trained.step is None else trained.step)
     success = levels["success"]
     solved = [level for level, value in enumerate(success) if value == 1.0]
     metrics = {

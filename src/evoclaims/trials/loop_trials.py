@@ -159,6 +159,7 @@ class LoopTrials:
         config: Any = jax.config
         modules = os.pathsep.join(os.path.abspath(path) for path in sys.path)
         chosen = {"PYTHONPATH": modules, "PYTHONHASHSEED": "0", **_ONE_THREAD}
+        chosen["JAX_TRACEBACK_FILTERING"] = "remove_frames"  # a crash ends with the error then, not with a note
         if config.jax_compilation_cache_dir:  # what one trial has compiled serves the others
             chosen["JAX_COMPILATION_CACHE_DIR"] = config.jax_compilation_cache_dir
         if self._devices[0].platform == "cpu":
