@@ -51,6 +51,8 @@ def champion_of(
     if chosen is None:
         return ShownChampion("No trial has run to its end, so there is no champion to show.")
     trial, which = chosen
+    if not trial.champion:
+        return ShownChampion("No parameters of these trials are kept, so there is no champion to show.")
     try:
         result = next((one for one in store.records(trial.trial) if one.champion == trial.champion), None)
         if result is None or not store.champion_file(result).exists():

@@ -102,8 +102,10 @@ def train(request: Request, answer: Callable[[Answer], None]) -> Trained:
     told = {"report": report} if wants_report(function) else {}
     returned = function(task, request.seed, budget, **from_plain(request.settings), **told)
     metrics, policy = returned if isinstance(returned, tuple) and len(returned) == 2 else (returned, None)
-    scores = None if policy is None else examined(task, policy, request.seed)
-    return Trained(numbers(metrics), scores, report.last)
+    told_metrics = numbers(metrics)
+    if policy is not None and not callable(policy):
+        raise UserError(f"A policy is a function from an observation to an action, and not {policy!r}.")
+    return Trained(told_metrics, None if policy is None else examined(task, policy, request.seed), report.last)
 
 
 def examined(task: Any, policy: Callable[[Any], Any], seed: int) -> Scores:

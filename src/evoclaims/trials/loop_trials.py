@@ -75,7 +75,8 @@ class LoopTrials:
         """Start nothing yet.
 
         Raises:
-            UserError: when a package is missing that the loop declares, or its arguments cannot be passed on.
+            UserError: when a package is missing that the loop declares, its arguments cannot be passed on, or its task
+                has no horizon, without which no policy can be examined.
         """
         self._stored = stored
         self._devices = devices
@@ -86,6 +87,7 @@ class LoopTrials:
                 f"The training loop {self._method.name!r} needs {', '.join(missing)}, not installed here: "
                 f"pip install {' '.join(missing)}"
             )
+        _ = stored.condition.task.horizon  # what has none is said before training, not after it
         self._request = {
             "function": self._method.place,
             "task": to_plain(stored.condition.task),

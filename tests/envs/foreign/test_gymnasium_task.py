@@ -21,6 +21,7 @@ from evoclaims.envs.foreign.gymnasium_task import GymnasiumTask
 from evoclaims.envs.foreign.scoring import NativelyExamined
 from evoclaims.envs.gates.parity import NParity
 from evoclaims.methods.random_search import RandomSearch
+from evoclaims.methods.training_loop import TrainingLoop
 from evoclaims.networks.mlp import Mlp
 from evoclaims.trials.budget import Budget
 from evoclaims.trials.runner import run
@@ -62,6 +63,20 @@ def test_it_has_the_environment_s_sizes_and_limit() -> None:
     assert (short.observation_size, short.action_size, short.horizon) == (3, 1, 30)
     assert short.examine_natively(lambda observation: np.zeros(1, np.float32), 3)[2] == {"episode_steps": 30.0}
     assert short.make().unwrapped.g == 9.81
+    several = GymnasiumTask("Blackjack-v1")  # a tuple of choices of 32, 11 and 2
+    assert (several.observation_size, several.action_size) == (45, 2)
+
+
+def trains(task: Any, seed: int, budget: Any) -> Any:
+    raise AssertionError("no training begins")
+
+
+def test_an_environment_whose_episodes_may_never_end_is_refused_before_training(store_of: Store) -> None:
+    endless = Condition(
+        TrainingLoop(trains, packages=()), GymnasiumTask("Blackjack-v1"), "whole_budget", Budget(environment_steps=1)
+    )
+    with pytest.raises(UserError, match="Episodes of Blackjack-v1 may never end: say episode_steps="):
+        run(endless, [0], store_of, jax.devices("cpu"))
 
 
 def test_an_unknown_environment_or_setting_is_a_sentence() -> None:

@@ -69,13 +69,13 @@ class GymnasiumTask(Examination):
     @cached_property
     def observation_size(self) -> int:
         """How many numbers an observation has."""
-        return int(np.prod(self._spaces[0].shape))
+        return _size(self._spaces[0])
 
     @cached_property
     def action_size(self) -> int:
         """How many numbers choose an action."""
         space = self._spaces[1]
-        return int(getattr(space, "n", 0) or np.prod(space.shape))
+        return int(space.n) if space.shape == () and hasattr(space, "n") else _size(space)
 
     @cached_property
     def horizon(self) -> int:
@@ -134,3 +134,10 @@ class GymnasiumTask(Examination):
             f"{self.name} is an environment of Gymnasium, which runs on the host: train on it by a TrainingLoop, or "
             "take the same environment from gymnax or Brax (GymnaxTask, BraxTask), on which every method trains."
         )
+
+
+def _size(space: Any) -> int:
+    """Return how many numbers an element of a space has, flattened where it consists of others."""
+    from gymnasium.spaces import flatdim
+
+    return int(flatdim(space) if space.shape is None else np.prod(space.shape))
