@@ -132,8 +132,9 @@ def _opened(path: Path) -> Iterator[tuple[Header, Packed]]:
             packed = Packed(file)
             if packed.nbytes(_HEADER) > _HEADER_BYTES:
                 raise DamagedFileError(path, "its header is longer than that of any batch of trials")
-            header = convert(asdict(Header(**json.loads(packed[_HEADER].tobytes()))), Header)
+            header = Header(**json.loads(packed[_HEADER].tobytes()))
             if header.schema == SCHEMA:
+                header = convert(asdict(header), Header)
                 if not _is_sound(header):
                     raise DamagedFileError(path, "its header does not describe a batch of trials")
                 if path.name != path_of(path.parent, header.condition, header.batch, header.platform).name:
