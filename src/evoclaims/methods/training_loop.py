@@ -7,9 +7,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Final, NoReturn
 
-from evoclaims.core.canonical import as_plain
 from evoclaims.core.errors import UserError
-from evoclaims.core.portable import reference, to_plain
+from evoclaims.core.portable import reference
 
 _NOT_HASHED: Final[Mapping[str, Any]] = {"canonical": False}
 
@@ -30,7 +29,7 @@ class TrainingLoop:
 
     Attributes:
         function: the function, which a module defines, or its place, "module:name".
-        settings: further arguments, by name; they are part of the trial's id.
+        settings: further arguments, by name: numbers, words, lists and tables; they are part of the trial's id.
         packages: the distributions that compute it, such as ("stable-baselines3", "torch"); another version runs its
             trials again.
         name: of the method; the function's if empty.
@@ -46,14 +45,12 @@ class TrainingLoop:
     def __post_init__(self) -> None:
         """Replace the function by its place, after checking that it takes the settings."""
         object.__setattr__(self, "settings", dict(self.settings))
-        to_plain(self.settings)  # what another process cannot be given is said at once
-        try:
-            as_plain(self.settings)
-        except TypeError as error:
-            raise UserError(
-                f"Settings of a training loop are part of its trials' ids: {error}; give a word that the training "
-                "function understands."
-            ) from error
+        for name, value in self.settings.items():
+            if not _is_plain(value):
+                raise UserError(
+                    "Settings of a training loop are part of its trials' ids, so they are numbers, words, lists and "
+                    f"tables by name, and {name!r} is {value!r}; let the training function make it."
+                )
         if callable(self.function):
             place = reference(self.function)
             check_arguments(self.function, self.settings)
@@ -87,6 +84,15 @@ class TrainingLoop:
             f"{self.name!r} is a training loop of its own: it is run whole, and its policies are examined where they "
             "are trained and are not kept, so there is no champion."
         )
+
+
+def _is_plain(value: Any) -> bool:
+    """Whether the canonical JSON of a value tells it from all others."""
+    if isinstance(value, dict):
+        return all(isinstance(name, str) and _is_plain(item) for name, item in value.items())
+    if isinstance(value, list | tuple):
+        return all(map(_is_plain, value))
+    return value is None or isinstance(value, str | int | float)
 
 
 def wants_report(function: Callable[..., Any]) -> bool:
