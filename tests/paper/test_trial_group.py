@@ -38,6 +38,12 @@ def test_a_group_is_named_as_the_claim_asked_for_it(group: Any) -> None:
     assert (made.label, made.fingerprint) == ("better on small", made.condition.id)
 
 
+def test_an_attribute_that_a_property_lacks_is_not_taken_for_a_measure() -> None:
+    without_id: Any = object()
+    with pytest.raises(AttributeError, match="'object' object has no attribute 'id'"):
+        _ = TrialGroup("better", "small", without_id, without_id).fingerprint
+
+
 def test_no_trial_is_fetched_before_a_verdict_needs_it(reproduction: Reproduction) -> None:
     def refuse(*asked: Any) -> Any:
         raise AssertionError("fetched")

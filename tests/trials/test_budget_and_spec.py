@@ -98,6 +98,18 @@ OTHERS = {
 }
 
 
+@pytest.mark.parametrize(
+    ("body", "what"),
+    [
+        ({"name": "mine"}, r"Mine has no revision, .*: write `revision: ClassVar\[int\] = …`"),
+        ({"name": "mine", "revision": 1}, r"Mine is no dataclass: write @dataclass\(frozen=True\)"),
+    ],
+)
+def test_what_a_method_lacks_to_be_told_apart_is_a_sentence(body: dict[str, Any], what: str) -> None:
+    with pytest.raises(UserError, match=what):
+        _ = Condition(type("Mine", (), body)(), NParity(3), "direct", Budget(generations=1)).id
+
+
 def test_the_id_changes_with_everything_that_makes_a_trial_another() -> None:
     ids = {name: condition.id for name, condition in {"same": CONDITION, **OTHERS}.items()}
     assert len(set(ids.values())) == len(ids)

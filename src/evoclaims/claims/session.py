@@ -17,6 +17,7 @@ from evoclaims.judging.baseline import DriftReport
 from evoclaims.judging.design import Design, Look
 from evoclaims.judging.fingerprint import fingerprint
 from evoclaims.judging.judge import judge
+from evoclaims.judging.measure import Event, Measure, Profile
 from evoclaims.judging.tripwire import DigestCheck
 from evoclaims.judging.verdict import Outcome, Verdict
 from evoclaims.paper import references
@@ -186,9 +187,10 @@ class Verdicts:
             UserError: for a second assertion, or a value that is not one.
         """
         if not isinstance(assertion, Assertion):
+            alone = isinstance(assertion, Measure | Event | Profile)
             raise UserError(
                 f"verdict(...) takes an assertion about trials, such as verdict(a.mean_success > b.mean_success), "
-                f"not {assertion!r}."
+                f"not {f'{assertion.name!r} alone: say what holds of it' if alone else repr(assertion)}."
             )
         if self.report is not None:
             raise UserError("A claim has one verdict: join several assertions with & (and) or | (or).")

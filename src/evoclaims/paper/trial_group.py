@@ -43,9 +43,9 @@ class TrialGroup:
 
         def __getattr__(self, name: str) -> Any:
             """Raise an error that lists the known measures."""
+            if name.startswith("_") or hasattr(type(self), name):
+                return object.__getattribute__(self, name)  # raises what the property itself has raised
             known = {known for known in dir(type(self)) if not known.startswith("_")} - set(dir(Limited))
-            if name.startswith("_") or name in known:
-                return object.__getattribute__(self, name)  # raises what the measure itself has raised
             raise UnknownMeasureError("measure", name, known)
 
     @property

@@ -18,7 +18,7 @@ from evoclaims.core.errors import UserError
 from evoclaims.core.keys import TRAINING, trial_key
 from evoclaims.core.pytree import strong
 from evoclaims.envs.base import Episode, MisfitError, Task, TaskState, fitting
-from evoclaims.methods.base import Method, Progress
+from evoclaims.methods.base import Method, Policy, Progress
 
 _NUMBER = jax.ShapeDtypeStruct((), jnp.int32)
 
@@ -48,7 +48,7 @@ def traced_progress(method: Method[Any], task: Task) -> Progress:
         shown: TaskState = jax.eval_shape(lambda seed, level: task.reset(_key(seed), level), _NUMBER, _NUMBER)
         _check_task_state(task, "reset", shown)
         before = jax.eval_shape(lambda seed: strong(method.init(_key(seed), task)), _NUMBER)
-        jax.eval_shape(lambda state, seen: fitting(task, method.best(task, state)(seen)), before, shown.observation)
+        jax.eval_shape(lambda state, seen: fitting(task, _policy(method, task, state)(seen)), before, shown.observation)
         action = jax.ShapeDtypeStruct((task.action_size,), jnp.float32)
         following: TaskState = jax.eval_shape(task.step, shown, action)
         _check_task_state(task, "step", following)
@@ -61,6 +61,20 @@ def traced_progress(method: Method[Any], task: Task) -> Progress:
         after, progress = jax.eval_shape(step, _NUMBER, _NUMBER, before)
         _check_unchanged(f"{method.name!r} changes its state by a step", before, after)
         return _checked_progress(method, progress)
+
+
+def _policy(method: Method[Any], task: Task, state: Any) -> Policy:
+    """Return the policy that a method has trained.
+
+    Raises:
+        MisfitError: when it is something else.
+    """
+    policy = method.best(task, state)
+    if not isinstance(policy, Policy):
+        raise MisfitError(
+            f"'best' of {method.name!r} returns a {type(policy).__name__}, not Policy(parameters, function)"
+        )
+    return policy
 
 
 def check_scores(task: Task, final: Episode) -> None:

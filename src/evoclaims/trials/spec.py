@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, is_dataclass
 from functools import cached_property
 from typing import Any, Literal, get_args
 
@@ -22,7 +22,27 @@ ENGINE_REVISION = 1
 
 def _described(component: Any) -> dict[str, Any]:
     """Return name, revision and parameters of a method or task, as plain JSON."""
+    _check(component)
     return {"name": component.name, "revision": component.revision, "parameters": as_plain(component)}
+
+
+def _check(component: Any) -> None:
+    """Reject a method or task without what tells its trials from others.
+
+    Raises:
+        UserError: when it has no name or no revision, or is no dataclass.
+    """
+    kind = type(component).__name__
+    for name, of in (("name", "str"), ("revision", "int")):
+        if not hasattr(component, name):
+            raise UserError(
+                f"{kind} has no {name}, by which its trials are stored: write `{name}: ClassVar[{of}] = …` in it."
+            )
+    if not is_dataclass(component):
+        raise UserError(
+            f"{kind} is no dataclass: write @dataclass(frozen=True) above the class, since the fields of a method or "
+            "task tell its trials apart."
+        )
 
 
 @dataclass(frozen=True)
