@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from tiny_project import Evoclaims
+from tiny_project import Evoclaims, Project
 
 from evoclaims.cli import main
 from evoclaims.judging.design import SEQUENTIAL
@@ -219,6 +219,13 @@ def test_plan_counts_what_is_stored_and_what_is_missing(evoclaims: Evoclaims) ->
     status, out, _ = evoclaims("plan")
     assert re.search(r"^right on parity +4 +6 +24 +\d+ s$", out, re.MULTILINE)
     assert re.search(r"^wrong on parity +0 +10 +40 +unknown$", out, re.MULTILINE)
+
+
+def test_plan_says_which_claim_cannot_be_judged_and_why(evoclaims: Evoclaims, project: Project) -> None:
+    project.write(c="verdict(trials('rigth', on='parity').mean_success > 0)")
+    status, out, _ = evoclaims("plan")
+    assert status == 0
+    assert "c: error: There is no method named 'rigth'. Did you mean 'right'?" in " ".join(out.split())
 
 
 def test_plan_shows_whole_numbers_on_a_narrow_terminal(evoclaims: Evoclaims, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -226,6 +226,7 @@ def test_commands_read_the_table_where_no_trial_is_stored_and_say_that_there_is_
     assert f"theirs on parity (smoke): nothing to run: {count}" in said["run theirs --numprocesses=2"]
     assert f"theirs on parity (smoke) has no champion: its {count}" in said["champion theirs --on parity"]
     assert "theirs on parity (its trials are imported, and there are no others)" in said["power"]
+    assert "--run" not in said["power"]
     assert "No fault can be planted: the trials that the smoke tier's claims read are not run here" in said["mutants"]
     report = unpacked.read(ours.path / "report" / "index.html")
     assert "imported from runs.csv, sha256 " in report

@@ -73,6 +73,9 @@ def main(options: argparse.Namespace) -> int:
         console.print(escape(sentence))
     console.print(f"\nClaims: the smallest p that the design allows (n trials a side, α {tier.design.alpha:g})")
     console.print(_claims(reports, costs))
+    for report in reports:
+        if report.outcome is Outcome.ERROR and not report.attainable:
+            console.print(escape(f"{report.name}: error: {report.reason}"), highlight=False)
     if any(pace is None for pace in paces.values()):
         console.print("\nTimes are unknown where no trial has run on such a device; --measure times a few steps.")
     return 0

@@ -48,14 +48,16 @@ def main(options: argparse.Namespace) -> int:
             project, pilots, {names: one for names, one in wanted.items() if pilots.unfit(names)}, design, options, host
         )
     powers = pilots.powers(chosen, options.draws)
+    imported = bool(wanted) and all(condition.existing is not None for condition in wanted.values())
+    advice = [] if imported else [_advice(options)]
     if not any(one.power for one in powers):
         told = "; ".join(power_cells.troubles(powers)[:1]) or "no claim has a test"
-        raise UserError(f"No power can be told at the {options.tier} tier: {told}. {_advice(options)}")
+        raise UserError(" ".join([f"No power can be told at the {options.tier} tier: {told}.", *advice]))
     _print(powers, design.last.n)
     for sentence in _versions(pilots, wanted):
         print(sentence)
-    if power_cells.troubles(powers):
-        print(_advice(options), file=sys.stderr)
+    if advice and power_cells.troubles(powers):
+        print(*advice, file=sys.stderr)
     return int(not all(one.suffices for one in powers))
 
 

@@ -62,7 +62,8 @@ def shared(windows: Sequence[Window]) -> Window:
             raise UserError(
                 f"These measures are known to multiples of {' and '.join(f'{one:,.12g}' for one in finer)} up to "
                 f"{min(window.limit for window in windows):,.12g}, which no rank test compares: give the conditions "
-                "budgets with reports equally far apart, or one after each step of the method."
+                "budgets with reports equally far apart (one number of environment_steps, a multiple of reports × cost "
+                "of each method), or one after each step of the method."
             )
     return Window(limit, every)
 
