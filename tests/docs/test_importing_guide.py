@@ -33,15 +33,18 @@ def test_a_claim_about_a_table_and_its_reproduction_take_ten_lines_or_fewer() ->
     assert len(lines) <= 10
 
 
-def test_the_guide_s_table_is_judged(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("tier", ["smoke", "full"])
+def test_the_guide_s_table_is_judged_and_at_the_full_tier_it_needs_no_smoke_tier(
+    tier: str, pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch
+) -> None:
     table = _table()
     assert set(SHOWN.splitlines()) <= set(table.splitlines())
     for name, text in FILES.items():
         (pytester.path / name).parent.mkdir(exist_ok=True)
-        (pytester.path / name).write_text(text)
+        (pytester.path / name).write_text(text if tier == "smoke" else text.replace('("smoke", "full")', '("full",)'))
     (pytester.path / "runs.csv").write_text(table)
     pytester.makepyprojecttoml('[tool.evoclaims]\nreproduction = "our_paper"\n[tool.pytest.ini_options]\n')
     monkeypatch.delitem(sys.modules, "our_paper", raising=False)
     monkeypatch.setenv("COLUMNS", "160")
-    result = pytester.runpytest_inprocess("claims", "-m", "smoke")
+    result = pytester.runpytest_inprocess("claims", "-m", tier)
     result.stdout.fnmatch_lines(["R1 *NEAT earns more than PPO (Table 1) * supported *10 * 1.00 *"])

@@ -48,8 +48,9 @@ def make_session(config: pytest.Config) -> Session:
     fetch = read if config.getoption("claims_stored") else run
     trials, variant = config.getoption("claims_trials"), config.getoption("claims_variant")
     made = Session(reproduction, store, fetch, trials, variant, run.again)
-    reproduction.tier("smoke", made.variant)
-    made.design("smoke")
+    for tier in reproduction.tiers:
+        reproduction.tier(tier, made.variant)
+        made.design(tier)
     _ = made.mutants  # a damaged file is told before the first trial
     fetch.check()
     config.stash[SESSION] = made
