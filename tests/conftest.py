@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import importlib
 import os
+import pkgutil
 import shutil
 import tempfile
+import warnings
 from typing import Final
 
 import pytest
@@ -34,3 +37,22 @@ def pytest_unconfigure(config: pytest.Config) -> None:
     if _made:
         shutil.rmtree(_made, ignore_errors=True)
         os.environ.pop(_CACHE, None)
+
+
+@pytest.fixture(scope="session")
+def all_imported() -> None:
+    """Every module, and what a run of pytest imports when it comes to it."""
+    import evoclaims
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DeprecationWarning)  # of Brax's requirements
+        for module in pkgutil.walk_packages(evoclaims.__path__, "evoclaims."):
+            importlib.import_module(module.name)
+    for name in ("hypothesis", "statsmodels.stats.multitest"):
+        importlib.import_module(name)
+
+
+@pytest.fixture
+def pytester(all_imported: None, pytester: pytest.Pytester) -> pytest.Pytester:
+    """pytest's own, which forgets the modules that a test has imported first: their classes would be there twice."""
+    return pytester

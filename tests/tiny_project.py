@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import importlib
 import json
-import pkgutil
 import shutil
 import sys
 from collections.abc import Callable, Iterable
@@ -19,9 +17,6 @@ from evoclaims.trials.store import Store
 
 FILES = {".evoclaims", "pyproject.toml", "tiny_paper.py", "claims", "__pycache__"}
 """What is in the project's folder when a command has written nothing else."""
-
-LATE = ("evoclaims.report.run_summary", "evoclaims.verdicts.regression", "hypothesis", "statsmodels.stats.multitest")
-"""What a run of pytest imports when it comes to it."""
 
 PYPROJECT = """
 [tool.evoclaims]
@@ -134,14 +129,7 @@ def claims(**bodies: str) -> str:
 
 @pytest.fixture(scope="session")
 def trials_of_both(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A store with the smoke tier's trials of the right and the wrong network, run once; tests copy it.
-
-    What a run imports late is imported here: pytester forgets the modules that a test has imported first.
-    """
-    for module in pkgutil.iter_modules(cli.__path__, "evoclaims.cli."):
-        importlib.import_module(module.name)
-    for name in LATE:
-        importlib.import_module(name)
+    """A store with the smoke tier's trials of the right and the wrong network, run once; tests copy it."""
     from evoclaims.envs.gates.parity import NParity
     from evoclaims.methods.hand_built import HandBuilt
     from evoclaims.trials import devices
