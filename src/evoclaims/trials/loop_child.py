@@ -25,7 +25,8 @@ class Child:
         """Start it, as the leader of a group of its own, with these environment variables besides this process's."""
         self._said = tempfile.TemporaryFile()  # noqa: SIM115  (closed by `close`)
         self._process = subprocess.Popen(
-            [sys.executable, "-P", "-m", "evoclaims.trials.loop_process"],  # modules are where this process has them
+            # Modules are where this process has them, and what was printed is there when the process is killed.
+            [sys.executable, "-P", "-u", "-m", "evoclaims.trials.loop_process"],
             stdin=subprocess.PIPE,  # stays open as long as this process lives
             stdout=subprocess.PIPE,
             stderr=self._said,
