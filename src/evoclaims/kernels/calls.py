@@ -15,6 +15,7 @@ from jax.interpreters import ad, batching, mlir
 from jaxtyping import Array
 
 from evoclaims.kernels import gpu_kernel, machine_code
+from evoclaims.kernels.block_shape import BlockShape
 from evoclaims.kernels.xla_handler import ENTRY
 
 GPU_TARGET: Final = "__gpu$xla.gpu.ptx"
@@ -50,21 +51,36 @@ def on_host(text: str, layout: Sequence[int], operands: Sequence[Array], shapes:
     return jax.ffi.ffi_call(_host_target(text), shapes)(np.array(layout, np.int32), *operands)
 
 
-def on_gpu(text: str, operands: Sequence[Array], shapes: Shapes, threads: int) -> Any:
-    """Call a kernel of NVIDIA's GPUs, given as LLVM's text."""
-    one, none = np.int32(1), np.int32(0)
+def on_gpu(
+    text: str,
+    operands: Sequence[Array],
+    shapes: Shapes,
+    elements: int,
+    shape: BlockShape | None = None,
+) -> Any:
+    """Call a kernel of NVIDIA's GPUs, given as LLVM's text.
+
+    Args:
+        text: of the kernel.
+        operands: the arrays it reads.
+        shapes: of its results.
+        elements: of the batch, one for each lane of a team.
+        shape: of its blocks; by default they are single warps, each with elements of its own.
+    """
+    one = np.int32(1)
+    warps, teams, memory = (shape.warps, shape.teams, shape.shared_bytes) if shape else (1, 1, 0)
     return jax.ffi.ffi_call(GPU_TARGET, shapes)(
         *operands,
         name=gpu_kernel.ENTRY,
         kernel_type="ptx",
         kernel_data=gpu_kernel.ptx(text),
-        grid_x=np.int32(-(-threads // gpu_kernel.BLOCK)),
+        grid_x=np.int32(-(-elements // (gpu_kernel.BLOCK * teams))),
         grid_y=one,
         grid_z=one,
         block_x=np.int32(gpu_kernel.BLOCK),
-        block_y=one,
-        block_z=one,
-        shared_mem_bytes=none,
+        block_y=np.int32(warps),
+        block_z=np.int32(teams),
+        shared_mem_bytes=np.int32(memory),
     )
 
 

@@ -28,39 +28,64 @@ def text(results: Sequence[Numbers], arrays: Mapping[int, Row], shared: Mapping[
         rows: elements of the batch.
     """
     page = Instructions(1, [number for result in results for number in result.flat])
-    row = begin(page, rows)
+    element = Element(page, begin(page, rows), arrays, shared)
+    registers: dict[int, str] = {}
+    page.compute(in_order([number for result in results for number in result.flat]), registers, element.load)
+    for z, result in enumerate(results):
+        for at, number in enumerate(result.flat):
+            element.store(page.operand(number, registers), number.dtype.kind, z, at, result.size)
+    return finished(page, parameters(arrays, len(results)))
 
-    def place(parameter: str, row: str, size: int, kind: str) -> str:
-        wide = page.put(f"zext i32 {row} to i64")
-        first = page.put(f"mul i64 {wide}, {size}")
-        return page.put(f"getelementptr {STORED[kind]}, ptr addrspace(1) {parameter}, i64 {first}")
 
-    addresses: dict[int, str] = {}
-    for array, of in arrays.items():
-        own = row if shared[array] == 1 else page.put(f"udiv i32 {row}, {shared[array]}")
-        addresses[array] = place(f"%a{array}", own, of.size, of.kind)
+class Element:
+    """A thread's element of the batch: how its numbers are read and written.
 
-    def number_at(address: str, at: int, kind: str) -> str:
-        return page.put(f"getelementptr {STORED[kind]}, ptr addrspace(1) {address}, i64 {at}")
+    Addresses are computed where they are first used; `forget` has them computed again, where they are not at hand.
+    """
 
-    def load(number: Input) -> str:
-        kind = number.dtype.kind
-        where = number_at(addresses[number.array], number.place, kind)
+    def __init__(self, page: Instructions, row: str, arrays: Mapping[int, Row], shared: Mapping[int, int]) -> None:
+        """Remember what `text` was given; `row` is the register with the element's number."""
+        self._page = page
+        self._row = row
+        self._arrays = arrays
+        self._shared = shared
+        self._addresses: dict[str, str] = {}
+
+    def forget(self) -> None:
+        """Forget all addresses."""
+        self._addresses.clear()
+
+    def load(self, number: Input) -> str:
+        """Return the register with a number that is read."""
+        kind, page, shared = number.dtype.kind, self._page, self._shared[number.array]
+        address = self._address(f"%a{number.array}", self._arrays[number.array].size, kind, shared)
+        where = page.put(f"getelementptr {STORED[kind]}, ptr addrspace(1) {address}, i64 {number.place}")
         value = page.put(f"load {STORED[kind]}, ptr addrspace(1) {where}, align {BYTES[kind]}")
         return page.put(f"icmp ne i8 {value}, 0") if kind == "b" else value
 
-    registers: dict[int, str] = {}
-    page.compute(in_order([number for result in results for number in result.flat]), registers, load)
-    for z, result in enumerate(results):
-        kind = result.flat[0].dtype.kind
-        address = place(f"%z{z}", row, result.size, kind)
-        for at, number in enumerate(result.flat):
-            value = page.operand(number, registers)
-            if kind == "b":
-                value = page.put(f"zext i1 {value} to i8")
-            where = number_at(address, at, kind)
-            page.write(f"store {STORED[kind]} {value}, ptr addrspace(1) {where}, align {BYTES[kind]}")
-    return finished(page, [*(f"%a{a}" for a in arrays), *(f"%z{z}" for z in range(len(results)))])
+    def store(self, value: str, kind: str, result: int, at: int, size: int) -> None:
+        """Write a number of a result that has `size`."""
+        page = self._page
+        address = self._address(f"%z{result}", size, kind, 1)
+        where = page.put(f"getelementptr {STORED[kind]}, ptr addrspace(1) {address}, i64 {at}")
+        if kind == "b":
+            value = page.put(f"zext i1 {value} to i8")
+        page.write(f"store {STORED[kind]} {value}, ptr addrspace(1) {where}, align {BYTES[kind]}")
+
+    def _address(self, parameter: str, size: int, kind: str, shared: int) -> str:
+        """Return the address of the element's row of an array."""
+        if parameter not in self._addresses:
+            page = self._page
+            row = self._row if shared == 1 else page.put(f"udiv i32 {self._row}, {shared}")
+            first = page.put(f"mul i64 {page.put(f'zext i32 {row} to i64')}, {size}")
+            address = page.put(f"getelementptr {STORED[kind]}, ptr addrspace(1) {parameter}, i64 {first}")
+            self._addresses[parameter] = address
+        return self._addresses[parameter]
+
+
+def parameters(arrays: Mapping[int, Row], results: int) -> list[str]:
+    """Return the names of a kernel's parameters."""
+    return [*(f"%a{a}" for a in arrays), *(f"%z{z}" for z in range(results))]
 
 
 def begin(page: Instructions, threads: int) -> str:
@@ -75,14 +100,14 @@ def begin(page: Instructions, threads: int) -> str:
     return number
 
 
-def finished(page: Instructions, parameters: Sequence[str]) -> str:
-    """Return the text of a kernel that has begun; its parameters are addresses."""
+def finished(page: Instructions, names: Sequence[str], warps: int = 1, teams: int = 1) -> str:
+    """Return the text of a kernel that has begun; its parameters are addresses of these names."""
     page.write("br label %done")
     page.label("done")
     page.write("ret void")
-    given = ", ".join(f"ptr addrspace(1) {name}" for name in parameters)
+    given = ", ".join(f"ptr addrspace(1) {name}" for name in names)
     body = "\n".join(page.lines)
-    attributes = f'nounwind "nvvm.maxntid"="{BLOCK},1,1"'
+    attributes = f'nounwind "nvvm.maxntid"="{BLOCK},{warps},{teams}"'
     kernel = f"define ptx_kernel void @{ENTRY}({given}) {attributes} {{\n{body}\n}}\n"
     return 'target triple = "nvptx64-nvidia-cuda"\n' + "\n".join(page.declared) + "\n" + kernel
 

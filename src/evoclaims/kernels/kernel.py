@@ -13,7 +13,7 @@ import jax.numpy as jnp
 from jax.extend.core import jaxpr_as_fun
 from jaxtyping import Array
 
-from evoclaims.kernels import calls, gpu_kernel, host_kernel, llvm_ir, machine_code
+from evoclaims.kernels import block_kernel, block_shape, calls, gpu_kernel, host_kernel, llvm_ir, machine_code
 from evoclaims.kernels.expressions import Input, everything
 from evoclaims.kernels.interpreter import Numbers
 from evoclaims.kernels.scalarize import scalarize
@@ -117,8 +117,12 @@ class Kernel:
 
         def call(rows: int, shared: list[int], shapes: Shapes) -> Any:
             given = {i: shared[i] for i in self.read}
-            text = gpu_kernel.text([self.results[i] for i in self.written], self.read, given, rows)
-            return calls.on_gpu(text, [leaves[i] for i in self.read], shapes, rows)
+            operands, results = [leaves[i] for i in self.read], [self.results[i] for i in self.written]
+            shape = block_shape.chosen(results, rows)
+            if shape is None:
+                return calls.on_gpu(gpu_kernel.text(results, self.read, given, rows), operands, shapes, rows)
+            text = block_kernel.text(shape, results, self.read, given, rows)
+            return calls.on_gpu(text, operands, shapes, rows, shape)
 
         return self._call(leaves, call)
 

@@ -1,0 +1,178 @@
+"""A kernel for NVIDIA's GPUs whose work for 32 elements is shared among the warps of a block (`warp_schedule`)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from evoclaims.kernels.block_shape import BlockShape
+from evoclaims.kernels.expressions import Carried, Input, Loop, LoopResult, Number, ScalarOperation, is_known
+from evoclaims.kernels.gpu_kernel import BLOCK, Element, finished, parameters
+from evoclaims.kernels.interpreter import Numbers
+from evoclaims.kernels.llvm_ir import TYPES, Instructions, Row, either
+from evoclaims.kernels.shared_slots import Slots
+from evoclaims.kernels.warp_schedule import Phase, Schedule
+
+SHARED = "@numbers = external addrspace(3) global [0 x i32], align 16\n"
+"""The block's shared memory; its size is said at the launch. A slot is a word of each lane."""
+
+
+def text(
+    shape: BlockShape, results: Sequence[Numbers], arrays: Mapping[int, Row], shared: Mapping[int, int], rows: int
+) -> str:
+    """Return LLVM's text of a kernel, as `gpu_kernel.text` does.
+
+    Lanes beyond the last element compute the last one, and store nothing: barriers wait for every warp.
+
+    Args:
+        shape: of a block.
+        results: what is computed for an element, none of them empty.
+        arrays: the rows of the arrays read, in order.
+        shared: how many consecutive elements share a row of each.
+        rows: elements of the batch.
+    """
+    plan, places, teams = shape.plan, shape.slots, shape.teams
+    page = Instructions(1, [number for result in results for number in result.flat])
+    page.label("entry")
+    sources = ("ctaid.x", "tid.x", "tid.y", "tid.z")
+    block, lane, own, in_block = (page.call(f"llvm.nvvm.read.ptx.sreg.{name}", "i32", []) for name in sources)
+    team = page.put(f"add i32 {page.put(f'mul i32 {block}, {teams}')}, {in_block}")
+    element = page.put(f"add i32 {page.put(f'mul i32 {team}, {BLOCK}')}, {lane}")
+    inside = page.put(f"icmp ult i32 {element}, {rows}")
+    row = page.call("llvm.umin.i32", "i32", [("i32", element), ("i32", str(rows - 1))])
+    first_lane = [("i32", "-1"), ("i32", own), ("i32", "0"), ("i32", "31")]
+    warp = page.call("llvm.nvvm.shfl.sync.idx.i32", "i32", first_lane)  # so the assembler knows that lanes go together
+    first = page.put(f"add i32 {page.put(f'mul i32 {in_block}, {places.count * BLOCK}')}, {lane}")
+    words = page.put(f"getelementptr i32, ptr addrspace(3) @numbers, i32 {first}")
+    others = " ".join(f"i32 {w}, label %warp{w}" for w in range(1, plan.warps))
+    page.write(f"switch i32 {warp}, label %warp0 [ {others} ]")
+    for number in range(plan.warps):
+        page.label(f"warp{number}")
+        element_of = Element(page, row, arrays, shared)
+        _Warp(number, plan, places, page, words, element_of).write(results, inside)
+    return finished(page, parameters(arrays, len(results)), plan.warps, teams) + SHARED
+
+
+class _Warp:
+    """What one warp does."""
+
+    def __init__(
+        self, number: int, plan: Schedule, places: Slots, page: Instructions, words: str, element: Element
+    ) -> None:
+        """Begin; `words` is the address of the lane's word of the first slot."""
+        self._number = number
+        self._plan = plan
+        self._slots = places
+        self._page = page
+        self._words = words
+        self._element = element
+        self._own: dict[int, str] = {}  # registers of what this warp has computed
+        self._at_hand: dict[int, str] = {}  # and of what it has read since the last barrier
+
+    def write(self, results: Sequence[Numbers], inside: str) -> None:
+        """Write all of it; `inside` says whether the lane has an element of its own."""
+        segments = self._plan.segments
+        for at, segment in enumerate(segments):
+            if segment.loop:
+                self._repeat(segment.loop, segment.phases)
+                continue
+            self._compute(segment.phases)
+            if at + 1 < len(segments):
+                following = segments[at + 1].loop
+                assert following
+                self._leave(following, following.start)
+                self._barrier()
+        self._store(results, inside)
+
+    def _compute(self, phases: Sequence[Phase]) -> None:
+        """Write phases, with barriers between them."""
+        for at, phase in enumerate(phases):
+            if at:
+                self._barrier()
+            for operation in phase[self._number]:
+                registers = {id(n): self._register(n) for n in self._plan.needed(operation)}
+                self._page.compute([operation], registers, self._element.load)
+                self._own[id(operation)] = registers[id(operation)]
+                if id(operation) in self._slots.of:
+                    self._put(operation, registers[id(operation)], self._slots.of[id(operation)])
+
+    def _repeat(self, around: Loop, phases: Sequence[Phase]) -> None:
+        """Write a loop; its carry stays in slots."""
+        page = self._page
+        before, again, after = page.block, f"{page.block}.again", f"{page.block}.after"
+        page.write(f"br label %{again}")
+        page.label(again)
+        head, rounds = len(page.lines), page.register()
+        self._compute(phases)
+        following = [self._value(number, place) for place, number in enumerate(around.results)]
+        self._barrier()
+        for place, value in enumerate(following):
+            if value:
+                self._put(around.carried[place], value, self._slots.of[id(around.carried[place])])
+        self._barrier()
+        more = page.put(f"add i32 {rounds}, 1")
+        page.lines.insert(head, either(rounds, "i32", ("0", before), (more, page.block)))
+        page.write(f"br i1 {page.put(f'icmp ult i32 {more}, {around.rounds}')}, label %{again}, label %{after}")
+        page.label(after)
+
+    def _leave(self, around: Loop, numbers: Sequence[Number]) -> None:
+        """Leave a loop's carry in its slots."""
+        for place, number in enumerate(numbers):
+            value = self._value(number, place)
+            if value:
+                self._put(around.carried[place], value, self._slots.of[id(around.carried[place])])
+
+    def _store(self, results: Sequence[Numbers], inside: str) -> None:
+        """Write the results that this warp is responsible for."""
+        values, place = [], 0
+        for z, result in enumerate(results):
+            for at, number in enumerate(result.flat):
+                value = self._value(number, place)
+                if value:
+                    values.append((value, number.dtype.kind, z, at, result.size))
+                place += 1
+        self._page.write(f"br i1 {inside}, label %{self._page.block}.store, label %done")
+        self._page.label(f"{self._page.block}.store")
+        self._element.forget()
+        for value in values:
+            self._element.store(*value)
+        self._page.write("br label %done")
+
+    def _value(self, number: Number, place: int) -> str:
+        """Return a number, or "" if another warp is responsible for it."""
+        if self._plan.responsible(number, place) != self._number:
+            return ""
+        return self._page.operand(number, {} if is_known(number) else {id(number): self._register(number)})
+
+    def _register(self, number: Number) -> str:
+        """Return the register with a number; read it from the arrays, or from its slot, if need be."""
+        if id(number) in self._own:
+            return self._own[id(number)]
+        kept = number.loop.carried[number.place] if isinstance(number, LoopResult) else number
+        if id(kept) not in self._at_hand:
+            read = self._element.load(kept) if isinstance(kept, Input) else self._get(kept)
+            self._at_hand[id(kept)] = read
+        return self._at_hand[id(kept)]
+
+    def _get(self, number: ScalarOperation | Carried) -> str:
+        """Return the register with a number read from its slot."""
+        type_ = TYPES[number.dtype.kind]
+        stored = "i32" if type_ == "i1" else type_
+        value = self._page.put(f"load {stored}, ptr addrspace(3) {self._slot(self._slots.of[id(number)])}, align 4")
+        return self._page.put(f"icmp ne i32 {value}, 0") if type_ == "i1" else value
+
+    def _put(self, number: ScalarOperation | Carried, value: str, slot: int) -> None:
+        """Write a number to a slot."""
+        type_ = TYPES[number.dtype.kind]
+        if type_ == "i1":
+            value, type_ = self._page.put(f"zext i1 {value} to i32"), "i32"
+        self._page.write(f"store {type_} {value}, ptr addrspace(3) {self._slot(slot)}, align 4")
+
+    def _slot(self, slot: int) -> str:
+        """Return the address of the lane's word of a slot."""
+        return self._page.put(f"getelementptr i32, ptr addrspace(3) {self._words}, i32 {slot * BLOCK}")
+
+    def _barrier(self) -> None:
+        """Wait for the other warps."""
+        self._page.call("llvm.nvvm.barrier0", "void", [])
+        self._at_hand.clear()
+        self._element.forget()

@@ -1,0 +1,82 @@
+"""How the blocks of a GPU's kernel are made up: how many warps share the work for 32 elements, and how many such teams.
+
+A processor of a GPU executes a large kernel no faster than it fetches instructions. Warps with different parts of the
+code fetch side by side; warps with the same code that barriers keep in step fetch it once. A block has eight warps, as
+many as have registers on a processor: as many teams as are needed for all elements to be computed at once, and as many
+warps in a team as that leaves.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+import jax
+
+from evoclaims.kernels.expressions import everything
+from evoclaims.kernels.gpu_kernel import BLOCK
+from evoclaims.kernels.interpreter import Numbers
+from evoclaims.kernels.shared_slots import Slots, slots
+from evoclaims.kernels.warp_schedule import Schedule, schedule
+
+SMALL: Final = 8_000
+"""Operations of a kernel whose code fits an instruction cache; it is faster as it is."""
+WARPS: Final = 8
+"""Warps of a block."""
+
+
+@dataclass(frozen=True)
+class BlockShape:
+    """What a block is made up of.
+
+    Attributes:
+        plan: which warp of a team computes what.
+        slots: the shared memory of a team.
+        teams: of a block.
+    """
+
+    plan: Schedule
+    slots: Slots
+    teams: int
+
+    @property
+    def warps(self) -> int:
+        """Warps of a team."""
+        return self.plan.warps
+
+    @property
+    def shared_bytes(self) -> int:
+        """Shared memory of a block: a word of each lane for each slot."""
+        return self.teams * self.slots.count * BLOCK * 4
+
+
+def chosen(results: Sequence[Numbers], elements: int) -> BlockShape | None:
+    """Return the shape of a kernel's blocks; None if each warp computes everything for elements of its own.
+
+    Args:
+        results: what is computed for an element.
+        elements: of the batch.
+    """
+    numbers = [number for result in results for number in result.flat]
+    if len(everything(numbers)) <= SMALL:
+        return None
+    processors, memory = (_of_device(name, usual) for name, usual in (("core_count", 132), (MEMORY, 99 * 1024)))
+    teams = min(WARPS, -(-elements // (BLOCK * processors)))
+    for warps in (WARPS // teams, 1):
+        plan = schedule(numbers, warps)
+        if plan is None:
+            return None
+        shape = BlockShape(plan, slots(plan, numbers), teams)
+        if shape.shared_bytes <= memory:
+            return shape
+    return None
+
+
+MEMORY: Final = "shared_memory_per_block_optin"
+
+
+def _of_device(name: str, usual: int) -> int:
+    """Return a property of the GPU; a program may be lowered where there is none."""
+    value: Any = getattr(jax.devices()[0], name, None)
+    return int(value) if value else usual

@@ -1,0 +1,216 @@
+"""Which warp of a GPU's block computes which expression of a kernel, and when.
+
+An ant's time step has 40,000 operations in chains of at most 700: more than a thread's registers and a processor's
+instruction cache hold, so that a warp alone waits for its instructions. Several warps share the step instead, each with
+its own part of the code (as in Bauer et al., "Singe: leveraging warp specialization for high performance on GPUs",
+PPoPP 2014). Lane i of each warp works for the team's i-th element. Work goes in phases; what a warp computes is visible
+to the others from the next phase on. Within a phase a warp may go on with what it has itself computed.
+"""
+
+from __future__ import annotations
+
+import heapq
+from collections import Counter, defaultdict
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from evoclaims.kernels.expressions import (
+    Expression,
+    Loop,
+    LoopResult,
+    Number,
+    ScalarOperation,
+    in_order,
+    is_known,
+    products_to_fuse,
+)
+from evoclaims.kernels.warp_assignment import Group, assign
+
+INSTRUCTIONS: Final = {"div": 9, "sqrt": 9}
+"""Of an operation; all others take one."""
+GROUP: Final = 8
+"""Most instructions of operations that are placed together: each but the last has only one use, in the same group."""
+BUDGET: Final = 100
+"""Instructions of a warp after which a phase ends: with fewer there are more barriers, with more, warps wait longer."""
+Phase = tuple[tuple[ScalarOperation, ...], ...]
+"""The operations of each warp, in order."""
+
+
+@dataclass(frozen=True)
+class Segment:
+    """What comes between loops, or a round of a loop.
+
+    Attributes:
+        loop: whose round it is.
+        phases: at least one.
+    """
+
+    loop: Loop | None
+    phases: tuple[Phase, ...]
+
+
+@dataclass(frozen=True)
+class Schedule:
+    """A kernel shared among warps.
+
+    Attributes:
+        warps: how many.
+        segments: in order.
+        owner: the warp that computes each operation, by the operation's id.
+        fused: ids of products that are computed where they are used (`products_to_fuse`).
+    """
+
+    warps: int
+    segments: tuple[Segment, ...]
+    owner: Mapping[int, int]
+    fused: frozenset[int]
+
+    def needed(self, operation: ScalarOperation) -> list[Expression]:
+        """Return the expressions that an operation reads, with those of a product that is fused with it."""
+        return _needed(operation, self.fused)
+
+    def responsible(self, number: Number, place: int) -> int:
+        """Return the warp that stores a number as the result, or the carry, at a place."""
+        return self.owner.get(id(number), place % self.warps)
+
+
+def _needed(operation: ScalarOperation, fused: frozenset[int]) -> list[Expression]:
+    """Return the expressions that an operation reads."""
+    direct = [o for o in operation.operands if not is_known(o)]
+    inner = (p for o in direct for p in ([o] if id(o) not in fused else o.operands))
+    return list({id(p): p for p in inner if not is_known(p)}.values())
+
+
+def schedule(results: Sequence[Number], warps: int) -> Schedule | None:
+    """Share a kernel among warps.
+
+    Returns:
+        The schedule; None for a kernel with a loop inside another, which only one warp can compute.
+    """
+    fused = products_to_fuse(results)
+    order = in_order(results)
+    loops = list({id(e.loop): e.loop for e in order if isinstance(e, LoopResult)}.values())
+    if any(isinstance(e, LoopResult) for around in loops for e in _body(around)):
+        return None
+    place = {id(around): at for at, around in enumerate(loops)}
+    after: dict[int, int] = {}  # how many loops must have ended before each expression
+    stretches: list[list[ScalarOperation]] = [[] for _ in range(len(loops) + 1)]
+    for expression in order:
+        if isinstance(expression, LoopResult):
+            after[id(expression)] = place[id(expression.loop)] + 1
+        elif isinstance(expression, ScalarOperation):
+            after[id(expression)] = max((after[id(o)] for o in expression.operands if not is_known(o)), default=0)
+            stretches[after[id(expression)]].append(expression)
+        else:
+            after[id(expression)] = 0
+    owner: dict[int, int] = {}
+    segments = []
+    for at, stretch in enumerate(stretches):
+        segments.append(Segment(None, _phases(stretch, warps, owner, fused)))
+        if at < len(loops):
+            body = [e for e in _body(loops[at]) if isinstance(e, ScalarOperation)]
+            segments.append(Segment(loops[at], _phases(body, warps, owner, fused)))
+    return Schedule(warps, tuple(segments), owner, fused)
+
+
+def _body(around: Loop) -> list[Expression]:
+    """Return what a loop computes in a round, operands first."""
+    inside = set(map(id, around.carried))
+    body = []
+    for expression in in_order(around.results):
+        if id(expression) not in inside and any(id(p) in inside for p in _operands(expression)):
+            inside.add(id(expression))
+            body.append(expression)
+    return body
+
+
+def _operands(expression: Expression) -> Iterable[Number]:
+    """Return the numbers that an expression reads."""
+    match expression:
+        case ScalarOperation(operands=operands):
+            return operands
+        case LoopResult(loop=around):
+            return (*around.start, *around.taken)
+    return ()
+
+
+def _groups(
+    operations: Sequence[ScalarOperation], fused: frozenset[int]
+) -> tuple[list[Group], list[list[ScalarOperation]]]:
+    """Put each operation that has one use with that use, as long as groups stay small; operands' groups come first."""
+    operations = [o for o in operations if id(o) not in fused]
+    read = {id(o): [id(r) for r in _needed(o, fused)] for o in operations}
+    users: dict[int, list[int]] = defaultdict(list)
+    for operation in operations:
+        for number in read[id(operation)]:
+            users[number].append(id(operation))
+    root: dict[int, int] = {}
+    size: Counter[int] = Counter()
+    for operation in reversed(operations):
+        mine, used = INSTRUCTIONS.get(operation.name, 1), users[id(operation)]
+        joins = len(used) == 1 and size[root[used[0]]] + mine <= GROUP
+        root[id(operation)] = root[used[0]] if joins else id(operation)
+        size[root[id(operation)]] += mine
+    members: dict[int, list[ScalarOperation]] = defaultdict(list)
+    for operation in operations:
+        members[root[id(operation)]].append(operation)
+    last = [o for o in operations if root[id(o)] == id(o)]  # of each group
+    number_of = {id(o): number for number, o in enumerate(last)}
+    groups = []
+    for operation in last:
+        reads = (r for member in members[id(operation)] for r in read[id(member)] if r in root)
+        makers = {r: number_of[root[r]] for r in reads if root[r] != id(operation)}
+        groups.append(Group(size[id(operation)], makers))
+    return groups, [members[id(o)] for o in last]
+
+
+def _phases(
+    operations: Sequence[ScalarOperation], warps: int, owner: dict[int, int], fused: frozenset[int]
+) -> tuple[Phase, ...]:
+    """Share operations among warps; `owner` gets them.
+
+    The longest chains come first; one warp alone keeps to the order, in which few numbers are alive at a time.
+    """
+    groups, members = _groups(operations, fused)
+    warp_of = assign(groups, warps)
+    for at, together in enumerate(members):
+        owner.update((id(operation), warp_of[at]) for operation in together)
+    before = [set(group.reads.values()) for group in groups]
+    users: list[list[int]] = [[] for _ in groups]
+    for at, makers in enumerate(before):
+        for maker in makers:
+            users[maker].append(at)
+    turn = list(range(len(groups)))  # lower ones come first
+    if warps > 1:
+        for at in reversed(turn):
+            turn[at] = min((turn[user] for user in users[at]), default=0) - groups[at].instructions
+    missing = [len(makers) for makers in before]
+    phase_of: dict[int, int] = {}
+    phases: list[Phase] = []
+    ready = [at for at in range(len(groups)) if not missing[at]]
+    while ready:
+        queues: list[list[tuple[int, int]]] = [[] for _ in range(warps)]
+        for at in ready:
+            heapq.heappush(queues[warp_of[at]], (turn[at], at))
+        ready = []
+        done: list[list[ScalarOperation]] = [[] for _ in range(warps)]
+        for warp, queue in enumerate(queues):
+            load = 0
+            while queue and load < BUDGET:
+                at = heapq.heappop(queue)[1]
+                load += groups[at].instructions
+                done[warp] += members[at]
+                phase_of[at] = len(phases)
+                for user in users[at]:
+                    missing[user] -= 1
+                    if missing[user]:
+                        continue
+                    here = {warp_of[maker] for maker in before[user] if phase_of[maker] == len(phases)}
+                    if here == {warp} == {warp_of[user]}:
+                        heapq.heappush(queue, (turn[user], user))
+                    else:
+                        ready.append(user)
+            ready += [at for _, at in queue]
+        phases.append(tuple(map(tuple, done)))
+    return tuple(phases) or (((),) * warps,)

@@ -1,0 +1,63 @@
+"""Runs a block kernel's text on this processor: a lane at a time, a thread for each warp, real barriers."""
+
+from __future__ import annotations
+
+import ctypes
+import re
+import threading
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from evoclaims.kernels import machine_code
+from evoclaims.kernels.block_shape import BlockShape
+from evoclaims.kernels.gpu_kernel import BLOCK, ENTRY
+
+CALLED = ctypes.CFUNCTYPE(None)
+
+
+def run(text: str, shape: BlockShape, rows: int, arrays: Sequence[Any], results: Sequence[Any]) -> list[Any]:
+    """Return a kernel's results.
+
+    Args:
+        text: LLVM's text of the kernel, for a GPU.
+        shape: of its blocks.
+        rows: elements of the batch.
+        arrays: those that it reads.
+        results: shapes of what it computes.
+    """
+    code = machine_code.address(_for_this_processor(text), ENTRY)
+    given = [np.ascontiguousarray(a) for a in arrays]
+    made = [np.full(r.shape, 77, r.dtype) for r in results]
+    addresses = [ctypes.c_void_p(a.ctypes.data) for a in (*given, *made)]
+    kernel = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * (len(addresses) + 1), *[ctypes.c_int32] * 4, CALLED)(code)
+    for first in range(0, rows, BLOCK * shape.teams):
+        for lane in range(BLOCK):
+            memory = np.full(shape.shared_bytes // 4, 0x7FC00000, np.int32)  # not a number
+            barrier = threading.Barrier(shape.warps * shape.teams)
+            wait = CALLED(lambda barrier=barrier: barrier.wait(60) and None)
+            block = first // (BLOCK * shape.teams)
+            places = [(block, lane, warp, team) for warp in range(shape.warps) for team in range(shape.teams)]
+            threads = [
+                threading.Thread(target=kernel, args=(*addresses, memory.ctypes.data, *place, wait)) for place in places
+            ]
+            for thread in threads:
+                thread.start()
+            for thread in threads:
+                thread.join()
+    return made
+
+
+def _for_this_processor(text: str) -> str:
+    """Replace what only a GPU has by parameters: shared memory, where a thread is, and the barrier."""
+    text = re.sub(r" ?addrspace\(\d\)", "", text.replace("ptx_kernel ", ""))
+    text = "\n".join(line for line in text.splitlines() if not line.startswith("declare") or "nvvm" not in line)
+    text = re.sub(r"target triple.*|@numbers = .*", "", text).replace("ptr @numbers", "ptr %numbers")
+    for register, name in (("ctaid.x", "block"), ("tid.x", "lane"), ("tid.y", "warp"), ("tid.z", "team")):
+        text = text.replace(f"call i32 @llvm.nvvm.read.ptx.sreg.{register}()", f"add i32 %{name}, 0")
+    text = re.sub(r"call i32 @llvm.nvvm.shfl.sync.idx.i32\(i32 -1, (i32 %\w+),.*", r"add \1, 0", text)
+    text = text.replace("call void @llvm.nvvm.barrier0()", "call void %wait()")
+    return re.sub(
+        r"(define void @\w+\(.*?)\)", r"\1, ptr %numbers, i32 %block, i32 %lane, i32 %warp, i32 %team, ptr %wait)", text
+    )

@@ -1,0 +1,137 @@
+"""A GPU's kernel that warps of a block share does what the same kernel does on this processor, to the bit."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from block_machine import run
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from kernel_functions import FUNCTIONS
+
+from evoclaims.envs.ecorobot.robots import ANT
+from evoclaims.envs.ecorobot.stones import SteppingStones
+from evoclaims.kernels import block_kernel, block_shape
+from evoclaims.kernels.block_shape import BlockShape
+from evoclaims.kernels.kernel import Kernel
+from evoclaims.kernels.shared_slots import slots
+from evoclaims.kernels.warp_assignment import SLACK, STRETCHES, Group, assign
+from evoclaims.kernels.warp_schedule import schedule
+
+
+def _kernel(function: Callable[..., Any], arguments: Any) -> Kernel:
+    """Return a function as a kernel; `arguments` have a batch dimension in front."""
+    leaves, structure = jax.tree.flatten(arguments)
+    return Kernel(function, "This", structure, tuple(jax.ShapeDtypeStruct(a.shape[1:], a.dtype) for a in leaves))
+
+
+def _check(kernel: Kernel, leaves: list[Any], warps: int, teams: int) -> None:
+    """Check that a block of warps computes what this processor's kernel does."""
+    results = [kernel.results[i] for i in kernel.written]
+    numbers = [number for result in results for number in result.flat]
+    plan = schedule(numbers, warps)
+    assert plan is not None
+    shape = BlockShape(plan, slots(plan, numbers), teams)
+    rows = len(leaves[0])
+    text = block_kernel.text(shape, results, kernel.read, dict.fromkeys(kernel.read, 1), rows)
+    outputs = [jax.ShapeDtypeStruct((rows, *kernel.outputs[i].shape), kernel.outputs[i].dtype) for i in kernel.written]
+    made = run(text, shape, rows, [leaves[i] for i in kernel.read], outputs)
+    expected = kernel.on_host(*map(jnp.asarray, leaves))
+    for i, result in zip(kernel.written, made, strict=True):
+        np.testing.assert_array_equal(_normal(result), _normal(expected[i]))
+
+
+def _normal(numbers: Any) -> Any:
+    """Return numbers with 0 for those that XLA lets processors flush to 0."""
+    numbers = np.asarray(numbers)
+    return np.where(np.abs(numbers) < np.finfo(np.float32).tiny, 0, numbers) if numbers.dtype.kind == "f" else numbers
+
+
+@pytest.mark.parametrize(("warps", "teams"), [(3, 2), (1, 2)])
+@pytest.mark.parametrize("case", [case for case in FUNCTIONS if case != "loops in a loop"])
+def test_warps_compute_together_what_one_does(case: str, warps: int, teams: int) -> None:
+    function, arguments = FUNCTIONS[case]
+    leaves = [np.asarray(leaf)[:37] for leaf in jax.tree.leaves(arguments)]  # the second team's lanes are not all used
+    _check(_kernel(function, arguments), leaves, warps, teams)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("warps", "teams"), [(8, 1), (4, 2)])
+def test_warps_make_a_robots_step_together(warps: int, teams: int) -> None:
+    task = SteppingStones(robot=ANT)
+    state = jax.vmap(task.reset, (0, None))(jax.random.split(jax.random.key(0), 3), jnp.int32(0))
+    action = jax.random.uniform(jax.random.key(1), (3, task.action_size), minval=-1.0, maxval=1.0)
+    for _ in range(20):  # until feet are on the ground
+        state = jax.vmap(task.step)(state, action)
+    places = jax.tree.map(lambda x: jnp.broadcast_to(x, (3, *jnp.shape(x))), task.numbers)
+    arguments = (state, action, places)
+
+    def step(state: Any, action: Any, places: Any) -> Any:
+        return task.with_numbers(places).plain_step(state, action)
+
+    _check(_kernel(step, arguments), [np.asarray(leaf) for leaf in jax.tree.leaves(arguments)], warps, teams)
+
+
+def test_a_loop_in_a_loop_is_left_to_one_warp() -> None:
+    function, arguments = FUNCTIONS["loops in a loop"]
+    assert schedule([number for result in _kernel(function, arguments).results for number in result.flat], 2) is None
+
+
+@pytest.mark.parametrize(
+    ("elements", "warps", "teams"),
+    [(1, 8, 1), (132 * 32, 8, 1), (132 * 32 + 1, 4, 2), (10_240, 2, 3), (20_480, 1, 5), (32_768, 1, 8), (10**6, 1, 8)],
+)
+def test_blocks_have_eight_warps_that_all_run_at_once(
+    elements: int, warps: int, teams: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(block_shape, "SMALL", 10)
+    shape = block_shape.chosen(_kernel(lambda x: jnp.sin(x) * x[::-1], (jnp.ones((1, 4)),)).results, elements)
+    assert shape is not None
+    assert (shape.warps, shape.teams) == (warps, teams)
+
+
+def test_a_team_without_enough_shared_memory_is_one_warp(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(block_shape, "SMALL", 10)
+    monkeypatch.setattr(block_shape, "_of_device", lambda name, usual: 132 if name == "core_count" else 127)
+    shape = block_shape.chosen(_kernel(lambda x: jnp.sin(x) * x[::-1], (jnp.ones((1, 4)),)).results, 1)
+    assert shape is not None
+    assert (shape.warps, shape.teams, shape.shared_bytes) == (1, 1, 0)
+
+
+def test_small_kernels_are_left_as_they_are() -> None:
+    assert block_shape.chosen(_kernel(lambda x: jnp.sin(x), (jnp.ones((1, 4)),)).results, 1) is None
+
+
+@st.composite
+def _graphs(draw: st.DrawFn) -> list[Group]:
+    """Draw groups of operations, each of which reads earlier ones."""
+    groups: list[Group] = []
+    for at in range(draw(st.integers(0, 60))):
+        makers = draw(st.lists(st.integers(0, at - 1), max_size=4, unique=True)) if at else []
+        groups.append(Group(draw(st.integers(1, 9)), {maker: maker for maker in makers}))
+    return groups
+
+
+@given(_graphs(), st.integers(1, 8))
+@settings(max_examples=60, deadline=None)
+def test_every_group_has_a_warp_and_no_warp_much_more_than_its_share(groups: list[Group], warps: int) -> None:
+    warp_of = assign(groups, warps)
+    assert len(warp_of) == len(groups)
+    assert set(warp_of) <= set(range(warps))
+    total, largest = sum(group.instructions for group in groups), max((g.instructions for g in groups), default=0)
+    for warp in range(warps):
+        load = sum(group.instructions for group, w in zip(groups, warp_of, strict=True) if w == warp)
+        assert load <= 3 * SLACK * total / warps + STRETCHES * largest
+
+
+def test_what_reads_one_another_stays_together() -> None:
+    chains = [Group(1, {} if at < 4 else {at - 4: at - 4}) for at in range(400)]  # four that have nothing in common
+    warp_of = assign(chains, 4)
+    apart = sum(warp_of[at] != warp_of[at - 4] for at in range(4, 400))
+    assert apart <= math.ceil(0.1 * 400)
