@@ -6,11 +6,12 @@ from collections.abc import Callable, Mapping
 from dataclasses import field
 from typing import Any, Protocol, runtime_checkable
 
+import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int, PRNGKeyArray
 
 from evoclaims.core.errors import UserError
-from evoclaims.core.pytree import pytree
+from evoclaims.core.pytree import pytree, select
 
 PolicyFn = Callable[[Float[Array, " observation"]], Float[Array, " action"]]
 """A policy with its parameters bound: one observation in, one action out; vmap it for batches."""
@@ -131,6 +132,28 @@ def fitting(task: Task, action: Float[Array, " action"]) -> Float[Array, " actio
             "type float32"
         )
     return found
+
+
+def played(
+    task: Task, policy: PolicyFn, start: TaskState, note: Callable[[TaskState], Any] | None = None
+) -> tuple[TaskState, Float[Array, ""], Any]:
+    """Play from `start` to the end of the episode; each step is computed up to the horizon, and counts until the end.
+
+    Returns:
+        The last state; the sum of rewards; and, leaves [horizon, …], what `note` returns of each state that was
+        reached, with whether the step belongs to the episode (None without `note`).
+    """
+
+    def step(carry: tuple[TaskState, Array, Array], _: None) -> tuple[tuple[TaskState, Array, Array], Any]:
+        state, total, alive = carry
+        following = task.step(state, policy(state.observation))
+        noted = None if note is None else (note(following), alive)
+        total = total + jnp.where(alive, following.reward, 0.0)
+        ended = following.terminated | following.truncated
+        return (select(alive, following, state), total, alive & ~ended), noted
+
+    (state, total, _), way = jax.lax.scan(step, (start, jnp.zeros(()), jnp.ones((), bool)), None, length=task.horizon)
+    return state, total, way
 
 
 @runtime_checkable

@@ -16,7 +16,7 @@ from jaxtyping import Array, Bool, Float, Int, PRNGKeyArray
 from evoclaims.core.errors import UserError
 from evoclaims.core.keys import streams
 from evoclaims.core.pytree import select, strong
-from evoclaims.envs.base import Episode, PolicyFn, TaskState, fitting
+from evoclaims.envs.base import Episode, PolicyFn, TaskState, fitting, played
 from evoclaims.envs.ecorobot import physics
 from evoclaims.envs.ecorobot.boxes import Box
 from evoclaims.envs.ecorobot.outing import Outing, Ruling
@@ -211,30 +211,14 @@ class RobotTask(ABC):
 
     def trajectory(self, policy: PolicyFn, key: PRNGKeyArray) -> tuple[Outing, Bool[Array, " steps"]]:
         """Return all states of one episode, leaves [steps, …], and which belong to it, for pictures."""
-        level = jnp.zeros((), jnp.int32)
-
-        def step(carry: tuple[TaskState, Array], _: None) -> tuple[tuple[TaskState, Array], tuple[Outing, Array]]:
-            state, alive = carry
-            following = self.step(state, policy(state.observation))
-            ended = following.terminated | following.truncated
-            return (select(alive, following, state), alive & ~ended), (following.inner, alive)
-
-        start = (self.reset(key, level), jnp.ones((), bool))
-        return jax.lax.scan(step, start, None, length=self.episode_steps)[1]
+        start = self.reset(key, jnp.zeros((), jnp.int32))
+        way: tuple[Outing, Array] = played(self, policy, start, lambda state: state.inner)[2]
+        return way
 
     def _play(self, policy: PolicyFn, key: PRNGKeyArray, level: Int[Array, ""], follow: bool) -> Episode:
         """Play to the end; with `follow`, record the path for `path_measures`."""
-
-        def step(carry: tuple[TaskState, Array, Array], _: None) -> tuple[tuple[TaskState, Array, Array], Any]:
-            state, total, alive = carry
-            following = self.step(state, policy(state.observation))
-            noted = (following.inner.pose.place[:2], alive) if follow else None
-            total = total + jnp.where(alive, following.reward, 0.0)
-            ended = following.terminated | following.truncated
-            return (select(alive, following, state), total, alive & ~ended), noted
-
-        start = (self.reset(key, level), jnp.zeros(()), jnp.ones((), bool))
-        (state, total, _), way = jax.lax.scan(step, start, None, length=self.episode_steps)
+        note = (lambda state: state.inner.pose.place[:2]) if follow else None
+        state, total, way = played(self, policy, self.reset(key, level), note)
         outing: Outing = state.inner
         steps = outing.time.astype(jnp.float32)
         metrics = {

@@ -10,7 +10,6 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, ClassVar
 
-import jax
 import jax.numpy as jnp
 from jaxtyping import Array, PRNGKeyArray
 
@@ -33,13 +32,7 @@ class BraxTask(JaxTask):
     revision: ClassVar[int] = 1
     packages: ClassVar[tuple[str, ...]] = ("brax", "mujoco", "mujoco-mjx")
 
-    environment_id: str = field(kw_only=False)
     settings: Mapping[str, Any] = field(default_factory=dict, hash=False, kw_only=False)
-
-    @property
-    def name(self) -> str:
-        """The environment's name."""
-        return self.environment_id
 
     def make(self) -> Any:
         """Return Brax's environment, which neither truncates episodes nor resets itself.
@@ -72,12 +65,6 @@ class BraxTask(JaxTask):
     def advance(self, key: PRNGKeyArray, state: Any, action: Array) -> Moment:
         """Act once; Brax's steps are not random."""
         return _moment(self._made.step(state, action))
-
-    @cached_property
-    def _made(self) -> Any:
-        """The environment."""
-        with jax.ensure_compile_time_eval():  # its arrays are numbers, also where a function is being traced
-            return self.make()
 
 
 def _moment(state: Any) -> Moment:

@@ -11,11 +11,11 @@ from typing import Any, ClassVar, NoReturn
 import numpy as np
 
 from evoclaims.core.errors import UserError
-from evoclaims.envs.foreign.scoring import Examination, Scored
+from evoclaims.envs.foreign.scoring import ForeignTask, Scored
 
 
 @dataclass(frozen=True, kw_only=True)
-class GymnasiumTask(Examination):
+class GymnasiumTask(ForeignTask):
     """An environment of Gymnasium, such as `GymnasiumTask("CartPole-v1", solved_at=475)`, with one level.
 
     Training loops train on what `make` returns. Methods of ours are compiled with their task, which this cannot be.
@@ -29,15 +29,9 @@ class GymnasiumTask(Examination):
 
     revision: ClassVar[int] = 1
 
-    environment_id: str = field(kw_only=False)
     settings: Mapping[str, Any] = field(default_factory=dict, hash=False, kw_only=False)
     episode_steps: int | None = None
     providers: tuple[str, ...] = field(default=(), metadata={"canonical": False})
-
-    @property
-    def name(self) -> str:
-        """The environment's name."""
-        return self.environment_id.rpartition(":")[2]
 
     @property
     def packages(self) -> tuple[str, ...]:
@@ -60,11 +54,6 @@ class GymnasiumTask(Examination):
             raise UserError(
                 f"Gymnasium makes no {self.environment_id!r} with {dict(self.settings)}: {error}"
             ) from error
-
-    @property
-    def levels(self) -> int:
-        """One."""
-        return 1
 
     @cached_property
     def observation_size(self) -> int:
@@ -113,27 +102,14 @@ class GymnasiumTask(Examination):
 
             return self.scores(map(played, seeds))
 
-    def reset(self, key: object, level: object) -> NoReturn:
-        """Raise a `UserError`."""
-        raise self._on_the_host()
-
-    def step(self, state: object, action: object) -> NoReturn:
-        """Raise a `UserError`."""
-        raise self._on_the_host()
-
-    def episode(self, policy: object, key: object, level: object) -> NoReturn:
-        """Raise a `UserError`."""
-        raise self._on_the_host()
-
-    def examine(self, policy: object, key: object, level: object) -> NoReturn:
-        """Raise a `UserError`."""
-        raise self._on_the_host()
-
-    def _on_the_host(self) -> UserError:
-        return UserError(
+    def reset(self, *_: Any, **__: Any) -> NoReturn:
+        """Raise a `UserError`: this runs on the host, and not in a compiled program."""
+        raise UserError(
             f"{self.name} is an environment of Gymnasium, which runs on the host: train on it by a TrainingLoop, or "
             "take the same environment from gymnax or Brax (GymnaxTask, BraxTask), on which every method trains."
         )
+
+    step = episode = examine = reset
 
 
 def _size(space: Any) -> int:

@@ -7,7 +7,6 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, ClassVar
 
-import jax
 import jax.numpy as jnp
 from jaxtyping import Array, PRNGKeyArray
 
@@ -28,13 +27,7 @@ class GymnaxTask(JaxTask):
     revision: ClassVar[int] = 1
     packages: ClassVar[tuple[str, ...]] = ("gymnax",)
 
-    environment_id: str = field(kw_only=False)
     parameters: Mapping[str, Any] = field(default_factory=dict, hash=False, kw_only=False)
-
-    @property
-    def name(self) -> str:
-        """The environment's name."""
-        return self.environment_id
 
     def make(self) -> tuple[Any, Any]:
         """Return gymnax's environment and its parameters.
@@ -77,9 +70,3 @@ class GymnaxTask(JaxTask):
             reward=jnp.asarray(reward, jnp.float32),
             terminated=jnp.asarray(terminated, bool),
         )
-
-    @cached_property
-    def _made(self) -> tuple[Any, Any]:
-        """The environment and its parameters."""
-        with jax.ensure_compile_time_eval():  # its arrays are numbers, also where a function is being traced
-            return self.make()

@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 from evoclaims.core.errors import UserError
 from evoclaims.core.foreign import implicit_promotions
 from evoclaims.core.keys import EVALUATION, streams, trial_key
-from evoclaims.core.pytree import pytree, select, strong
-from evoclaims.envs.base import Episode, PolicyFn, TaskState, fitting
+from evoclaims.core.pytree import pytree, strong
+from evoclaims.envs.base import Episode, PolicyFn, TaskState, fitting, played
 from evoclaims.envs.foreign.actions import Choice, Range
-from evoclaims.envs.foreign.scoring import Examination, Scored
+from evoclaims.envs.foreign.scoring import ForeignTask, Scored
 
 
 @pytree
@@ -69,8 +69,8 @@ class Descriptor:
 
 
 @dataclass(frozen=True, kw_only=True)
-class JaxTask(Examination, ABC):
-    """An environment as a task with one level. A subclass has name, revision, `begin`, `advance` and the sizes.
+class JaxTask(ForeignTask, ABC):
+    """An environment in jax. A subclass has revision, `make`, `begin`, `advance` and `actions`.
 
     A step after which a number is not finite is undone: no reward, and the episode ends.
 
@@ -88,10 +88,9 @@ class JaxTask(Examination, ABC):
         if self.episode_steps < 1:
             raise UserError(f"An episode has at least 1 step, not {self.episode_steps}.")
 
-    @property
     @abstractmethod
-    def name(self) -> str:
-        """The registered name."""
+    def make(self) -> Any:
+        """Return the library's environment."""
 
     @property
     @abstractmethod
@@ -105,11 +104,6 @@ class JaxTask(Examination, ABC):
     @abstractmethod
     def advance(self, key: PRNGKeyArray, state: Any, action: Array) -> Moment:
         """Act once, by an action of the environment's own."""
-
-    @property
-    def levels(self) -> int:
-        """One."""
-        return 1
 
     @property
     def horizon(self) -> int:
@@ -161,19 +155,7 @@ class JaxTask(Examination, ABC):
 
     def episode(self, policy: PolicyFn, key: PRNGKeyArray, level: Int[Array, ""]) -> Episode:
         """Run one episode: fitness is its return, success whether that is `solved_at` or more."""
-        start = self.reset(key, level), jnp.zeros(()), jnp.ones((), bool)
-
-        def step(carry: tuple[TaskState, Array, Array], _: None) -> tuple[tuple[TaskState, Array, Array], None]:
-            state, total, alive = carry
-            following = self.step(state, policy(state.observation))
-            ended = following.terminated | following.truncated
-            return (
-                select(alive, following, state),
-                total + jnp.where(alive, following.reward, 0.0),
-                alive & ~ended,
-            ), None
-
-        (state, total, _), _ = jax.lax.scan(step, start, None, length=self.episode_steps)
+        state, total, _ = played(self, policy, self.reset(key, level))
         return Episode(
             fitness=total,
             success=(total >= self.threshold).astype(jnp.float32),
@@ -204,7 +186,7 @@ class JaxTask(Examination, ABC):
         """Run `examined_episodes` of a policy that acts as the environment wants it, on the host, and average."""
         begin, advance = jax.jit(self.begin), jax.jit(self.advance)
 
-        def played(key: Array) -> tuple[float, int]:
+        def one(key: Array) -> tuple[float, int]:
             key, begin_key = jax.random.split(key)
             moment, total = begin(begin_key), 0.0
             for step in range(1, self.episode_steps + 1):
@@ -216,7 +198,13 @@ class JaxTask(Examination, ABC):
             return total, self.episode_steps
 
         with implicit_promotions():
-            return self.scores(map(played, jax.random.split(trial_key(seed, EVALUATION), self.examined_episodes)))
+            return self.scores(map(one, jax.random.split(trial_key(seed, EVALUATION), self.examined_episodes)))
+
+    @cached_property
+    def _made(self) -> Any:
+        """What `make` returns."""
+        with jax.ensure_compile_time_eval():  # its arrays are numbers, also where a function is being traced
+            return self.make()
 
     def _place(self, observation: Float[Array, " observation"]) -> Mapping[str, Float[Array, ""]]:
         """Return where an episode has ended, as MAP-Elites wants it."""

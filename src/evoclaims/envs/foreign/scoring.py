@@ -1,4 +1,4 @@
-"""How episodes of another library's environment are scored: by their return, and by the return that solves them.
+"""What all tasks of other libraries' environments share: a name, and how episodes are scored, by their return.
 
 This needs no jax: a training loop that does not use it starts in a third of the time.
 """
@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from statistics import fmean
-from typing import Any, Protocol, runtime_checkable
+from typing import Any, ClassVar, Protocol, runtime_checkable
 
 from evoclaims.core.errors import UserError
 
@@ -26,14 +26,18 @@ class NativelyExamined(Protocol):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Examination:
-    """What an examination asks for.
+class ForeignTask:
+    """An environment of another library as a task with one level.
 
     Attributes:
-        examined_episodes: episodes, from different starts, over which it averages.
+        environment_id: as the library takes it.
+        examined_episodes: episodes, from different starts, over which an examination averages.
         solved_at: return from which an episode counts as solved; None: no episode does.
     """
 
+    levels: ClassVar[int] = 1
+
+    environment_id: str = field(kw_only=False)
     examined_episodes: int = 10
     solved_at: float | None = None
 
@@ -41,6 +45,11 @@ class Examination:
         """Check the count."""
         if self.examined_episodes < 1:
             raise UserError(f"An examination has at least 1 episode, not {self.examined_episodes}.")
+
+    @property
+    def name(self) -> str:
+        """The environment's name, without the module that registers it."""
+        return self.environment_id.rpartition(":")[2]
 
     @property
     def threshold(self) -> float:
