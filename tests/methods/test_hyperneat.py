@@ -21,6 +21,7 @@ from evoclaims.methods.hyperneat import CPPN_FUNCTIONS, PAPER, HyperNeat, Substr
 from evoclaims.methods.neat import settings as neat
 from evoclaims.methods.neat.settings import Settings, Species
 from evoclaims.networks.genome import EMPTY, Connections, Genome, Nodes
+from evoclaims.networks.graph import GraphNetwork
 from evoclaims.networks.substrate import Substrate, layered, on_circle
 
 NAMES = (*CPPN_FUNCTIONS, "sigmoid")
@@ -80,7 +81,7 @@ def _drawn(network: SubstrateNetwork, genome: Genome) -> list[NDArray[np.float64
             [
                 [
                     _weight(
-                        _ask(genome, network.activations, network.output, (*source, *target)),
+                        _ask(genome, network.cppn.activations, network.cppn.output, (*source, *target)),
                         network.threshold,
                         network.max_weight,
                     )
@@ -126,7 +127,7 @@ CPPNS = [_any_genome(DRAWING) for _ in range(60)]
 
 
 def _network(substrate: Substrate) -> SubstrateNetwork:
-    return SubstrateNetwork(substrate, NAMES, "tanh", threshold=0.3, max_weight=5.0)
+    return SubstrateNetwork(substrate, GraphNetwork(4, 1, NAMES, "tanh"), threshold=0.3, max_weight=5.0)
 
 
 @SUBSTRATES
@@ -186,7 +187,7 @@ def _answering(weights: Sequence[float], bias: float = 0.0) -> Genome:
 
 def test_a_weight_leads_from_the_first_place_that_is_asked_about_to_the_second() -> None:
     substrate = Substrate((((0.1, 0.2), (0.3, 0.4), (0.5, 0.6)), ((0.7, 0.8), (0.9, 1.0)), ((0.15, 0.25),)))
-    network = SubstrateNetwork(substrate, ("tanh",), "identity", threshold=0.0, max_weight=1.0)
+    network = SubstrateNetwork(substrate, GraphNetwork(4, 1, ("tanh",), "identity"), threshold=0.0, max_weight=1.0)
     for coordinate, wanted in enumerate(
         [
             ([[0.1, 0.3, 0.5]] * 2, [[0.7, 0.9]]),
@@ -202,7 +203,7 @@ def test_a_weight_leads_from_the_first_place_that_is_asked_about_to_the_second()
 
 PAIR = Substrate((((0.0, 0.0),), ((0.0, 0.0),)))
 WEIGHING = {
-    sizes: jax.jit(SubstrateNetwork(PAIR, ("tanh",), "identity", *sizes).express)
+    sizes: jax.jit(SubstrateNetwork(PAIR, GraphNetwork(4, 1, ("tanh",), "identity"), *sizes).express)
     for sizes in ((0.3, 5.0), (0.0, 1.0), (0.75, 2.0))
 }
 
@@ -264,8 +265,7 @@ def test_layers_are_the_observation_and_the_bias_then_the_hidden_ones_then_the_a
 def test_the_settings_numbers_reach_the_network() -> None:
     method = HyperNeat(replace(PAPER, output="identity"), threshold=0.25, max_weight=3.0)
     network = method.encoding(TASK)
-    assert (network.inputs, network.outputs) == (4, 1)
-    assert (network.activations, network.output) == (CPPN_FUNCTIONS, "identity")
+    assert network.cppn == GraphNetwork(4, 1, CPPN_FUNCTIONS, "identity")
     assert (network.threshold, network.max_weight) == (0.25, 3.0)
 
 

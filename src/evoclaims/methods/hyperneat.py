@@ -37,18 +37,14 @@ class SubstrateNetwork:
     """
 
     substrate: Substrate
-    activations: tuple[str, ...]
-    output: str
+    cppn: GraphNetwork
     threshold: float
     max_weight: float
-    inputs: int = 4
-    outputs: int = 1
 
     def express(self, genome: Genome) -> list[Float[Array, "to from"]]:
         """Return the weights into each layer except the first."""
-        cppn = GraphNetwork(self.inputs, self.outputs, self.activations, self.output)
         queries = jnp.asarray(self.substrate.queries)
-        q = jax.vmap(partial(cppn.apply, cppn.express(genome)))(queries)[:, 0]
+        q = jax.vmap(partial(self.cppn.apply, self.cppn.express(genome)))(queries)[:, 0]
         size = jnp.maximum(jnp.abs(q) - self.threshold, 0.0) / (1 - self.threshold) * self.max_weight
         weights = jnp.sign(q) * size
         shapes = self.substrate.shapes
@@ -91,14 +87,14 @@ class HyperNeat(GenomeMethod):
 
     def __post_init__(self) -> None:
         """Check the numbers."""
-        if not 0 <= self.threshold < 1 or not 0 < self.max_weight < math.inf:
-            raise UserError(
-                "HyperNEAT's threshold lies in [0, 1) and its largest weight is finite and above 0: not "
-                f"{self.threshold} and {self.max_weight}."
-            )
+        check_weights(self.threshold, self.max_weight)
+
+    def network(self, task: Task) -> GraphNetwork:
+        """Return the CPPN, whose inputs are the coordinates of a connection's ends."""
+        return GraphNetwork(4, 1, self.settings.activations, self.settings.output)
 
     def encoding(self, task: Task) -> SubstrateNetwork:
-        """Return how a genome encodes a policy of the task's size."""
+        """Return how a genome encodes a policy of the task's size; a `UserError` says when they do not fit."""
         inputs, outputs = task.observation_size + 1, task.action_size
         substrate = self.substrate or layered((inputs, *self.hidden, outputs), self.extent)
         ends = len(substrate.layers[0]), len(substrate.layers[-1])
@@ -107,6 +103,13 @@ class HyperNeat(GenomeMethod):
                 f"{task.name} needs a substrate with {inputs} inputs (one of them the bias) and {outputs} outputs; "
                 f"this one has {ends[0]} and {ends[1]}."
             )
-        return SubstrateNetwork(
-            substrate, self.settings.activations, self.settings.output, self.threshold, self.max_weight
+        return SubstrateNetwork(substrate, self.network(task), self.threshold, self.max_weight)
+
+
+def check_weights(threshold: float, max_weight: float) -> None:
+    """Raise a `UserError` for numbers by which no weight can be drawn."""
+    if not 0 <= threshold < 1 or not 0 < max_weight < math.inf:
+        raise UserError(
+            "HyperNEAT's threshold lies in [0, 1) and its largest weight is finite and above 0: not "
+            f"{threshold} and {max_weight}."
         )

@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, ClassVar, get_args
+from typing import Any, ClassVar
 
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
-from evoclaims.core.errors import UnknownNameError, UserError
 from evoclaims.core.foreign import implicit_promotions
 from evoclaims.envs.base import Task
-from evoclaims.methods.hyperneat import PAPER
+from evoclaims.methods.hyperneat import PAPER, check_weights
 from evoclaims.methods.neat.settings import Settings
 from evoclaims.methods.tensorneat import NeatTensorneat, library, neat
 from evoclaims.networks.activations import ACTIVATIONS
-from evoclaims.networks.substrate import Extent
+from evoclaims.networks.substrate import Extent, layered
 
 
 @dataclass(frozen=True)
@@ -41,14 +40,9 @@ class HyperneatTensorneat(NeatTensorneat):
     max_weight: float = 5.0
 
     def __post_init__(self) -> None:
-        """Check the substrate."""
-        if self.extent not in get_args(Extent):
-            raise UnknownNameError("extent of a substrate", self.extent, get_args(Extent))
-        if min(self.hidden, default=1) < 1 or not 0 <= self.threshold < 1 or self.max_weight <= 0:
-            raise UserError(
-                "HyperNEAT's hidden layers have at least one neuron each, its threshold lies in [0, 1) and its largest "
-                f"weight above 0; {self.hidden}, {self.threshold} and {self.max_weight} do not."
-            )
+        """Check the substrate and the weights."""
+        layered((1, *self.hidden, 1), self.extent)
+        check_weights(self.threshold, self.max_weight)
 
     def _algorithm(self, task: Task) -> Any:
         """Build TensorNEAT's algorithm for a substrate of the task's size."""

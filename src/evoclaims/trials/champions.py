@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Protocol, runtime_checkable
+from typing import Any
 
 import jax
 import numpy as np
@@ -16,11 +16,12 @@ from evoclaims.core.keys import EVALUATION, TRAINING, trial_key
 from evoclaims.core.provenance import what_fixes_bits
 from evoclaims.envs.base import Episode
 from evoclaims.methods.base import Policy
+from evoclaims.methods.hyperneat import SubstrateNetwork
 from evoclaims.methods.neat.evolution import GenomeMethod
 from evoclaims.networks.genome import Genome
 from evoclaims.networks.graph import GraphNetwork
 from evoclaims.networks.substrate import Substrate
-from evoclaims.trials.devices import MATMUL_PRECISION, layout_for
+from evoclaims.trials.devices import MATMUL_PRECISION, layout_on
 from evoclaims.trials.lanes import options_for
 from evoclaims.trials.program import over_trials
 from evoclaims.trials.result import TrialResult
@@ -28,18 +29,6 @@ from evoclaims.trials.result_making import named_leaves, provenance
 from evoclaims.trials.rollout import score_every_level
 from evoclaims.trials.spec import Condition
 from evoclaims.trials.store import Store
-
-
-@runtime_checkable
-class OnSubstrate(Protocol):
-    """An encoding in which a genome computes another network's weights."""
-
-    @property
-    def substrate(self) -> Substrate:
-        """The positions of that network's neurons."""
-
-    def express(self, genome: Genome) -> Sequence[Array]:
-        """Return the weights into each layer except the first, shapes [to, from]."""
 
 
 @dataclass(frozen=True)
@@ -83,7 +72,7 @@ def replay(condition: Condition, result: TrialResult, parameters: Any, devices: 
         return score_every_level(condition.task, policy, trial_key(seed, EVALUATION))
 
     arguments = jax.tree.map(lambda leaf: np.asarray(leaf)[None], (np.int32(result.seed), parameters))
-    layout = layout_for(list(devices))
+    layout = layout_on(devices[0].platform)
     with jax.default_matmul_precision(MATMUL_PRECISION):
         compiled = jax.jit(over_trials(score, layout), compiler_options=options_for(condition, layout))
         episode: Episode = jax.device_get(compiled(*jax.device_put(arguments, devices[0])))
@@ -106,8 +95,7 @@ def network_of(condition: Condition, parameters: Any) -> GraphNetwork | None:
     """Return the network of a champion that is a genome; None for any other champion."""
     if not isinstance(parameters, Genome) or not isinstance(condition.method, GenomeMethod):
         return None
-    encoding = condition.method.encoding(condition.task)
-    return GraphNetwork(encoding.inputs, encoding.outputs, encoding.activations, encoding.output)
+    return condition.method.network(condition.task)
 
 
 def substrate_of(condition: Condition, parameters: Any) -> tuple[Substrate, list[NDArray[Any]]] | None:
@@ -115,7 +103,7 @@ def substrate_of(condition: Condition, parameters: Any) -> tuple[Substrate, list
     if network_of(condition, parameters) is None:
         return None
     encoding = condition.method.encoding(condition.task)  # type: ignore[attr-defined]
-    if not isinstance(encoding, OnSubstrate):
+    if not isinstance(encoding, SubstrateNetwork):
         return None
     with jax.default_matmul_precision(MATMUL_PRECISION):
         return encoding.substrate, [np.asarray(weights) for weights in encoding.express(parameters)]

@@ -19,32 +19,11 @@ from evoclaims.methods.neat.capacity import capacities, in_capacity
 from evoclaims.methods.neat.population import Population, first_population, forget_records, next_population
 from evoclaims.methods.neat.settings import Settings
 from evoclaims.networks.genome import Genome, resized
+from evoclaims.networks.graph import GraphNetwork
 
 
 class Encoding(Protocol):
-    """How a genome encodes a policy; frozen and hashable.
-
-    Attributes:
-        inputs, outputs: of the network that the genome itself describes.
-        activations: functions that its node genes index.
-        output: function of its outputs.
-    """
-
-    @property
-    def inputs(self) -> int:
-        """Inputs of the genome's network."""
-
-    @property
-    def outputs(self) -> int:
-        """Outputs of the genome's network."""
-
-    @property
-    def activations(self) -> tuple[str, ...]:
-        """Activation functions of its nodes."""
-
-    @property
-    def output(self) -> str:
-        """Activation function of its outputs."""
+    """How a genome encodes a policy; frozen and hashable."""
 
     def express(self, genome: Genome) -> Any:
         """Turn a genome into its phenotype: a tree of arrays."""
@@ -71,18 +50,23 @@ class Evolution:
 
 
 class GenomeMethod(ABC):
-    """A method that evolves genomes; a subclass, a frozen dataclass with `settings`, says what a genome encodes."""
+    """A method that evolves genomes; a subclass, a frozen dataclass with `settings`, says what a genome describes."""
 
     settings: Settings
 
     @abstractmethod
+    def network(self, task: Task) -> GraphNetwork:
+        """Return the network that a genome describes."""
+
     def encoding(self, task: Task) -> Encoding:
-        """Return how a genome encodes a policy of the task's size; a `UserError` says when they do not fit."""
+        """Return how a genome encodes a policy of the task's size: by default, its network is the policy's."""
+        return self.network(task)
 
     def init(self, key: PRNGKeyArray, task: Task) -> Evolution:
-        """Draw the first population; a `UserError` says when the smallest network does not fit."""
-        encoding = self.encoding(task)
-        population = first_population(key, self.settings, encoding.inputs, encoding.outputs)
+        """Draw the first population; a `UserError` says when a policy or the smallest network does not fit."""
+        _ = self.encoding(task)
+        network = self.network(task)
+        population = first_population(key, self.settings, network.inputs, network.outputs)
         return Evolution(
             population=population,
             level=jnp.zeros((), jnp.int32),
@@ -94,18 +78,18 @@ class GenomeMethod(ABC):
         self, key: PRNGKeyArray, task: Task, level: Int[Array, ""], state: Evolution
     ) -> tuple[Evolution, Progress]:
         """Evaluate the population on `level` and replace it by the next."""
-        encoding, settings, population = self.encoding(task), self.settings, state.population
+        network, settings, population = self.network(task), self.settings, state.population
         if settings.species.on_level_up == "reset":
             population = select(level == state.level, population, forget_records(population))
         episode_key, reproduction_key = streams(key, "episode", "reproduction")
-        run = partial(_evaluate, encoding, task)
-        sizes = capacities(settings, encoding.inputs, encoding.outputs)
+        run = partial(_evaluate, self.encoding(task), task)
+        sizes = capacities(settings, network.inputs, network.outputs)
         episodes = in_capacity(sizes, (population.genomes,), run, episode_key, level, population.genomes)
         fitness = jnp.where(jnp.isnan(episodes.fitness), -jnp.inf, episodes.fitness)
         # The newest of equals, as everywhere in NEAT.
         best = settings.population - 1 - jnp.argmax(fitness[::-1])
         champion, episode = jax.tree.map(lambda leaf: leaf[best], (population.genomes, episodes))
-        following = next_population(reproduction_key, settings, population, fitness, encoding.inputs, encoding.outputs)
+        following = next_population(reproduction_key, settings, population, fitness, network.inputs, network.outputs)
         genomes = population.genomes
         metrics = {
             "nodes": jnp.mean(genomes.node_count.astype(jnp.float32)),

@@ -21,6 +21,6 @@ class Neat(GenomeMethod):
 
     settings: Settings = PAPER
 
-    def encoding(self, task: Task) -> GraphNetwork:
-        """Return how a genome encodes a policy of the task's size."""
+    def network(self, task: Task) -> GraphNetwork:
+        """Return the policy's network."""
         return GraphNetwork(task.observation_size, task.action_size, self.settings.activations, self.settings.output)
