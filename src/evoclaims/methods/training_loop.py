@@ -67,23 +67,14 @@ class TrainingLoop:
         """Return 1: a budget's environment steps are the function's own to count."""
         return 1
 
-    def init(self, key: object, task: object) -> NoReturn:
-        """Raise a `UserError`: there is no state."""
-        raise self._no_steps()
-
-    def step(self, key: object, task: object, level: object, state: object) -> NoReturn:
+    def init(self, *_: Any, **__: Any) -> NoReturn:
         """Raise a `UserError`: the function trains, not steps that the engine compiles."""
-        raise self._no_steps()
-
-    def best(self, task: object, state: object) -> NoReturn:
-        """Raise a `UserError`: the policy stays in the process that trained it."""
-        raise self._no_steps()
-
-    def _no_steps(self) -> UserError:
-        return UserError(
+        raise UserError(
             f"{self.name!r} is a training loop of its own: it is run whole, and its policies are examined where they "
             "are trained and are not kept, so there is no champion."
         )
+
+    step = best = init
 
 
 def _is_plain(value: Any) -> bool:
