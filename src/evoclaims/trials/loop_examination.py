@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import Any
 
 import jax
@@ -18,7 +18,7 @@ from evoclaims.trials.rollout import score_every_level
 
 
 def examined(task: Task, policy: Callable[[Any], Any], seed: int) -> Scores:
-    """Return the scores of a policy on a task of ours, with keys that training has no way to.
+    """Return the scores of a policy on a task of ours (metrics of the last level), with keys unknown to training.
 
     It is examined as all methods' policies are: observations [observation_size] in, actions [action_size] out.
     """
@@ -32,13 +32,8 @@ def examined(task: Task, policy: Callable[[Any], Any], seed: int) -> Scores:
     return Scores(
         success=tuple(map(float, final.success)),
         fitness=tuple(map(float, final.fitness)),
-        metrics=_last(final.metrics),
+        metrics={name: float(values[-1]) for name, values in final.metrics.items()},
     )
-
-
-def _last(metrics: Mapping[str, Any]) -> dict[str, Any]:
-    """Return metrics [levels] of the last level."""
-    return {name: float(values[-1]) for name, values in metrics.items()}
 
 
 def _fitted(task: Task, policy: Callable[[Any], Any]) -> Callable[[Array], Array]:

@@ -21,7 +21,7 @@ import msgspec
 
 from evoclaims.core.errors import UserError
 from evoclaims.core.portable import from_plain, resolve
-from evoclaims.envs.foreign.scoring import NativelyExamined
+from evoclaims.envs.foreign.scoring import ForeignTask
 from evoclaims.methods.training_loop import wants_report
 from evoclaims.trials.loop_messages import Answer, Failed, Reported, Request, Scores, Trained, encode, last_lines
 
@@ -110,7 +110,7 @@ def train(request: Request, answer: Callable[[Answer], None]) -> Trained:
 
 def examined(task: Any, policy: Callable[[Any], Any], seed: int) -> Scores:
     """Return the scores of a policy, which acts on another library's environment as that wants it."""
-    if isinstance(task, NativelyExamined):
+    if isinstance(task, ForeignTask):
         fitness, success, metrics = task.examine_natively(policy, seed)
         return Scores(success=(success,), fitness=(fitness,), metrics=dict(metrics))
     from evoclaims.trials import loop_examination  # not before: many loops need no jax

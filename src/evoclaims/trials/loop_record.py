@@ -33,11 +33,13 @@ def trained_record(
     policy's scores are not finite.
     """
     assert isinstance(spec.condition.method, TrainingLoop)
-    returned = floats(trained.metrics)
-    broken = any(math.isnan(value) for value in returned.values())
-    levels = _told_levels(returned, spec.condition.task.levels)
-    if trained.scores is not None:
-        levels = {"success": _vector(trained.scores.success), "fitness": _vector(trained.scores.fitness)}
+    returned, scores = floats(trained.metrics), trained.scores
+    broken = any(map(math.isnan, returned.values()))
+    if scores is None:  # the last level at most is known
+        unknown = (math.nan,) * (spec.condition.task.levels - 1)
+        levels = {name: (*unknown, returned.get(f"last_{name}", math.nan)) for name in ("success", "fitness")}
+    else:
+        levels = {"success": tuple(map(float, scores.success)), "fitness": tuple(map(float, scores.fitness))}
         broken = broken or not all(map(math.isfinite, (*levels["success"], *levels["fitness"])))
     steps = returned.get("environment_steps", spec.condition.steps if trained.step is None else trained.step)
     success = levels["success"]
@@ -51,24 +53,14 @@ def trained_record(
         "steps": float(returned.get("steps", steps)),
         "environment_steps": float(steps),
     }
-    if trained.scores is None:
+    if scores is None:
         metrics |= returned
     else:
         known = {name: value for name, value in metrics.items() if not math.isnan(value)}
-        metrics |= returned | known | floats(trained.scores.metrics)
+        metrics |= returned | known | floats(scores.metrics)
     status: Status = "diverged" if broken else "done"
     origin = {
         "trained_by": spec.condition.method.place,
-        SCORED_BY: "training function" if trained.scores is None else "examination",
+        SCORED_BY: "training function" if scores is None else "examination",
     }
     return make_record(spec, status, metrics, levels, curves, b"", timing, devices, origin)
-
-
-def _told_levels(returned: Mapping[str, float], levels: int) -> dict[str, tuple[float, ...]]:
-    """Return the vectors over levels of a trial that nobody has examined: the last level at most is known."""
-    unknown = (math.nan,) * (levels - 1)
-    return {name: (*unknown, returned.get(f"last_{name}", math.nan)) for name in ("success", "fitness")}
-
-
-def _vector(values: Sequence[Any]) -> tuple[float, ...]:
-    return tuple(map(float, values))

@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
-from typing import Any, Final
+from typing import Any, Final, Literal
 
 import jax
 
@@ -21,7 +21,7 @@ from evoclaims.methods.training_loop import TrainingLoop
 from evoclaims.trials import crashes
 from evoclaims.trials.allowance import Allowance, OutOfTimeError
 from evoclaims.trials.batches import StoredTrials
-from evoclaims.trials.devices import layout_for, usable_cores
+from evoclaims.trials.devices import layout_on, usable_cores
 from evoclaims.trials.loop_child import Child
 from evoclaims.trials.loop_messages import Failed, Reported, Request, Trained
 from evoclaims.trials.loop_record import trained_record
@@ -42,22 +42,16 @@ class Running:
         began: when its process began, UTC.
         points: of the training curve.
         newest: the last report; None before the first.
-        trained: what it has come to; None until then.
-        late: whether it has run out of time.
-        reason: why it crashed; empty if it did not.
         seconds: that its process lived.
-        ended: whether all this is known.
+        outcome: what it has come to, or "late"; None until all this is known.
     """
 
     spec: TrialSpec
     began: str = ""
     points: list[Reported] = field(default_factory=list)
     newest: Reported | None = None
-    trained: Trained | None = None
-    late: bool = False
-    reason: str = ""
     seconds: float = 0.0
-    ended: bool = False
+    outcome: Trained | Failed | Literal["late"] | None = None
 
     @property
     def curves(self) -> dict[str, list[float]]:
@@ -101,7 +95,7 @@ class LoopTrials:
 
     def make(self, owed: Sequence[int], tell: Watcher) -> None:
         """Run trials and store each as it ends; those that have ended stay when anything is raised."""
-        at_a_time = usable_cores() if layout_for(list(self._devices)) == "alone" else 1
+        at_a_time = usable_cores() if layout_on(self._devices[0].platform) == "alone" else 1
         running = [Running(TrialSpec(self._stored.condition, seed)) for seed in owed]
         began, stored = time.monotonic(), set[int]()
         with ThreadPoolExecutor(at_a_time) as pool:
@@ -112,7 +106,7 @@ class LoopTrials:
                     heard = self._events.get()
                     if isinstance(heard, BaseException):
                         raise heard
-                    if heard.ended and heard.spec.seed not in stored:
+                    if heard.outcome and heard.spec.seed not in stored:
                         self._store(heard, tell)
                         stored.add(heard.spec.seed)
                     tell(self._progress(running, len(stored), time.monotonic() - began))
@@ -130,31 +124,30 @@ class LoopTrials:
                 self._children.add(child)
                 if self._stopping:
                     child.stop()
+            outcome: Trained | Failed | Literal["late"] | None = "late"
             try:
-                Allowance(self._stored.time_limit).spend(lambda: self._listen(child, one))
+                outcome = Allowance(self._stored.time_limit).spend(lambda: self._listen(child, one))
             except OutOfTimeError:
-                one.late = True
+                pass
             finally:
                 with self._lock:
                     self._children.discard(child)
                 reason = child.close()
-            one.reason = one.reason or ("" if one.trained or one.late else reason)
-            one.seconds, one.ended = time.monotonic() - began, True
+            one.seconds = time.monotonic() - began
+            one.outcome = outcome or Failed(reason)
             self._events.put(one)
         except BaseException as error:
             self._events.put(error)
 
-    def _listen(self, child: Child, one: Running) -> None:
-        """Note what a process answers."""
+    def _listen(self, child: Child, one: Running) -> Trained | Failed | None:
+        """Note what a process reports, and return its last answer; None if it ended without one."""
         for answer in child.answers():
-            if isinstance(answer, Trained):
-                one.trained = answer
-            elif isinstance(answer, Failed):
-                one.reason = answer.reason
-            else:
-                one.newest = answer
-                one.points += [answer] * answer.kept
-                self._events.put(one)
+            if not isinstance(answer, Reported):
+                return answer
+            one.newest = answer
+            one.points += [answer] * answer.kept
+            self._events.put(one)
+        return None
 
     def _environment(self) -> Mapping[str, str]:
         """Return what a process's environment has besides this one's: its modules, one thread, and these devices."""
@@ -171,21 +164,20 @@ class LoopTrials:
     def _store(self, one: Running, tell: Watcher) -> None:
         """Store a trial that has ended."""
         timing = {"run": one.seconds, "compile": 0.0, "batch": 1, "started": one.began}
-        if one.trained is not None:
-            result = trained_record(one.spec, one.trained, one.curves, timing, self._devices)
-        elif one.late:
-            limited = {**timing, "limit": self._stored.time_limit}
-            result = make_unfinished(one.spec, "timeout", one.curves, limited, self._devices)
-            self._remark(f"seed {one.spec.seed} is out of time after {self._stored.time_limit:g} s", tell)
-        else:
-            result = make_unfinished(one.spec, "crashed", one.curves, timing, self._devices, one.reason)
+        failed = ""
+        if isinstance(one.outcome, Trained):
+            result = trained_record(one.spec, one.outcome, one.curves, timing, self._devices)
+        elif isinstance(one.outcome, Failed):
+            result = make_unfinished(one.spec, "crashed", one.curves, timing, self._devices, one.outcome.reason)
             crashes.remember(result)
-            self._remark(f"seed {one.spec.seed} crashed: {crashes.why(result)}", tell)
+            failed = f"crashed: {crashes.why(result)}"
+        else:
+            limit = self._stored.time_limit
+            result = make_unfinished(one.spec, "timeout", one.curves, {**timing, "limit": limit}, self._devices)
+            failed = f"is out of time after {limit:g} s"
+        if failed:
+            tell(RunProgress(self._stored.condition.label, f"seed {one.spec.seed} {failed}", 0, remark=True))
         self._stored.store.put(result, {})
-
-    def _remark(self, text: str, tell: Watcher) -> None:
-        """Say how a trial has failed."""
-        tell(RunProgress(self._stored.condition.label, text, 0, remark=True))
 
     def _progress(self, running: Sequence[Running], ended: int, seconds: float) -> RunProgress:
         """Return how far all trials are."""
@@ -214,6 +206,6 @@ class LoopTrials:
 
 def _step(one: Running, whole: int) -> int:
     """Return how far a trial is, of a whole budget."""
-    if one.ended:
+    if one.outcome:
         return whole
     return min(one.newest.step, whole) if one.newest else 0

@@ -18,7 +18,7 @@ from gymnasium.utils.env_checker import check_env
 from evoclaims.core.errors import UserError
 from evoclaims.envs.foreign.gymnasium_env import GymnasiumEnv
 from evoclaims.envs.foreign.gymnasium_task import GymnasiumTask
-from evoclaims.envs.foreign.scoring import NativelyExamined
+from evoclaims.envs.foreign.scoring import ForeignTask
 from evoclaims.envs.gates.parity import NParity
 from evoclaims.methods.random_search import RandomSearch
 from evoclaims.methods.training_loop import TrainingLoop
@@ -45,7 +45,7 @@ def leaning(observation: Any) -> int:
 
 
 def test_a_policy_is_examined_on_the_host_from_its_own_starts() -> None:
-    assert isinstance(CART, NativelyExamined)
+    assert isinstance(CART, ForeignTask)
     fitness, success, metrics = CART.examine_natively(leaning, 0)
     assert fitness == metrics["episode_steps"] > 100
     assert 0 < success <= 1

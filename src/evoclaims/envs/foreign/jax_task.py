@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -69,7 +69,7 @@ class Descriptor:
 
 
 @dataclass(frozen=True, kw_only=True)
-class JaxTask(ForeignTask, ABC):
+class JaxTask(ForeignTask):
     """An environment in jax. A subclass has revision, `make`, `begin`, `advance` and `actions`.
 
     A step after which a number is not finite is undone: no reward, and the episode ends.

@@ -6,10 +6,11 @@ This needs no jax: a training loop that does not use it starts in a third of the
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from statistics import fmean
-from typing import Any, ClassVar, Protocol, runtime_checkable
+from typing import Any, ClassVar
 
 from evoclaims.core.errors import UserError
 
@@ -17,17 +18,9 @@ Scored = tuple[float, float, Mapping[str, float]]
 """Fitness, success and metrics of a policy, as a task's `examine` has them."""
 
 
-@runtime_checkable
-class NativelyExamined(Protocol):
-    """A task of another library's environment: what is trained on that acts in its own observations and actions."""
-
-    def examine_natively(self, policy: Callable[[Any], Any], seed: int) -> Scored:
-        """Return what a policy scores on the host."""
-
-
 @dataclass(frozen=True, kw_only=True)
-class ForeignTask:
-    """An environment of another library as a task with one level.
+class ForeignTask(ABC):
+    """An environment of another library as a task with one level; training loops act in its own terms.
 
     Attributes:
         environment_id: as the library takes it.
@@ -50,6 +43,10 @@ class ForeignTask:
     def name(self) -> str:
         """The environment's name, without the module that registers it."""
         return self.environment_id.rpartition(":")[2]
+
+    @abstractmethod
+    def examine_natively(self, policy: Callable[[Any], Any], seed: int) -> Scored:
+        """Return what a policy of the environment's own observations and actions scores on the host."""
 
     @property
     def threshold(self) -> float:
