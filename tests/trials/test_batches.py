@@ -105,7 +105,7 @@ def test_more_trials_may_be_asked_for_than_the_stopped_run_had(
 @pytest.fixture
 def side_by_side(monkeypatch: pytest.MonkeyPatch) -> list[tuple[int, int]]:
     """Lay trials out as on a GPU; gives the steps and the number of lanes of every chunk that is run."""
-    monkeypatch.setattr("evoclaims.trials.lanes.layout_for", lambda devices: "vector")
+    monkeypatch.setattr("evoclaims.trials.lanes.layout_on", lambda platform: "vector")
     chunks: list[tuple[int, int]] = []
     advance = Lanes.advance
 

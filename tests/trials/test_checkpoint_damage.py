@@ -137,7 +137,7 @@ def test_no_byte_changed_in_a_checkpoint_goes_unnoticed_or_leads_astray(data: st
     """Either the damage is seen, or it hit a byte that carries nothing (as some of a zip's do)."""
     header = checkpoint.Header("0" * 64, "p", [3], [3], 2, {"3": {"steps": [1.0]}}, 0.5, 0.5, "now")
     with tempfile.TemporaryDirectory() as folder:
-        path = checkpoint.path_of(Path(folder), header.condition, header.batch, header.platform)
+        path = checkpoint.path_of(Path(folder), header)
         checkpoint.save(Path(folder), header, np.arange(5.0))  # type: ignore[arg-type]
         whole = path.read_bytes()
         place = data.draw(st.integers(0, len(whole) - 1))

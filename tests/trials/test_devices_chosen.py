@@ -32,7 +32,7 @@ def test_a_gpu_that_is_not_there_is_a_sentence_with_the_remedy(monkeypatch: pyte
 
 def test_the_cpu_can_always_be_asked_for() -> None:
     assert {device.platform for device in devices.choose("cpu")} == {"cpu"}
-    assert devices.layout_for(devices.choose("cpu")) == "alone"
+    assert devices.layout_on(devices.choose("cpu")[0].platform) == "alone"
 
 
 SCRIPT = """

@@ -86,7 +86,7 @@ def test_trials_side_by_side_on_several_devices_are_all_run_once(
     store: Store, cpus: list[Any], small_memory: Small, puts: Counter[int], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Their bits may depend on the number of lanes, so that only the trials are compared."""
-    monkeypatch.setattr("evoclaims.trials.lanes.layout_for", lambda devices: "vector")
+    monkeypatch.setattr("evoclaims.trials.lanes.layout_on", lambda platform: "vector")
     small_memory("advance", 4, from_step=2)
     results = run_climbers(store, cpus)
     assert [result.seed for result in results] == list(SEEDS)

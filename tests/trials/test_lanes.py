@@ -119,7 +119,7 @@ def test_each_size_of_a_share_is_compiled_once_a_device_in_a_run(
     monkeypatch: pytest.MonkeyPatch,
     caplog: pytest.LogCaptureFixture,
 ) -> None:
-    monkeypatch.setattr("evoclaims.trials.lanes.layout_for", lambda devices: layout)
+    monkeypatch.setattr("evoclaims.trials.lanes.layout_on", lambda platform: layout)
     sizes: Counter[int] = Counter()
     compile_size = Lanes._compile
 

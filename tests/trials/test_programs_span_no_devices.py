@@ -36,7 +36,7 @@ class EmptySumWalker(Walker):
 @pytest.fixture(params=["alone", "vector"])
 def layout(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> str:
     """How trials are laid out, on a CPU and on accelerators."""
-    monkeypatch.setattr("evoclaims.trials.lanes.layout_for", lambda devices: request.param)
+    monkeypatch.setattr("evoclaims.trials.lanes.layout_on", lambda platform: request.param)
     return str(request.param)
 
 

@@ -110,7 +110,7 @@ def test_a_trial_stored_elsewhere_after_the_checkpoint_is_not_run_again(
 def test_a_batch_that_has_narrowed_goes_on_to_the_same_bits(
     store: Store, tmp_path: Path, cpus: list[Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("evoclaims.trials.lanes.layout_for", lambda devices: "vector")
+    monkeypatch.setattr("evoclaims.trials.lanes.layout_on", lambda platform: "vector")
     wanted = run_climbers(Store(tmp_path / "whole"), cpus)
     with pytest.raises(StoppedError):
         run_climbers(store, cpus, stopping(5))

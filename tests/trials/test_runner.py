@@ -42,7 +42,7 @@ def test_only_the_missing_trials_are_run(store: Store, cpus: list[Any], puts: Co
 def test_a_report_tells_of_the_trials_that_run_whatever_lanes_they_have_moved_to(
     layout: str, store: Store, cpus: list[Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("evoclaims.trials.lanes.layout_for", lambda devices: layout)
+    monkeypatch.setattr("evoclaims.trials.lanes.layout_on", lambda platform: layout)
     log = Log()
     seeds = range(16)
     results = run_climbers(store, cpus, log, condition=walk(chance=0.4, hazard=0.15, bits=9), seeds=seeds)

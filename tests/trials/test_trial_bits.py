@@ -78,7 +78,7 @@ def test_trials_side_by_side_climb_and_end_as_trials_one_after_the_other(
     """The "vector" layout, which narrows as trials end; its arithmetic may round otherwise, so no digests here."""
     seeds, condition = range(5), walk(chance=0.25)
     loop = run(condition, seeds, Store(tmp_path / "alone"), cpus)
-    monkeypatch.setattr("evoclaims.trials.lanes.layout_for", lambda devices: "vector")
+    monkeypatch.setattr("evoclaims.trials.lanes.layout_on", lambda platform: "vector")
     vector = run(condition, seeds, Store(tmp_path / "vector"), cpus)
     for one, other in zip(loop, vector, strict=True):
         assert (one.seed, one.status) == (other.seed, other.status)

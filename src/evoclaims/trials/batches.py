@@ -46,6 +46,10 @@ class StoredTrials:
         look = self.store.get if self.any_version else self.store.made_with
         return look(TrialSpec(self.condition, seed).id, self.condition.versions)
 
+    def has(self, seed: int) -> bool:
+        """Whether the trial of a seed has come to its end."""
+        return is_final(self.get(seed))
+
     def lacks(self, seed: int) -> bool:
         """Whether the trial of a seed must be run."""
         return not answers(self.get(seed), self.time_limit)
@@ -61,7 +65,6 @@ class Run:
 
     Attributes:
         checkpoint_seconds: minimum time between two checkpoints.
-        time_limit: seconds that a batch may take.
         most: trials that a new batch has at most.
     """
 
@@ -69,7 +72,6 @@ class Run:
     stored: StoredTrials
     watch: Watcher
     checkpoint_seconds: float
-    time_limit: float
     most: int
 
     @property
@@ -120,12 +122,11 @@ def batches(run: Run, missing: Sequence[int]) -> Iterator[tuple[Header, Callable
     """
     remaining = list(missing)
     for header in checkpoint.find(run.store.checkpoints, run.condition.id, _platform(run.lanes)):
-        held = [seed for seed in header.lanes if seed is not None]
-        if not set(held).isdisjoint(remaining):
-            remaining = [seed for seed in remaining if seed not in held]
+        if not set(header.seeds).isdisjoint(remaining):
+            remaining = [seed for seed in remaining if seed not in header.seeds]
             yield header, partial(_resumed, run, header)
     # Earlier batches may take hours: another process may have stored the rest meanwhile.
-    remaining = [seed for seed in remaining if not is_final(run.stored.get(seed))]
+    remaining = [seed for seed in remaining if not run.stored.has(seed)]
     for first in range(0, len(remaining), run.most):
         header = _planned(run.lanes, remaining[first : first + run.most])
         yield header, partial(_started, run, header)
@@ -140,13 +141,13 @@ def drop_finished_checkpoints(stored: StoredTrials) -> None:
 
     def is_stored(seed: int) -> bool:
         try:
-            return is_final(stored.get(seed))
+            return stored.has(seed)
         except DamagedFileError:
             return False
 
     folder, here = stored.store.checkpoints, short_hash(stored.condition.versions)
     for header in checkpoint.sound_ones(folder, stored.condition.id):
-        if header.versions in ("", here) and all(seed is None or is_stored(seed) for seed in header.lanes):
+        if header.versions in ("", here) and all(map(is_stored, header.seeds)):
             checkpoint.remove(folder, header)
 
 
@@ -157,8 +158,7 @@ def _resumed(run: Run, interrupted: Header) -> Batch | None:
         return None
     header, state = restored
     lanes, width = run.lanes, len(header.lanes)
-    held = [seed for seed in header.lanes if seed is not None]
-    stored = frozenset(seed for seed in held if is_final(run.stored.get(seed)))
+    stored = frozenset(filter(run.stored.has, header.seeds))
     if lanes.layout == "alone":
         # Bits do not depend on other lanes: a lane whose trial is stored becomes idle, and costs nothing.
         header = replace(header, lanes=[None if seed in stored else seed for seed in header.lanes])
@@ -174,9 +174,8 @@ def _restored(run: Run, interrupted: Header) -> tuple[Header, TrialState] | None
     and state are read again, together: from two different moments they would mix into a wrong trial.
     """
     folder = run.store.checkpoints
-    held = [seed for seed in interrupted.lanes if seed is not None]
-    owed = [seed for seed in held if not is_final(run.stored.get(seed))]
-    run.watch(RunProgress(run.condition.label, "resuming", len(owed)))
+    owed = sum(not run.stored.has(seed) for seed in interrupted.seeds)
+    run.watch(RunProgress(run.condition.label, "resuming", owed))
     header = checkpoint.newest(folder, interrupted)
     while header is not None:
         state = checkpoint.restore(folder, header, run.lanes.shapes(len(header.lanes)))

@@ -59,17 +59,22 @@ class Header:
     versions: str = ""
     schema: int = SCHEMA
 
+    @property
+    def seeds(self) -> list[int]:
+        """The seeds of the running trials."""
+        return [seed for seed in self.lanes if seed is not None]
 
-def path_of(folder: Path, condition: str, batch: list[int], platform: str) -> Path:
+
+def path_of(folder: Path, header: Header) -> Path:
     """Return the path of a batch's checkpoint."""
-    return folder / f"{condition}-{content_hash([batch, platform])[:16]}.npz"
+    return folder / f"{header.condition}-{content_hash([header.batch, header.platform])[:16]}.npz"
 
 
 def save(folder: Path, header: Header, state: TrialState) -> None:
     """Write header and state (on the host, leaves [lanes, …]) in one atomic step."""
     arrays = {f"{i:04d}": np.asarray(leaf) for i, leaf in enumerate(jax.tree.leaves(state))}
     arrays[_HEADER] = np.frombuffer(_text(header).encode(), dtype=np.uint8)
-    write_atomically(path_of(folder, header.condition, header.batch, header.platform), pack(arrays), ADVICE)
+    write_atomically(path_of(folder, header), pack(arrays), ADVICE)
 
 
 def _text(header: Header) -> str:
@@ -105,7 +110,7 @@ def newest(folder: Path, header: Header) -> Header | None:
     Raises:
         DamagedFileError: as for `find`.
     """
-    return _header(path_of(folder, header.condition, header.batch, header.platform))
+    return _header(path_of(folder, header))
 
 
 def _header(path: Path) -> Header | None:
@@ -135,24 +140,16 @@ def _opened(path: Path) -> Iterator[tuple[Header, Packed]]:
             header = Header(**json.loads(packed[_HEADER].tobytes()))
             if header.schema == SCHEMA:
                 header = convert(asdict(header), Header)
-                if not _is_sound(header):
+                known = all(seed in header.batch for seed in header.seeds)  # as the runner relies on
+                if not (known and is_hash(header.condition) and header.curves.keys() == set(map(str, header.batch))):
                     raise DamagedFileError(path, "its header does not describe a batch of trials")
-                if path.name != path_of(path.parent, header.condition, header.batch, header.platform).name:
+                if path.name != path_of(path.parent, header).name:
                     raise DamagedFileError(path, "its name is not that of the batch it holds")
             yield header, packed
     except FileNotFoundError:
         raise
     except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         raise DamagedFileError(path, "it is not a readable checkpoint") from error
-
-
-def _is_sound(header: Header) -> bool:
-    """Whether the fields of a header fit each other as the runner relies on."""
-    return (
-        is_hash(header.condition)
-        and all(seed is None or seed in header.batch for seed in header.lanes)
-        and header.curves.keys() == {str(seed) for seed in header.batch}
-    )
 
 
 def restore(folder: Path, header: Header, like: Any) -> TrialState | None:
@@ -164,7 +161,7 @@ def restore(folder: Path, header: Header, like: Any) -> TrialState | None:
         DamagedFileError: when the file is torn or edited.
         UserError: when its arrays do not fit `like`, which only the condition's program can tell.
     """
-    path = path_of(folder, header.condition, header.batch, header.platform)
+    path = path_of(folder, header)
     expected, structure = jax.tree.flatten(like)
     try:
         with _opened(path) as (there, packed):
@@ -186,7 +183,7 @@ def restore(folder: Path, header: Header, like: Any) -> TrialState | None:
 def remove(folder: Path, header: Header) -> None:
     """Delete the checkpoint of a batch whose trials are all stored; on a read-only disk it stays, harmlessly."""
     with contextlib.suppress(OSError):
-        path_of(folder, header.condition, header.batch, header.platform).unlink(missing_ok=True)
+        path_of(folder, header).unlink(missing_ok=True)
 
 
 def fault(path: Path) -> str | None:

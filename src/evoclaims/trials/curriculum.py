@@ -37,11 +37,6 @@ def start(levels: int, progression: Any) -> Ascent:
     )
 
 
-def stops_when_finished(progression: Any) -> bool:
-    """Whether a trial ends when its last level is solved."""
-    return {"curriculum": True, "direct": True, "whole_budget": False}[progression]
-
-
 def climb(ascent: Ascent, success: Float[Array, ""], steps: Int[Array, ""]) -> Ascent:
     """Move up one level when `success` is exactly 1 after `steps` steps; finish when the last is solved."""
     last = ascent.solved_at.shape[0] - 1

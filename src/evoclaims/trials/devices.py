@@ -76,11 +76,6 @@ def choose(name: str) -> list[jax.Device]:
         ) from error
 
 
-def layout_for(devices: list[jax.Device]) -> str:
-    """Return how trials are laid out on these devices (see `program.over_trials`)."""
-    return layout_on(devices[0].platform)
-
-
 def layout_on(platform: str) -> str:
-    """Return how trials are laid out on devices of a platform, such as "cpu"."""
+    """Return how trials are laid out on devices of a platform, such as "cpu" (see `program.over_trials`)."""
     return "alone" if platform == "cpu" else "vector"

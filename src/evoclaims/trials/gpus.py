@@ -29,18 +29,15 @@ def gpus(device: str) -> tuple[str, ...]:
     Empty where jax has no plugin for CUDA, or JAX_PLATFORMS asks for other hardware.
     """
     asked = {name.strip() for name in os.environ.get("JAX_PLATFORMS", "").split(",")} - {""}
-    if device == "cpu" or (asked and not asked & {"cuda", "gpu"}) or not _has_plugin():
+    if device == "cpu" or (asked and not asked & {"cuda", "gpu"}):
+        return ()
+    if not any("cuda" in plugin.name for plugin in importlib.metadata.entry_points(group="jax_plugins")):
         return ()
     named = os.environ.get(VISIBLE)
     if named is not None:
         return tuple(name.strip() for name in named.split(",") if name.strip() not in ("", "-1", "NoDevFiles"))
     nodes = [path for path in _NODES.glob("nvidia*") if re.fullmatch(r"nvidia\d+", path.name)]
     return tuple(map(str, range(len(nodes))))  # CUDA numbers those that it may open from 0
-
-
-def _has_plugin() -> bool:
-    """Whether jax is installed with CUDA."""
-    return any("cuda" in plugin.name for plugin in importlib.metadata.entry_points(group="jax_plugins"))
 
 
 def shared(found: Sequence[str], processes: int) -> list[dict[str, str]]:

@@ -10,15 +10,14 @@ import logging
 from dataclasses import replace
 
 import jax
-import numpy as np
 
 from evoclaims.core.errors import UserError
 from evoclaims.trials import checkpoint
 from evoclaims.trials.batches import Run
 from evoclaims.trials.checkpoint import Header
+from evoclaims.trials.lanes import picked
 from evoclaims.trials.program import TrialState
 from evoclaims.trials.progress import RunProgress
-from evoclaims.trials.time_limit import is_final
 
 _log = logging.getLogger(__name__)
 
@@ -43,7 +42,7 @@ def halved(run: Run, tried: Header) -> int:
     """
     header = checkpoint.newest(run.store.checkpoints, tried)
     lanes = (header or tried).lanes
-    left = [lane for lane, seed in enumerate(lanes) if seed is not None and not is_final(run.stored.get(seed))]
+    left = [lane for lane, seed in enumerate(lanes) if seed is not None and not run.stored.has(seed)]
     least = 1 if run.lanes.layout == "alone" else len(run.lanes.devices)
     if len(left) <= least:
         each = "" if least == 1 else ", one on each device"
@@ -72,11 +71,5 @@ def _save(run: Run, header: Header, state: TrialState, part: list[int]) -> None:
     lanes = [None if lane is None else header.lanes[lane] for lane in order]
     seeds = [seed for lane in part if (seed := header.lanes[lane]) is not None]
     curves = {str(seed): header.curves[str(seed)] for seed in seeds}
-    rows = np.array([part[0] if lane is None else lane for lane in order])
-    held: TrialState = jax.tree.map(lambda leaf: np.asarray(leaf)[rows], state)
-    idle = np.asarray(held.idle) | np.array([seed is None for seed in lanes])
-    checkpoint.save(
-        run.store.checkpoints,
-        replace(header, batch=seeds, lanes=lanes, curves=curves),
-        replace(held, idle=idle),
-    )
+    batch = replace(header, batch=seeds, lanes=lanes, curves=curves)
+    checkpoint.save(run.store.checkpoints, batch, picked(state, order))

@@ -10,7 +10,6 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any, Final
 
-from evoclaims.core.canonical import content_hash
 from evoclaims.core.errors import UserError
 from evoclaims.core.packages import DEPENDS_ON
 from evoclaims.core.provenance import version_of
@@ -134,11 +133,6 @@ class Imported(Condition):
                 "empty_means_diverged": self.empty_means_diverged,
             }
         }
-
-    @cached_property
-    def id(self) -> str:
-        """SHA-256 of the canonical JSON of the condition."""
-        return content_hash(self.plain)
 
     @cached_property
     def packages(self) -> tuple[str, ...]:

@@ -19,7 +19,7 @@ import jax
 import numpy as np
 from jax.sharding import SingleDeviceSharding
 
-from evoclaims.trials.devices import MATMUL_PRECISION, layout_for, usable_cores
+from evoclaims.trials.devices import MATMUL_PRECISION, layout_on, usable_cores
 from evoclaims.trials.program import Program, Report, Score, TrialState, over_trials
 from evoclaims.trials.spec import Condition
 
@@ -76,7 +76,7 @@ class Lanes:
         """Store the condition and the devices; nothing is compiled yet."""
         self.condition = condition
         self.devices = list(devices)
-        self.layout = layout_for(self.devices)
+        self.layout = layout_on(self.devices[0].platform)
         self.seconds = 0.0
         self._program = Program(condition)
         self._compiled: dict[tuple[int, jax.Device], Compiled] = {}
@@ -150,11 +150,7 @@ class Lanes:
 
     def rearrange(self, state: Shares, lanes: Sequence[int | None], width: int) -> Shares:
         """Build a batch of `width` from the given lanes of `state`, in this order; None makes an idle lane."""
-        spare = next(lane for lane in lanes if lane is not None)
-        order = np.array([spare if lane is None else lane for lane in lanes])
-        host: TrialState = jax.tree.map(lambda leaf: leaf[order], self.gather(state))
-        idle = np.array([lane is None for lane in lanes])
-        return self.place(dataclasses.replace(host, idle=host.idle | idle), width)
+        return self.place(picked(self.gather(state), lanes), width)
 
     def arrangement(self, active: Sequence[int], width: int) -> list[int | None]:
         """Deal active lanes to the shares in turn, so that all shares have about equal work."""
@@ -221,6 +217,14 @@ class Lanes:
             with ThreadPoolExecutor() as pool:
                 made = list(pool.map(self._finished, lowered))
         return {home: Compiled(*made[2 * place : 2 * place + 2]) for place, home in enumerate(homes)}
+
+
+def picked(state: TrialState, lanes: Sequence[int | None]) -> TrialState:
+    """Return the given lanes of a batch's state on the host, in this order; None makes an idle lane."""
+    spare = next(lane for lane in lanes if lane is not None)
+    order = np.array([spare if lane is None else lane for lane in lanes])
+    held: TrialState = jax.tree.map(lambda leaf: np.asarray(leaf)[order], state)
+    return dataclasses.replace(held, idle=held.idle | np.array([lane is None for lane in lanes]))
 
 
 def _seeds(lanes: int) -> tuple[jax.ShapeDtypeStruct, jax.ShapeDtypeStruct]:

@@ -155,7 +155,7 @@ class Program:
     def _ended(self, trial: TrialState) -> Bool[Array, ""]:
         """Whether no further step will be taken."""
         done = trial.diverged | trial.idle | (trial.steps >= self.condition.steps)
-        return done | trial.ascent.finished if curriculum.stops_when_finished(self.condition.progression) else done
+        return done if self.condition.progression == "whole_budget" else done | trial.ascent.finished
 
 
 def over_trials(function: Callable[..., Any], layout: str) -> Callable[..., Any]:

@@ -7,7 +7,6 @@ import math
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from functools import partial
 from typing import Any, Final
 
 import jax
@@ -33,7 +32,6 @@ from evoclaims.trials.running import shared
 from evoclaims.trials.spec import Condition, TrialSpec
 from evoclaims.trials.stopping import postponed
 from evoclaims.trials.store import Store
-from evoclaims.trials.time_limit import is_final
 
 _log = logging.getLogger(__name__)
 
@@ -77,8 +75,10 @@ def run(
     make = _maker(stored, devices, checkpoint_seconds, len(wanted))
     while not stored.answer(found := [stored.get(seed) for seed in wanted]):
         store.check_writable()
-        waits = partial(_tell_of_waiting, condition, len(seeds), watch)
-        with announced(store.root, condition.id, waits), shared(store.root, condition.id, watch) as tell:
+        with (
+            announced(store.root, condition.id, lambda text: watch(RunProgress(condition.label, text, len(seeds)))),
+            shared(store.root, condition.id, watch) as tell,
+        ):
             owed = [seed for seed in wanted if stored.lacks(seed)]  # another process may have stored some meanwhile
             make(owed, tell)
     drop_finished_checkpoints(stored)
@@ -90,37 +90,20 @@ Maker = Callable[[Sequence[int], Watcher], None]
 
 
 def _maker(stored: StoredTrials, devices: Sequence[jax.Device], checkpoint_seconds: float, most: int) -> Maker:
-    """Return what makes a condition's trials: a process for each, or the compiled programs of all."""
+    """Return what makes a condition's trials: a process for each, or compiled programs, at first of `most` trials."""
     if isinstance(stored.condition.method, TrainingLoop):
         return LoopTrials(stored, devices).make
-    return CompiledTrials(stored, devices, checkpoint_seconds, most).make
 
-
-class CompiledTrials:
-    """Makes trials of methods and tasks that are compiled together."""
-
-    def __init__(
-        self, stored: StoredTrials, devices: Sequence[jax.Device], checkpoint_seconds: float, most: int
-    ) -> None:
-        """Compile nothing yet; `most` is how many trials a batch has at first."""
-        self._stored = stored
-        self._devices = devices
-        self._checkpoint_seconds = checkpoint_seconds
-        self._most = most
-
-    def make(self, owed: Sequence[int], tell: Watcher) -> None:
+    def make(owed: Sequence[int], tell: Watcher) -> None:
         """Run batches until all trials are stored, or one turns out too large for the device's memory."""
-        lanes = Lanes(self._stored.condition, self._devices)
-        one = Run(lanes, self._stored, tell, self._checkpoint_seconds, self._stored.time_limit, self._most)
+        nonlocal most
+        one = Run(Lanes(stored.condition, devices), stored, tell, checkpoint_seconds, most)
         with single_threaded_linear_algebra():
             too_large = _finish_all(one, owed)
         if too_large is not None:
-            self._most = halved(one, too_large)
+            most = halved(one, too_large)
 
-
-def _tell_of_waiting(condition: Condition, trials: int, watch: Watcher, text: str) -> None:
-    """Report that another process runs the condition."""
-    watch(RunProgress(condition.label, text, trials))
+    return make
 
 
 def _finish_all(run: Run, owed: Sequence[int]) -> Header | None:
@@ -140,7 +123,7 @@ def _finish_all(run: Run, owed: Sequence[int]) -> Header | None:
 
 def _finish(run: Run, header: Header, begin: Callable[[], Batch | None]) -> None:
     """Run a batch until all its trials are stored or its time is over."""
-    allowance, strides = Allowance(run.time_limit), Strides()
+    allowance, strides = Allowance(run.stored.time_limit), Strides()
     try:
         begun = allowance.spend(begin)
         if begun is None:
@@ -216,32 +199,30 @@ def _store_ended(run: Run, batch: Batch, report: Report, ended: Sequence[int], a
     """Score the trials in the ended lanes, and store those without a record."""
     header, due = batch.header, [lane for lane in ended if lane in batch.owed]
     timing = _timing(run, header)
-    score = allowance.spend(lambda: run.lanes.score(batch.state, len(header.lanes))) if due else None
+    score: Any = allowance.spend(lambda: run.lanes.score(batch.state, len(header.lanes))) if due else None
     for lane in due:
         seed = header.lanes[lane]
         assert seed is not None
-        assert score is not None
         spec = TrialSpec(run.condition, seed)
         curves = header.curves[str(seed)]
         put = run.store.put(*make_result(spec, report, score, lane, curves, timing, run.lanes.devices))
-        if put == "differs":
-            _tell_of_difference(run, seed)
+        if put == "differs":  # another process has stored the trial meanwhile
+            text = f"seed {seed} is stored already and came out differently here: the first record stays"
+            run.watch(RunProgress(run.condition.label, text, 1, remark=True))
+            _log.warning("%s: %s.", run.condition.label, text)
     running = [None if lane in ended else seed for lane, seed in enumerate(header.lanes)]
     return replace(batch, header=replace(header, lanes=running))
 
 
 def _give_up(run: Run, header: Header) -> None:
     """Store the unfinished trials of a batch as timed out."""
-    timing = {**_timing(run, header), "limit": run.time_limit}
-    owed = [
-        TrialSpec(run.condition, seed)
-        for seed in header.lanes
-        if seed is not None and not is_final(run.stored.get(seed))
-    ]
-    for spec in owed:
-        curves = header.curves[str(spec.seed)]
+    limit = run.stored.time_limit
+    timing = {**_timing(run, header), "limit": limit}
+    owed = [seed for seed in header.seeds if not run.stored.has(seed)]
+    for seed in owed:
+        spec, curves = TrialSpec(run.condition, seed), header.curves[str(seed)]
         run.store.put(make_unfinished(spec, "timeout", curves, timing, run.lanes.devices), {})
-    run.watch(RunProgress(run.condition.label, f"out of time after {run.time_limit:g} s", len(owed), remark=True))
+    run.watch(RunProgress(run.condition.label, f"out of time after {limit:g} s", len(owed), remark=True))
 
 
 def _timing(run: Run, header: Header) -> dict[str, Any]:
@@ -252,13 +233,6 @@ def _timing(run: Run, header: Header) -> dict[str, Any]:
         "batch": len(header.batch),
         "started": header.started,
     }
-
-
-def _tell_of_difference(run: Run, seed: int) -> None:
-    """Report that another process has stored the trial meanwhile, with other bits than here."""
-    text = f"seed {seed} is stored already and came out differently here: the first record stays"
-    run.watch(RunProgress(run.condition.label, text, 1, remark=True))
-    _log.warning("%s: %s.", run.condition.label, text)
 
 
 def _rearranged(run: Run, batch: Batch) -> Batch:

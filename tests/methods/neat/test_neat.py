@@ -110,7 +110,7 @@ def test_a_trial_alone_is_the_same_trial_to_the_bit(
 def test_trials_side_by_side_have_the_same_structure_and_nearly_the_same_numbers(
     batch: list[TrialResult], tmp_path: Path, device: list[Any], programs: None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("evoclaims.trials.lanes.layout_for", lambda devices: "vector")
+    monkeypatch.setattr("evoclaims.trials.lanes.layout_on", lambda platform: "vector")
     store = Store(tmp_path)
     for one, other in zip(batch, run(CONDITION, SEEDS, store, device), strict=True):
         assert (one.seed, one.status, one.levels["solved_at"]) == (other.seed, other.status, other.levels["solved_at"])
