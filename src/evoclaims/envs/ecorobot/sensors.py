@@ -26,7 +26,22 @@ class Sensor(Protocol):
 
 
 @dataclass(frozen=True)
-class Rangefinders:
+class _Rays:
+    """The base of sensors of several rays that reach equally far."""
+
+    count: int
+    reach: float = ARENA
+
+    def __post_init__(self) -> None:
+        """Check the numbers."""
+        if self.count < 1 or not 0 < self.reach < math.inf:
+            raise UserError(
+                f"A sensor has at least 1 ray and a finite reach above 0 m, not {self.count} and {self.reach}."
+            )
+
+
+@dataclass(frozen=True)
+class Rangefinders(_Rays):
     """Distances to the nearest box or the floor, from the front half of the torso's surface outwards.
 
     Attributes:
@@ -35,11 +50,6 @@ class Rangefinders:
     """
 
     count: int = 5
-    reach: float = ARENA
-
-    def __post_init__(self) -> None:
-        """Check the numbers."""
-        _check(self.count, self.reach)
 
     def read(self, scene: Scene, pose: Pose) -> Float[Array, " size"]:
         """Return distance / reach of each ray, 1 for nothing."""
@@ -48,7 +58,7 @@ class Rangefinders:
 
 
 @dataclass(frozen=True)
-class PieSlices:
+class PieSlices(_Rays):
     """Whether there is anything in each sector around the robot.
 
     Attributes:
@@ -57,11 +67,6 @@ class PieSlices:
     """
 
     count: int = 4
-    reach: float = ARENA
-
-    def __post_init__(self) -> None:
-        """Check the numbers."""
-        _check(self.count, self.reach)
 
     def read(self, scene: Scene, pose: Pose) -> Float[Array, " size"]:
         """Return 1 for each sector in which one of five rays (at -45°, -22.5°, 0, 22.5°, 45°) hits, else 0."""
@@ -100,9 +105,3 @@ def distances(scene: Scene, pose: Pose, angles: np.ndarray) -> Float[Array, " ra
     leaves = jnp.min(jnp.maximum(one, other), axis=-1)
     hits = jnp.where((enters <= leaves) & (leaves >= 0), jnp.maximum(enters, 0.0), jnp.inf)
     return jnp.minimum(nearest, jnp.min(hits, axis=1))
-
-
-def _check(count: int, reach: float) -> None:
-    """Reject sensors without rays or without reach."""
-    if count < 1 or not 0 < reach < math.inf:
-        raise UserError(f"A sensor has at least 1 ray and a finite reach above 0 m, not {count} and {reach}.")

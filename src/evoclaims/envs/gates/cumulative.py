@@ -8,34 +8,20 @@ from typing import ClassVar
 
 import numpy as np
 
-from evoclaims.envs.gates.circuit import Circuit, Sampling
 from evoclaims.envs.gates.parity import NParity
 from evoclaims.envs.gates.truth_table import TruthTable
 
 
 @dataclass(frozen=True)
-class CumulativeParity(Circuit):
+class CumulativeParity(NParity):
     """Level k asks the tables of levels 0 … k of N-parity, one after the other.
 
     One of the published environments does so with its curriculum switched on. Rows of early levels are asked once for
     every level so far, so forgetting them costs more than in `NParity`, and success weighs them the same way.
-
-    Attributes:
-        bits: N, from 2 to 12.
-        sampling: see `Circuit`.
     """
 
     name: ClassVar[str] = "cumulative_parity"
     revision: ClassVar[int] = 1
-    packages: ClassVar[tuple[str, ...]] = ()
-
-    bits: int = 6
-    sampling: Sampling = "exhaustive"
-
-    def __post_init__(self) -> None:
-        """Check the size."""
-        _ = NParity(self.bits)
-        super().__post_init__()
 
     @cached_property
     def table(self) -> TruthTable:
