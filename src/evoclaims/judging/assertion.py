@@ -112,19 +112,10 @@ class Assertion(ABC):
         effect: bool = False,
         tested: bool = True,
     ) -> Finding:
-        """Return what this assertion has found, with one entry of evidence.
+        """Return what this assertion has found, with one entry of evidence, whose fields the arguments are.
 
-        Args:
-            p: for and against the assertion.
-            attainable: the smallest of each that n and the ties allow.
-            alpha: significance level of the look.
-            samples: what was read from the trials.
-            detail: further information for the reader.
-            bounds: what the trials are compared with.
-            intervals: makes those of the evidence; description only.
-            events: whether values say that something held.
-            effect: whether to report the effect size between the two samples.
-            tested: whether p comes from a test; the p of a fact (0 for true, 1 for false) is not reported.
+        `effect` says whether to report the effect size between the two samples, and `tested` whether p comes from a
+        test: the p of a fact (0 for true, 1 for false) is not reported.
         """
         first, last = samples[0].values, samples[-1].values
 

@@ -131,11 +131,7 @@ def check_drift(cases: Sequence[DriftCase], alpha: float = ALPHA) -> DriftReport
     """Test every metric of every case: exact two-sided rank test, Holm over all rows that could be tested.
 
     A failed trial ranks below all others. If the code is unchanged, new trials with seeds of references repeat them;
-    such ties only make the test more conservative.
-
-    Args:
-        cases: conditions to check.
-        alpha: familywise error of the whole report.
+    such ties only make the test more conservative. `alpha` is the familywise error of the whole report.
     """
     rows = [_test(case, metric) for case in cases for metric in case.metrics]
     tested = [row.p for row in rows if row.p is not None]

@@ -15,6 +15,7 @@ LEVEL = 0.95
 
 BOOTSTRAP_SEED = 20250714
 """Fixed, so that the same trials always give the same interval."""
+RESAMPLES = 1000
 
 
 def _dominance(a: Floats, b: Floats) -> Floats:
@@ -83,37 +84,33 @@ def _percentiles(resampled: Floats) -> tuple[float, float]:
     return float(low), float(high)
 
 
-def a12_interval(a: Sequence[float], b: Sequence[float], resamples: int = 1000) -> tuple[float, float]:
+def _resampled(rng: np.random.Generator, values: Sequence[float]) -> Floats:
+    """Return bootstrap samples of values, shape [RESAMPLES, n]."""
+    sample = np.asarray(values, np.float64)
+    return sample[rng.integers(0, len(sample), (RESAMPLES, len(sample)))]
+
+
+def a12_interval(a: Sequence[float], b: Sequence[float]) -> tuple[float, float]:
     """Return the percentile bootstrap interval of A12 (fixed seed).
 
     Percentile rather than BCa: BCa fails on constant data, which solved tasks give.
     """
     rng = np.random.default_rng(BOOTSTRAP_SEED)
-    left, right = np.asarray(a, np.float64), np.asarray(b, np.float64)
-    drawn_left = left[rng.integers(0, len(left), (resamples, len(left)))]
-    drawn_right = right[rng.integers(0, len(right), (resamples, len(right)))]
-    return _percentiles((_dominance(drawn_left, drawn_right) + 1) / 2)
+    return _percentiles((_dominance(_resampled(rng, a), _resampled(rng, b)) + 1) / 2)
 
 
-def iqm_interval(*strata: Sequence[float], resamples: int = 1000) -> tuple[float, float]:
+def iqm_interval(*strata: Sequence[float]) -> tuple[float, float]:
     """Return the stratified percentile bootstrap interval of the interquartile mean of all strata (fixed seed).
 
-    Args:
-        strata: the trials of a condition each; each is resampled by itself (Agarwal et al. 2021).
-        resamples: number of bootstrap samples.
+    Each stratum has the trials of a condition, and is resampled by itself (Agarwal et al. 2021).
     """
     rng = np.random.default_rng(BOOTSTRAP_SEED)
-    drawn = [
-        np.asarray(stratum, np.float64)[rng.integers(0, len(stratum), (resamples, len(stratum)))] for stratum in strata
-    ]
-    return _percentiles(_iqm(np.concatenate(drawn, axis=1)))
+    return _percentiles(_iqm(np.concatenate([_resampled(rng, stratum) for stratum in strata], axis=1)))
 
 
-def median_interval(values: Sequence[float], resamples: int = 1000) -> tuple[float, float]:
+def median_interval(values: Sequence[float]) -> tuple[float, float]:
     """Return the percentile bootstrap interval of the median (fixed seed)."""
-    rng = np.random.default_rng(BOOTSTRAP_SEED)
-    ordered = np.asarray(values, np.float64)
-    drawn = np.sort(ordered[rng.integers(0, len(ordered), (resamples, len(ordered)))], axis=1)
-    low, high = drawn[:, (len(ordered) - 1) // 2], drawn[:, len(ordered) // 2]
+    drawn = np.sort(_resampled(np.random.default_rng(BOOTSTRAP_SEED), values), axis=1)
+    low, high = drawn[:, (len(values) - 1) // 2], drawn[:, len(values) // 2]
     medians = np.array([x if x == y else (x + y) / 2 for x, y in zip(low, high, strict=True)], np.float64)
     return _percentiles(medians)

@@ -11,13 +11,9 @@ JUDGING_REVISION = 1
 
 
 def fingerprint(assertion: Assertion, design: Design, *, claim: str = "", tier: str = "") -> str:
-    """Return the fingerprint of a claim, 64 hexadecimal digits.
+    """Return the fingerprint of a claim, such as "G1", in a tier: 64 hexadecimal digits.
 
-    Args:
-        assertion: its kind, measures and margins, with the ids of its conditions.
-        design: looks with their alpha, margins, p0 and seeds.
-        claim: the claim's id, such as "G1".
-        tier: "smoke" or "full".
+    It hashes the assertion's kind, measures and margins, with the ids of its conditions, and all of the design.
     """
     return content_hash(
         {

@@ -10,8 +10,7 @@ from evoclaims.judging.assertion import Assertion, Finding
 from evoclaims.judging.counting import MAX_TRIALS
 from evoclaims.judging.design import Design, Look
 from evoclaims.judging.fingerprint import fingerprint
-from evoclaims.judging.sample import Source, Trials, UnreadableTrialError
-from evoclaims.judging.shortage import shortage
+from evoclaims.judging.sample import Limited, Source, Trials, UnreadableTrialError
 from evoclaims.judging.verdict import Outcome, PValues, Verdict
 from evoclaims.trials.crashes import why
 from evoclaims.trials.result import TrialResult
@@ -37,13 +36,7 @@ class Ending:
 
 
 def judge(assertion: Assertion, design: Design, *, claim: str = "", tier: str = "") -> Verdict:
-    """Judge an assertion by the trials of its sources; see `decide`.
-
-    Args:
-        assertion: the claim.
-        design: looks, margins and seeds, fixed beforehand.
-        claim: the claim's id, for the fingerprint.
-        tier: the claim's tier, for the fingerprint.
+    """Judge an assertion by the trials of its sources (see `decide`); `claim` and `tier` are for the fingerprint.
 
     Raises:
         Exception: whatever a source raises when it is asked for trials.
@@ -91,12 +84,7 @@ def decide(
     Each look first checks the smallest attainable p: if neither direction can be decided, no trial is fetched. Nor is
     any where a source cannot have as many trials as the look asks for.
     Judging ends at the first decisive look, or when no outcome of the remaining trials could change the verdict
-    (curtailment).
-
-    Args:
-        assertion: the claim.
-        design: looks, margins and seeds, fixed beforehand.
-        fetch: gets the trials of a source for some seeds, in their order.
+    (curtailment). `fetch` gets the trials of a source for some seeds, in their order.
 
     Returns:
         The end; None if no look can decide.
@@ -108,7 +96,7 @@ def decide(
     for index, look in enumerate(looks):
         if not _decidable(assertion.attainable(look.n, design), look.alpha):
             continue
-        if short := shortage(assertion, look, design):
+        if short := _shortage(assertion, look, design):
             return ending and replace(ending, note=f"{short}; ")
         trials = {source.fingerprint: fetch(source, design.seeds(look.n)) for source in assertion.sources()}
         crashed = _crashed(assertion, trials)
@@ -145,6 +133,16 @@ def needed_trials(assertion: Assertion, design: Design) -> int | None:
 def _decidable(attainable: PValues, alpha: float) -> bool:
     """Whether at least one direction can be decided."""
     return attainable.supported <= alpha or attainable.refuted <= alpha
+
+
+def _shortage(assertion: Assertion, look: Look, design: Design) -> str:
+    """Say which source has too few trials for a look, which is then not taken; empty if none has."""
+    for source in assertion.sources():
+        existing = source.existing if isinstance(source, Limited) else None
+        if existing is not None and design.seeds(look.n)[-1] >= existing:
+            few = f"there are {existing}" if existing > 1 else "there is 1" if existing else "there is none"
+            return f"underpowered: needs n = {design.seeds(look.n)[-1] + 1} trials of {source.label}, and {few}"
+    return ""
 
 
 def _crashed(assertion: Assertion, trials: Trials) -> str:
@@ -228,7 +226,7 @@ def _underpowered(assertion: Assertion, design: Design, mark: str) -> Verdict:
     """Return the verdict of a design in which no look can decide."""
     look, attainable = attainability(assertion, design)[-1]
     decidable = (one for one in assertion.looks(design) if _decidable(assertion.attainable(one.n, design), one.alpha))
-    short = "".join(shortage(assertion, one, design) for one in list(decidable)[:1])
+    short = "".join(_shortage(assertion, one, design) for one in list(decidable)[:1])
     return Verdict(
         outcome=Outcome.INCONCLUSIVE,
         reason=short or f"underpowered: {_needs(assertion, design)}",

@@ -89,21 +89,13 @@ class Measure(NumberReading):
         return SelfComparison(self)
 
     def _measure(self, other: object) -> Measure:
-        """Return `other` if it is a measure.
-
-        Raises:
-            UserError: when it is not.
-        """
+        """Return `other`, which must be a measure."""
         if not isinstance(other, Measure):
             raise UserError(f"{self.describe()!r} is compared with another measure or a number, not with {other!r}.")
         return other
 
     def _at_least_0(self, trial: TrialResult) -> float:
-        """Return the number of a finished trial.
-
-        Raises:
-            UnreadableTrialError: when it is below 0.
-        """
+        """Return the number of a finished trial, which must be 0 or above."""
         value = self.read(trial)
         if value < 0:
             raise UnreadableTrialError(

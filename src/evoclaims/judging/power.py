@@ -43,12 +43,7 @@ class Draws:
     """
 
     def __init__(self, pilot: Trials, count: int = DRAWS) -> None:
-        """Draw nothing yet.
-
-        Args:
-            pilot: trials of each condition, by its fingerprint.
-            count: number of draws.
-        """
+        """Draw nothing yet; the pilot's trials are by the fingerprint of their condition."""
         self.count = count
         self._pilot = {mark: tuple(map(checked, trials)) for mark, trials in pilot.items()}
         self._chosen: dict[str, list[list[int]]] = {}

@@ -235,11 +235,7 @@ class LevelsReading(TrialReading):
 
 
 def _worst(better: Better) -> float:
-    """Return the value of a failed trial.
-
-    Raises:
-        UnknownNameError: for another direction.
-    """
+    """Return the value of a failed trial, after checking the direction."""
     if better not in get_args(Better):
         raise UnknownNameError("direction of better", better, get_args(Better))
     return -math.inf if better == "higher" else math.inf

@@ -62,11 +62,6 @@ class PublishedMean:
     scale: tuple[float, float] | None = None
     precision: float = 0.0
 
-    @property
-    def at_an_end(self) -> bool:
-        """Whether every trial must have had the same value: the mean is at an end of the scale."""
-        return self.scale is not None and self.mean in self.scale and not self.error and not self.precision
-
     def allows(self, deviation: float) -> bool:
         """Whether values on the scale can have this mean and this standard deviation (Bhatia and Davis 2000)."""
         if self.scale is None:
@@ -147,7 +142,8 @@ def _missing(count: int, broken: int) -> str:
 def _predictions(published: PublishedMean, ours: Sequence[float], planned: int) -> tuple[tuple[Prediction, ...], str]:
     """Return the predictions for our number of trials, and a remark on the published spread."""
     trials, n = published.trials, len(ours) or planned
-    if published.at_an_end:
+    at_an_end = published.scale is not None and published.mean in published.scale
+    if at_an_end and not published.error and not published.precision:  # every trial had the same value
         return (_count(published.mean, trials, n, ours),), ""
     if published.error:
         bars = {Spread.DEVIATION: published.error, Spread.STANDARD_ERROR: published.error * math.sqrt(trials)}

@@ -13,20 +13,15 @@ from evoclaims.trials.result import TrialResult
 
 
 class Source(Protocol):
-    """A condition whose trials can be fetched by seed.
-
-    Attributes:
-        label: a short name, such as "cma_es on n_parity".
-        fingerprint: id of the condition; equal fingerprints mean the same trials.
-    """
+    """A condition whose trials can be fetched by seed."""
 
     @property
     def label(self) -> str:
-        """A short name for tables and sentences."""
+        """A short name for tables and sentences, such as "cma_es on n_parity"."""
 
     @property
     def fingerprint(self) -> str:
-        """Id of the condition."""
+        """Id of the condition; equal fingerprints mean the same trials."""
 
     def fetch(self, seeds: Sequence[int]) -> Sequence[TrialResult]:
         """Return one trial per seed, in any order; run missing ones, or raise if nothing may run."""
@@ -154,8 +149,8 @@ def ranked(value: float, trial: TrialResult, what: str) -> float:
     return value
 
 
-def sample(label: str, trials: Sequence[TrialResult], values: Sequence[float], limit: float | None = None) -> Sample:
-    """Return the sample of `values`, one for each of `trials`; see `Sample` for the limit."""
+def sample(label: str, trials: Sequence[TrialResult], values: Sequence[float]) -> Sample:
+    """Return the sample of `values`, one for each of `trials`, without a limit."""
     failed = [trial for trial in trials if is_failed(trial)]
     return Sample(
         label=label,
@@ -164,5 +159,4 @@ def sample(label: str, trials: Sequence[TrialResult], values: Sequence[float], l
         median=median(values),
         failed=tuple(trial.seed for trial in failed),
         endings=tuple(trial.status for trial in failed),
-        limit=limit,
     )

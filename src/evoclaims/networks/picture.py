@@ -145,10 +145,11 @@ def _paint(axis: Any, panel: Panel) -> None:
         if node in panel.inside:
             axis.text(x, y, panel.inside[node], fontsize=5.5, **style)
         if node in panel.beside:
+            sign = -1.0 if kinds[node] == "input" else 1.0  # out of the network
             axis.annotate(
                 panel.beside[node],
                 (x, y),
-                xytext=_beside(kinds[node], panel.flowing),
+                xytext=(17.0 * sign, 0.0) if panel.flowing else (0.0, 15.0 * sign),
                 textcoords="offset points",
                 fontsize=8,
                 **style,
@@ -156,12 +157,6 @@ def _paint(axis: Any, panel: Panel) -> None:
     axis.set_title(panel.title, fontsize=9)
     axis.margins(0.08, 0.08)
     axis.set_axis_off()
-
-
-def _beside(kind: str, flowing: bool) -> tuple[float, float]:
-    """Return a name's offset from its node's centre, in points, out of the network."""
-    sign = -1.0 if kind == "input" else 1.0
-    return (17.0 * sign, 0.0) if flowing else (0.0, 15.0 * sign)
 
 
 def _paint_connections(axis: Any, panel: Panel, working: set[Hashable]) -> None:

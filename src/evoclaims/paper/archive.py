@@ -43,11 +43,7 @@ class Archive:
         _ = self._committed
 
     def get(self, trial: str, versions: Versions | None = None) -> TrialResult | None:
-        """Return the record of the trial with this id, or None.
-
-        Args:
-            trial: its id.
-            versions: preferred versions of its packages; None for no preference.
+        """Return the record of the trial with this id, if possible made with `versions` of its packages, or None.
 
         Raises:
             UserError: when a record, or a file of reference trials, is damaged or edited.

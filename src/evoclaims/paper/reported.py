@@ -85,8 +85,9 @@ def load_published(path: Path) -> Published:
         *(f"{task}.{name}" for task, found in plots.items() for name, plot in found.items() if not _is_plot(plot)),
         *(name for name, table in tables.items() if not table.get("place") or not table.get("values")),
         *sorted(set(plain) - {"plots", "tables", "trials"}),
-        *(["trials"] if not _is_count(plain.get("trials", 2)) else []),
     ]
+    if not isinstance(trials := plain.get("trials", 2), int) or trials < 2:  # fewer have no spread
+        wrong.append("trials")
     if wrong:
         raise UserError(
             f"{path} holds [plots.TASK.QUANTITY] with a place and methods (each with mean, and error of the same "
@@ -94,11 +95,6 @@ def load_published(path: Path) -> Published:
             f"trials = how many each mean is of, at least 2; these are neither: {', '.join(wrong)}."
         )
     return Published(plots, tables, plain.get("trials"))
-
-
-def _is_count(value: Any) -> bool:
-    """Whether a value is a number of trials with a spread."""
-    return isinstance(value, int) and value >= 2
 
 
 def _is_plot(plot: Any) -> bool:
