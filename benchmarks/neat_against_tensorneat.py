@@ -34,8 +34,7 @@ from evoclaims.envs.gates.parity import NParity  # noqa: E402
 from evoclaims.methods.neat.neat import Neat  # noqa: E402
 from evoclaims.methods.neat.settings import Settings, Species  # noqa: E402
 from evoclaims.methods.neat.species import one_species  # noqa: E402
-from evoclaims.methods.tensorneat import NeatTensorneat, library  # noqa: E402
-from evoclaims.methods.tensorneat_genes import translated  # noqa: E402
+from evoclaims.methods.tensorneat import NeatTensorneat, library, translated  # noqa: E402
 from evoclaims.networks.genome import Connections, Genome, Nodes  # noqa: E402
 from evoclaims.trials.budget import Budget  # noqa: E402
 from evoclaims.trials.lanes import Lanes  # noqa: E402

@@ -26,8 +26,7 @@ from evoclaims.methods.neat.neat import Neat
 from evoclaims.methods.neat.reproduction import offspring
 from evoclaims.methods.neat.settings import Attribute, Mutation, Settings, Species
 from evoclaims.methods.neat.species import SpeciesState, speciate
-from evoclaims.methods.tensorneat import NeatTensorneat, library, neat
-from evoclaims.methods.tensorneat_genes import Genes, translated
+from evoclaims.methods.tensorneat import Genes, NeatTensorneat, library, neat, translated
 from evoclaims.networks.graph import GraphNetwork
 from evoclaims.trials.result_making import is_sound
 

@@ -13,6 +13,7 @@ from typing import Any, ClassVar
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Bool, Float, Int, PRNGKeyArray
 
 from evoclaims.core.errors import UserError
@@ -23,10 +24,23 @@ from evoclaims.envs.base import Episode, PolicyFn, Task
 from evoclaims.methods.base import Policy, Progress
 from evoclaims.methods.champion import no_episode
 from evoclaims.methods.neat.settings import PAPER, Settings
-from evoclaims.methods.tensorneat_genes import Genes, present
 from evoclaims.networks.activations import ACTIVATIONS
+from evoclaims.networks.genome import Genome
 
 INSTALL = 'pip install "tensorneat @ git+https://github.com/EMI-Group/tensorneat"'
+
+
+@pytree
+class Genes:
+    """One of TensorNEAT's genomes; NaN where there is no gene.
+
+    Attributes:
+        nodes: rows (key, bias, response, aggregation, activation): inputs, outputs, then hidden nodes in any order.
+        connections: rows (source key, target key, weight).
+    """
+
+    nodes: Float[Array, "nodes 5"]
+    connections: Float[Array, "connections 3"]
 
 
 @pytree
@@ -109,8 +123,9 @@ class NeatTensorneat:
         return Policy(parameters=state.champion, function=lambda genes, x: _acting(algorithm, genes)(x))
 
     def used(self, parameters: Genes) -> Any:
-        """Return only the rows that hold a gene."""
-        return present(parameters)
+        """Return only the rows of nodes and of connections that hold a gene."""
+        tables = np.asarray(parameters.nodes), np.asarray(parameters.connections)
+        return [table[~np.isnan(table).all(axis=1)] for table in tables]
 
     def cost(self, task: Task) -> int:
         """Return the environment steps of one generation, at the longest episode."""
@@ -244,3 +259,19 @@ def _is_whole(genes: Genes) -> Bool[Array, ""]:
     missing = jnp.isnan(genes.nodes)
     absent = jnp.all(missing, axis=1)
     return ~jnp.all(absent) & jnp.all(jnp.any(missing, axis=1) == absent)
+
+
+def translated(genome: Genome) -> Genes:
+    """Translate one of our genomes to TensorNEAT's format, where keys from 2²⁴ on are not exact, to compare the two."""
+    nodes, genes = genome.nodes, genome.connections
+    absent = np.iinfo(np.int32).max
+    # Sorting by key puts inputs first, then outputs, then hidden nodes.
+    order = jnp.argsort(jnp.where(genome.has_node, nodes.key, absent), stable=True)
+    columns = (nodes.key, nodes.bias, nodes.response, jnp.zeros_like(nodes.bias), nodes.activation)
+    rows = jnp.stack([column.astype(jnp.float32) for column in columns], axis=1)
+    links = (nodes.key[genes.source], nodes.key[genes.target], genes.weight)
+    linked = jnp.stack([column.astype(jnp.float32) for column in links], axis=1)
+    return Genes(
+        nodes=jnp.where(genome.has_node[:, None], rows, jnp.nan)[order],
+        connections=jnp.where(genome.has_connection[:, None], linked, jnp.nan),
+    )
