@@ -57,56 +57,59 @@ def known_pace(
     committed = references.committed(folder, tier, method, task)
     trials += [trial for trial in committed if trial.condition == condition.id]
     batch = _largest_batch(trial for trial in trials if trial.device.get("kind") == kind)
-    if not batch:
+    if batch is None:
         return None
-    took, steps = Took.of(batch), [trial.metrics["steps"] for trial in batch]
-    work = sum(steps) if took.layout == "alone" else max(steps)
-    return Pace(took.run / max(work, 1), took.compile, took.layout)
+    steps = [trial.metrics["steps"] for trial in batch.trials]
+    work = sum(steps) if batch.layout == "alone" else max(steps)
+    return Pace(batch.run / max(work, 1), batch.compile, batch.layout)
 
 
 @dataclass(frozen=True)
-class Took:
-    """How long a batch of trials took, as its records say.
+class Batch:
+    """Trials that ran together, as their records say.
 
     Attributes:
-        compile, run: seconds.
-        trials: how many there were.
+        trials: at least one.
+        compile, run: seconds, until the last trial had ended.
         layout: see `program.over_trials`.
     """
 
+    trials: Sequence[TrialResult]
     compile: float
     run: float
-    trials: int
     layout: str
 
-    @staticmethod
-    def of(batch: Sequence[TrialResult]) -> Took:
-        """Read the records of a batch, at least one."""
-        compiling, running = (max(float(trial.timing[name]) for trial in batch) for name in ("compile", "run"))
-        return Took(compiling, running, len(batch), layout_on(str(batch[0].device["platform"])))
+    @property
+    def core_seconds(self) -> float:
+        """Seconds of a CPU's core: a batch takes as many cores as it has trials, if there are."""
+        return self.run * min(int(self.trials[0].device.get("count") or 1), len(self.trials))
 
     def seconds(self, trials: int) -> float:
         """Return about how long so many trials of the same condition take."""
-        return self.compile + self.run * (trials / self.trials if self.layout == "alone" else 1)
+        return self.compile + self.run * (trials / len(self.trials) if self.layout == "alone" else 1)
 
 
-def took(trials: Iterable[TrialResult], platform: str) -> Took | None:
-    """Return how long the largest batch among trials of one condition took on a platform; None if there is none."""
-    batch = _largest_batch(trial for trial in trials if trial.device.get("platform") == platform)
-    return Took.of(batch) if batch else None
+def took(trials: Iterable[TrialResult], platform: str) -> Batch | None:
+    """Return the largest batch among trials of one condition on a platform; None if there is none."""
+    return _largest_batch(trial for trial in trials if trial.device.get("platform") == platform)
 
 
-def _largest_batch(trials: Iterable[TrialResult]) -> list[TrialResult]:
-    """Return the trials of the largest batch that came to an end; none if there is none."""
-    return max(by_batch(trial for trial in trials if trial.status in COMPLETE), key=len, default=[])
+def _largest_batch(trials: Iterable[TrialResult]) -> Batch | None:
+    """Return the largest batch of trials that came to an end; None if there is none."""
+    ended = by_batch(trial for trial in trials if trial.status in COMPLETE)
+    return max(ended, key=lambda batch: len(batch.trials), default=None)
 
 
-def by_batch(trials: Iterable[TrialResult]) -> list[list[TrialResult]]:
-    """Return trials by batch, which share their times; in the order of the first of each."""
+def by_batch(trials: Iterable[TrialResult]) -> list[Batch]:
+    """Return trials by batch, in the order of the first of each."""
     batches: dict[tuple[str, str], list[TrialResult]] = defaultdict(list)
     for trial in trials:
         batches[str(trial.timing["started"]), str(trial.device.get("kind"))].append(trial)
-    return list(batches.values())
+    found = []
+    for each in batches.values():
+        compiling, running = (max(float(trial.timing[name]) for trial in each) for name in ("compile", "run"))
+        found.append(Batch(each, compiling, running, layout_on(str(each[0].device["platform"]))))
+    return found
 
 
 def measured_pace(condition: Condition, devices: Sequence[jax.Device]) -> Pace:

@@ -94,15 +94,14 @@ def _known(one: Missing, platform: str, layout: str) -> Estimate | None:
     """Estimate by earlier trials; None where none ran on this platform."""
     here = (trial for trial in one.earlier if trial.device.get("platform") == platform)
     batches = by_batch(trial for trial in here if trial.status in COMPLETE)
-    same = [batch for batch in batches if batch[0].condition == one.condition.id]
+    same = [batch for batch in batches if batch.trials[0].condition == one.condition.id]
     if not batches:
         return None
-    batch = max(same or batches[:1], key=len)
-    run = max(float(trial.timing["run"]) for trial in batch)
-    steps = [max(float(trial.metrics.get("environment_steps", 0.0)), 1.0) for trial in batch]
+    batch = max(same or batches[:1], key=lambda batch: len(batch.trials))
+    steps = [max(float(trial.metrics.get("environment_steps", 0.0)), 1.0) for trial in batch.trials]
     if layout == "alone":
-        run *= min(int(batch[0].device.get("count") or 1), len(batch))
-        work = run * one.trials / len(batch) if same else run / sum(steps) * _steps(one, layout)
+        used = batch.core_seconds
+        work = used * one.trials / len(steps) if same else used / sum(steps) * _steps(one, layout)
     else:
-        work = run if same else run / max(steps) * _steps(one, layout)
-    return Estimate(max(float(trial.timing["compile"]) for trial in batch), work, one.trials, layout)
+        work = batch.run if same else batch.run / max(steps) * _steps(one, layout)
+    return Estimate(batch.compile, work, one.trials, layout)

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from evoclaims.paper import references
-from evoclaims.paper.cost import by_batch
+from evoclaims.paper.cost import Batch, by_batch
 from evoclaims.paper.reproduction import Reproduction
 from evoclaims.trials.result import TrialResult
 
@@ -44,25 +44,20 @@ def spent(reproduction: Reproduction, tier: str, method: str, task: str) -> Spen
     trials = [trial for trial in committed if trial.condition == condition.id]
     seconds: dict[str, float] = defaultdict(float)
     for batch in _batches(trials):
-        device = batch[0].device
-        if device.get("platform") != "cpu":
-            seconds[str(device.get("kind"))] += batch[0].timing["run"] + batch[0].timing["compile"]
+        if batch.layout != "alone":
+            seconds[str(batch.trials[0].device["kind"])] += batch.run + batch.compile
     others = (references.committed(folder, name, method, task) for name in reproduction.tiers if name != tier)
     paces = (_core_pace(found) for found in (trials, *others))
     return Spent(len(trials), dict(seconds), next((pace for pace in paces if pace is not None), None))
 
 
 def _core_pace(trials: Iterable[TrialResult]) -> float | None:
-    """Return the seconds of a core per environment step; a batch takes as many cores as it has trials, if there are."""
-    used = steps = 0.0
-    for batch in _batches(trials):
-        device = batch[0].device
-        if device.get("platform") == "cpu":
-            used += batch[0].timing["run"] * min(int(device.get("count") or 1), len(batch))
-            steps += sum(trial.metrics.get("environment_steps", 0.0) for trial in batch)
-    return used / steps if steps else None
+    """Return the seconds of a core per environment step."""
+    batches = [batch for batch in _batches(trials) if batch.layout == "alone"]
+    steps = sum(trial.metrics.get("environment_steps", 0.0) for batch in batches for trial in batch.trials)
+    return sum(batch.core_seconds for batch in batches) / steps if steps else None
 
 
-def _batches(trials: Iterable[TrialResult]) -> list[list[TrialResult]]:
+def _batches(trials: Iterable[TrialResult]) -> list[Batch]:
     """Return trials by batch, without those that did not end by themselves or do not name their device."""
     return by_batch(trial for trial in trials if trial.status == "done" and trial.device)
