@@ -117,13 +117,10 @@ def _policy(condition: Condition) -> Policy:
 
 def _filled(shapes: Any, arrays: Mapping[str, NDArray[Any]], what: str) -> Any:
     """Return the tree of `shapes` with its leaves taken from `arrays` by name."""
-    leaves, structure = jax.tree.flatten(shapes)
-    places = {int(i): name for name, i in named_leaves(jax.tree.unflatten(structure, range(len(leaves)))).items()}
-    names = [places[i] for i in range(len(leaves))]
-    expected = {name: (leaf.shape, leaf.dtype) for name, leaf in zip(names, leaves, strict=True)}
+    expected = {name: (leaf.shape, leaf.dtype) for name, leaf in named_leaves(shapes).items()}
     if {name: (array.shape, array.dtype) for name, array in arrays.items()} != expected:
         raise UserError(
             f"{what} does not have the arrays of this method's policies, so it was made by another version of the "
             "code: name another storage, or check that version out."
         )
-    return jax.tree.unflatten(structure, [arrays[name] for name in names])
+    return jax.tree.unflatten(jax.tree.structure(shapes), [arrays[name] for name in expected])

@@ -84,8 +84,10 @@ def _records(store: Store) -> Iterator[Problem]:
             result = store.read(path)
         except DamagedFileError as error:
             yield Problem(path, "record", error.reason)
-            for champion in _champions_of(store, path):
-                yield Problem(champion, "champion", "its trial's record cannot be used")
+            trial_id = record_id(path)
+            if trial_id and path.parent == store.record_path(trial_id).parent:
+                for champion in sorted({*store.champion_files(trial_id)} - _named(store, trial_id)):
+                    yield Problem(champion, "champion", "its trial's record cannot be used")
             continue
         if result is None:
             continue
@@ -97,13 +99,10 @@ def _records(store: Store) -> Iterator[Problem]:
                 yield Problem(error.path, "champion", error.reason)
 
 
-def _champions_of(store: Store, path: Path) -> tuple[Path, ...]:
-    """Return the champions of an unreadable record: those that no other record names."""
-    trial_id = record_id(path)
-    if trial_id is None or path.parent != store.record_path(trial_id).parent:
-        return ()
-    named = {store.champion_file(result) for result in store.results([], store.record_files(trial_id))}
-    return tuple(champion for champion in store.champion_files(trial_id) if champion not in named)
+def _named(store: Store, trial_id: str) -> set[Path]:
+    """Return the champions that the readable records of a trial name."""
+    records = store.results([], store.record_files(trial_id))
+    return {store.champion_file(result) for result in records if result.champion}
 
 
 def _champions(store: Store) -> Iterator[Problem]:
@@ -114,17 +113,8 @@ def _champions(store: Store) -> Iterator[Problem]:
             yield Problem(path, "champion", "its name or place is not that of a champion")
         elif not any(map(os.path.lexists, store.record_files(trial_id))) and _settled(path):
             yield Problem(path, "leftover", "it has no record, so its run was stopped before the trial was stored")
-        elif len(store.champion_files(trial_id)) > 1 and not _is_named(store, path, trial_id) and _settled(path):
+        elif len(store.champion_files(trial_id)) > 1 and path not in _named(store, trial_id) and _settled(path):
             yield Problem(path, "leftover", "no record of its trial names it")
-
-
-def _is_named(store: Store, path: Path, trial_id: str) -> bool:
-    """Whether a record of the trial names the champion in `path`; unreadable files are reported elsewhere."""
-    try:
-        records = store.records(trial_id)
-    except DamagedFileError:
-        return True
-    return any(result.champion != "" and store.champion_file(result) == path for result in records)
 
 
 def _checkpoints(store: Store, fault: Callable[[Path], str | None]) -> Iterator[Problem]:

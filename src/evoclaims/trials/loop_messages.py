@@ -3,20 +3,15 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
 from typing import Any, Final
 
 import msgspec
 
 from evoclaims.core.canonical import as_plain
 from evoclaims.core.printable import printable
-from evoclaims.trials.result_schema import Number, Vector
 
 _LAST_LINES: Final = 8
 _LONGEST_LINE: Final = 500
-
-Numbers = dict[str, Number]
-"""Numbers by name; NaN and the infinities are words, as in records."""
 
 
 class Request(msgspec.Struct, frozen=True):
@@ -39,16 +34,16 @@ class Reported(msgspec.Struct, frozen=True, tag=True):
     """How far training is; `kept` says whether this is a point of the training curve."""
 
     step: int
-    numbers: Numbers
+    numbers: dict[str, float]
     kept: bool
 
 
 class Scores(msgspec.Struct, frozen=True):
     """An examination of the final policy: success and fitness on each level, and the task's metrics on the last."""
 
-    success: Vector
-    fitness: Vector
-    metrics: Numbers
+    success: tuple[float, ...]
+    fitness: tuple[float, ...]
+    metrics: dict[str, float]
 
 
 class Trained(msgspec.Struct, frozen=True, tag=True):
@@ -60,7 +55,7 @@ class Trained(msgspec.Struct, frozen=True, tag=True):
         step: of its last report; None if it reported nothing.
     """
 
-    metrics: Numbers
+    metrics: dict[str, float]
     scores: Scores | None
     step: int | None
 
@@ -75,13 +70,13 @@ Answer = Reported | Trained | Failed
 
 
 def encode(message: Request | Answer) -> bytes:
-    """Return a message as one line of JSON."""
+    """Return a message as one line of JSON, in which NaN and the infinities are words."""
     return json.dumps(as_plain(msgspec.to_builtins(message)), allow_nan=False).encode("ascii") + b"\n"
 
 
 def decode(line: bytes) -> Answer:
     """Return the answer in a line; raise a `msgspec.MsgspecError` if it is torn."""
-    answer: Answer = msgspec.json.decode(line, type=Answer)
+    answer: Answer = msgspec.json.decode(line, type=Answer, strict=False)  # "nan" is a float
     return answer
 
 
@@ -89,8 +84,3 @@ def last_lines(text: str) -> str:
     """Return how much of a traceback, or of what a process said last, is kept as the reason of a crash."""
     lines = [line.rstrip() for line in text.splitlines() if line.strip()]
     return "\n".join(printable(line)[:_LONGEST_LINE] for line in lines[-_LAST_LINES:])
-
-
-def floats(numbers: Mapping[str, Number]) -> dict[str, float]:
-    """Return numbers with their words turned back."""
-    return {name: float(value) for name, value in numbers.items()}

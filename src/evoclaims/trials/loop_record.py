@@ -9,7 +9,7 @@ from typing import Any, Final
 import jax
 
 from evoclaims.methods.training_loop import TrainingLoop
-from evoclaims.trials.loop_messages import Trained, floats
+from evoclaims.trials.loop_messages import Trained
 from evoclaims.trials.result import Status, TrialResult
 from evoclaims.trials.result_making import make_record
 from evoclaims.trials.spec import TrialSpec
@@ -33,14 +33,14 @@ def trained_record(
     policy's scores are not finite.
     """
     assert isinstance(spec.condition.method, TrainingLoop)
-    returned, scores = floats(trained.metrics), trained.scores
+    returned, scores = trained.metrics, trained.scores
     broken = any(map(math.isnan, returned.values()))
     if scores is None:  # the last level at most is known
         unknown = (math.nan,) * (spec.condition.task.levels - 1)
         levels = {name: (*unknown, returned.get(f"last_{name}", math.nan)) for name in ("success", "fitness")}
     else:
-        levels = {"success": tuple(map(float, scores.success)), "fitness": tuple(map(float, scores.fitness))}
-        broken = broken or not all(map(math.isfinite, (*levels["success"], *levels["fitness"])))
+        levels = {"success": scores.success, "fitness": scores.fitness}
+        broken = broken or not all(map(math.isfinite, (*scores.success, *scores.fitness)))
     steps = returned.get("environment_steps", spec.condition.steps if trained.step is None else trained.step)
     success = levels["success"]
     solved = [level for level, value in enumerate(success) if value == 1.0]
@@ -57,7 +57,7 @@ def trained_record(
         metrics |= returned
     else:
         known = {name: value for name, value in metrics.items() if not math.isnan(value)}
-        metrics |= returned | known | floats(scores.metrics)
+        metrics |= returned | known | scores.metrics
     status: Status = "diverged" if broken else "done"
     origin = {
         "trained_by": spec.condition.method.place,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import queue
 import sys
@@ -58,7 +59,7 @@ class Running:
         """The training curves; a number that a report left out is NaN there."""
         names = dict.fromkeys(name for point in self.points for name in point.numbers)
         steps = [float(point.step) for point in self.points]
-        told = {name: [float(point.numbers.get(name, "nan")) for point in self.points] for name in names}
+        told = {name: [point.numbers.get(name, math.nan) for point in self.points] for name in names}
         return {**told, "steps": steps, "environment_steps": steps} if steps else {}
 
 
@@ -192,7 +193,7 @@ class LoopTrials:
             ended=ended,
             steps=max(reached),
             total_steps=condition.steps,
-            best=max(map(float, told), default=None),
+            best=max(told, default=None),
             seconds_left=seconds * (1 - done) / done if done > 0.01 else None,
         )
 

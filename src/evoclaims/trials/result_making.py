@@ -154,7 +154,7 @@ def provenance(devices: Sequence[jax.Device], condition: Condition) -> dict[str,
     }
 
 
-def named_leaves(tree: Any) -> dict[str, NDArray[Any]]:
-    """Return the leaves of a tree by their paths, such as "[0].mean"."""
+def named_leaves(tree: Any) -> dict[str, Any]:
+    """Return the leaves of a tree by their paths, such as "[0].mean", in their order."""
     leaves, _ = jax.tree_util.tree_flatten_with_path(tree)
-    return {jax.tree_util.keystr(path) or "parameters": np.asarray(leaf) for path, leaf in leaves}
+    return {jax.tree_util.keystr(path) or "parameters": leaf for path, leaf in leaves}
