@@ -15,7 +15,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from trial_toys import walk
 
-from evoclaims.trials.lanes import Compiled, Lanes, width_for
+from evoclaims.trials.lanes import Compiled, Lanes, picked, width_for
 from evoclaims.trials.runner import run
 from evoclaims.trials.store import Store
 
@@ -93,7 +93,7 @@ def test_on_a_cpu_every_lane_is_a_call_of_its_own_on_one_device(full: int, devic
 def test_rearranged_lanes_keep_their_state_and_the_others_go_idle(order: list[int | None]) -> None:
     lanes = Lanes(walk(), jax.devices("cpu")[:1])
     program_state = _started()
-    moved = lanes.gather(lanes.rearrange(lanes.place(program_state, 4), order, len(order)))
+    moved = lanes.gather(lanes.place(picked(program_state, order), len(order)))
     for place, lane in enumerate(order):
         assert moved.idle[place] == (lane is None)
         if lane is not None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 
 from evoclaims.core.printable import shown
 
@@ -22,6 +22,19 @@ class UnknownNameError(UserError):
     def __init__(self, kind: str, name: object, known: Iterable[str]) -> None:
         """Build the message from `kind` (such as "method"), the wrong `name` and the `known` ones."""
         super().__init__(f"There is no {kind} named {name!r}.{guess(name, known)}")
+
+
+def require_known(kind: str, name: object, known: Collection[object]) -> None:
+    """Raise an `UnknownNameError`, for a `kind` such as "method", unless the name is known."""
+    if name not in known:
+        raise UnknownNameError(kind, name, map(str, known))
+
+
+def require_at_least(least: float, whose: str, **values: float) -> None:
+    """Raise a `UserError`, such as "PPO's minibatches must be at least 1, not 0.", for a value below `least`."""
+    for name, value in values.items():
+        if value < least:
+            raise UserError(f"{whose} {name} must be at least {least}, not {value}.")
 
 
 def guess(name: object, known: Iterable[str]) -> str:

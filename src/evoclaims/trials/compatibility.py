@@ -64,11 +64,7 @@ def traced_progress(method: Method[Any], task: Task) -> Progress:
 
 
 def _policy(method: Method[Any], task: Task, state: Any) -> Policy:
-    """Return the policy that a method has trained.
-
-    Raises:
-        MisfitError: when it is something else.
-    """
+    """Return the policy that a method has trained, which must be one."""
     policy = method.best(task, state)
     if not isinstance(policy, Policy):
         raise MisfitError(

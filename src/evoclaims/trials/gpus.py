@@ -61,9 +61,7 @@ def only(found: Sequence[str]) -> dict[str, str]:
 def environment_of_worker(device: str, environment: Mapping[str, str]) -> dict[str, str]:
     """Return what a worker of pytest-xdist sets before jax starts there, so that each worker has its own GPU.
 
-    Args:
-        device: as --claims-device says.
-        environment: of the worker: pytest-xdist has put its number there, and how many there are.
+    pytest-xdist has put the worker's number into its environment, and how many there are.
     """
     worker = re.fullmatch(r"gw(\d+)", environment.get("PYTEST_XDIST_WORKER", ""))
     count = int(environment.get("PYTEST_XDIST_WORKER_COUNT", "1"))

@@ -28,11 +28,7 @@ def is_exhausted(error: BaseException) -> bool:
 
 
 def halved(run: Run, tried: Header) -> int:
-    """Split what a batch has left into two halves, each with a checkpoint if the batch has one.
-
-    Args:
-        run: where it ran.
-        tried: its header when it began.
+    """Split what a batch has left into two halves, each with a checkpoint if the batch (`tried`) has one.
 
     Returns:
         The most trials that a batch should have from now on.

@@ -148,10 +148,6 @@ class Lanes:
         score: Score = self.gather(scores)
         return score
 
-    def rearrange(self, state: Shares, lanes: Sequence[int | None], width: int) -> Shares:
-        """Build a batch of `width` from the given lanes of `state`, in this order; None makes an idle lane."""
-        return self.place(picked(self.gather(state), lanes), width)
-
     def arrangement(self, active: Sequence[int], width: int) -> list[int | None]:
         """Deal active lanes to the shares in turn, so that all shares have about equal work."""
         size = self._size(width)

@@ -113,7 +113,10 @@ class LoopTrials:
                     tell(self._progress(running, len(stored), time.monotonic() - began))
             except BaseException:
                 pool.shutdown(wait=False, cancel_futures=True)
-                self._stop()
+                with self._lock:
+                    self._stopping = True  # also those that are being started
+                    for child in self._children:
+                        child.stop()
                 raise
 
     def _attend(self, one: Running) -> None:
@@ -183,7 +186,8 @@ class LoopTrials:
     def _progress(self, running: Sequence[Running], ended: int, seconds: float) -> RunProgress:
         """Return how far all trials are."""
         condition = self._stored.condition
-        reached = [_step(one, condition.steps) for one in running]
+        steps = [condition.steps if one.outcome else one.newest.step if one.newest else 0 for one in running]
+        reached = [min(step, condition.steps) for step in steps]
         done = sum(reached) / max(condition.steps * len(running), 1)
         told = [one.newest.numbers["success"] for one in running if one.newest and "success" in one.newest.numbers]
         return RunProgress(
@@ -196,17 +200,3 @@ class LoopTrials:
             best=max(told, default=None),
             seconds_left=seconds * (1 - done) / done if done > 0.01 else None,
         )
-
-    def _stop(self) -> None:
-        """End all processes, and those that are being started."""
-        with self._lock:
-            self._stopping = True
-            for child in self._children:
-                child.stop()
-
-
-def _step(one: Running, whole: int) -> int:
-    """Return how far a trial is, of a whole budget."""
-    if one.outcome:
-        return whole
-    return min(one.newest.step, whole) if one.newest else 0

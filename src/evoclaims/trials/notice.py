@@ -17,8 +17,7 @@ from typing import Final
 
 import filelock
 
-from evoclaims.core.errors import UserError
-from evoclaims.trials.result_codec import is_hash
+from evoclaims.trials.result_codec import checked_id
 
 FRESH_SECONDS: Final = 60.0
 """A notice is valid for this long after its last refresh, by the clock of the waiting process: its own process may be
@@ -33,9 +32,7 @@ _CONTAINER: Final = "?pidns-"
 
 def notice_path(store_root: Path, condition_id: str) -> Path:
     """Return the path of a condition's notice; raise a `UserError` for a text that is not an id."""
-    if not is_hash(condition_id):
-        raise UserError(f"{condition_id!r} is not a condition's id: an id is 64 lower-case hexadecimal digits.")
-    return store_root / "running" / f"{condition_id}.lock"
+    return store_root / "running" / f"{checked_id(condition_id, 'condition')}.lock"
 
 
 def progress_path(store_root: Path, condition_id: str) -> Path:

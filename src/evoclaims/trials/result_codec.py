@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from typing import Any, Final, NoReturn, cast
 
 from evoclaims.core.canonical import canonical_json
+from evoclaims.core.errors import UserError
 from evoclaims.trials.result import SCHEMA, TrialResult
 from evoclaims.trials.result_schema import Number, RecordError, Vector, check
 
@@ -24,6 +25,13 @@ _FIELDS: Final = {field.name for field in dataclasses.fields(TrialResult)} | {"s
 def is_hash(text: object) -> bool:
     """Whether `text` is 64 lower-case hexadecimal digits, as every id, digest and seal is."""
     return isinstance(text, str) and _HASH.fullmatch(text) is not None
+
+
+def checked_id(text: str, of: str) -> str:
+    """Return the id of a trial or a condition (`of`) as it is; any other text might be a path outside of the store."""
+    if not is_hash(text):
+        raise UserError(f"{text!r} is not a {of}'s id: an id is 64 lower-case hexadecimal digits.")
+    return text
 
 
 def dump(result: TrialResult) -> bytes:

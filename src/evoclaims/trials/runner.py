@@ -20,7 +20,7 @@ from evoclaims.trials.checkpoint import Header
 from evoclaims.trials.devices import single_threaded_linear_algebra
 from evoclaims.trials.halving import halved, is_exhausted
 from evoclaims.trials.imported import into_store
-from evoclaims.trials.lanes import Lanes
+from evoclaims.trials.lanes import Lanes, picked
 from evoclaims.trials.loop_trials import LoopTrials
 from evoclaims.trials.notice import announced
 from evoclaims.trials.pacing import Rhythm, Strides
@@ -199,7 +199,8 @@ def _store_ended(run: Run, batch: Batch, report: Report, ended: Sequence[int], a
     """Score the trials in the ended lanes, and store those without a record."""
     header, due = batch.header, [lane for lane in ended if lane in batch.owed]
     timing = _timing(run, header)
-    score: Any = allowance.spend(lambda: run.lanes.score(batch.state, len(header.lanes))) if due else None
+    if due:
+        score = allowance.spend(lambda: run.lanes.score(batch.state, len(header.lanes)))
     for lane in due:
         seed = header.lanes[lane]
         assert seed is not None
@@ -242,7 +243,7 @@ def _rearranged(run: Run, batch: Batch) -> Batch:
     if not batch.owed or width >= len(batch.header.lanes):
         return batch
     order = run.lanes.arrangement(active, width)
-    state = run.lanes.rearrange(batch.state, order, width)
+    state = run.lanes.place(picked(run.lanes.gather(batch.state), order), width)
     moved = [None if lane is None else batch.header.lanes[lane] for lane in order]
     return replace(batch, header=replace(batch.header, lanes=moved), state=state)
 

@@ -40,13 +40,7 @@ class Running:
 
 @contextlib.contextmanager
 def shared(store_root: Path, condition_id: str, watch: Watcher) -> Iterator[Watcher]:
-    """Give a watcher that passes on to `watch`, and tells other processes until the `with` block ends.
-
-    Args:
-        store_root: the store's folder.
-        condition_id: the condition that this process has announced.
-        watch: is told everything, too.
-    """
+    """Give a watcher that passes on to `watch`, and tells other processes until the `with` block ends."""
     path, since = progress_path(store_root, condition_id), time.time()
     written, phase = -WRITE_SECONDS, ""
 

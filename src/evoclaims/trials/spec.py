@@ -7,7 +7,7 @@ from functools import cached_property
 from typing import Any, Literal, get_args
 
 from evoclaims.core.canonical import as_plain, content_hash
-from evoclaims.core.errors import UnknownNameError, UserError
+from evoclaims.core.errors import UserError, require_known
 from evoclaims.core.packages import ALWAYS, installed, packages_of
 from evoclaims.envs.base import Task
 from evoclaims.methods.base import Method
@@ -21,28 +21,19 @@ ENGINE_REVISION = 1
 
 
 def _described(component: Any) -> dict[str, Any]:
-    """Return name, revision and parameters of a method or task, as plain JSON."""
-    _check(component)
-    return {"name": component.name, "revision": component.revision, "parameters": as_plain(component)}
-
-
-def _check(component: Any) -> None:
-    """Reject a method or task without what tells its trials from others.
-
-    Raises:
-        UserError: when it has no name or no revision, or is no dataclass.
-    """
+    """Return name, revision and parameters of a method or task, as plain JSON; a `UserError` says what is missing."""
     kind = type(component).__name__
     for name, of in (("name", "str"), ("revision", "int")):
         if not hasattr(component, name):
             raise UserError(
                 f"{kind} has no {name}, by which its trials are stored: write `{name}: ClassVar[{of}] = …` in it."
             )
-    if not is_dataclass(component):
+    if not is_dataclass(type(component)):
         raise UserError(
             f"{kind} is no dataclass: write @dataclass(frozen=True) above the class, since the fields of a method or "
             "task tell its trials apart."
         )
+    return {"name": component.name, "revision": component.revision, "parameters": as_plain(component)}
 
 
 @dataclass(frozen=True)
@@ -64,8 +55,7 @@ class Condition:
 
     def __post_init__(self) -> None:
         """Reject an unknown progression."""
-        if self.progression not in get_args(Progression):
-            raise UnknownNameError("progression", self.progression, get_args(Progression))
+        require_known("progression", self.progression, get_args(Progression))
 
     @cached_property
     def plain(self) -> dict[str, Any]:

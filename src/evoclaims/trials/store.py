@@ -83,13 +83,9 @@ class Store(StoreFiles):
         probe.unlink(missing_ok=True)
 
     def made_with(self, trial_id: str, versions: Versions) -> TrialResult | None:
-        """Return the record that was made with these versions, or None when there is none.
+        """Return the record made with these versions of all packages that its condition depends on, or None.
 
         This decides whether a trial must be run in an environment.
-
-        Args:
-            trial_id: the trial.
-            versions: of all packages that its condition depends on (`Condition.versions`).
 
         Raises:
             DamagedFileError: when a file that may hold it is torn, edited, foreign or unreadable.
@@ -186,8 +182,9 @@ class Store(StoreFiles):
         if present is not None and not _gives_way(present, result):
             return "present" if present.digest == result.digest else "differs"
         mark(self.root)
-        if packed:
-            self._write_champion(sealed, packed)
+        usual = self.champion_path(sealed.id)
+        if packed and not write_once(usual, packed, ADVICE) and _sha256(usual) != sealed.champion:
+            write_atomically(self.spare_champion_path(sealed.id, sealed.champion), packed, ADVICE)
         path = self.home(result)
         if present is None and write_once(path, record, ADVICE):
             return "stored"
@@ -214,12 +211,6 @@ class Store(StoreFiles):
                     path.unlink(missing_ok=True)
                 except OSError as error:
                     raise UserError(f"Cannot remove {path}: {error.strerror or error}.") from error
-
-    def _write_champion(self, sealed: TrialResult, packed: bytes) -> None:
-        """Write a champion to its usual place, or beside it if another one is there."""
-        usual = self.champion_path(sealed.id)
-        if not write_once(usual, packed, ADVICE) and _sha256(usual) != sealed.champion:
-            write_atomically(self.spare_champion_path(sealed.id, sealed.champion), packed, ADVICE)
 
     def _remove_champion_beside(self, first: TrialResult, sealed: TrialResult) -> None:
         """Remove our champion of a trial that another process stored first with a different champion."""

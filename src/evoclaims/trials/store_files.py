@@ -9,9 +9,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from evoclaims.core.errors import UserError
 from evoclaims.core.packages import SHORT_HASH, Versions, short_hash
-from evoclaims.trials.result_codec import is_hash
+from evoclaims.trials.result_codec import checked_id
 
 DEFAULT_ROOT: Final = Path(".evoclaims")
 
@@ -37,13 +36,13 @@ class StoreFiles:
         return self.root / "checkpoints"
 
     def record_path(self, trial_id: str, versions: Versions | None = None) -> Path:
-        """Return the path for the record of `trial_id`; raise a `UserError` for a text that is not an id.
+        """Return the path for a record of `trial_id`, made with `versions` of its packages or not naming them.
 
-        Args:
-            trial_id: the trial.
-            versions: of the packages that it depends on; None for a record that does not name them.
+        A `UserError` says that a text is no id.
         """
-        name = f"{_checked(trial_id)}.json" if versions is None else f"{trial_id}.{short_hash(versions)}.json"
+        name = (
+            f"{checked_id(trial_id, 'trial')}.json" if versions is None else f"{trial_id}.{short_hash(versions)}.json"
+        )
         return self.root / "trials" / trial_id[:2] / name
 
     def record_files(self, trial_id: str) -> tuple[Path, ...]:
@@ -53,7 +52,7 @@ class StoreFiles:
 
     def champion_path(self, trial_id: str) -> Path:
         """Return the path for the champion of `trial_id`; raise a `UserError` for a text that is not an id."""
-        return self.root / "champions" / _checked(trial_id)[:2] / f"{trial_id}.npz"
+        return self.root / "champions" / checked_id(trial_id, "trial")[:2] / f"{trial_id}.npz"
 
     def champion_files(self, trial_id: str) -> tuple[Path, ...]:
         """Return the files that hold a champion of `trial_id`; more than one if processes raced (see `put`)."""
@@ -78,13 +77,6 @@ def record_id(path: Path) -> str | None:
     """Return the trial id in the name of a record file; None for any other name."""
     named = _RECORD.fullmatch(path.name)
     return named[1] if named else None
-
-
-def _checked(trial_id: str) -> str:
-    """Return `trial_id` if it is one; any other text might be a path outside of the store."""
-    if not is_hash(trial_id):
-        raise UserError(f"{trial_id!r} is not a trial's id: an id is 64 lower-case hexadecimal digits.")
-    return trial_id
 
 
 def _walk(top: Path) -> Iterator[Path]:
