@@ -348,8 +348,8 @@ def test_a_task_that_cannot_be_mapped_is_one_sentence() -> None:
 @pytest.mark.parametrize(
     ("wrong", "sentence"),
     [
-        ({"batch": 0}, "at least 1 individual in a batch and 1 to begin with, not 0 and 8"),
-        ({"initial": 0}, "not 8 and 0"),
+        ({"batch": 0}, "MAP-Elites's batch must be at least 1, not 0"),
+        ({"initial": 0}, "MAP-Elites's initial must be at least 1, not 0"),
         ({"cells": (5,)}, "two numbers of cells, each at least 1, not (5,)"),
         ({"cells": (5, 0)}, "not (5, 0)"),
         ({"iso_sigma": -0.1}, "iso_sigma and line_sigma are -0.1 and 0.2"),

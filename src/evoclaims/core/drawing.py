@@ -7,7 +7,7 @@ import io
 from contextlib import AbstractContextManager
 from typing import Any, Literal, get_args
 
-from evoclaims.core.errors import UnknownNameError, UserError
+from evoclaims.core.errors import UserError, require_known
 
 Format = Literal["svg", "png"]
 
@@ -40,8 +40,7 @@ def saved(figure: Any, file_format: str, title: str | None = None, **options: An
     Raises:
         UnknownNameError: for a format not in `Format`.
     """
-    if file_format not in get_args(Format):
-        raise UnknownNameError("format of a picture", file_format, get_args(Format))
+    require_known("format of a picture", file_format, get_args(Format))
     file, unsaid = io.BytesIO(), {"svg": "Date", "png": "Software"}[file_format]
     metadata = {unsaid: None, **({"Title": title} if title else {})}
     figure.savefig(file, format=file_format, metadata=metadata, **options)

@@ -37,10 +37,7 @@ def read_file(path: Path) -> bytes:
 def write_atomically(path: Path, data: bytes, advice: str = ADVICE) -> None:
     """Write `data` to `path`; a reader always sees the whole old file or the whole new one, even after a kill.
 
-    Args:
-        path: the file; missing parent folders are created.
-        data: its whole content.
-        advice: a sentence for the user if writing fails.
+    Missing parent folders are created. `advice` is a sentence for the user if writing fails.
 
     Raises:
         UserError: when the folder cannot be written or the disk is full.

@@ -61,11 +61,9 @@ def rank_test(a: Sequence[float], b: Sequence[float]) -> ExactTest:
 
 @lru_cache(maxsize=512)
 def _splits_by_doubled_u(n: int, ties: tuple[int, ...]) -> Counts:
-    """Count the splits of pooled values by their 2U.
+    """Count the splits of pooled values, `n` of A and the others of B, by their 2U.
 
-    Args:
-        n: number of values of A; the others belong to B.
-        ties: sizes of the groups of equal pooled values, in rising order of value.
+    `ties` are the sizes of the groups of equal pooled values, in rising order of value.
     """
     m = sum(ties) - n
     total = math.comb(n + m, n)
@@ -94,16 +92,10 @@ def rank_attainable(n: int, m: int) -> float:
 
 @lru_cache(maxsize=4096)
 def binomial_test(k: int, n: int, p0: float, alternative: Alternative = "greater") -> ExactTest:
-    """Test a probability of success by the exact binomial test.
-
-    Args:
-        k: successes.
-        n: trials, at least 1.
-        p0: the null's probability, strictly between 0 and 1.
-        alternative: "greater" tests P(success) > p0, "less" tests P(success) < p0.
+    """Test P(success) > p0 ("greater") or P(success) < p0 ("less") by the exact binomial test, given `k` of `n` trials.
 
     Raises:
-        ValueError: for another alternative, or numbers outside their ranges.
+        ValueError: for another alternative, less than one trial, or a p0 that is not strictly between 0 and 1.
     """
     if alternative not in get_args(Alternative):
         raise ValueError(f"No alternative {alternative!r}; known: {', '.join(get_args(Alternative))}.")

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import Any, Literal, Self, TypeVar, get_args
 
-from evoclaims.core.errors import UnknownNameError, UserError
+from evoclaims.core.errors import UserError, require_known
 from evoclaims.judging.sample import (
     Limited,
     Sample,
@@ -236,6 +236,5 @@ class LevelsReading(TrialReading):
 
 def _worst(better: Better) -> float:
     """Return the value of a failed trial, after checking the direction."""
-    if better not in get_args(Better):
-        raise UnknownNameError("direction of better", better, get_args(Better))
+    require_known("direction of better", better, get_args(Better))
     return -math.inf if better == "higher" else math.inf

@@ -6,7 +6,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-import jax
 import jax.numpy as jnp
 from evosax.algorithms.distribution_based.cma_es import CMA_ES
 from jaxtyping import Array, Float, Int, PRNGKeyArray
@@ -104,7 +103,7 @@ class CmaEs:
         """Build evosax's algorithm and its default parameters for the task's encoding."""
         size = self.network.size(task.observation_size, task.action_size)
         search = self._algorithm(
-            self.population, jnp.zeros(size), fitness_shaping_fn=ordinal_weights, metrics_fn=_no_metrics
+            self.population, jnp.zeros(size), fitness_shaping_fn=ordinal_weights, metrics_fn=lambda *_: {}
         )
         with implicit_promotions():
             return search, search.default_params
@@ -113,8 +112,3 @@ class CmaEs:
     def _algorithm(self) -> Callable[..., CMA_ES]:
         """Return what makes the search."""
         return CMA_ES
-
-
-def _no_metrics(*_: Any) -> dict[str, jax.Array]:
-    """Compute none of evosax's metrics."""
-    return {}

@@ -124,10 +124,7 @@ def alu_circuit(operations: Sequence[str]) -> ThresholdCircuit:
     """Return the circuit with one neuron per operation and value of its inputs (§3.1.2).
 
     A neuron fires only on its own eight bits: x · (2 bits − 1) exceeds Σ bits − ½ for no others. It adds +1 to the
-    outputs that must be 1, and −1 to the others.
-
-    Args:
-        operations: names, in the order of their indices in the four control bits.
+    outputs that must be 1, and −1 to the others. The names are in the order of their indices in the four control bits.
     """
     shown, wanted = [], []
     for index, operation in enumerate(operations):

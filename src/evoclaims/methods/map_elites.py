@@ -22,7 +22,7 @@ from qdax.core.emitters.mutation_operators import isoline_variation
 from qdax.core.emitters.standard_emitters import MixingEmitter
 from qdax.core.map_elites import MAPElites
 
-from evoclaims.core.errors import UserError
+from evoclaims.core.errors import UserError, require_at_least
 from evoclaims.core.foreign import implicit_promotions
 from evoclaims.core.keys import streams
 from evoclaims.core.pytree import pytree, strong
@@ -93,11 +93,7 @@ class MapElites:
 
     def __post_init__(self) -> None:
         """Check the sizes and standard deviations."""
-        if self.batch < 1 or self.initial < 1:
-            raise UserError(
-                f"MAP-Elites needs at least 1 individual in a batch and 1 to begin with, not {self.batch} and "
-                f"{self.initial}."
-            )
+        require_at_least(1, "MAP-Elites's", batch=self.batch, initial=self.initial)
         if len(self.cells) != 2 or min(self.cells) < 1:
             raise UserError(f"The grid of MAP-Elites is two numbers of cells, each at least 1, not {self.cells}.")
         spreads = (self.iso_sigma, self.line_sigma)
@@ -154,7 +150,9 @@ class MapElites:
         An individual becomes its cell's elite when it is fitter than the old one; within a batch, the first best one.
         """
         descriptors = jnp.stack([episodes.metrics["x"], episodes.metrics["y"]], axis=-1)
-        valid = _inside(_mapped(task), descriptors) & jnp.isfinite(episodes.fitness)
+        low, high = jnp.asarray(_mapped(task).area, jnp.float32).T
+        inside = jnp.all((descriptors >= low[None]) & (descriptors <= high[None]), axis=1)  # NaN is not
+        valid = inside & jnp.isfinite(episodes.fitness)
         fitness = jnp.where(valid, episodes.fitness, -jnp.inf)
         with implicit_promotions():
             cell = get_cells_indices(descriptors, state.archive.centroids)
@@ -269,9 +267,3 @@ def _mapped(task: Task) -> MappedTask:
             "`area` and `reachable`, such as a maze."
         )
     return task
-
-
-def _inside(task: MappedTask, descriptors: Float[Array, "batch 2"]) -> Bool[Array, " batch"]:
-    """Return which descriptors are finite and in the area."""
-    low, high = jnp.asarray(task.area, jnp.float32).T
-    return jnp.all((descriptors >= low[None]) & (descriptors <= high[None]), axis=1)

@@ -15,7 +15,7 @@ import jax.numpy as jnp
 import optax
 from jaxtyping import Array, Float, Int, PRNGKeyArray
 
-from evoclaims.core.errors import UserError
+from evoclaims.core.errors import UserError, require_at_least
 from evoclaims.core.foreign import implicit_promotions
 from evoclaims.core.keys import stream, streams
 from evoclaims.core.pytree import pytree, select, strong
@@ -53,11 +53,7 @@ class LevelTest:
 
     def __post_init__(self) -> None:
         """Check the counts."""
-        if self.every < 0 or self.sampled_episodes < 0:
-            raise UserError(
-                "PPO's level test is held every 0 or more training steps over 0 or more sampled episodes, not every "
-                f"{self.every} over {self.sampled_episodes}."
-            )
+        require_at_least(0, "The level test's", every=self.every, sampled_episodes=self.sampled_episodes)
 
 
 @dataclass(frozen=True)
@@ -100,9 +96,7 @@ class Ppo:
     def __post_init__(self) -> None:
         """Check the sizes, and that the collected data fills the minibatches."""
         sizes = ("environments", "unroll_length", "batch_size", "minibatches", "updates_per_batch")
-        for name in sizes:
-            if getattr(self, name) < 1:
-                raise UserError(f"PPO's {name} must be at least 1, not {getattr(self, name)}.")
+        require_at_least(1, "PPO's", **{name: getattr(self, name) for name in sizes})
         if any(width < 1 for width in (*self.policy_layers, *self.value_layers)):
             raise UserError(
                 "Every layer of PPO's networks has at least 1 neuron; these are "
@@ -135,7 +129,7 @@ class Ppo:
         return strong(
             PpoState(
                 networks=parameters,
-                optimizer=self._optimizer().init(parameters),
+                optimizer=optax.adam(self.learning_rate).init(parameters),
                 statistics=statistics,
                 interaction=Interaction.start(task, reset_key, jnp.zeros((), jnp.int32), self.environments),
                 steps=jnp.zeros((), jnp.int32),
@@ -212,10 +206,6 @@ class Ppo:
 
         return function
 
-    def _optimizer(self) -> optax.GradientTransformation:
-        """Adam, as in Brax."""
-        return optax.adam(self.learning_rate)
-
     def _train(
         self, key: PRNGKeyArray, task: Task, data: Any, statistics: Any, parameters: Any, optimizer: Any
     ) -> tuple[Any, Any]:
@@ -229,7 +219,7 @@ class Ppo:
             gae_lambda=self.gae_lambda,
             clipping_epsilon=self.clipping,
         )
-        adam = self._optimizer()
+        adam = optax.adam(self.learning_rate)
 
         def descend(carry: tuple[Any, Any], minibatch: tuple[Array, Array]) -> tuple[tuple[Any, Any], None]:
             parameters, optimizer = carry

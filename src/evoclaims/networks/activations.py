@@ -9,7 +9,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float, Int
 
-from evoclaims.core.errors import UnknownNameError
+from evoclaims.core.errors import require_known
 
 ACTIVATIONS: Mapping[str, Callable[[Array], Array]] = MappingProxyType(
     {
@@ -26,8 +26,7 @@ ACTIVATIONS: Mapping[str, Callable[[Array], Array]] = MappingProxyType(
 def check_activations(names: Sequence[str]) -> None:
     """Raise an `UnknownNameError`, which lists the known names, for any other name."""
     for name in names:
-        if name not in ACTIVATIONS:
-            raise UnknownNameError("activation function", name, ACTIVATIONS)
+        require_known("activation function", name, ACTIVATIONS)
 
 
 def apply_activation(

@@ -15,13 +15,6 @@ from evoclaims.networks.graph import GraphNetwork
 FORMAT: Final = "evoclaims genome 1"
 
 
-def kind_of(key: int, network: GraphNetwork) -> str:
-    """Return whether the node with this key is an "input", an "output" or "hidden"."""
-    if key < network.inputs:
-        return "input"
-    return "output" if key < network.inputs + network.outputs else "hidden"
-
-
 def to_networkx(genome: Genome, network: GraphNetwork) -> Any:
     """Return one genome's network as a `networkx.DiGraph`.
 
@@ -35,8 +28,9 @@ def to_networkx(genome: Genome, network: GraphNetwork) -> Any:
     graph = optional("networkx").DiGraph()
     nodes, connections = _genes(genome)
     fixed = {"input": "identity", "output": network.output}
+    ends = ["input"] * network.inputs + ["output"] * network.outputs  # by key
     for node in nodes:
-        kind = kind_of(node["key"], network)
+        kind = ends[node["key"]] if node["key"] < len(ends) else "hidden"
         function = fixed.get(kind, network.activations[node["activation"]])
         graph.add_node(node["key"], kind=kind, bias=node["bias"], response=node["response"], activation=function)
     for connection in connections:

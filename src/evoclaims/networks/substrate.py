@@ -11,7 +11,7 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from evoclaims.core.errors import UnknownNameError, UserError
+from evoclaims.core.errors import UserError, require_known
 
 Point = tuple[float, float]
 Extent = Literal["largest_layer", "unit"]
@@ -61,8 +61,7 @@ def layered(widths: Sequence[int], extent: Extent = "largest_layer") -> Substrat
     Raises:
         UserError: for fewer than two layers, or an empty one.
     """
-    if extent not in get_args(Extent):
-        raise UnknownNameError("extent of a substrate", extent, get_args(Extent))
+    require_known("extent of a substrate", extent, get_args(Extent))
     if len(widths) < 2 or min(widths) < 1:
         raise UserError(f"A substrate has at least two layers of at least one neuron each, not {tuple(widths)}.")
     size = float(max(widths)) if extent == "largest_layer" else 1.0

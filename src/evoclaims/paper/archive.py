@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -65,14 +65,9 @@ class Archive:
     @cached_property
     def _committed(self) -> dict[str, list[TrialResult]]:
         """Reference trials and imported ones by id."""
+        files = sorted(self.references.rglob("*.jsonl")) if self.references is not None else ()
         found: dict[str, list[TrialResult]] = defaultdict(list)
-        for trial in self._read():
-            found[trial.id].append(trial)
+        for trials in (*(condition.existing or () for condition in self.existing), *map(references.load, files)):
+            for trial in trials:
+                found[trial.id].append(trial)
         return dict(found)
-
-    def _read(self) -> Iterator[TrialResult]:
-        """Read every file of reference trials, and the trials that exist already."""
-        for condition in self.existing:
-            yield from condition.existing or ()
-        for path in sorted(self.references.rglob("*.jsonl")) if self.references is not None else ():
-            yield from references.load(path)

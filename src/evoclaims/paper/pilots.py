@@ -22,7 +22,6 @@ from evoclaims.judging.design import Design
 from evoclaims.judging.reading import TrialReading
 from evoclaims.judging.sample import UnreadableTrialError
 from evoclaims.trials.result import Status, TrialResult
-from evoclaims.trials.result_schema import Number, Vector
 from evoclaims.trials.spec import Condition
 
 SCHEMA: Final = 1
@@ -46,9 +45,9 @@ class _Trial(Struct):
     seed: int
     status: Status
     provenance: int
-    metrics: dict[str, Number]
-    levels: dict[str, Vector]
-    curves: dict[str, Vector]
+    metrics: dict[str, float]
+    levels: dict[str, tuple[float, ...]]
+    curves: dict[str, tuple[float, ...]]
 
 
 def path_of(folder: Path, tier: str, method: str, task: str) -> Path:
@@ -60,17 +59,7 @@ def write(path: Path, trials: Collection[TrialResult], readings: Sequence[TrialR
     """Write what some readings read of the trials of a condition, in the order of seeds."""
     kept = sorted((_kept(trial, readings) for trial in trials), key=lambda trial: trial.seed)
     provenances = list({canonical_json(trial.provenance): dict(trial.provenance) for trial in kept}.values())
-    lines = [
-        {
-            "seed": trial.seed,
-            "status": trial.status,
-            "provenance": provenances.index(dict(trial.provenance)),
-            "metrics": trial.metrics,
-            "levels": trial.levels,
-            "curves": trial.curves,
-        }
-        for trial in kept
-    ]
+    lines = [{**_own(trial), "provenance": provenances.index(dict(trial.provenance))} for trial in kept]
     spec = {name: value for name, value in kept[0].spec.items() if name != "seed"}
     shared = {"schema": SCHEMA, "condition": kept[0].condition, "spec": spec, "provenances": provenances}
     written = [canonical_json(line) for line in ({**shared, "seal": content_hash([shared, *lines])}, *lines)]
@@ -85,7 +74,7 @@ def load(path: Path) -> tuple[TrialResult, ...]:
     """
     try:
         first, *rest = map(json.decode, read_file(path).splitlines() or [b""])
-        shared, trials = convert(first, _Shared), convert(rest, list[_Trial])
+        shared, trials = convert(first, _Shared), convert(rest, list[_Trial], strict=False)  # "nan" is a float
         sealed = {name: value for name, value in first.items() if name != "seal"}
         if shared.schema != SCHEMA:
             _fail(path, f"its schema is {shared.schema} and this version of evoclaims reads schema {SCHEMA}")
@@ -151,15 +140,16 @@ def _result(shared: _Shared, trial: _Trial) -> TrialResult:
         id=content_hash(spec),
         condition=shared.condition,
         spec=spec,
-        seed=trial.seed,
-        status=trial.status,
-        metrics={name: float(value) for name, value in trial.metrics.items()},
-        levels={name: tuple(map(float, values)) for name, values in trial.levels.items()},
-        curves={name: tuple(map(float, values)) for name, values in trial.curves.items()},
         digest="",
         timing={},
         provenance=shared.provenances[trial.provenance],
+        **_own(trial),
     )
+
+
+def _own(trial: TrialResult | _Trial) -> dict[str, Any]:
+    """Return what a trial and its line have alike."""
+    return {name: getattr(trial, name) for name in ("seed", "status", "metrics", "levels", "curves")}
 
 
 def _fail(path: Path, why: str) -> NoReturn:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
-from evoclaims.core.errors import UnknownNameError, UserError
+from evoclaims.core.errors import UserError, require_known
 
 FILE: Final = "reported.toml"
 """Name of the file in a reproduction's folder."""
@@ -65,8 +65,7 @@ class Published:
 
     def table(self, name: str) -> Mapping[str, Any]:
         """Return a table's "place" and "values"; an `UnknownNameError` lists the known tables."""
-        if name not in self.tables:
-            raise UnknownNameError("published table", name, self.tables)
+        require_known("published table", name, self.tables)
         return self.tables[name]
 
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from evoclaims.core.errors import UnknownNameError, UserError
+from evoclaims.core.errors import UnknownNameError, UserError, require_known
 from evoclaims.judging.design import Design
 from evoclaims.paper.reported import FILE, Published, load_published
 from evoclaims.paper.trial_group import TrialGroup
@@ -30,11 +30,9 @@ class Tier:
     def condition(self, method: str, task: str) -> Condition:
         """Return the condition of a method on a task; an `UnknownNameError` lists the known ones."""
         methods = {m for m, _ in self.conditions}
-        if method not in methods:
-            raise UnknownNameError("method", method, methods)
+        require_known("method", method, methods)
         tasks = {t for m, t in self.conditions if m == method}
-        if task not in tasks:
-            raise UnknownNameError(f"task for {method}", task, tasks)
+        require_known(f"task for {method}", task, tasks)
         return self.conditions[method, task]
 
 
@@ -102,8 +100,7 @@ class Reproduction:
 
     def tier(self, name: str, variant: str = "") -> Tier:
         """Return a tier, changed by a variant if one is named; an `UnknownNameError` lists the known ones."""
-        if name not in self.tiers:
-            raise UnknownNameError("tier", name, self.tiers)
+        require_known("tier", name, self.tiers)
         if not variant:
             return self.tiers[name]
         if variant not in self.variants:

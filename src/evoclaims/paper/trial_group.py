@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from evoclaims.core.errors import UnknownNameError
+from evoclaims.core.errors import UnknownNameError, require_known
 from evoclaims.judging.measure import Event, Measure, Profile
 from evoclaims.judging.reading import Better
 from evoclaims.judging.sample import Limited, Source
@@ -83,8 +83,7 @@ class TrialGroup:
         """
         if read is None and self.condition.existing is not None:
             known = self.condition.existing[0].metrics
-            if name not in known:
-                raise UnknownNameError(f"metric of {self.label}", name, known)
+            require_known(f"metric of {self.label}", name, known)
         return Measure(self, name, read or (lambda t: t.metrics[name]), better)
 
     def event(self, name: str, holds: Callable[[TrialResult], bool]) -> Event:

@@ -10,7 +10,7 @@ from typing import Any, Final
 import jax
 from threadpoolctl import threadpool_limits
 
-from evoclaims.core.errors import UnknownNameError, UserError
+from evoclaims.core.errors import UserError, require_known
 
 DEVICE_NAMES: Final = ("auto", "cpu", "gpu")
 MATMUL_PRECISION: Final = "highest"
@@ -63,8 +63,7 @@ def choose(name: str) -> list[jax.Device]:
     Raises:
         UserError: when a GPU is requested, here or by JAX_PLATFORMS, and jax sees none.
     """
-    if name not in DEVICE_NAMES:
-        raise UnknownNameError("device", name, DEVICE_NAMES)
+    require_known("device", name, DEVICE_NAMES)
     try:
         return list(jax.devices(None if name == "auto" else name))
     except (RuntimeError, AssertionError) as error:  # jax asserts that a platform in JAX_PLATFORMS has a plugin

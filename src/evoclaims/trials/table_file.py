@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
-from evoclaims.core.errors import UnknownNameError, UserError, guess
+from evoclaims.core.errors import UserError, guess, require_known
 from evoclaims.core.files import read_file
 
 Columns = Mapping[str, Sequence[Any]]
@@ -47,8 +47,7 @@ class TableFile:
         Raises:
             UnknownNameError: when there is none of this name.
         """
-        if name not in self.columns:
-            raise UnknownNameError(f"column in {self.name} ({role})", name, self.columns)
+        require_known(f"column in {self.name} ({role})", name, self.columns)
         return self.columns[name]
 
     def rows_where(self, where: Mapping[str, object]) -> list[int]:

@@ -157,7 +157,7 @@ def test_wrong_names_and_what_map_elites_needs_are_sentences() -> None:
         BraxTask("antt").make()
     with pytest.raises(UserError, match="nothing says by what of fast: give the task a descriptor"):
         traced_progress(METHODS["map_elites"], FAST)
-    with pytest.raises(UserError, match="at least 1 step, not 0"):
+    with pytest.raises(UserError, match="episode_steps must be at least 1, not 0"):
         BraxTask("fast", episode_steps=0)
-    with pytest.raises(UserError, match="at least 1 episode, not 0"):
+    with pytest.raises(UserError, match="examined_episodes must be at least 1, not 0"):
         BraxTask("fast", examined_episodes=0)

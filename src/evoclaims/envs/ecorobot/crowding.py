@@ -18,10 +18,8 @@ LINES: Final = 500
 def reach(model: mujoco.MjModel) -> float:
     """Return an upper bound on the distance from the torso's centre at which a robot can touch a box, m.
 
-    Limbs are assumed stretched out straight. With a limb on a slide, or a separate body, it is infinity.
-
-    Args:
-        model: the robot alone; its first body is the torso.
+    Limbs are assumed stretched out straight. With a limb on a slide, or a separate body, it is infinity. The model has
+    the robot alone, whose first body is the torso.
     """
     # For each body: a point about which it turns, and that point's largest distance from the torso's centre.
     pivots, furthest = np.zeros((model.nbody, 3)), np.zeros(model.nbody)

@@ -8,7 +8,7 @@ from typing import ClassVar, Final, Literal, get_args
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
-from evoclaims.core.errors import UnknownNameError
+from evoclaims.core.errors import require_known
 from evoclaims.core.pytree import pytree
 from evoclaims.envs.ecorobot import stones
 from evoclaims.envs.ecorobot.boxes import Box
@@ -69,8 +69,7 @@ class DeceptiveMaze(Maze):
     def __post_init__(self) -> None:
         """Check the name of the difficulty."""
         super().__post_init__()
-        if self.difficulty not in get_args(Difficulty):
-            raise UnknownNameError("difficulty", self.difficulty, get_args(Difficulty))
+        require_known("difficulty", self.difficulty, get_args(Difficulty))
 
     @property
     def plan(self) -> MazePlan:

@@ -9,7 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from evoclaims.core.errors import UnknownNameError
+from evoclaims.core.errors import require_known
 from evoclaims.core.pytree import pytree
 from evoclaims.envs.ecorobot.boxes import Box
 from evoclaims.envs.ecorobot.locomotion import forward
@@ -55,8 +55,7 @@ class Obstacles(RobotTask):
     def __post_init__(self) -> None:
         """Check the name of the heights."""
         super().__post_init__()
-        if self.heights not in get_args(Heights):
-            raise UnknownNameError("profile of heights", self.heights, get_args(Heights))
+        require_known("profile of heights", self.heights, get_args(Heights))
 
     @property
     def obstacle_places(self) -> tuple[float, ...]:

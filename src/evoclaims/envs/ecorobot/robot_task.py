@@ -13,7 +13,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int, PRNGKeyArray
 
-from evoclaims.core.errors import UserError
+from evoclaims.core.errors import require_at_least
 from evoclaims.core.keys import streams
 from evoclaims.core.pytree import select, strong
 from evoclaims.envs.base import Episode, PolicyFn, TaskState, fitting, played
@@ -56,11 +56,8 @@ class RobotTask(ABC):
 
     def __post_init__(self) -> None:
         """Check the counts."""
-        if self.episode_steps < 1 or self.examined_episodes < 1:
-            raise UserError(
-                f"A task has episodes of at least 1 step and examines at least 1, not {self.episode_steps} and "
-                f"{self.examined_episodes}."
-            )
+        counts = {"episode_steps": self.episode_steps, "examined_episodes": self.examined_episodes}
+        require_at_least(1, f"{self.name}'s", **counts)
 
     @property
     @abstractmethod

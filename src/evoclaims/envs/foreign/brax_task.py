@@ -13,7 +13,7 @@ from typing import Any, ClassVar
 import jax.numpy as jnp
 from jaxtyping import Array, PRNGKeyArray
 
-from evoclaims.core.errors import UnknownNameError, UserError
+from evoclaims.core.errors import UserError, require_known
 from evoclaims.envs.foreign.actions import Range
 from evoclaims.envs.foreign.jax_task import JaxTask, Moment
 
@@ -45,8 +45,7 @@ class BraxTask(JaxTask):
             warnings.simplefilter("ignore")
             from brax import envs
 
-            if self.environment_id not in envs._envs:
-                raise UnknownNameError("environment of Brax", self.environment_id, envs._envs)
+            require_known("environment of Brax", self.environment_id, envs._envs)
             try:
                 return envs.get_environment(self.environment_id, **self.settings)
             except (TypeError, ValueError) as error:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -14,7 +14,7 @@ import numpy as np
 from jaxtyping import Array, Bool, Float, Int, PRNGKeyArray
 from numpy.typing import NDArray
 
-from evoclaims.core.errors import UserError
+from evoclaims.core.errors import UserError, require_at_least
 from evoclaims.core.foreign import implicit_promotions
 from evoclaims.core.keys import EVALUATION, streams, trial_key
 from evoclaims.core.pytree import pytree, strong
@@ -85,8 +85,7 @@ class JaxTask(ForeignTask):
     def __post_init__(self) -> None:
         """Check the counts."""
         super().__post_init__()
-        if self.episode_steps < 1:
-            raise UserError(f"An episode has at least 1 step, not {self.episode_steps}.")
+        require_at_least(1, f"{self.name}'s", episode_steps=self.episode_steps)
 
     @abstractmethod
     def make(self) -> Any:
@@ -156,11 +155,10 @@ class JaxTask(ForeignTask):
     def episode(self, policy: PolicyFn, key: PRNGKeyArray, level: Int[Array, ""]) -> Episode:
         """Run one episode: fitness is its return, success whether that is `solved_at` or more."""
         state, total, _ = played(self, policy, self.reset(key, level))
-        return Episode(
-            fitness=total,
-            success=(total >= self.threshold).astype(jnp.float32),
-            metrics={"episode_steps": state.inner.time.astype(jnp.float32), **self._place(state.observation)},
-        )
+        metrics = {"episode_steps": state.inner.time.astype(jnp.float32)}
+        if self.descriptor is not None:
+            metrics |= {name: state.observation[at] for name, at in zip("xy", self.descriptor.places, strict=True)}
+        return Episode(fitness=total, success=(total >= self.threshold).astype(jnp.float32), metrics=metrics)
 
     def examine(self, policy: PolicyFn, key: PRNGKeyArray, level: Int[Array, ""]) -> Episode:
         """Run `examined_episodes` from different starts and average; success is the share that is solved."""
@@ -205,13 +203,6 @@ class JaxTask(ForeignTask):
         """What `make` returns."""
         with jax.ensure_compile_time_eval():  # its arrays are numbers, also where a function is being traced
             return self.make()
-
-    def _place(self, observation: Float[Array, " observation"]) -> Mapping[str, Float[Array, ""]]:
-        """Return where an episode has ended, as MAP-Elites wants it."""
-        if self.descriptor is None:
-            return {}
-        first, second = self.descriptor.places
-        return {"x": observation[first], "y": observation[second]}
 
 
 def _flat(observation: Array) -> Float[Array, " observation"]:

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from statistics import fmean
 from typing import Any, ClassVar
 
-from evoclaims.core.errors import UserError
+from evoclaims.core.errors import require_at_least
 
 Scored = tuple[float, float, Mapping[str, float]]
 """Fitness, success and metrics of a policy, as a task's `examine` has them."""
@@ -36,8 +36,7 @@ class ForeignTask(ABC):
 
     def __post_init__(self) -> None:
         """Check the count."""
-        if self.examined_episodes < 1:
-            raise UserError(f"An examination has at least 1 episode, not {self.examined_episodes}.")
+        require_at_least(1, f"{self.name}'s", examined_episodes=self.examined_episodes)
 
     @property
     def name(self) -> str:

@@ -8,7 +8,7 @@ from typing import ClassVar, Literal, get_args
 
 import numpy as np
 
-from evoclaims.core.errors import UnknownNameError, UserError
+from evoclaims.core.errors import UserError, require_known
 from evoclaims.envs.gates.circuit import Circuit, Sampling
 from evoclaims.envs.gates.truth_table import Operation, TruthTable, bits_of, number_of
 
@@ -17,16 +17,6 @@ WIDTH = 4
 
 OperationList = Literal["paper", "published_code"]
 MultiplexerReading = Literal["paper", "published_code"]
-
-
-def _add(amount: int) -> Operation:
-    """Return the operation that adds `amount` modulo 16."""
-    return Operation(
-        "increment" if amount > 0 else "decrement",
-        WIDTH,
-        WIDTH,
-        lambda bits: bits_of((number_of(bits) + amount) % 2**WIDTH, WIDTH),
-    )
 
 
 MULTIPLEXER = Operation("multiplexer", 3, 1, lambda x: (x[1] if x[0] else x[2],))
@@ -38,8 +28,8 @@ NOT = Operation("not", 1, 1, lambda x: (1 - x[0],))
 AND = Operation("and", 2, 1, lambda x: (x[0] & x[1],))
 XOR = Operation("xor", 2, 1, lambda x: (x[0] ^ x[1],))
 XAX = Operation("xax", 3, 1, lambda x: ((x[0] ^ x[1]) & (x[1] ^ x[2]),))
-INCREMENT = _add(1)
-DECREMENT = _add(-1)
+INCREMENT = Operation("increment", WIDTH, WIDTH, lambda x: bits_of((number_of(x) + 1) % 2**WIDTH, WIDTH))
+DECREMENT = Operation("decrement", WIDTH, WIDTH, lambda x: bits_of((number_of(x) - 1) % 2**WIDTH, WIDTH))
 SHIFT_LEFT = Operation("shift left", WIDTH, WIDTH, lambda x: (*x[1:], 0))
 SHIFT_RIGHT = Operation("shift right", WIDTH, WIDTH, lambda x: (0, *x[:-1]))
 
@@ -74,10 +64,8 @@ class SimpleAlu(Circuit):
 
     def __post_init__(self) -> None:
         """Check the sizes and names."""
-        if self.operations not in OPERATIONS:
-            raise UnknownNameError("operation list", self.operations, OPERATIONS)
-        if self.multiplexer not in get_args(MultiplexerReading):
-            raise UnknownNameError("multiplexer reading", self.multiplexer, get_args(MultiplexerReading))
+        require_known("operation list", self.operations, OPERATIONS)
+        require_known("multiplexer reading", self.multiplexer, get_args(MultiplexerReading))
         if not 1 <= self.level_count <= len(OPERATIONS[self.operations]):
             raise UserError(f"Simple ALU has 1 to {len(OPERATIONS[self.operations])} levels, not {self.level_count}.")
         super().__post_init__()

@@ -9,7 +9,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int, PRNGKeyArray
 
-from evoclaims.core.errors import UnknownNameError
+from evoclaims.core.errors import require_known
 from evoclaims.core.pytree import pytree
 from evoclaims.envs.base import Episode, PolicyFn, TaskState, fitting, share
 from evoclaims.envs.gates.truth_table import TruthTable
@@ -38,8 +38,7 @@ class Circuit(ABC):
 
     def __post_init__(self) -> None:
         """Check the protocol's name."""
-        if self.sampling not in get_args(Sampling):
-            raise UnknownNameError("way of sampling rows", self.sampling, get_args(Sampling))
+        require_known("way of sampling rows", self.sampling, get_args(Sampling))
 
     @property
     @abstractmethod

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import ClassVar, Literal
 
-from evoclaims.core.errors import UnknownNameError, UserError
+from evoclaims.core.errors import UserError, require_known
 from evoclaims.judging.assertion import Assertion, Finding
 from evoclaims.judging.design import Design
 from evoclaims.judging.entry import Entry
@@ -43,8 +43,7 @@ class Threshold(Assertion):
 
     def __post_init__(self) -> None:
         """Reject an unknown side, and a number that is not finite or beyond what is observed."""
-        if self.side not in _OPPOSITE:
-            raise UnknownNameError("side", self.side, _OPPOSITE)
+        require_known("side", self.side, _OPPOSITE)
         if not math.isfinite(self.number):
             raise UserError(f"{self.measure.describe()!r} is compared with a finite number, unlike {self.number}.")
         self.measure.require_seen(self.number)

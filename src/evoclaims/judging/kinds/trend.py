@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from evoclaims.core.errors import UnknownNameError
+from evoclaims.core.errors import require_known
 from evoclaims.judging.assertion import Assertion, Finding
 from evoclaims.judging.design import Design
 from evoclaims.judging.entry import Entry
@@ -40,8 +40,7 @@ class Trend(Assertion):
 
     def __post_init__(self) -> None:
         """Reject an unknown direction."""
-        if self.direction not in _OPPOSITE:
-            raise UnknownNameError("direction", self.direction, _OPPOSITE)
+        require_known("direction", self.direction, _OPPOSITE)
 
     def describe(self) -> str:
         """Return "P falls with the level"."""

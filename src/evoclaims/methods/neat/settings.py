@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass, fields
 from typing import Literal, get_args
 
-from evoclaims.core.errors import UnknownNameError, UserError
+from evoclaims.core.errors import UserError, require_at_least, require_known
 from evoclaims.networks.activations import check_activations
 
 LevelUp = Literal["reset", "keep"]
@@ -98,12 +98,9 @@ class Species:
 
     def __post_init__(self) -> None:
         """Check the names and sizes."""
-        if self.on_level_up not in get_args(LevelUp):
-            raise UnknownNameError("treatment of stagnation on a new level", self.on_level_up, get_args(LevelUp))
-        least = {"most": 1, "exempt": 1, "stagnation": 0, "elites": 0}
-        for name, value in least.items():
-            if getattr(self, name) < value:
-                raise UserError(f"NEAT's species need {name} to be at least {value}, not {getattr(self, name)}.")
+        require_known("treatment of stagnation on a new level", self.on_level_up, get_args(LevelUp))
+        require_at_least(1, "NEAT's", most=self.most, exempt=self.exempt)
+        require_at_least(0, "NEAT's", stagnation=self.stagnation, elites=self.elites)
         if not (0 < self.survival <= 1 and 0 <= self.change <= 1 and self.threshold > 0):
             raise UserError(
                 "Of a species a share in (0, 1] survives, it changes by a share in [0, 1], and its threshold is above "

@@ -25,15 +25,10 @@ DIGITS: Final = 6
 
 
 def page(task: RobotTask, motion: Motion, title: str) -> bytes:
-    """Return the page of an episode.
+    """Return the page of an episode, under a title of plain text.
 
     It contains the viewer (`assets/viewer.html`, `assets/viewer.js`) and, as JSON, what `scenery` returns. It needs
     no network, and its policy forbids network access and any other script.
-
-    Args:
-        task: whose marks are shown, and whose robot sets the first view.
-        motion: of the episode.
-        title: plain text.
     """
     # "<" could end the element around the text; the escape means the same in JSON.
     data = json.dumps(scenery(task, motion), allow_nan=False).replace("<", "\\u003c")
