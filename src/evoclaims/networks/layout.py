@@ -78,13 +78,10 @@ def positions(graph: Any) -> dict[Hashable, Point]:
 
 
 def substrate_graph(substrate: Substrate, weights: Sequence[NDArray[Any]]) -> tuple[Any, dict[Hashable, Point]]:
-    """Return a substrate's network and its neurons' places; a weight of 0 means no connection.
+    """Return a substrate's network and its neurons' places.
 
-    Nodes are (layer, place in the layer), with their `kind`.
-
-    Args:
-        substrate: where the neurons lie.
-        weights: into each layer but the first, shapes [to, from].
+    Nodes are (layer, place in the layer), with their `kind`. The weights are into each layer but the first, shapes
+    [to, from]; 0 means no connection.
     """
     graph = optional("networkx").DiGraph()
     last = len(substrate.layers) - 1

@@ -74,13 +74,7 @@ def network_panel(
 
 
 def substrate_panel(substrate: Substrate, weights: Sequence[NDArray[Any]], title: str) -> Panel:
-    """Show the network that a CPPN made: neurons at their coordinates, and its connections.
-
-    Args:
-        substrate: where the neurons lie.
-        weights: into each layer but the first, shapes [to, from]; 0 for no connection.
-        title: what to write above it, before the counts.
-    """
+    """Show the network that a CPPN made: neurons at their coordinates, and its connections (see `substrate_graph`)."""
     graph, places = substrate_graph(substrate, weights)
     last = len(substrate.layers[0]) - 1
     outputs = _numbered("y", len(substrate.layers[-1]))

@@ -100,9 +100,8 @@ def network_of(condition: Condition, parameters: Any) -> GraphNetwork | None:
 
 def substrate_of(condition: Condition, parameters: Any) -> tuple[Substrate, list[NDArray[Any]]] | None:
     """Return a champion's substrate and the weights that it computes there, by layer; None without a substrate."""
-    if network_of(condition, parameters) is None:
-        return None
-    encoding = condition.method.encoding(condition.task)  # type: ignore[attr-defined]
+    method = condition.method
+    encoding = method.encoding(condition.task) if isinstance(method, GenomeMethod) else None
     if not isinstance(encoding, SubstrateNetwork):
         return None
     with jax.default_matmul_precision(MATMUL_PRECISION):

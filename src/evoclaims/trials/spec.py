@@ -105,8 +105,7 @@ class Condition:
     @property
     def label(self) -> str:
         """A short name for progress lines and tables, such as "cma_es on n_parity"."""
-        suffix = {"curriculum": "", "direct": " (direct)", "whole_budget": ""}[self.progression]
-        return f"{self.method.name} on {self.task.name}{suffix}"
+        return f"{self.method.name} on {self.task.name}" + " (direct)" * (self.progression == "direct")
 
     @property
     def steps(self) -> int:
