@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import argparse
+import importlib
 import os
 import signal
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from importlib import metadata
 
 from evoclaims.cli.terminal import plain_output
@@ -16,22 +17,31 @@ from evoclaims.trials.stopping import interrupted_by
 
 USER_ERROR, INTERRUPTED, CLOSED_PIPE = 2, 130, 141
 
+_WITHOUT_TIER = {"jobs", "verify", "merge", "tables"}
+_TIERS = {
+    **dict.fromkeys(("report", "accept", "compare", "export"), ("all", "smoke, full or all (default)")),
+    "replicate": ("full", "full (default: the paper's size) or smoke"),
+}
+"""Defaults of --tier, and how it is explained, where they are not those of the other commands."""
+
+_ON_DEVICES = {"plan", "run", "submit", "mutants", "power", "champion", "look", "across", "bisect"}
+_IN_PROCESSES = {"run", "mutants", "power"}
+_PROCESSES = (
+    "how many processes run trials (1, on all devices); auto: one for each GPU, and on processors as many as keep the "
+    "cores busy"
+)
+
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command and return its exit status: 0, the command's own, or 2 for a user error."""
-    status = _status(arguments)
-    end_without(status)
-    return status
-
-
-def _status(arguments: Sequence[str] | None) -> int:
-    """Run one command, and print no terminal control characters."""
     try:
         with plain_output():
-            return _ended(arguments)
+            status = _ended(arguments)
     except BrokenPipeError:  # `evoclaims status | head`: the reader has seen enough
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return CLOSED_PIPE
+        status = CLOSED_PIPE
+    end_without(status)
+    return status
 
 
 def _ended(arguments: Sequence[str] | None) -> int:
@@ -41,9 +51,9 @@ def _ended(arguments: Sequence[str] | None) -> int:
         from evoclaims.cli.storage import storage_of
 
         options.storage = storage_of(options.storage, options.command)
-        run = _command(options.command)
+        command = importlib.import_module(f"evoclaims.cli.{options.command}")  # only now: --help waits for no jax
         with interrupted_by(signal.SIGTERM):
-            status: int = run(options)
+            status: int = command.main(options)
         sys.stdout.flush()
     except UserError as error:
         print(f"evoclaims: {error}", file=sys.stderr)
@@ -52,14 +62,6 @@ def _ended(arguments: Sequence[str] | None) -> int:
         print("\nevoclaims: interrupted; the same command goes on from the last checkpoint.", file=sys.stderr)
         return INTERRUPTED
     return status
-
-
-def _command(name: str) -> Callable[[argparse.Namespace], int]:
-    """Return a command's function; imported only now, so that --help does not wait for jax."""
-    import importlib
-
-    function: Callable[[argparse.Namespace], int] = importlib.import_module(f"evoclaims.cli.{name}").main
-    return function
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -71,22 +73,14 @@ def _parser() -> argparse.ArgumentParser:
     def add(name: str, text: str, kept: str = ".evoclaims") -> argparse.ArgumentParser:
         command = commands.add_parser(name, help=text, description=text)
         command.add_argument("--storage", metavar="DIR", help=f"folder of trials ({kept} in the project's root)")
+        if name not in _WITHOUT_TIER:
+            default, known = _TIERS.get(name, ("smoke", "smoke (default) or full"))
+            command.add_argument("--tier", default=default, help=known)
+        if name in _ON_DEVICES:
+            command.add_argument("--device", default="auto", help="auto (default), cpu or gpu")
+        if name in _IN_PROCESSES:
+            command.add_argument("--numprocesses", metavar="N", default="1", help=_PROCESSES)
         return command
-
-    def tier(command: argparse.ArgumentParser) -> None:
-        command.add_argument("--tier", default="smoke", help="smoke (default) or full")
-
-    def device(command: argparse.ArgumentParser) -> None:
-        command.add_argument("--device", default="auto", help="auto (default), cpu or gpu")
-
-    def processes(command: argparse.ArgumentParser) -> None:
-        command.add_argument(
-            "--numprocesses",
-            metavar="N",
-            default="1",
-            help="how many processes run trials (1, on all devices); auto: one for each GPU, and on processors as many "
-            "as keep the cores busy",
-        )
 
     text = "write a project that runs, with a method, a task and two claims; or, with --from, that of a paper"
     new = commands.add_parser("new", help=text, description=text)
@@ -95,16 +89,12 @@ def _parser() -> argparse.ArgumentParser:
     new.add_argument("--from", dest="project", metavar="PAPER", default="skeleton", help="a paper, such as nisioti2025")
 
     plan = add("plan", "say what a tier would run, what it costs here, and what its verdicts can show")
-    tier(plan)
-    device(plan)
     plan.add_argument("--like", metavar="KIND", help="times as of trials made on such a device, such as 'NVIDIA H200'")
     plan.add_argument("--measure", action="store_true", help="time a few steps of conditions never run here")
 
     run = add("run", "run conditions without judging them; or what a variant of the protocol changes, and judge that")
     run.add_argument("method", nargs="?", help="only this method")
     run.add_argument("--on", metavar="TASK", help="only this task")
-    tier(run)
-    device(run)
     run.add_argument("--variant", metavar="NAME", default="", help="run what this variant changes, then judge by it")
     run.add_argument("--trials", type=int, metavar="N", help="trials per condition (default: the tier's)")
     run.add_argument(
@@ -114,14 +104,11 @@ def _parser() -> argparse.ArgumentParser:
     )
     run.add_argument("--retry", action="store_true", help="run trials again that ran out of time under this limit")
     run.add_argument("--first-seed", type=int, default=0, metavar="SEED", help="seed of the first trial (0)")
-    processes(run)
 
     submit = add("submit", "submit the batches that a tier lacks as jobs of SLURM, or of this machine; none twice")
     submit.add_argument("method", nargs="?", help="only this method")
     submit.add_argument("--on", metavar="TASK", help="only this task")
     submit.add_argument("--variant", metavar="NAME", default="", help="what this variant of the protocol changes")
-    tier(submit)
-    device(submit)
     submit.add_argument("--cluster", default="slurm", help="slurm (default), or local: jobs on this machine")
     submit.add_argument("--partition", metavar="NAME", help="SLURM's partition")
     submit.add_argument("--gpus", type=int, metavar="N", help="GPUs of a job")
@@ -136,17 +123,11 @@ def _parser() -> argparse.ArgumentParser:
     add("jobs", "show which submitted jobs are queued, running, done or failed, why, and where their logs are")
 
     mutants = add("mutants", "plant faults in methods and tasks, run them, and write which of them the claims notice")
-    tier(mutants)
-    device(mutants)
     mutants.add_argument("--mutant", metavar="NAME", help="only this fault, such as minimizes")
     mutants.add_argument("--of", metavar="TARGET", help="only faults of this method or this task")
-    processes(mutants)
     mutants.add_argument("--stored", action="store_true", help="run nothing: judge the trials that have run")
 
     power = add("power", "say from a pilot how often each claim ends as expected; 1 when one does less than 0.95")
-    tier(power)
-    device(power)
-    processes(power)
     power.add_argument("--only", metavar="CLAIMS", help="only these claims, by id or name, such as G1,S2[cma_es]")
     made = power.add_mutually_exclusive_group()
     made.add_argument(
@@ -166,13 +147,11 @@ def _parser() -> argparse.ArgumentParser:
     power.add_argument("--draws", type=int, default=1000, metavar="N", help="draws from the pilot (1000)")
 
     status = add("status", "show the verdicts that the stored trials give, one line for each claim; run nothing")
-    tier(status)
     status.add_argument("--only", metavar="IDS", help="only these claims, such as G1,G7; G: all of G1, G2, …")
     status.add_argument("--why", action="store_true", help="also say why verdicts are accepted, or inconclusive")
     status.add_argument("--as", dest="form", metavar="FORM", help="print csv, json or markdown instead of a table")
 
     report = add("report", "write a web page and a Markdown file about all claims from the trials at hand; run nothing")
-    report.add_argument("--tier", default="all", help="smoke, full or all (default)")
     report.add_argument(
         "--trajectories",
         action="store_true",
@@ -183,16 +162,12 @@ def _parser() -> argparse.ArgumentParser:
     champion = add("champion", "replay a stored trial's champion on every level, and draw or export its network")
     champion.add_argument("method", help="the method")
     champion.add_argument("--on", metavar="TASK", required=True, help="the task")
-    tier(champion)
-    device(champion)
     champion.add_argument("--seed", type=int, default=0, help="the trial's seed (0)")
     champion.add_argument("--as", dest="form", metavar="FORM", help="also write its network: json, svg or png")
     champion.add_argument("--out", metavar="FILE", help="where to (figures/METHOD-TASK-SEED.FORM)")
 
     look = add("look", "draw a robot's task, or show what a stored champion does in it")
     look.add_argument("task", help="the task")
-    tier(look)
-    device(look)
     look.add_argument("--method", help="the method whose champion is shown; else the task alone")
     look.add_argument("--seed", type=int, default=0, help="the trial's seed (0)")
     look.add_argument(
@@ -211,11 +186,9 @@ def _parser() -> argparse.ArgumentParser:
 
     reproduce = add("reproduce", "redraw figures and tables of the paper from the trials at hand; run nothing")
     reproduce.add_argument("figure", help="its name, such as fig3; all for every one")
-    tier(reproduce)
     reproduce.add_argument("--out", metavar="DIR", help="folder for PNG, SVG and CSV (figures/TIER)")
 
     replicate = add("replicate", "put the numbers that the paper has published beside those of the trials at hand")
-    replicate.add_argument("--tier", default="full", help="full (default: the paper's size) or smoke")
     replicate.add_argument(
         "--variant", metavar="NAME", default="", help="under this variant of the protocol; all: under each, too"
     )
@@ -234,11 +207,9 @@ def _parser() -> argparse.ArgumentParser:
     merge.add_argument("--dry-run", action="store_true", help="say what would be copied, and copy nothing")
 
     reference = add("reference", "write the stored trials of a tier as the committed reference trials")
-    tier(reference)
     reference.add_argument("--variant", metavar="NAME", default="", help="those that only this variant has")
 
-    accept = add("accept", "write the verdicts of now into verdicts.toml, as accepted; 1 when that changed the file")
-    accept.add_argument("--tier", default="all", help="smoke, full or all (default)")
+    add("accept", "write the verdicts of now into verdicts.toml, as accepted; 1 when that changed the file")
 
     compare = add(
         "compare",
@@ -246,7 +217,6 @@ def _parser() -> argparse.ArgumentParser:
         "a store (OLD) against --storage; or two revisions, or two stores, against each other; run nothing",
     )
     compare.add_argument("places", nargs="*", metavar="OLD [NEW]", help="a git revision or a folder of trials")
-    compare.add_argument("--tier", default="all", help="smoke, full or all (default)")
     compare.add_argument("--fail", metavar="CHANGES", help="end with 1 on these, such as 'supported->refuted,*->error'")
     compare.add_argument(
         "--timeline", metavar="CLAIM", nargs="?", const="", help="list accepted verdicts by date, of CLAIM or of all"
@@ -269,8 +239,6 @@ def _parser() -> argparse.ArgumentParser:
     across.add_argument("--constraints", nargs="+", metavar="FILE", help="an environment with the pins of each file")
     across.add_argument("--python", nargs="+", metavar="VERSION", help="an environment with each Python, such as 3.13")
     across.add_argument("--only", metavar="IDS", help="judge only these claims, such as G1,G7 or G6[neat-ppo]")
-    tier(across)
-    device(across)
     across.add_argument(
         "--as", dest="form", metavar="FORM", help="also write it: markdown, csv, json, or a chart as svg"
     )
@@ -287,11 +255,8 @@ def _parser() -> argparse.ArgumentParser:
     bisect.add_argument("--bad", metavar="VERSION", required=True, help="a later release, after it")
     bisect.add_argument("--releases", nargs="+", metavar="VERSION", help="those between (default: as pip lists them)")
     bisect.add_argument("--by", metavar="WHAT", help="verdict, drift or bits (default: the first of them that changed)")
-    tier(bisect)
-    device(bisect)
 
     export = add("export", "write the trials at hand, or the verdicts that they give, as a table")
-    export.add_argument("--tier", default="all", help="smoke, full or all (default)")
     export.add_argument("--verdicts", action="store_true", help="one row per claim instead of one per trial")
     export.add_argument("--as", dest="form", metavar="FORM", default="json", help="json (default), csv or parquet")
     export.add_argument("--out", metavar="FILE", help="where to (report/trials.FORM, report/verdicts.FORM)")
@@ -300,6 +265,5 @@ def _parser() -> argparse.ArgumentParser:
     tables.add_argument("files", nargs="+", metavar="FILE", help="such as README.md")
 
     badge = add("badge", "draw how many claims ended how, as a small SVG picture")
-    tier(badge)
     badge.add_argument("--out", metavar="FILE", help="where to (report/claims-TIER.svg)")
     return parser
