@@ -11,13 +11,13 @@ from xml.etree import ElementTree
 import pytest
 from hand_made_verdicts import report
 from made_trials import trial_of
-from rich.console import Console
 
 from evoclaims.core.packages import recorded
 from evoclaims.envs.gates.parity import NParity
 from evoclaims.methods.hand_built import HandBuilt
 from evoclaims.report import across_table
 from evoclaims.report.charts_of_verdicts import across_chart
+from evoclaims.report.console import PlainSpokenConsole
 from evoclaims.report.verdict_chart import svg
 from evoclaims.trials.budget import Budget
 from evoclaims.trials.result import TrialResult
@@ -112,7 +112,7 @@ def test_the_first_environment_is_the_first_that_has_verdicts(store: Store) -> N
 
 @pytest.mark.parametrize("width", [40, 80, 200])
 def test_the_table_shows_every_environment_at_any_width(found: Across, width: int) -> None:
-    console = Console(width=width, record=True, file=io.StringIO())
+    console = PlainSpokenConsole(width=width, record=True, file=io.StringIO())
     for part in across_table.terminal(found, width):
         console.print(part)
     text = console.export_text()

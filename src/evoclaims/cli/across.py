@@ -54,7 +54,7 @@ def main(options: argparse.Namespace) -> int:
     console = PlainSpokenConsole(file=styled())
     for part in across_table.terminal(found, console.width):
         console.print()
-        console.print(part, highlight=False)
+        console.print(part)
     print(f"\n{across_table.LEGEND}")
     for line in (*found.lines, *_unused(found, options.package), across_table.headline(found)):
         print(line)

@@ -8,15 +8,13 @@ from functools import partial
 from pathlib import Path
 from typing import Final, get_args
 
-from rich.table import Table
-
 from evoclaims.cli.project import open_project
 from evoclaims.cli.stored import FIGURES, Stored, describe, load, write
 from evoclaims.cli.terminal import styled
 from evoclaims.core.errors import UnknownNameError, UserError
 from evoclaims.networks import export, picture
 from evoclaims.report.champion import network_panels
-from evoclaims.report.console import PlainSpokenConsole
+from evoclaims.report.console import PlainSpokenConsole, plain_table
 from evoclaims.trials import champions, devices
 from evoclaims.trials.champions import Replay
 
@@ -40,7 +38,13 @@ def main(options: argparse.Namespace) -> int:
             )
     replay = champions.replay(trial.condition, trial.result, trial.parameters, chosen)
     print(f"{trial.title}\n  {describe(trial.result)}")
-    PlainSpokenConsole(file=styled()).print(_table(replay))
+    # Each value as recorded and as replayed, to the last digit of a float32.
+    columns = [values[name] for name in ("success", "fitness") for values in (replay.again, replay.recorded)]
+    rows = (
+        [str(level), *(f"{value + 0.0:.9g}" for value in row)] for level, row in enumerate(zip(*columns, strict=True))
+    )
+    headings = ("level", "success", "recorded", "fitness", "recorded")
+    PlainSpokenConsole(file=styled()).print(plain_table(headings, rows, names=0))
     print(_judgement(replay))
     if made is not None:
         default = FIGURES / f"{options.method}-{options.on}-{options.seed}.{options.form}"
@@ -69,17 +73,6 @@ FORMS: Final[Mapping[str, Callable[[Stored], bytes | None]]] = {
     "json": _json,
     **{file_format: partial(_picture, file_format=file_format) for file_format in get_args(picture.Format)},
 }
-
-
-def _table(replay: Replay) -> Table:
-    """Build the table of levels: each value as recorded and as replayed, to the last digit of a float32."""
-    table = Table(box=None, pad_edge=False)
-    for heading in ("level", "success", "recorded", "fitness", "recorded"):
-        table.add_column(heading, justify="right")
-    columns = [values[name] for name in ("success", "fitness") for values in (replay.again, replay.recorded)]
-    for level, values in enumerate(zip(*columns, strict=True)):
-        table.add_row(str(level), *(f"{value + 0.0:.9g}" for value in values))
-    return table
 
 
 def _judgement(replay: Replay) -> str:

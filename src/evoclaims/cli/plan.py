@@ -6,7 +6,6 @@ import argparse
 from collections.abc import Mapping, Sequence
 from typing import Final
 
-from rich.markup import escape
 from rich.table import Table
 
 from evoclaims.cli.project import open_project
@@ -17,7 +16,7 @@ from evoclaims.methods.training_loop import TrainingLoop
 from evoclaims.paper.cost import Pace, known_pace, measured_pace
 from evoclaims.paper.reproduction import Tier
 from evoclaims.paper.spent import Spent, spent
-from evoclaims.report.console import PlainSpokenConsole
+from evoclaims.report.console import PlainSpokenConsole, plain_table
 from evoclaims.report.live_line import duration
 from evoclaims.trials import devices
 from evoclaims.trials.batches import StoredTrials
@@ -55,7 +54,7 @@ def main(options: argparse.Namespace) -> int:
         raise UserError(f"No trial of the {options.tier} tier at hand was made on a device called {options.like!r}.")
     console = PlainSpokenConsole(file=styled())
     where = f"as they took on one {kind}" if options.like else f"on {len(chosen)} × {kind}"
-    console.print(escape(f"Conditions of the {options.tier} tier, {where}"))
+    console.print(f"Conditions of the {options.tier} tier, {where}")
     console.print(_conditions(tier, store, used, paces, costs, project.config.seconds(None)))
     own = sum(_has_run(store, tier, names) for names in used)
     if not options.like and own < len(used):
@@ -68,14 +67,14 @@ def main(options: argparse.Namespace) -> int:
             condition, n = tier.condition(*names), tier.design.last.n
             few = f", and the design looks at {n}" if len(condition.existing or ()) < n else ""
             said = f"{' on '.join(names)}: nothing to run: {where_from(condition)}{few}"
-            console.print(escape(said), highlight=False)
+            console.print(said)
     for sentence in _about({names: costs[names] for names in used}, tier.design.last.n):
-        console.print(escape(sentence))
+        console.print(sentence)
     console.print(f"\nClaims: the smallest p that the design allows (n trials a side, α {tier.design.alpha:g})")
     console.print(_claims(reports, costs))
     for report in reports:
         if report.outcome is Outcome.ERROR and not report.attainable:
-            console.print(escape(f"{report.name}: error: {report.reason}"), highlight=False)
+            console.print(f"{report.name}: error: {report.reason}")
     if any(pace is None for pace in paces.values()):
         console.print("\nTimes are unknown where no trial has run on such a device; --measure times a few steps.")
     return 0
@@ -94,12 +93,10 @@ def _conditions(
     Trials that ran out of less time than `limit` (seconds) count as missing, too. Where there are reference trials,
     their cost is shown.
     """
-    table = Table(box=None, pad_edge=False)
     kinds, cores = _kinds(costs), any(cost.core_pace for cost in costs.values())
     measured = [f"took on one\n{kind}" for kind in kinds] + ["CPU\ncore hours"] * cores
-    for heading in ("condition", "cached", "missing", "environment\nsteps", "time,\nat most", *measured):
-        first = heading == "condition"  # it alone is broken where the terminal is narrow
-        table.add_column(escape(heading), justify="left" if first else "right", no_wrap=not first, overflow="fold")
+    headings = ("condition", "cached", "missing", "environment\nsteps", "time,\nat most", *measured)
+    table = plain_table(headings, ())
     seeds = tier.design.seeds(tier.design.last.n)
     steps, seconds, unknown = 0, 0.0, False
     needed = {names: costs[names].core_seconds(tier.condition(*names).environment_steps * len(seeds)) for names in used}
@@ -110,7 +107,7 @@ def _conditions(
         pace = paces[names]
         time = 0.0 if not missing else None if pace is None else pace.seconds(condition, missing)
         table.add_row(
-            escape(f"{names[0]} on {names[1]}"),
+            " on ".join(names),
             str(len(seeds) - missing),
             str(missing),
             f"{owed:,}",
@@ -175,18 +172,16 @@ def _about(costs: Costs, n: int) -> list[str]:
 
 def _claims(reports: Sequence[ClaimReport], costs: Costs) -> Table:
     """Build the table of claims."""
-    table = Table(box=None, pad_edge=False)
     kinds = _kinds(costs)
-    for heading in ("claim", "n", "α", "p for", "p against", "can be decided", *(f"took on one {k}" for k in kinds)):
-        names = heading == "claim"
-        table.add_column(escape(heading), justify="left" if names else "right", no_wrap=names)
+    took = [f"took on one\n{kind}" for kind in kinds]
+    table = plain_table(("claim", "n", "α", "p for", "p against", "can be decided", *took), ())
     for report in reports:
         used = [(source.method, source.task) for source in report.sources]
         for look in report.attainable:
             smallest = {Outcome.SUPPORTED: look.supported, Outcome.REFUTED: look.refuted}
             reach = [outcome for outcome, p in smallest.items() if p <= look.alpha]
             table.add_row(
-                escape(report.name),
+                report.name,
                 str(look.n),
                 f"{look.alpha:g}",
                 f"{look.supported:.2g}",

@@ -7,11 +7,8 @@ import shlex
 import sys
 from collections.abc import Mapping, Sequence
 
-from rich.markup import escape
-from rich.table import Table
-
 from evoclaims.claims.fetching import StoredOnly
-from evoclaims.claims.power import Asserted, ClaimPower, Listening, Pilots, asserted, only
+from evoclaims.claims.power import Asserted, Listening, Pilots, asserted, only
 from evoclaims.cli.project import Project, open_project
 from evoclaims.cli.reference import of_one_environment
 from evoclaims.cli.running import Running
@@ -25,7 +22,7 @@ from evoclaims.judging.design import Design
 from evoclaims.mutants.conditions import Job
 from evoclaims.paper.variant import Names
 from evoclaims.report import power_cells
-from evoclaims.report.console import PlainSpokenConsole
+from evoclaims.report.console import PlainSpokenConsole, plain_table
 from evoclaims.report.live_line import LiveLine
 from evoclaims.trials.spec import Condition, TrialSpec
 from evoclaims.trials.time_limit import is_final
@@ -53,7 +50,10 @@ def main(options: argparse.Namespace) -> int:
     if not any(one.power for one in powers):
         told = "; ".join(power_cells.troubles(powers)[:1]) or "no claim has a test"
         raise UserError(" ".join([f"No power can be told at the {options.tier} tier: {told}.", *advice]))
-    _print(powers, design.last.n)
+    console = PlainSpokenConsole(file=styled())
+    console.print(plain_table(power_cells.HEADINGS, map(power_cells.cells, powers)))
+    for sentence in (*power_cells.about(powers, design.last.n), *power_cells.troubles(powers)):
+        console.print(sentence)
     for sentence in _versions(pilots, wanted):
         print(sentence)
     if advice and power_cells.troubles(powers):
@@ -119,20 +119,6 @@ def _write(project: Project, pilots: Pilots, names: Names, condition: Condition,
         )
         return
     print(f"wrote {pilots.write(names, trials)}: {len(trials)} trials")
-
-
-def _print(powers: Sequence[ClaimPower], n: int) -> None:
-    """Print the table, and what it means."""
-    console = PlainSpokenConsole(file=styled())
-    table = Table(box=None, pad_edge=False)
-    for heading in power_cells.HEADINGS:
-        name = heading == power_cells.HEADINGS[0]  # it alone is broken where the terminal is narrow
-        table.add_column(heading, justify="left" if name else "right", no_wrap=not name, overflow="fold")
-    for one in powers:
-        table.add_row(*map(escape, power_cells.cells(one)))
-    console.print(table)
-    for sentence in (*power_cells.about(powers, n), *power_cells.troubles(powers)):
-        console.print(escape(sentence), highlight=False)
 
 
 def _versions(pilots: Pilots, wanted: Mapping[Names, Condition]) -> list[str]:

@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Final
-
-from rich.markup import escape
-from rich.table import Table
 
 from evoclaims.cli.project import Project, open_project
 from evoclaims.cli.stored import REPORT, write
@@ -17,7 +14,7 @@ from evoclaims.core.errors import UnknownNameError, UserError
 from evoclaims.figures.figure import SIZES
 from evoclaims.figures.replication import Replication, replications
 from evoclaims.report import replication_cells
-from evoclaims.report.console import PlainSpokenConsole
+from evoclaims.report.console import PlainSpokenConsole, plain_table
 from evoclaims.report.markdown import numbers
 from evoclaims.verdicts import export
 
@@ -44,12 +41,12 @@ def main(options: argparse.Namespace) -> int:
         return 0
     console = PlainSpokenConsole(file=styled())
     size = SIZES.get(options.tier, f"{options.tier} tier")
-    console.print(escape(f"Published numbers and ours ({size})"))
-    console.print(_table(found))
-    console.print(escape(replication_cells.HOW))
+    console.print(f"Published numbers and ours ({size})")
+    console.print(plain_table(replication_cells.HEADINGS, _rows(found), len(replication_cells.HEADINGS)))
+    console.print(replication_cells.HOW)
     (reports,) = project.judge_sessions([(project.as_published(options.tier), options.tier)])
     for line in (*replication_cells.totals(found), *replication_cells.put_to_the_paper(reports)):
-        console.print(escape(line), highlight=False)
+        console.print(line)
     return 0
 
 
@@ -72,14 +69,10 @@ def _found(project: Project, tier: str, variant: str) -> tuple[Replication, ...]
     return found
 
 
-def _table(found: Sequence[Replication]) -> Table:
-    """Build the table; a number's name is written once for all variants."""
-    table = Table(box=None, pad_edge=False)
-    for heading in replication_cells.HEADINGS:
-        table.add_column(heading)
+def _rows(found: Sequence[Replication]) -> Iterator[tuple[str, ...]]:
+    """Yield the table's rows; a number's name is written once for all variants."""
     before = ""
     for one in found:
         name, *rest = replication_cells.cells(one)
-        table.add_row("" if name == before else escape(name), *map(escape, rest))
+        yield "" if name == before else name, *rest
         before = name
-    return table

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Final
 
-from rich.markup import escape
 from rich.table import Table
 
 from evoclaims.report.formatting import p_value, plural
@@ -38,10 +37,10 @@ def _part(found: Across, labels: Sequence[str]) -> Table:
     shown = Table(pad_edge=False, box=None)
     shown.add_column("claim", no_wrap=True)
     for label in labels:
-        shown.add_column(escape(label), max_width=COLUMN - 1)
+        shown.add_column(label, max_width=COLUMN - 1)
     for claim in found.claims:
         cells = (found.cells.get((claim, label)) for label in labels)
-        shown.add_row(escape(claim), *(escape("\n".join(said(cell))) for cell in cells))
+        shown.add_row(claim, *("\n".join(said(cell)) for cell in cells))
     return shown
 
 

@@ -5,23 +5,35 @@ Rich itself drops five control characters and lets all others through, including
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 from rich.console import Console, ConsoleOptions, RenderableType
 from rich.segment import Segment
+from rich.table import Table
 
 from evoclaims.core.printable import shown
 
 
 class PlainSpokenConsole(Console):
-    """A console that escapes control characters in all content, after its layout."""
+    """A console that escapes control characters in all content, after its layout, and reads no markup in it."""
 
     def __init__(self, **settings: Any) -> None:
-        """Turn no word into an emoji."""
-        super().__init__(emoji=False, **settings)
+        """Show texts as they are."""
+        super().__init__(emoji=False, markup=False, highlight=False, **settings)
 
     def render(self, renderable: RenderableType, options: ConsoleOptions | None = None) -> Iterable[Segment]:
         """Yield the pieces that content is made of, each safe to print."""
         for segment in super().render(renderable, options):
             yield segment if segment.control else segment._replace(text=shown(segment.text))
+
+
+def plain_table(headings: Sequence[str], rows: Iterable[Sequence[str]], names: int = 1) -> Table:
+    """Return a table without lines; the first columns hold `names`, which alone are broken on a narrow terminal."""
+    made = Table(box=None, pad_edge=False)
+    for place, heading in enumerate(headings):
+        name = place < names
+        made.add_column(heading, justify="left" if name else "right", no_wrap=not name, overflow="fold")
+    for row in rows:
+        made.add_row(*row)
+    return made

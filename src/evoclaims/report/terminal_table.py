@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Final, Literal
 
 from rich.cells import cell_len, set_cell_size
-from rich.markup import escape
 from rich.text import Text
 
 from evoclaims.core.printable import printable
@@ -135,7 +134,7 @@ def explanations(reports: Sequence[ClaimReport], width: int, colour: bool) -> st
             note = f" [{kept}: {report.because}]"
         worst = f" [worst rank: {broken}]" if broken else ""
         lines.append(f"{report.outcome.symbol} {report.name}: {report.reason}{worst}{note}")
-    return _rendered("\n".join(_literal(line) for line in lines), width, colour) if lines else ""
+    return _rendered("\n".join(" ".join(line.split()) for line in lines), width, colour) if lines else ""
 
 
 def drift_lines(drift: DriftReport, changed: Sequence[str], compared: int) -> str:
@@ -153,18 +152,10 @@ def drift_lines(drift: DriftReport, changed: Sequence[str], compared: int) -> st
     return "\n".join([head, *drift.lines, bits])
 
 
-def _literal(text: str) -> str:
-    """Return text as markup that shows it as it is, on one line."""
-    return escape(" ".join(text.split()))
-
-
 def _rendered(content: Text | str, width: int, colour: bool) -> str:
     """Return rich content as text; a `Text` stays on one line, whatever the width."""
     file = io.StringIO()
     system: Literal["standard"] | None = "standard" if colour else None
     console = PlainSpokenConsole(file=file, width=max(width, 60), force_terminal=colour, color_system=system)
-    if isinstance(content, Text):
-        console.print(content, highlight=False, crop=False, no_wrap=True, overflow="ignore")
-    else:
-        console.print(content, highlight=False)
+    console.print(content, soft_wrap=isinstance(content, Text))
     return file.getvalue().rstrip("\n")
