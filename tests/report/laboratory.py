@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -25,9 +25,8 @@ from evoclaims.methods.neat.neat import Neat
 from evoclaims.methods.neat.settings import Settings, Species
 from evoclaims.paper.archive import Archive
 from evoclaims.paper.reproduction import Reproduction, Tier
-from evoclaims.report.across_shown import AcrossShown
 from evoclaims.report.build import gather
-from evoclaims.report.model import Page, PaperFigure, Section
+from evoclaims.report.model import Page, Section
 from evoclaims.trials.budget import Budget
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.result_making import named_leaves
@@ -113,24 +112,21 @@ class Laboratory:
         self,
         *reports: ClaimReport,
         history: History | None = None,
-        figures: Sequence[PaperFigure] = (),
         mutants: Matrix | None = None,
         sentences: dict[str, str] | None = None,
-        across: AcrossShown | None = None,
+        **more: Any,
     ) -> Page:
-        """Gather reports by their tiers."""
+        """Gather reports by their tiers; `more` are further parts of the page."""
         verdicts = {tier: [r for r in reports if r.tier == tier] for tier in ("full", "smoke")}
-        return gather(
+        page = gather(
             self.reproduction,
             {tier: found for tier, found in verdicts.items() if found},
             self.archive,
             history or {},
             sentences=sentences or {},
-            figures=figures,
             mutants=mutants,
-            across=across,
-            generated="Written by a test.",
         )
+        return replace(page, generated="Written by a test.", **more)
 
     def section(self, report: ClaimReport, **arguments: Any) -> Section:
         """Return the section of one claim."""

@@ -113,14 +113,11 @@ MATRIX: Matrix = {
 
 
 def test_the_score_counts_each_mutant_once_by_the_best_that_notices_it() -> None:
-    found = score(MATRIX, "smoke")
-    assert (found.mutants, found.by_verdict, found.by_drift, found.claims) == (4, 2, 1, 3)
-    assert (found.insensitive, found.partly) == (("B[x]",), ("C",))
-    assert str(found) == (
+    assert score(MATRIX, "smoke") == (
         "Mutation score (smoke): 2 of 4 planted faults change a verdict, 1 more are found by the drift check; of 3 "
         "claims 1 are insensitive, and 1 notice faults in some of their methods alone."
     )
-    assert str(score(MATRIX, "middle")) == "Mutation score (middle): not tried."
+    assert score(MATRIX, "middle") == "Mutation score (middle): not tried."
 
 
 def test_the_file_gives_back_what_was_written(tmp_path: Path) -> None:

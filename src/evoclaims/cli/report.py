@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from dataclasses import replace
 from datetime import UTC, datetime
 from importlib import metadata
 from pathlib import Path
@@ -47,19 +48,22 @@ def main(options: argparse.Namespace) -> int:
         for row in matrix(verdicts[tier], {name: judged[on, name] for on, name in asked if name and on == tier})
     ]
     drawn, missing = paper_figures(reproduction, archive, shown[0])
-    page = gather(
+    gathered = gather(
         reproduction,
         {tier: verdicts[tier] for tier in shown},
         archive,
         history.load(reproduction.folder / history.FILE),
         sentences={report.name: report.statement for report in verdicts[tiers[0]]},
         draws=(trajectory, network) if options.trajectories else (network,),
+        put_to_the_paper=by_the_paper,
+        mutants=mutation_matrix.load(reproduction.folder / mutation_matrix.FILE),
+    )
+    page = replace(
+        gathered,
         figures=drawn,
         missing=missing,
         robustness=robustness,
         numbers=replications(archive, reproduction, tiers[0], ("", *reproduction.variants)),
-        put_to_the_paper=by_the_paper,
-        mutants=mutation_matrix.load(reproduction.folder / mutation_matrix.FILE),
         across=across_shown.last({project.store.root.absolute(), project.config.root / APART["across"]}),
         generated=f"Written on {datetime.now(UTC):%Y-%m-%d %H:%M} UTC by evoclaims {metadata.version('evoclaims')}.",
     )

@@ -3,29 +3,29 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
 from evoclaims.core.errors import UserError
-from evoclaims.figures.replication import Replication
 from evoclaims.judging.design import Design
 from evoclaims.judging.verdict import Outcome
 from evoclaims.paper.archive import Archive
 from evoclaims.paper.reproduction import Reproduction
 from evoclaims.report import origin, replication_cells, table_cells, training_curves
-from evoclaims.report.across_shown import AcrossShown
 from evoclaims.report.champion import Draw, champion_of, network
 from evoclaims.report.charts_of_verdicts import timeline_chart
 from evoclaims.report.evidence import Part, judged_parts, unjudged_part
 from evoclaims.report.fault_grid import fault_grid
 from evoclaims.report.formatting import Anchors, clean, counted, listed, places, plural
-from evoclaims.report.model import Board, ConditionTrials, Page, PaperFigure, Section, ShownChampion
+from evoclaims.report.model import Board, ConditionTrials, Page, Section, ShownChampion
 from evoclaims.report.trial_summary import Reader, TrialSummary
+from evoclaims.trials.store import Store
 from evoclaims.verdicts.acceptance import UNDECIDED
 from evoclaims.verdicts.claim_report import ClaimReport
 from evoclaims.verdicts.history import Entry, History, eras, key_of
 from evoclaims.verdicts.mutation_matrix import Matrix, described
-from evoclaims.verdicts.robustness import Robustness
 from evoclaims.verdicts.source_trials import SourceTrials
 
 Verdicts = Mapping[str, Sequence[ClaimReport]]
@@ -40,16 +40,10 @@ def gather(
     *,
     sentences: Mapping[str, str],
     draws: Sequence[Draw] = (network,),
-    figures: Sequence[PaperFigure] = (),
-    missing: Sequence[str] = (),
-    robustness: Sequence[Robustness] = (),
-    numbers: Sequence[Replication] = (),
     put_to_the_paper: Sequence[ClaimReport] = (),
     mutants: Matrix | None = None,
-    across: AcrossShown | None = None,
-    generated: str = "",
 ) -> Page:
-    """Return the data of a whole report.
+    """Return a report's data on verdicts; what else a page shows is its caller's to add.
 
     Args:
         reproduction: the paper under test.
@@ -58,17 +52,18 @@ def gather(
         history: accepted verdicts.
         sentences: the paper's own sentences by claim, such as "G1[n_parity]".
         draws: ways of drawing a champion, in the order in which they are tried.
-        figures: of the paper.
-        missing: sentences about missing figures.
-        robustness: how claims end under variants of the protocol.
-        numbers: published ones beside ours.
         put_to_the_paper: reports of claims that were judged from the paper's own numbers.
         mutants: the committed matrix of planted faults; None for none.
-        across: what `evoclaims across` has last found; None for nothing.
-        generated: when, and by which version.
     """
-    tried = mutants or {}
-    gathered = _Gathering(reproduction, archive, history, sentences, draws, put_to_the_paper, tried)
+    tried, reader = mutants or {}, Reader(archive)
+    failing = {
+        (report.tier, report.name): replication_cells.would_not_pass(report)
+        for report in put_to_the_paper
+        if replication_cells.is_decided(report) and report.outcome is not Outcome.SUPPORTED
+    }
+    gathered = _Gathering(reproduction, archive.store, reader, history, sentences, draws, failing, tried)
+    keys = {key_of(report) for reports in verdicts.values() for report in reports}
+    accepted = {key: entries for key, entries in history.items() if key in keys}
     boards = tuple(
         Board(tier, tuple(gathered.section(report) for report in table_cells.in_the_papers_order(reports)))
         for tier, reports in verdicts.items()
@@ -78,24 +73,12 @@ def gather(
         name=reproduction.name,
         boards=boards,
         conditions=gathered.conditions,
-        notices=tuple(_notices(boards, gathered.reader)),
-        figures=tuple(figures),
-        missing=tuple(missing),
+        notices=tuple(_notices(boards, reader)),
         variants={name: variant.says for name, variant in reproduction.variants.items()},
-        robustness=tuple(robustness),
-        numbers=tuple(numbers),
         put_to_the_paper=tuple(replication_cells.put_to_the_paper(put_to_the_paper)),
         faults=tuple(fault_grid(tried, tier, reports) for tier, reports in verdicts.items() if reports),
-        across=across,
-        history=timeline_chart(shown) if (shown := _shown(history, verdicts)) else None,
-        generated=generated,
+        history=timeline_chart(accepted) if accepted else None,
     )
-
-
-def _shown(history: History, verdicts: Verdicts) -> History:
-    """Return the accepted verdicts of the claims that are shown."""
-    keys = {key_of(report) for reports in verdicts.values() for report in reports}
-    return {key: entries for key, entries in history.items() if key in keys}
 
 
 def _notices(boards: Sequence[Board], reader: Reader) -> list[str]:
@@ -117,41 +100,33 @@ def _notices(boards: Sequence[Board], reader: Reader) -> list[str]:
     return notices
 
 
+@dataclass(frozen=True)
 class _Gathering:
-    """What a report's sections share while it is built."""
+    """What a report's sections share while it is built: what `gather` was given, and what has been read so far."""
 
-    def __init__(
-        self,
-        reproduction: Reproduction,
-        archive: Archive,
-        history: History,
-        sentences: Mapping[str, str],
-        draws: Sequence[Draw],
-        put_to_the_paper: Sequence[ClaimReport],
-        mutants: Matrix,
-    ) -> None:
-        self._reproduction, self._archive, self._history = reproduction, archive, history
-        self._sentences, self._draws, self._anchors = sentences, draws, Anchors()
-        self._mutants = mutants
-        self._failing = {
-            (report.tier, report.name): replication_cells.would_not_pass(report)
-            for report in put_to_the_paper
-            if replication_cells.is_decided(report) and report.outcome is not Outcome.SUPPORTED
-        }
-        self.reader = Reader(archive)
-        self.conditions: dict[str, ConditionTrials] = {}
+    reproduction: Reproduction
+    store: Store
+    reader: Reader
+    history: History
+    sentences: Mapping[str, str]
+    draws: Sequence[Draw]
+    failing: Mapping[tuple[str, str], str]
+    mutants: Matrix
+    anchors: Anchors = field(default_factory=Anchors)
+    conditions: dict[str, ConditionTrials] = field(default_factory=dict)
 
     def section(self, report: ClaimReport) -> Section:
         """Return one claim's section."""
-        read = {source.label: self._trials(source) for source in report.sources}
+        read = {source.label: self.reader.read(source.trials, source.installed) for source in report.sources}
         every = [trial for trials in read.values() for trial in trials]
-        made = origin.grouped(trial.origin for trial in every)
-        sentence = self._sentences.get(report.name, "")
-        entries = self._history.get(key_of(report), ())
-        tier = self._reproduction.tiers.get(report.tier)
+        made = Counter(trial.origin for trial in every)
+        sentence = self.sentences.get(report.name, "")
+        entries = self.history.get(key_of(report), ())
+        tier = self.reproduction.tiers.get(report.tier)
+        failing = self.failing.get((report.tier, report.name))
         return Section(
             report=report,
-            anchor=self._anchors.new(report.claim, report.case, report.tier),
+            anchor=self.anchors.new(report.claim, report.case, report.tier),
             methods=tuple(dict.fromkeys(clean(source.method) for source in report.sources)),
             places=places(report.where),
             paper=sentence if sentence != report.statement else "",
@@ -159,22 +134,17 @@ class _Gathering:
             parts=_parts(report, read),
             conditions=tuple(self._condition(report.tier, source) for source in report.sources if source.trials),
             made=made,
-            warnings=(*_broken(every), *origin.warnings(made), *self._of_the_paper(report)),
+            warnings=(*_broken(every), *origin.warnings(made), *filter(None, [failing])),
             history=eras(entries),
             change=_change(entries, report),
-            faults=described(self._mutants, report) if report.n else "",
+            faults=described(self.mutants, report) if report.n else "",
         )
-
-    def _of_the_paper(self, report: ClaimReport) -> tuple[str, ...]:
-        """Say that the paper's own numbers would not pass a claim's assertion, where it is so."""
-        found = self._failing.get((report.tier, report.name))
-        return (found,) if found else ()
 
     def _condition(self, tier: str, source: SourceTrials) -> str:
         """Return the key of a condition with this number of trials, after gathering its data."""
         key = f"{source.condition}-{len(source.trials)}"
         if key not in self.conditions:
-            trials = self._trials(source)
+            trials = self.reader.read(source.trials, source.installed)
             panels, rest = training_curves.panels(trials)
             settings = _flat(self.reader.settings.get(source.condition, {}))
             says = f"{plural(len(trials), 'trial')}. {rest}".strip()
@@ -182,17 +152,13 @@ class _Gathering:
             self.conditions[key] = ConditionTrials(source.label, says, settings, panels, champion)
         return key
 
-    def _trials(self, source: SourceTrials) -> tuple[TrialSummary, ...]:
-        """Read the trials of one condition of a claim: the records that were judged."""
-        return self.reader.read(source.trials, source.installed)
-
     def _champion(self, tier: str, source: SourceTrials, trials: Sequence[TrialSummary]) -> ShownChampion:
         """Return a condition's champion; the condition is found by its names."""
         try:
-            condition = self._reproduction.tier(tier).condition(source.method, source.task)
+            condition = self.reproduction.tier(tier).condition(source.method, source.task)
         except UserError as error:
             return ShownChampion(str(error))
-        return champion_of(self._archive.store, condition, trials, self._draws)
+        return champion_of(self.store, condition, trials, self.draws)
 
 
 def _parts(report: ClaimReport, read: Mapping[str, Sequence[TrialSummary]]) -> tuple[Part, ...]:

@@ -17,30 +17,17 @@ LEGEND: Final = ", ".join(f"{fate.symbol} {fate}" for fate in Fate)
 
 
 @dataclass(frozen=True)
-class GridCell:
-    """One fault tried on one claim, in each method or task that the claim is about.
-
-    Attributes:
-        symbols: one for each of them.
-        says: which of them, in words.
-    """
-
-    symbols: str
-    says: str
-
-
-@dataclass(frozen=True)
 class GridRow:
     """One claim.
 
     Attributes:
         report: of it.
-        cells: by mutant.
+        cells: by mutant, how it was tried in each method or task that the claim is about.
         unnoticed: methods that it names, and none of whose own faults changes its verdict.
     """
 
     report: ClaimReport
-    cells: Mapping[str, GridCell]
+    cells: Mapping[str, Sequence[Attempt]]
     unnoticed: str
 
 
@@ -73,21 +60,16 @@ def fault_grid(matrix: Matrix, tier: str, reports: Iterable[ClaimReport]) -> Fau
     )
     return FaultGrid(
         tier=tier,
-        score=str(score({key_of(report): row for report, row in found.values()}, tier)),
+        score=score({key_of(report): row for report, row in found.values()}, tier),
         mutants=tuple(dict.fromkeys(mutant for row in rows for mutant in row.cells)),
         rows=rows,
         untried=tuple(report.name for report in ordered if rows and report.n and report.name not in found),
     )
 
 
-def _cells(attempts: Sequence[Attempt]) -> dict[str, GridCell]:
-    """Return a cell for each mutant that was tried."""
+def _cells(attempts: Sequence[Attempt]) -> dict[str, list[Attempt]]:
+    """Return the attempts by mutant."""
     by_mutant: dict[str, list[Attempt]] = {}
     for attempt in attempts:
         by_mutant.setdefault(attempt.mutant, []).append(attempt)
-    return {
-        mutant: GridCell(
-            "".join(one.fate.symbol for one in several), "; ".join(f"{one.target}: {one.fate}" for one in several)
-        )
-        for mutant, several in by_mutant.items()
-    }
+    return by_mutant

@@ -54,7 +54,7 @@ def _faults(page: Page) -> Iterator[str]:
                     (
                         literal(row.report.name),
                         literal(table_cells.verdict(row.report)),
-                        *(row.cells[name].symbols if name in row.cells else "" for name in grid.mutants),
+                        *("".join(one.fate.symbol for one in row.cells.get(name, ())) for name in grid.mutants),
                         literal(row.unnoticed),
                     )
                     for row in grid.rows
@@ -141,7 +141,8 @@ def _section(section: Section, page: Page) -> Iterator[str]:
         yield f"{literal(condition.label)}: {literal(condition.says)}"
     if section.made:
         yield "Made by: " + "; ".join(
-            literal(f"{plural(one.count, 'trial')} on {one.origin.device}, {one.origin.code}") for one in section.made
+            literal(f"{plural(count, 'trial')} on {origin.device}, {origin.code}")
+            for origin, count in section.made.most_common()
         )
     if section.history:
         yield table(

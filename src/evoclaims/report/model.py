@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
@@ -12,7 +13,7 @@ from evoclaims.report.across_shown import AcrossShown
 from evoclaims.report.evidence import Part
 from evoclaims.report.fault_grid import FaultGrid
 from evoclaims.report.formatting import counted
-from evoclaims.report.origin import Made
+from evoclaims.report.origin import Origin
 from evoclaims.report.training_curves import CurvePanel
 from evoclaims.report.verdict_chart import VerdictChart
 from evoclaims.verdicts.claim_report import ClaimReport
@@ -66,7 +67,7 @@ class Section:
         design: how it was judged, in words.
         parts: its evidence.
         conditions: keys of `Page.conditions`.
-        made: where its trials were made.
+        made: how many of its trials were made where.
         warnings: what a reader should know first.
         history: accepted verdicts, oldest first; a new tuple begins where what is judged has changed.
         change: what differs from the last accepted verdict; empty when nothing does.
@@ -81,7 +82,7 @@ class Section:
     design: str = ""
     parts: tuple[Part, ...] = ()
     conditions: tuple[str, ...] = ()
-    made: tuple[Made, ...] = ()
+    made: Counter[Origin] = field(default_factory=Counter)
     warnings: tuple[str, ...] = ()
     history: tuple[tuple[Entry, ...], ...] = ()
     change: str = ""
@@ -90,7 +91,7 @@ class Section:
     @property
     def devices(self) -> str:
         """How many trials were made on which devices."""
-        return counted(one.origin.device for one in self.made for _ in range(one.count))
+        return counted(origin.device for origin in self.made.elements())
 
 
 @dataclass(frozen=True)

@@ -6,23 +6,8 @@ from collections import defaultdict
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from evoclaims.judging.verdict import Outcome
 from evoclaims.report.model import Page, Section
-
-
-@dataclass(frozen=True)
-class UnderVariant:
-    """What came of one case of a claim under a variant of the protocol.
-
-    Attributes:
-        says: the claim's name, the tier and the outcome.
-        outcome: under the variant.
-        differs: whether the protocol itself has another outcome.
-    """
-
-    says: str
-    outcome: Outcome
-    differs: bool
+from evoclaims.verdicts.robustness import Robustness
 
 
 @dataclass(frozen=True)
@@ -34,14 +19,14 @@ class OpeningLine:
         sentence: the paper's own.
         place: the section of the paper; empty where the line above has the same.
         cases: in the order of the tiers.
-        variants: what came of its cases under each variant that was tried on one of them.
+        variants: its cases that were judged under each variant that was tried on some claim.
     """
 
     claim: str
     sentence: str
     place: str
     cases: tuple[Section, ...]
-    variants: Mapping[str, tuple[UnderVariant, ...]] = field(default_factory=dict)
+    variants: Mapping[str, tuple[Robustness, ...]] = field(default_factory=dict)
 
     def at(self, tier: str) -> tuple[Section, ...]:
         """Return its cases at a tier."""
@@ -61,15 +46,8 @@ def opening_lines(page: Page) -> list[OpeningLine]:
     return lines
 
 
-def _under_variants(page: Page, cases: list[Section]) -> dict[str, tuple[UnderVariant, ...]]:
-    """Return what came of the cases of one sentence under each variant."""
+def _under_variants(page: Page, cases: list[Section]) -> dict[str, tuple[Robustness, ...]]:
+    """Return the cases of one sentence that were judged under each variant."""
     names = {(section.report.name, section.report.tier) for section in cases}
     rows = [row for row in page.robustness if (row.claim, row.tier) in names]
-    return {
-        variant: tuple(
-            UnderVariant(f"{row.claim} ({row.tier}): {outcome}", outcome, variant in row.hangs_on)
-            for row in rows
-            if (outcome := row.outcomes.get(variant)) is not None
-        )
-        for variant in page.tried
-    }
+    return {variant: tuple(row for row in rows if variant in row.outcomes) for variant in page.tried}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -58,27 +58,9 @@ class Origin:
         return f"{self.revision[:SHORT]}, {state}" if self.revision else "unknown revision"
 
 
-@dataclass(frozen=True)
-class Made:
-    """Trials of one origin.
-
-    Attributes:
-        origin: of them.
-        count: how many.
-    """
-
-    origin: Origin
-    count: int
-
-
-def grouped(origins: Iterable[Origin]) -> tuple[Made, ...]:
-    """Count trials by origin, the commonest first."""
-    return tuple(Made(origin, count) for origin, count in Counter(origins).most_common())
-
-
-def warnings(made: Sequence[Made]) -> tuple[str, ...]:
+def warnings(made: Counter[Origin]) -> tuple[str, ...]:
     """Return what a reader should know before trusting the trials together: sentences, none when all is well."""
-    every = [one.origin for one in made for _ in range(one.count)]
+    every = list(made.elements())
     found = []
     if len({origin.device for origin in every}) > 1:
         found.append(f"Trials from mixed devices: {counted(origin.device for origin in every)}.")
