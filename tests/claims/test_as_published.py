@@ -10,6 +10,7 @@ import pytest
 
 from evoclaims.claims.as_published import AsPublished
 from evoclaims.claims.claim import Claim
+from evoclaims.claims.collected import ClaimTest
 from evoclaims.claims.session import Session
 from evoclaims.judging.assertion import Assertion
 from evoclaims.judging.verdict import Outcome
@@ -77,7 +78,7 @@ def put(reproduction: Reproduction, store: Store, says: Claim) -> Callable[..., 
         def group(method: str, on: str = "small") -> TrialGroup:
             return session.group(method, on, "full")
 
-        return session.complete(session.settle(says, "", "full", asserted(group)), None)
+        return session.complete(session.settle(ClaimTest(says, "full", ""), asserted(group)), None)
 
     return judge
 

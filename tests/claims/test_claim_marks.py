@@ -11,7 +11,8 @@ import pytest
 
 from evoclaims import Outcome, claim, expected
 from evoclaims.claims.claim import Claim, Expectation, claim_of, expectation_of, gap_of
-from evoclaims.claims.reporting import broken, expecting
+from evoclaims.claims.collected import ClaimTest
+from evoclaims.claims.reporting import expecting, unjudged
 from evoclaims.core.errors import UserError
 from evoclaims.verdicts.claim_report import ClaimReport, save
 
@@ -142,7 +143,7 @@ def test_without_an_acceptance_for_its_tier_a_test_has_none(pytester: pytest.Pyt
     assert expectation_of(item, "full") == Expectation(Outcome.INCONCLUSIVE, "claim, full", "full")
 
 
-REPORT = broken(Claim("T1", **TEXTS), "n_parity", "smoke", "it broke")
+REPORT = unjudged(ClaimTest(Claim("T1", **TEXTS), "smoke", "n_parity"), Outcome.ERROR, "it broke")
 
 
 @pytest.mark.parametrize(

@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 
 from evoclaims.claims.claim import Claim
+from evoclaims.claims.collected import ClaimTest
 from evoclaims.claims.fetching import NotStoredError, RunMissing, StoredOnly
 from evoclaims.claims.session import Session, Verdicts
 from evoclaims.core.errors import UserError
@@ -40,7 +41,7 @@ def _pair(session: Session, tier: str = "smoke") -> tuple[Any, Any]:
 
 def test_a_claim_ends_supported_or_refuted_and_names_its_trials(session: Session, says: Claim) -> None:
     better, worse = _pair(session)
-    report = session.settle(says, "small", "smoke", better.mean_success > worse.mean_success)
+    report = session.settle(ClaimTest(says, "smoke", "small"), better.mean_success > worse.mean_success)
     assert (report.name, report.outcome, report.n, report.tier) == ("T1[small]", "supported", 6, "smoke")
     assert report.statement == says.smoke
     assert [(s.method, s.task, len(s.trials)) for s in report.sources] == [
@@ -48,14 +49,14 @@ def test_a_claim_ends_supported_or_refuted_and_names_its_trials(session: Session
         ("worse", "small", 6),
     ]
     assert report.sources[0].trials[3] == session.fetch(better.condition, [3])[0].id
-    other = session.settle(says, "small", "smoke", worse.mean_success > better.mean_success)
+    other = session.settle(ClaimTest(says, "smoke", "small"), worse.mean_success > better.mean_success)
     assert other.outcome == "refuted"
     assert other.failed
 
 
 def test_the_full_tier_judges_the_papers_own_sentence_with_its_own_design(session: Session, says: Claim) -> None:
     better, worse = _pair(session, "full")
-    report = session.settle(says, "", "full", better.mean_success > worse.mean_success)
+    report = session.settle(ClaimTest(says, "full", ""), better.mean_success > worse.mean_success)
     assert (report.name, report.n, report.statement) == ("T1", 10, says.says)
     assert [look.n for look in report.attainable] == [10]
 
@@ -64,8 +65,8 @@ def test_a_fixed_number_of_trials_takes_the_place_of_the_looks(session: Session,
     fixed = replace(session, trials=4)
     assert [(look.n, look.alpha) for look in fixed.design("full").looks] == [(4, pytest.approx(0.05))]
     better, worse = _pair(fixed)
-    assert fixed.settle(says, "", "smoke", better.mean_success > worse.mean_success).n == 4
-    report = replace(session, trials=1).settle(says, "", "smoke", better.mean_success > worse.mean_success)
+    assert fixed.settle(ClaimTest(says, "smoke", ""), better.mean_success > worse.mean_success).n == 4
+    report = replace(session, trials=1).settle(ClaimTest(says, "smoke", ""), better.mean_success > worse.mean_success)
     assert (report.outcome, report.n) == ("inconclusive", 0)
     assert "underpowered: needs n = 3" in report.reason
 
@@ -98,13 +99,13 @@ def test_trials_that_may_not_be_run_end_a_claim_as_not_run(
     better, worse = _pair(stored)
     for seed in range(6):
         store.put(made(better.condition, seed, 1.0), {})
-    report = stored.settle(says, "", "smoke", better.mean_success > worse.mean_success)
+    report = stored.settle(ClaimTest(says, "smoke", ""), better.mean_success > worse.mean_success)
     assert (report.outcome, report.n, report.failed) == ("not run", 0, False)
     assert report.reason.startswith("6 of 6 trials of hand_built_negated on n_parity are missing")
     assert len(report.fingerprint) == 64
     for seed in range(6):
         store.put(made(worse.condition, seed, 0.0), {})
-    assert stored.settle(says, "", "smoke", better.mean_success > worse.mean_success).outcome == "supported"
+    assert stored.settle(ClaimTest(says, "smoke", ""), better.mean_success > worse.mean_success).outcome == "supported"
 
 
 def test_stored_trials_are_read_in_the_order_of_the_seeds(store: Store, made: Made, session: Session) -> None:
@@ -131,7 +132,7 @@ def test_missing_trials_are_run_and_a_bad_store_or_device_is_found_before(tmp_pa
 
 def test_a_test_gives_exactly_one_verdict(session: Session, says: Claim) -> None:
     better, worse = _pair(session)
-    verdict = Verdicts(lambda assertion: session.settle(says, "", "smoke", assertion))
+    verdict = Verdicts(lambda assertion: session.settle(ClaimTest(says, "smoke", ""), assertion))
     with pytest.raises(UserError, match=r"takes an assertion about trials.*not True"):
         verdict(True)  # type: ignore[arg-type]
     with pytest.raises(UserError, match=r"takes an assertion about trials.*not 'mean success over levels' alone"):
@@ -155,7 +156,7 @@ def _settled(session: Session, made: Made, says: Claim, value: Callable[[int], f
     better, _ = _pair(session)
     for seed in range(6):
         session.store.put(made(better.condition, seed, value(seed)), {})
-    return [session.settle(says, "", "smoke", better.solves_every_level.in_most_trials())]
+    return [session.settle(ClaimTest(says, "smoke", ""), better.solves_every_level.in_most_trials())]
 
 
 def test_the_same_trials_have_not_drifted(session: Session, says: Claim, made: Made) -> None:

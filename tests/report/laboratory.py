@@ -13,13 +13,15 @@ import jax
 from made_trials import trial_of
 
 from evoclaims.claims.claim import Claim
+from evoclaims.claims.collected import ClaimTest
 from evoclaims.claims.fetching import StoredOnly
-from evoclaims.claims.reporting import broken
+from evoclaims.claims.reporting import unjudged
 from evoclaims.claims.session import Session
 from evoclaims.core.keys import TRAINING, trial_key
 from evoclaims.envs.gates.parity import NParity
 from evoclaims.judging.assertion import Assertion
 from evoclaims.judging.design import Design
+from evoclaims.judging.verdict import Outcome
 from evoclaims.methods.hand_built import HandBuilt
 from evoclaims.methods.neat.neat import Neat
 from evoclaims.methods.neat.settings import Settings, Species
@@ -102,11 +104,12 @@ class Laboratory:
     def judge(self, assert_: Judge, tier: str = "full", case: str = "", **texts: str) -> ClaimReport:
         """Judge a claim from the store, as `evoclaims report` does."""
         claim = Claim(**{"id": "T1", "says": "Better is better", "where": "§1.2, Fig. 3", "smoke": "In small", **texts})
+        test = ClaimTest(claim, tier, case)
         session = Session(self.reproduction, self.store, StoredOnly(self.archive))
         try:
-            return session.settle(claim, case, tier, assert_(lambda method: session.group(method, "small", tier)))
+            return session.settle(test, assert_(lambda method: session.group(method, "small", tier)))
         except Exception as error:  # as the pytest plugin does
-            return broken(claim, case, tier, str(error))
+            return unjudged(test, Outcome.ERROR, str(error))
 
     def page(
         self,

@@ -11,6 +11,7 @@ from laboratory import CONDITIONS, Laboratory, record
 
 from evoclaims.claims.as_published import AsPublished
 from evoclaims.claims.claim import Claim
+from evoclaims.claims.collected import ClaimTest
 from evoclaims.claims.session import Session
 from evoclaims.judging.assertion import Assertion
 from evoclaims.judging.kinds.omnibus import any_differ
@@ -148,7 +149,7 @@ def test_each_kind_is_put_to_the_papers_own_numbers(lab: Laboratory, kind: str) 
     (lab.reproduction.folder / "reported.toml").write_text(PUBLISHED)
     session = Session(replace(lab.reproduction), lab.store, AsPublished(lab.reproduction, "full"))
     assertion = make(*groups(lambda method: session.group(method, "small", "full")))
-    report = session.settle(Claim("T1", "says", "§1", "small"), "", "full", assertion)
+    report = session.settle(ClaimTest(Claim("T1", "says", "§1", "small"), "full", ""), assertion)
     if kind in LACKING:
         assert report.outcome is Outcome.ERROR
         assert LACKING[kind] in report.reason

@@ -6,7 +6,7 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Final
 
-from evoclaims.claims.claim import Claim
+from evoclaims.claims.collected import ClaimTest
 from evoclaims.claims.reporting import judged
 from evoclaims.claims.selection import selected
 from evoclaims.claims.session import Session
@@ -36,13 +36,13 @@ class Listening(Session):
 
     assertions: dict[str, Assertion] = field(default_factory=dict)
 
-    def settle(self, claim: Claim, case: str, tier: str, assertion: Assertion) -> ClaimReport:
+    def settle(self, test: ClaimTest, assertion: Assertion) -> ClaimReport:
         """Keep an assertion."""
-        design, name = self.design(tier), named(claim.id, case)
+        design, name = self.design(test.tier), named(test.claim.id, test.case)
         self.assertions[name] = assertion
-        mark = fingerprint(assertion, design, claim=name, tier=tier)
+        mark = fingerprint(assertion, design, claim=name, tier=test.tier)
         verdict = Verdict(Outcome.NOT_RUN, "it is not judged", assertion.describe(), mark)
-        return judged(claim, case, tier, assertion, design, verdict, {})
+        return judged(test, assertion, design, verdict, {})
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 
-from evoclaims.claims.claim import Claim, Expectation
+from evoclaims.claims.claim import Expectation
+from evoclaims.claims.collected import ClaimTest
 from evoclaims.judging.assertion import Assertion
 from evoclaims.judging.design import Design
 from evoclaims.judging.judge import attainability
@@ -18,19 +19,13 @@ from evoclaims.verdicts.versions import found_in
 
 
 def judged(
-    claim: Claim,
-    case: str,
-    tier: str,
-    assertion: Assertion,
-    design: Design,
-    verdict: Verdict,
-    again: Mapping[str, Collection[int]],
+    test: ClaimTest, assertion: Assertion, design: Design, verdict: Verdict, again: Mapping[str, Collection[int]]
 ) -> ClaimReport:
     """Build the report of a claim that was judged; `again` holds the seeds that were run again, by condition id."""
     groups = [source for source in assertion.sources() if isinstance(source, TrialGroup)]
     seeds = design.seeds(verdict.n)
     return replace(
-        _unjudged(claim, case, tier, verdict.outcome, verdict.reason),
+        unjudged(test, verdict.outcome, verdict.reason),
         verdict=verdict,
         sources=tuple(_source(group, seeds, again.get(group.fingerprint, ())) for group in groups),
         attainable=tuple(
@@ -39,20 +34,18 @@ def judged(
     )
 
 
-def broken(claim: Claim, case: str, tier: str, reason: str) -> ClaimReport:
-    """Build the report of a claim whose test broke before it was judged."""
-    return _unjudged(claim, case, tier, Outcome.ERROR, reason)
-
-
-def skipped(claim: Claim, case: str, tier: str, reason: str) -> ClaimReport:
-    """Build the report of a claim whose test was skipped, with pytest's reason."""
-    return _unjudged(claim, case, tier, Outcome.NOT_RUN, f"its test was skipped ({reason or 'no reason given'})")
-
-
-def without_instance(claim: Claim, case: str, tier: str, because: str) -> ClaimReport:
-    """Build the report of a claim that has no test at a tier."""
-    report = _unjudged(claim, case, tier, Outcome.NOT_RUN, f"it has no {tier} test: {because}")
-    return replace(report, has_test=False)
+def unjudged(test: ClaimTest, outcome: Outcome, reason: str, *, has_test: bool = True) -> ClaimReport:
+    """Build the report of a claim without a verdict: its test broke or was skipped, or there is none at this tier."""
+    return ClaimReport(
+        claim=test.claim.id,
+        case=test.case,
+        tier=test.tier,
+        statement=test.claim.statement(test.tier),
+        where=test.claim.where,
+        outcome=outcome,
+        reason=reason,
+        has_test=has_test,
+    )
 
 
 def expecting(report: ClaimReport, expectation: Expectation | None) -> ClaimReport:
@@ -60,19 +53,6 @@ def expecting(report: ClaimReport, expectation: Expectation | None) -> ClaimRepo
     if expectation is None or report.variant:
         return report
     return replace(report, expected=expectation.outcome, because=expectation.because)
-
-
-def _unjudged(claim: Claim, case: str, tier: str, outcome: Outcome, reason: str) -> ClaimReport:
-    """Build the report of a claim without a verdict of the judge."""
-    return ClaimReport(
-        claim=claim.id,
-        case=case,
-        tier=tier,
-        statement=claim.statement(tier),
-        where=claim.where,
-        outcome=outcome,
-        reason=reason,
-    )
 
 
 def _source(group: TrialGroup, seeds: Sequence[int], again: Collection[int]) -> SourceTrials:

@@ -7,7 +7,8 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 from evoclaims.claims.as_published import AsPublished
-from evoclaims.claims.claim import Claim, Expectation
+from evoclaims.claims.claim import Expectation
+from evoclaims.claims.collected import ClaimTest
 from evoclaims.claims.fetching import NotStoredError, StoredOnly
 from evoclaims.claims.reporting import expecting, judged
 from evoclaims.core.errors import UserError
@@ -85,10 +86,9 @@ class Session:
             return design
         return replace(design, looks=(Look(self.trials, design.alpha),))
 
-    def settle(self, claim: Claim, case: str, tier: str, assertion: Assertion) -> ClaimReport:
+    def settle(self, test: ClaimTest, assertion: Assertion) -> ClaimReport:
         """Judge an assertion; trials that may not be run make the verdict "not run"."""
-        design = self.design(tier)
-        name = named(claim.id, case)
+        design, name, tier = self.design(test.tier), named(test.claim.id, test.case), test.tier
         try:
             if self.leaves(tier, assertion):
                 raise NotStoredError(f"the variant {self.variant} changes none of its trials")
@@ -96,7 +96,7 @@ class Session:
         except NotStoredError as error:
             mark = fingerprint(assertion, design, claim=name, tier=tier)
             verdict = Verdict(Outcome.NOT_RUN, str(error), assertion.describe(), mark)
-        return judged(claim, case, tier, assertion, design, verdict, self.again)
+        return judged(test, assertion, design, verdict, self.again)
 
     def complete(self, report: ClaimReport, expectation: Expectation | None) -> ClaimReport:
         """Return a report with the variant, an accepted outcome, what mutants showed, and the file that holds it.

@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+import inspect
+import warnings
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from statistics import median
+from typing import Any
 
 import pytest
 
 from evoclaims.claims.claim import gap_of
-from evoclaims.claims.collected import ClaimTest
+from evoclaims.claims.collected import TIER, ClaimTest
 from evoclaims.claims.fetching import NotStoredError, RunMissing
-from evoclaims.claims.needs import asked_for
 from evoclaims.claims.session import Session
 from evoclaims.core.errors import UserError
 from evoclaims.core.provenance import machine_class
+from evoclaims.judging.assertion import Assertion
 from evoclaims.paper import references
 from evoclaims.paper.cost import took
 from evoclaims.paper.trial_group import TrialGroup
@@ -110,15 +113,34 @@ def _known(work: Work, scale: float) -> float | None:
 
 
 def _needed(session: Session, item: pytest.Item, test: ClaimTest) -> Sequence[TrialGroup]:
-    """Return the trials that a claim needs."""
-    if gap_of(item, test.tier):
+    """Return the trials that a claim needs: its test is called once, as far as it gets without trials.
+
+    Nothing is known of a test with fixtures of its own, which are for the run itself. What a test raises is told when
+    it is run.
+    """
+    found: list[TrialGroup] = []
+    judged: list[Assertion] = []
+
+    def trials(method: str, *, on: str) -> TrialGroup:
+        found.append(replace(session.group(method, on, test.tier), get=_never))
+        return found[-1]
+
+    function: Callable[..., Any] = item.obj  # type: ignore[attr-defined]
+    given = {**item.callspec.params, TIER: test.tier, "trials": trials, "verdict": judged.append}  # type: ignore[attr-defined]
+    names = inspect.signature(function).parameters
+    if gap_of(item, test.tier) or not set(names) <= set(given):
         return ()
-
-    def group(method: str, task: str) -> TrialGroup:
-        return replace(session.group(method, task, test.tier), get=_never)
-
-    groups, assertion = asked_for(item, test.tier, group)
-    return () if assertion is not None and session.leaves(test.tier, assertion) else groups
+    try:
+        with warnings.catch_warnings(action="ignore"):
+            function(**{name: given[name] for name in names})
+    except KeyboardInterrupt:
+        raise
+    except BaseException:  # noqa: S110  (pytest's own outcomes, such as a skip, are no `Exception`)
+        pass
+    if isinstance(item.parent, pytest.Class):  # the run needs a new object of its class
+        vars(item).pop("_instance", None)
+        vars(item).pop("_obj", None)
+    return () if judged and session.leaves(test.tier, judged[0]) else found
 
 
 def _never(condition: Condition, seeds: Sequence[int]) -> Sequence[TrialResult]:

@@ -192,7 +192,7 @@ def verdict(request: pytest.FixtureRequest, claim_tier: str) -> Verdicts:
 
     def settle(assertion: Any) -> ClaimReport:
         try:
-            return session.settle(test.claim, test.case, test.tier, assertion)
+            return session.settle(test, assertion)
         finally:
             if line is not None:
                 line.close()
@@ -242,19 +242,20 @@ def _claim_report(item: pytest.Item, call: pytest.CallInfo[None], report: pytest
     """Return the report of a claim test: its verdict, the error that prevented one, or why it was skipped."""
     from evoclaims.claims.claim import expectation_of
     from evoclaims.claims.collected import ClaimTest
-    from evoclaims.claims.reporting import broken, skipped, without_instance
+    from evoclaims.claims.reporting import unjudged
+    from evoclaims.judging.verdict import Outcome
 
     test, verdicts = ClaimTest.of(item), item.stash.get(_verdicts, None)
     if because := _gap(item):
-        return without_instance(test.claim, test.case, test.tier, because)
+        return unjudged(test, Outcome.NOT_RUN, f"it has no {test.tier} test: {because}", has_test=False)
     if report.skipped:  # or failed as an xfail mark expects
         said = report.longrepr[2] if isinstance(report.longrepr, tuple) else f"xfail: {getattr(report, 'wasxfail', '')}"
-        return skipped(test.claim, test.case, test.tier, said.removeprefix("Skipped: "))
+        why = said.removeprefix("Skipped: ") or "no reason given"
+        return unjudged(test, Outcome.NOT_RUN, f"its test was skipped ({why})")
     if call.excinfo is not None:
-        claimed = broken(test.claim, test.case, test.tier, _sentence(call.excinfo))
+        claimed = unjudged(test, Outcome.ERROR, _sentence(call.excinfo))
     elif verdicts is None or verdicts.report is None:
-        nothing = "the test ended without calling verdict(...), so it judged nothing"
-        claimed = broken(test.claim, test.case, test.tier, nothing)
+        claimed = unjudged(test, Outcome.ERROR, "the test ended without calling verdict(...), so it judged nothing")
     else:
         claimed = verdicts.report
     return make_session(item.config).complete(claimed, expectation_of(item, test.tier))

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Generator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from typing import TYPE_CHECKING, Any, Final
 
 import pytest
@@ -71,11 +71,17 @@ class ProgressLine:
     def _made(self) -> LiveLine:
         """Return the line, made when it is first needed."""
         if self._line is None:
-            from evoclaims.plugin.terminal import uncaptured
             from evoclaims.report.live_line import LiveLine
 
-            self._line = LiveLine(*uncaptured(self._config))
+            writer = self._config.get_terminal_writer()
+            self._line = LiveLine(self._write, writer.fullwidth if writer.hasmarkup else None)
         return self._line
+
+    def _write(self, text: str) -> None:
+        """Write past pytest's capture, while trials run."""
+        capture: Any = self._config.pluginmanager.get_plugin("capturemanager")
+        with capture.global_and_fixture_disabled() if capture else nullcontext():
+            self._config.get_terminal_writer().write(text, flush=True)
 
     def _tick(self) -> None:
         """Show what the workers do, until the run ends."""
