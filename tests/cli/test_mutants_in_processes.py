@@ -52,7 +52,7 @@ def test_a_process_that_dies_loses_its_condition_alone_and_the_next_call_runs_th
     before = stored.ids()
     status, _, err = evoclaims("mutants", "--mutant=dies", "--numprocesses=2")
     assert status == 1
-    assert "right on parity, right: dies failed: its process died (status 7), 3 times." in err
+    assert "right on parity, right: dies (smoke) failed: its process died (status 7), 3 times." in err
     assert "1 of 2 conditions failed." in err
     assert load(Path("mutants.toml"))["smoke", "a"].named(Fate.BROKEN) == ("right: dies",)
     assert evoclaims("mutants", "--mutant=negated", "--numprocesses=2")[0] == 0

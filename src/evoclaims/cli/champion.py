@@ -12,8 +12,9 @@ from evoclaims.cli.project import open_project
 from evoclaims.cli.stored import FIGURES, Stored, describe, load, write
 from evoclaims.cli.terminal import styled
 from evoclaims.core.errors import UnknownNameError, UserError
-from evoclaims.networks import export, picture
-from evoclaims.report.champion import network_panels
+from evoclaims.networks import export
+from evoclaims.networks.picture import Format
+from evoclaims.report.champion import network
 from evoclaims.report.console import PlainSpokenConsole, plain_table
 from evoclaims.trials import champions, devices
 from evoclaims.trials.champions import Replay
@@ -56,22 +57,19 @@ def main(options: argparse.Namespace) -> int:
 
 def _json(trial: Stored) -> bytes | None:
     """Return a champion's genome as JSON; None for one without a graph."""
-    network = champions.network_of(trial.condition, trial.parameters)
-    return None if network is None else export.to_json(trial.parameters, network).encode()
+    graph = champions.network_of(trial.condition, trial.parameters)
+    return None if graph is None else export.to_json(trial.parameters, graph).encode()
 
 
-def _picture(trial: Stored, file_format: picture.Format) -> bytes | None:
-    """Draw a champion's network, beside it the one that it generates on a substrate; None for one without a graph."""
-    network = champions.network_of(trial.condition, trial.parameters)
-    if network is None:
-        return None
-    panels = network_panels(trial.condition, network, trial.parameters)
-    return picture.draw(panels, f"{trial.title}, seed {trial.result.seed}", file_format)
+def _picture(trial: Stored, file_format: Format) -> bytes | None:
+    """Draw a champion's network; None for one without a graph."""
+    title = f"{trial.title}, seed {trial.result.seed}"
+    return network(trial.condition, trial.result, trial.parameters, title, file_format)
 
 
 FORMS: Final[Mapping[str, Callable[[Stored], bytes | None]]] = {
     "json": _json,
-    **{file_format: partial(_picture, file_format=file_format) for file_format in get_args(picture.Format)},
+    **{file_format: partial(_picture, file_format=file_format) for file_format in get_args(Format)},
 }
 
 

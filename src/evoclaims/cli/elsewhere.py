@@ -7,7 +7,6 @@ import os
 import subprocess
 import tempfile
 import time
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -15,7 +14,7 @@ from pathlib import Path
 from evoclaims.cli.terminal import terminal
 from evoclaims.core.environments import Environment, NotInstallableError, Recipe, make, reason
 from evoclaims.core.printable import printable
-from evoclaims.report.live_line import duration
+from evoclaims.report.live_line import LiveLine, duration
 from evoclaims.report.table_cells import totals
 from evoclaims.trials.store import Store
 from evoclaims.verdicts.across import Judged, judged
@@ -106,7 +105,8 @@ def _watched(command: list[str], folder: Path, log: Path) -> tuple[int, str]:
     Returns:
         Its status and all that it said.
     """
-    show = _newest_line()
+    write, columns = terminal()
+    line_shown = LiveLine(write if columns else lambda _: None, columns)
     lines = []
     # Lines are wanted when they are written; the page of a step on GitHub is for the table, not for every environment.
     environment = {name: value for name, value in os.environ.items() if name != "GITHUB_STEP_SUMMARY"}
@@ -120,26 +120,16 @@ def _watched(command: list[str], folder: Path, log: Path) -> tuple[int, str]:
         errors="replace",
     ) as process:
         try:
-            assert process.stdout is not None
             with open(log, "w", encoding="utf-8", errors="backslashreplace") as file:
                 for line in process.stdout:
                     lines.append(line)
                     file.write(line)
                     file.flush()
-                    show(printable(line.strip()))
+                    line_shown.show(partial(printable, line.strip()))
         except BaseException:  # what it has stored stays, and checkpoints let the next call go on
             process.terminate()
             process.wait()
             raise
         finally:
-            show("")
+            line_shown.close()
     return process.returncode, "".join(lines)
-
-
-def _newest_line() -> Callable[[str], None]:
-    """Return a function that shows a text in place of the last one; it shows nothing where there is no terminal."""
-    write, columns = terminal()
-    if columns is None:
-        return lambda _: None
-    width = columns - 1
-    return lambda text: write(f"\r{text[:width].ljust(width)}\r" if text else f"\r{' ' * width}\r")

@@ -22,14 +22,7 @@ TAIL: Final = 20_000
 
 @dataclass(frozen=True)
 class Place:
-    """Where a batch was submitted last.
-
-    Attributes:
-        name: the submission's.
-        submission: the submission.
-        job: the job of it.
-        batch: the batch in the job.
-    """
+    """Where a batch was submitted last: the submission with its name, and of it the job and the batch."""
 
     name: str
     submission: Submission
@@ -38,17 +31,9 @@ class Place:
 
 
 @dataclass(frozen=True)
-class Row:
-    """What has become of a batch.
+class Row(Place):
+    """What has become of a batch: "queued", "running", "done" or "failed", why, if that is known, and its output."""
 
-    Attributes:
-        place: where it was submitted.
-        state: "queued", "running", "done" or "failed".
-        reason: of the state; may be empty.
-        log: the job's output.
-    """
-
-    place: Place
     state: str
     reason: str
     log: Path
@@ -62,10 +47,10 @@ def main(options: argparse.Namespace) -> int:
         print(f"No job was submitted for {project.store.root}: `evoclaims submit` does.")
         return 0
     for row in rows:
-        job, batch = row.place.job, row.place.batch
+        job, batch = row.job, row.batch
         told = f": {row.reason}" * bool(row.reason)
         log = f" ({row.log})" * row.log.exists()
-        print(f"{row.state:8} {job.id}  {batch.label}, {row.place.submission.tier_and_variant}{told}{log}")
+        print(f"{row.state:8} {job.id}  {batch.label}, {row.submission.tier_and_variant}{told}{log}")
     counts = {state: sum(row.state == state for row in rows) for state in ("queued", "running", "done", "failed")}
     print(", ".join(f"{count} {state}" for state, count in counts.items() if count))
     if counts["failed"]:
@@ -76,7 +61,7 @@ def main(options: argparse.Namespace) -> int:
 def active(project: Project) -> dict[str, str]:
     """Return the conditions whose batch is queued or running, with a sentence that says so."""
     return {
-        row.place.batch.condition: f"{row.state} already, as job {row.place.job.id}"
+        row.batch.condition: f"{row.state} already, as job {row.job.id}"
         for row in _rows(project)
         if row.state in ("queued", "running")
     }
@@ -97,9 +82,10 @@ def _rows(project: Project) -> Iterator[Row]:
     for condition, place in latest.items():
         log, found = log_of(project.store.root, place.name, place.job), seen.get((place.name, place.job.id), GONE)
         if condition not in owed or (found.state is State.ENDED and not _lacks(project, place)):  # it ended meanwhile
-            yield Row(place, "done", "", log)
+            yield Row(**vars(place), state="done", reason="", log=log)
         else:
-            yield Row(place, *_told(project, place, found, log), log)
+            state, reason = _told(project, place, found, log)
+            yield Row(**vars(place), state=state, reason=reason, log=log)
 
 
 def _lacks(project: Project, place: Place) -> bool:

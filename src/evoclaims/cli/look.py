@@ -172,16 +172,6 @@ def _path(subject: Subject, ending: str) -> bytes:
     return pictures.draw(subject.task, outings.torsos, title, ending)
 
 
-def _page(subject: Subject, ending: str) -> bytes:
-    """Show the chosen episode in space."""
-    return page.page(subject.task, subject.motion, subject.episode_title)
-
-
-def _gif(subject: Subject, ending: str) -> bytes:
-    """Film the chosen episode."""
-    return film.film(subject.task, subject.motion, subject.episode_title)
-
-
 def _elites(subject: Subject, ending: str) -> bytes:
     """Draw the map of elites that MAP-Elites stores with its champion."""
     method, on = subject.options.method, subject.options.task
@@ -199,7 +189,7 @@ def _elites(subject: Subject, ending: str) -> bytes:
 
 FORMS: Final[Mapping[str, Form]] = {
     "path": Form(PICTURE, _path),
-    "page": Form(("html",), _page),
-    "gif": Form(("gif",), _gif),
+    "page": Form(("html",), lambda one, _: page.page(one.task, one.motion, one.episode_title)),
+    "gif": Form(("gif",), lambda one, _: film.film(one.task, one.motion, one.episode_title)),
     "elites": Form(PICTURE, _elites, episodes=False),
 }

@@ -10,14 +10,12 @@ from dataclasses import replace
 from evoclaims.cli.project import Project, open_project
 from evoclaims.cli.running import Running
 from evoclaims.cli.seats import Host, host_of
-from evoclaims.cli.terminal import terminal
 from evoclaims.cli.worker import Order
 from evoclaims.core.errors import UnknownNameError, UserError
 from evoclaims.core.files import write_atomically
 from evoclaims.mutants import catalogue
 from evoclaims.mutants.conditions import Job, Planted, jobs, plantings
 from evoclaims.mutants.trying import Comparison, merged, noticed, under_faults
-from evoclaims.report.live_line import LiveLine
 from evoclaims.trials.spec import Condition
 from evoclaims.verdicts import mutation_matrix
 from evoclaims.verdicts.history import key_of
@@ -97,16 +95,12 @@ def _run(project: Project, wanted: Mapping[Job, Condition], options: argparse.Na
     """Run conditions that lack trials, and return those that have failed."""
     design = project.reproduction.tier(options.tier).design
     order = Order(options.storage, options.tier, options.device, design.first_seed, design.last.n)
-    running = Running(project, order, host, LiveLine(*terminal()))
+    running = Running(project, order, host)
     running.check()
-    failed = set()
-    for ended in running.run(wanted, lambda text: None):
-        if ended.error:
-            failed.add(ended.job)
-            print(f"evoclaims: {ended.job.label} failed: {ended.error}.", file=sys.stderr)
+    failed = frozenset(ended.job for ended in running.run(wanted, lambda text: None) if ended.error)
     if failed:
         print(f"evoclaims: {len(failed)} of {len(wanted)} conditions failed.", file=sys.stderr)
-    return frozenset(failed)
+    return failed
 
 
 def _told(row: Sensitivity) -> str:

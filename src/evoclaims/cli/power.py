@@ -13,7 +13,7 @@ from evoclaims.cli.project import Project, open_project
 from evoclaims.cli.reference import of_one_environment
 from evoclaims.cli.running import Running
 from evoclaims.cli.seats import Host, host_of
-from evoclaims.cli.terminal import styled, terminal
+from evoclaims.cli.terminal import styled
 from evoclaims.cli.worker import Order
 from evoclaims.core.errors import UserError
 from evoclaims.core.packages import recorded
@@ -23,7 +23,6 @@ from evoclaims.mutants.conditions import Job
 from evoclaims.paper.variant import Names
 from evoclaims.report import power_cells
 from evoclaims.report.console import PlainSpokenConsole, plain_table
-from evoclaims.report.live_line import LiveLine
 from evoclaims.trials.spec import Condition, TrialSpec
 from evoclaims.trials.time_limit import is_final
 from evoclaims.verdicts.versions import change
@@ -96,13 +95,11 @@ def _make(
             _write(project, pilots, names, condition, seeds)
         return
     order = Order(options.storage, options.tier, options.device, seeds[0], options.trials)
-    running = Running(project, order, host, LiveLine(*terminal()))
+    running = Running(project, order, host)
     if wanted:
         running.check()
     for ended in running.run({Job("", *names): one for names, one in wanted.items()}, lambda text: print(f"  {text}")):
-        if ended.error:
-            print(f"evoclaims: {ended.job.label} ({options.tier}) failed: {ended.error}.", file=sys.stderr)
-        else:
+        if not ended.error:
             _write(project, pilots, ended.job.names, wanted[ended.job.names], seeds)
 
 

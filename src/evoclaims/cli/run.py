@@ -10,7 +10,6 @@ from evoclaims.cli.project import Project, open_project
 from evoclaims.cli.running import Running
 from evoclaims.cli.seats import host_of
 from evoclaims.cli.stored import describe
-from evoclaims.cli.terminal import terminal
 from evoclaims.cli.variant_cost import to_run
 from evoclaims.cli.worker import Order
 from evoclaims.core.errors import UnknownNameError, UserError
@@ -18,7 +17,6 @@ from evoclaims.judging.counting import MAX_TRIALS
 from evoclaims.mutants.conditions import Job
 from evoclaims.paper.reproduction import Reproduction, Tier
 from evoclaims.paper.variant import Names
-from evoclaims.report.live_line import LiveLine
 from evoclaims.trials.imported import where_from
 from evoclaims.trials.spec import Condition, TrialSpec
 from evoclaims.trials.store import Store
@@ -41,7 +39,7 @@ def main(options: argparse.Namespace) -> int:
     for names in chosen[:1]:  # an invalid seed is so for every condition: it is reported once, and nothing is run
         _ = [TrialSpec(tier.condition(*names), seed) for seed in seeds]
     order = Order(options.storage, options.tier, options.device, seeds[0], n, options.variant, options.time_limit)
-    running = Running(project, order, host, LiveLine(*terminal()))
+    running = Running(project, order, host)
     running.check()
     if options.variant and not (options.method and options.on):
         chosen = to_run(running, chosen)
@@ -54,11 +52,7 @@ def main(options: argparse.Namespace) -> int:
     failed = 0
     for ended in running.run(wanted, lambda text: print(f"  {text}", flush=True)):
         name = f"{ended.job.label} ({options.tier})"
-        if ended.error:
-            failed += 1
-            print(f"evoclaims: {name} failed: {ended.error}.", file=sys.stderr)
-        else:
-            failed += _print_trials(store, name, wanted[ended.job], seeds, ended.again)
+        failed += bool(ended.error) or _print_trials(store, name, wanted[ended.job], seeds, ended.again)
     if failed and len(chosen) > 1:
         print(f"evoclaims: {failed} of {len(chosen)} conditions failed.", file=sys.stderr)
     if options.variant:

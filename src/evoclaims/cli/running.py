@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import sys
 import time
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from evoclaims.claims.fetching import RunMissing
 from evoclaims.cli.missing import missing_batches
 from evoclaims.cli.project import Project
 from evoclaims.cli.seats import Host
+from evoclaims.cli.terminal import terminal
 from evoclaims.cli.worker import Ended, Order, run_jobs
 from evoclaims.cli.workers import Workers, in_queue
 from evoclaims.mutants.conditions import Job
@@ -26,13 +28,12 @@ class Running:
         project: what is run.
         order: what the conditions have in common.
         host: the processes and GPUs that may be used.
-        line: shows progress.
     """
 
     project: Project
     order: Order
     host: Host
-    line: LiveLine
+    line: LiveLine = field(default_factory=lambda: LiveLine(*terminal()))
 
     @property
     def limit(self) -> float:
@@ -49,7 +50,7 @@ class Running:
         RunMissing(self.project.store, self.device, self.line, self.limit).check()
 
     def run(self, wanted: Mapping[Job, Condition], tell: Callable[[str], None]) -> Iterator[Ended]:
-        """Run what the store lacks of some conditions, and yield each when it has ended.
+        """Run what the store lacks of some conditions, and yield each when it has ended; say which have failed.
 
         With several processes those that lack nothing come first, then each as it ends, with a line on the time left.
 
@@ -57,9 +58,14 @@ class Running:
             wanted: the conditions.
             tell: is told the progress of worker processes; a process that runs everything draws its line.
         """
-        if self.host.alone:
-            yield from run_jobs(self.project, self.order, wanted, self.line)
-            return
+        alone = run_jobs(self.project, self.order, wanted, self.line)
+        for ended in alone if self.host.alone else self._in_processes(wanted, tell):
+            if ended.error:
+                print(f"evoclaims: {ended.job.label} ({self.order.tier}) failed: {ended.error}.", file=sys.stderr)
+            yield ended
+
+    def _in_processes(self, wanted: Mapping[Job, Condition], tell: Callable[[str], None]) -> Iterator[Ended]:
+        """Run conditions in worker processes."""
         platform = "gpu" if self.host.gpus else devices.choose(self.device)[0].platform
         seeds, tier = self.order.seeds, self.order.tier
         batches = missing_batches(self.project, tier, wanted, seeds, self.limit, platform)

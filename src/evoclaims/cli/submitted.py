@@ -97,7 +97,8 @@ def log_of(store_root: Path, name: str, job: SubmittedJob) -> Path:
 
 def save(store_root: Path, name: str, submission: Submission) -> None:
     """Write down a submission."""
-    write_once(_path(store_root, name), msgspec.json.format(msgspec.json.encode(submission), indent=1) + b"\n")
+    text = msgspec.json.format(msgspec.json.encode(submission), indent=1) + b"\n"
+    write_once(folder_of(store_root, name).with_suffix(".json"), text)
 
 
 def load_all(store_root: Path) -> dict[str, Submission]:
@@ -116,8 +117,3 @@ def load_all(store_root: Path) -> dict[str, Submission]:
                 "that still run are not known then."
             ) from error
     return found
-
-
-def _path(store_root: Path, name: str) -> Path:
-    """Return the file of a submission."""
-    return store_root / FOLDER / f"{name}.json"

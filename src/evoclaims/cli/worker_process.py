@@ -52,16 +52,12 @@ class Process:
 
     def close(self) -> None:
         """Give it nothing more to do, and wait for its end."""
-        stdin, stdout, stderr = self._process.stdin, self._process.stdout, self._process.stderr
-        assert stdin is not None
-        assert stdout is not None
-        assert stderr is not None
         with contextlib.suppress(OSError):  # it is dead already
-            stdin.close()
+            self._process.stdin.close()
         self._process.wait()
         self._errors.join()
-        stdout.close()
-        stderr.close()
+        self._process.stdout.close()
+        self._process.stderr.close()
 
     def stop(self) -> None:
         """End it, whatever it does; it is still to be closed."""
@@ -70,13 +66,11 @@ class Process:
     def _ask(self, what: Order | Job) -> None:
         """Write a line to its standard input; a dead process is found when it does not reply."""
         with contextlib.suppress(OSError):
-            assert self._process.stdin is not None
             self._process.stdin.write(msgspec.json.encode(what) + b"\n")
             self._process.stdin.flush()
 
     def _reply(self) -> Reply | None:
         """Wait for its next reply; None where it has died."""
-        assert self._process.stdout is not None
         line = self._process.stdout.readline()
         try:
             return msgspec.json.decode(line, type=Reply) if line else None
@@ -85,6 +79,5 @@ class Process:
 
     def _pass_errors_on(self) -> None:
         """Print what it writes to standard error."""
-        assert self._process.stderr is not None
         for line in self._process.stderr:
             print(line.decode(errors="replace"), end="", file=sys.stderr, flush=True)

@@ -8,7 +8,6 @@ from typing import Any, Final
 
 from evoclaims.core.errors import UserError
 from evoclaims.networks import export, picture
-from evoclaims.networks.graph import GraphNetwork
 from evoclaims.report.model import ShownChampion
 from evoclaims.report.trial_summary import TrialSummary
 from evoclaims.trials import champions
@@ -24,8 +23,10 @@ Draw = Callable[[Condition, TrialResult, Any, str], bytes | None]
 """Draws a champion as SVG: takes condition, record, parameters and a title; None where there is nothing to draw."""
 
 
-def network(condition: Condition, result: TrialResult, parameters: Any, title: str) -> bytes | None:
-    """Draw the network of a champion that is a graph.
+def network(
+    condition: Condition, result: TrialResult, parameters: Any, title: str, file_format: picture.Format = "svg"
+) -> bytes | None:
+    """Draw the network of a champion that is a graph, beside it the one that it generates on a substrate.
 
     Raises:
         UserError: when matplotlib or networkx is not installed.
@@ -33,7 +34,15 @@ def network(condition: Condition, result: TrialResult, parameters: Any, title: s
     graph = champions.network_of(condition, parameters)
     if graph is None:
         return None
-    return picture.draw(network_panels(condition, graph, parameters), title, "svg")
+    nodes, drawing = export.to_networkx(parameters, graph), champions.substrate_of(condition, parameters)
+    if drawing is None:
+        panels = [picture.network_panel(nodes, graph, "the network that evolved")]
+    else:
+        panels = [
+            picture.network_panel(nodes, graph, "the CPPN that evolved", ("x₁", "y₁", "x₂", "y₂"), ("q",)),
+            picture.substrate_panel(*drawing, "the network that it draws"),
+        ]
+    return picture.draw(panels, title, file_format)
 
 
 def champion_of(
@@ -82,20 +91,3 @@ def typical(trials: Sequence[TrialSummary]) -> tuple[TrialSummary, str] | None:
     middle = ranked[(len(ranked) - 1) // 2][0]
     trial = next(t for score, _, t in ranked if score == middle)
     return trial, f"seed {trial.seed}, the median of {len(ranked)} by mean success"
-
-
-def network_panels(condition: Condition, network: GraphNetwork, genome: Any) -> list[picture.Panel]:
-    """Return the network of a genome, and the network that it generates on a substrate, if any.
-
-    Raises:
-        UserError: when networkx is not installed.
-    """
-    graph = export.to_networkx(genome, network)
-    drawing = champions.substrate_of(condition, genome)
-    if drawing is None:
-        return [picture.network_panel(graph, network, "the network that evolved")]
-    ends = ("x₁", "y₁", "x₂", "y₂"), ("q",)
-    return [
-        picture.network_panel(graph, network, "the CPPN that evolved", *ends),
-        picture.substrate_panel(*drawing, "the network that it draws"),
-    ]
