@@ -13,10 +13,6 @@ from evoclaims.judging.verdict import Outcome
 
 F = TypeVar("F", bound=Callable[..., Any])
 
-CLAIM_MARK = "claim"
-EXPECT_MARK = "claim_expect"
-GAP_MARK = "claim_without_smoke"
-
 
 @dataclass(frozen=True)
 class Claim:
@@ -119,13 +115,13 @@ def without_smoke(*, because: str) -> pytest.MarkDecorator:
 
 def gap_of(item: pytest.Item, tier: str) -> str:
     """Return why a test has no instance at a tier; empty if it has one."""
-    mark = item.get_closest_marker(GAP_MARK) if tier == "smoke" else None
+    mark = item.get_closest_marker("claim_without_smoke") if tier == "smoke" else None
     return str(mark.args[0]) if mark else ""
 
 
 def claim_of(item: pytest.Item) -> Claim | None:
     """Return the claim that a test checks, or None."""
-    mark = item.get_closest_marker(CLAIM_MARK)
+    mark = item.get_closest_marker("claim")
     found: Claim | None = mark.args[0] if mark and mark.args else None
     return found
 
@@ -140,7 +136,7 @@ def expectation_of(item: pytest.Item, tier: str) -> Expectation | None:
     of_case = {id(mark) for mark in callspec.marks} if callspec else set()
     nodes = item.listchain()[::-1]
     found: list[tuple[int, bool, Expectation]] = []
-    for node, mark in item.iter_markers_with_node(EXPECT_MARK):
+    for node, mark in item.iter_markers_with_node("claim_expect"):
         expectation: Expectation = mark.args[0]
         # pytest lists the marks of a test before those of its parameters.
         distance = 0 if id(mark) in of_case else 1 + nodes.index(node)

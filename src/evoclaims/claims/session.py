@@ -172,13 +172,17 @@ class Session:
         return [trial for trial in stored if trial is not None]
 
 
+@dataclass
 class Verdicts:
-    """The `verdict` fixture: takes exactly one assertion per test and keeps its report."""
+    """The `verdict` fixture: takes exactly one assertion per test and keeps its report.
 
-    def __init__(self, settle: Callable[[Assertion], ClaimReport]) -> None:
-        """Remember how to judge."""
-        self._settle = settle
-        self.report: ClaimReport | None = None
+    Attributes:
+        settle: judges it.
+        report: what came of it; None so far.
+    """
+
+    settle: Callable[[Assertion], ClaimReport]
+    report: ClaimReport | None = None
 
     def __call__(self, assertion: Assertion) -> None:
         """Judge the claim's assertion.
@@ -194,4 +198,4 @@ class Verdicts:
             )
         if self.report is not None:
             raise UserError("A claim has one verdict: join several assertions with & (and) or | (or).")
-        self.report = self._settle(assertion)
+        self.report = self.settle(assertion)

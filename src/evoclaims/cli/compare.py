@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import chain
 from pathlib import Path
 
@@ -47,7 +47,7 @@ def main(options: argparse.Namespace) -> int:
         return 0
     if options.out is not None:
         raise UserError("--out draws what --timeline lists: add --timeline.")
-    old, new = (side.of(tiers) for side in _Places(project, tiers).sides(options.places))
+    old, new = (side.of(tiers) for side in _sides(project, tiers, options.places))
     found = transitions.compare(old.verdicts, new.verdicts)
     drift, digests = comparison.compare_trials(old, new)
     for line in (
@@ -67,69 +67,64 @@ def main(options: argparse.Namespace) -> int:
     return int(bool(matched))
 
 
-@dataclass(frozen=True)
-class _Places:
-    """Where verdicts and trials are found."""
+def _sides(project: Project, tiers: Sequence[str], places: Sequence[str]) -> tuple[Side, Side]:
+    """Return the old and the new side that the command line names."""
+    reproduction = project.reproduction
+    if not places:
+        accepted = comparison.working_tree(reproduction)
+        if not accepted.verdicts:
+            raise UserError("No verdict has been accepted yet: `evoclaims accept` accepts those of now.")
+        store, reports = project.store, project.judge(*tiers)
+        now = replace(
+            comparison.store(reproduction, store, reports),
+            verdicts=transitions.standings(reports),
+            name=f"judged from the store {store.root}, and from reference trials where it has none",
+        )
+        return replace(accepted, name="accepted verdicts, and reference trials"), now
+    found = [_place(project, place) for place in places]
+    revisions = [place for place in found if isinstance(place, GitRevision)]
+    stores = [place for place in found if isinstance(place, Store)]
+    if revisions and stores:
+        raise UserError(
+            f"{revisions[0].name} is a revision and {stores[0].root} a store: two of a kind can be compared."
+        )
+    if revisions:
+        read = [comparison.revision(reproduction, place) for place in revisions]
+        return read[0], read[1] if len(read) == 2 else comparison.working_tree(reproduction)
+    return _stores(project, tiers, *[*stores, project.store][:2])
 
-    project: Project
-    tiers: Sequence[str]
 
-    def sides(self, places: Sequence[str]) -> tuple[Side, Side]:
-        """Return the old and the new side that the command line names."""
-        reproduction = self.project.reproduction
-        if not places:
-            accepted = comparison.working_tree(reproduction)
-            if not accepted.verdicts:
-                raise UserError("No verdict has been accepted yet: `evoclaims accept` accepts those of now.")
-            store, reports = self.project.store, self.project.judge(*self.tiers)
-            now = replace(
-                comparison.store(reproduction, store, reports),
-                verdicts=transitions.standings(reports),
-                name=f"judged from the store {store.root}, and from reference trials where it has none",
-            )
-            return replace(accepted, name="accepted verdicts, and reference trials"), now
-        found = [self._place(place) for place in places]
-        revisions = [place for place in found if isinstance(place, GitRevision)]
-        stores = [place for place in found if isinstance(place, Store)]
-        if revisions and stores:
-            raise UserError(
-                f"{revisions[0].name} is a revision and {stores[0].root} a store: two of a kind can be compared."
-            )
-        if revisions:
-            read = [comparison.revision(reproduction, place) for place in revisions]
-            return read[0], read[1] if len(read) == 2 else comparison.working_tree(reproduction)
-        return self._stores(*[*stores, self.project.store][:2])
+def _place(project: Project, name: str) -> GitRevision | Store:
+    """Return what a name stands for."""
+    path, revision = Path(name), None
+    if not path.is_absolute() and not name.startswith("."):  # no git revision has such a name
+        try:
+            revision = find_revision(name, project.reproduction.folder)
+        except UserError:
+            if not path.is_dir():  # without a repository, the name can still be a folder
+                raise
+    if revision is not None and path.is_dir():
+        raise UserError(
+            f"{name} is both a folder and a git revision: write ./{name} for the folder, or "
+            f"the revision's hash, {revision.sha[:12]}."
+        )
+    if revision is not None:
+        return revision
+    if not path.is_dir():
+        raise UserError(f"There is neither a git revision nor a folder called {name}.")
+    return open_store(name)
 
-    def _place(self, name: str) -> GitRevision | Store:
-        """Return what a name stands for."""
-        path, revision = Path(name), None
-        if not path.is_absolute() and not name.startswith("."):  # no git revision has such a name
-            try:
-                revision = find_revision(name, self.project.reproduction.folder)
-            except UserError:
-                if not path.is_dir():  # without a repository, the name can still be a folder
-                    raise
-        if revision is not None and path.is_dir():
-            raise UserError(
-                f"{name} is both a folder and a git revision: write ./{name} for the folder, or "
-                f"the revision's hash, {revision.sha[:12]}."
-            )
-        if revision is not None:
-            return revision
-        if not path.is_dir():
-            raise UserError(f"There is neither a git revision nor a folder called {name}.")
-        return open_store(name)
 
-    def _stores(self, old: Store, new: Store) -> tuple[Side, Side]:
-        """Judge two stores, each from its own trials."""
-        for store in (old, new):
-            if not store.ids():
-                raise UserError(f"The folder {store.root} holds no trials, so there is nothing to compare.")
-        sessions = [replace(self.project, storage=str(store.root)).session() for store in (old, new)]
-        found = judge(self.project.config, [(session, tier) for tier in self.tiers for session in sessions])
-        before, after = chain.from_iterable(found[::2]), chain.from_iterable(found[1::2])
-        reproduction = self.project.reproduction
-        return comparison.store(reproduction, old, before), comparison.store(reproduction, new, after)
+def _stores(project: Project, tiers: Sequence[str], old: Store, new: Store) -> tuple[Side, Side]:
+    """Judge two stores, each from its own trials."""
+    for store in (old, new):
+        if not store.ids():
+            raise UserError(f"The folder {store.root} holds no trials, so there is nothing to compare.")
+    sessions = [replace(project, storage=str(store.root)).session() for store in (old, new)]
+    found = judge(project.config, [(session, tier) for tier in tiers for session in sessions])
+    before, after = chain.from_iterable(found[::2]), chain.from_iterable(found[1::2])
+    reproduction = project.reproduction
+    return comparison.store(reproduction, old, before), comparison.store(reproduction, new, after)
 
 
 def _drift_lines(drift: DriftReport, digests: DigestCheck, new: Side) -> Iterator[str]:

@@ -5,8 +5,7 @@ from __future__ import annotations
 import contextlib
 import gc
 import io
-import os
-from collections.abc import Generator, Iterator, Sequence
+from collections.abc import Generator, Sequence
 from itertools import zip_longest
 from pathlib import Path
 from typing import Final
@@ -51,12 +50,17 @@ def judge(config: SuiteConfig, asked: Sequence[tuple[Session, str]]) -> list[lis
     """
     run = _Run(config, asked)
     said = io.StringIO()
-    with contextlib.redirect_stderr(said), _without(_ENVIRONMENT), _frozen():
+    with contextlib.redirect_stderr(said), pytest.MonkeyPatch.context() as environment:
+        for name in _ENVIRONMENT:
+            environment.delenv(name, raising=False)
+        gc.freeze()  # the garbage collection at the end of a run of pytest takes long with all imported objects
         try:
             status = pytest.main([*run.arguments], plugins=[run])
         except (Exception, SystemExit) as error:  # such as a plugin that does not import
             run.troubles.append(_told(error, config.root))
             status = pytest.ExitCode.INTERNAL_ERROR
+        finally:
+            gc.unfreeze()
     if run.interrupted:
         raise KeyboardInterrupt
     if not run.troubles and status in (pytest.ExitCode.USAGE_ERROR, pytest.ExitCode.INTERNAL_ERROR):
@@ -176,23 +180,3 @@ def _told(error: BaseException, root: Path) -> str:
             return in_one_line(cause, root)
         return " ".join(str(error).split()).removesuffix(".")
     return in_one_line(error, root)
-
-
-@contextlib.contextmanager
-def _without(names: Sequence[str]) -> Iterator[None]:
-    """Run without some environment variables."""
-    kept = {name: os.environ.pop(name) for name in names if name in os.environ}
-    try:
-        yield
-    finally:
-        os.environ.update(kept)
-
-
-@contextlib.contextmanager
-def _frozen() -> Iterator[None]:
-    """Keep imported objects out of the garbage collection at the end of a run of pytest, which else takes long."""
-    gc.freeze()
-    try:
-        yield
-    finally:
-        gc.unfreeze()

@@ -33,8 +33,7 @@ class Minimizes(Fault):
 
     def step(self, key: PRNGKeyArray, task: Task, level: Int[Array, ""], state: Any) -> tuple[Any, Progress]:
         """Train on the reversed reward."""
-        trained: tuple[Any, Progress] = self.sound.step(key, plant(ReversesReward, task), level, state)
-        return trained
+        return self.sound.step(key, plant(ReversesReward, task), level, state)
 
 
 class SelectsAtRandom(Fault):
@@ -44,8 +43,7 @@ class SelectsAtRandom(Fault):
 
     def step(self, key: PRNGKeyArray, task: Task, level: Int[Array, ""], state: Any) -> tuple[Any, Progress]:
         """Train on random rewards."""
-        trained: tuple[Any, Progress] = self.sound.step(key, plant(PaysAtRandom, task), level, state)
-        return trained
+        return self.sound.step(key, plant(PaysAtRandom, task), level, state)
 
 
 class ForgetsChampion(Fault):
@@ -55,8 +53,7 @@ class ForgetsChampion(Fault):
 
     def best(self, task: Task, state: Any) -> Policy:
         """Return the policy of an untrained state."""
-        policy: Policy = self.sound.best(task, self.sound.init(jax.random.key(0), task))
-        return policy
+        return self.sound.best(task, self.sound.init(jax.random.key(0), task))
 
 
 class HasOneSeed(Fault):
@@ -78,8 +75,7 @@ class HasOneSeed(Fault):
 
     def best(self, task: Task, state: tuple[Int[Array, ""], Any]) -> Policy:
         """Return the policy of the sound method's state."""
-        policy: Policy = self.sound.best(task, state[1])
-        return policy
+        return self.sound.best(task, state[1])
 
 
 class KeepsItsStepSize(Fault):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from statistics import median
 from typing import Final
 
@@ -97,9 +97,19 @@ class Part:
 
 def judged_parts(verdict: Verdict) -> tuple[Part, ...]:
     """Return the parts of a verdict as they are shown."""
-    parts = tuple(map(_judged_part, verdict.evidence))
     return tuple(
-        replace(part, decided=index == verdict.deciding and len(parts) > 1) for index, part in enumerate(parts)
+        Part(
+            describe=evidence.describe,
+            outcome=evidence.outcome,
+            numbers=_numbers(evidence),
+            detail=evidence.detail,
+            event=evidence.events,
+            strips=tuple(_strip(sample, evidence.events) for sample in evidence.samples),
+            bounds=tuple(bound for bound in evidence.bounds if bound.on_axis),
+            spans=tuple(interval for interval in evidence.intervals if interval.on_axis),
+            decided=index == verdict.deciding and len(verdict.evidence) > 1,
+        )
+        for index, evidence in enumerate(verdict.evidence)
     )
 
 
@@ -107,20 +117,6 @@ def in_short(labels: Sequence[str]) -> list[str]:
     """Return the conditions of labels such as "cma_es on n_parity: reward" if they tell them apart, else the labels."""
     conditions = [label.partition(":")[0] for label in labels]
     return conditions if len(set(conditions)) == len(conditions) else list(labels)
-
-
-def _judged_part(evidence: Evidence) -> Part:
-    """Return one part as it is shown."""
-    return Part(
-        describe=evidence.describe,
-        outcome=evidence.outcome,
-        numbers=_numbers(evidence),
-        detail=evidence.detail,
-        event=evidence.events,
-        strips=tuple(_strip(sample, evidence.events) for sample in evidence.samples),
-        bounds=tuple(bound for bound in evidence.bounds if bound.on_axis),
-        spans=tuple(interval for interval in evidence.intervals if interval.on_axis),
-    )
 
 
 def unjudged_part(label: str, trials: Sequence[TrialSummary]) -> Part:

@@ -9,16 +9,11 @@ from evoclaims.judging.verdict import Direction
 from evoclaims.report.formatting import p_value, place_key, places
 from evoclaims.verdicts import mixed_versions
 from evoclaims.verdicts.claim_report import ClaimReport
-from evoclaims.verdicts.history import in_order, key_of
+from evoclaims.verdicts.history import ordered
 from evoclaims.verdicts.sensitivity import Tally, Tried
 
 NONE = "–"
 """Not measured."""
-
-
-def ordered(reports: Iterable[ClaimReport]) -> list[ClaimReport]:
-    """Return reports by tier, G9 before G10."""
-    return sorted(reports, key=lambda report: in_order(key_of(report)))
 
 
 def in_the_papers_order(reports: Iterable[ClaimReport]) -> list[ClaimReport]:

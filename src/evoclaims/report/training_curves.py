@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
 from evoclaims.report.formatting import clean, number
@@ -91,7 +92,8 @@ def _panel(trials: Sequence[TrialSummary], name: str) -> CurvePanel:
         return CurvePanel(clean(name), lines, None, broken)
     ends = [trial.curves[AXES[0]] for trial in trials]
     x = np.unique(np.linspace(min(axis[0] for axis in ends), max(axis[-1] for axis in ends), POINTS))
-    low, middle, high = _quantiles(np.stack([_held(trial, name, x) for trial in trials]))
+    held = pd.DataFrame([_held(trial, name, x) for trial in trials])
+    low, middle, high = held.quantile([0.1, 0.5, 0.9]).to_numpy()  # of the finite values; NaN where there are none
     count = len(trials)
     return CurvePanel(
         clean(name),
@@ -99,18 +101,6 @@ def _panel(trials: Sequence[TrialSummary], name: str) -> CurvePanel:
         (Line("lower decile", x, low), Line("upper decile", x, high)),
         broken,
     )
-
-
-def _quantiles(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return lower decile, median and upper decile of the finite values in each column; NaN where there are none."""
-    levels = [0.1, 0.5, 0.9]
-    if np.isfinite(values).all():
-        found: NDArray[np.float64] = np.quantile(values, levels, axis=0)
-        return found
-    some = np.isfinite(values).any(axis=0)
-    found = np.full((len(levels), values.shape[1]), np.nan)
-    found[:, some] = np.nanquantile(values[:, some], levels, axis=0)
-    return found
 
 
 def _held(trial: TrialSummary, name: str, x: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from evoclaims.judging.baseline import DriftReport, DriftRow
 from evoclaims.judging.verdict import Outcome
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.store import Store
 from evoclaims.verdicts.claim_report import ClaimReport
-from evoclaims.verdicts.history import in_order, key_of
+from evoclaims.verdicts.history import ordered
 from evoclaims.verdicts.source_trials import SourceTrials
 from evoclaims.verdicts.upgrade import Succession, Upgrade, upgrade
 
@@ -126,7 +126,7 @@ def judged(label: str, reports: Iterable[ClaimReport], store: Store, notes: str 
         store: the store that it used.
         notes: what else than the release on trial differs there.
     """
-    by_name = {report.name: report for report in sorted(reports, key=lambda report: in_order(key_of(report)))}
+    by_name = {report.name: report for report in ordered(reports)}
     trials: dict[str, dict[str, TrialResult]] = {}
     for source in (source for report in by_name.values() for source in report.sources):
         for trial in _trials(source, store):
@@ -181,10 +181,8 @@ def _cell(report: ClaimReport, before: ClaimReport | None, found: Upgrade | None
     labels = {source.label for source in report.sources}
     own = [one for one in found.successions if one.label in labels]
     rows = [row for row in found.drift.rows if row.label in labels and row.p_holm is not None]
-    return Cell(
-        cell.outcome,
-        cell.n,
-        cell.was,
+    return replace(
+        cell,
         repeated=bool(own),
         compared=sum(len(one.pairs) for one in own),
         changed=sum(one.changed for one in own),

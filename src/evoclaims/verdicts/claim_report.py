@@ -15,7 +15,7 @@ from evoclaims.core.errors import UserError
 from evoclaims.core.file_names import file_name
 from evoclaims.core.files import write_atomically
 from evoclaims.judging.verdict import Outcome, Verdict
-from evoclaims.verdicts.sensitivity import Tally, Tried, tally
+from evoclaims.verdicts.sensitivity import Tally, Tried
 from evoclaims.verdicts.source_trials import SourceTrials, versions_of
 from evoclaims.verdicts.versions import Several
 
@@ -95,7 +95,8 @@ class ClaimReport:
     @property
     def counted_as(self) -> Tally:
         """What the claim counts as, wherever claims are counted."""
-        return tally(self.outcome, self.tried)
+        insensitive = (self.outcome, self.tried) == (Outcome.SUPPORTED, Tried.INSENSITIVE)
+        return Tally.INSENSITIVE if insensitive else Tally(self.outcome.value)
 
     @property
     def as_expected(self) -> bool:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import itertools
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields
 from datetime import date
 from pathlib import Path
@@ -74,6 +74,11 @@ def in_order(key: tuple[str, str]) -> tuple[str, str, int, str, str]:
     tier, name = key
     claim, _, case = name.partition("[")
     return tier, claim[:1], len(claim), claim, case.removesuffix("]")
+
+
+def ordered(reports: Iterable[ClaimReport]) -> list[ClaimReport]:
+    """Return reports by tier, G9 before G10."""
+    return sorted(reports, key=lambda report: in_order(key_of(report)))
 
 
 def eras(entries: Sequence[Entry]) -> tuple[tuple[Entry, ...], ...]:

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
-from typing import Any, Final, Literal
+from typing import Any, Final, Literal, get_args
 
 import msgspec
 import tomli_w
@@ -216,9 +216,8 @@ def _written(row: Sensitivity) -> _Written:
     """Return a row as the file has it."""
     written = _Written(row.outcome, row.fingerprint, row.untried, {name: {} for name in row.methods}, {})
     for one in row.attempts:
-        parts: dict[Part, dict[str, dict[str, str]]] = {"method": written.method, "task": written.task}
         said = str(one.outcome if one.fate is Fate.KILLED else one.fate)
-        parts[one.part].setdefault(one.target, {})[one.mutant] = said
+        getattr(written, one.part).setdefault(one.target, {})[one.mutant] = said
     return written
 
 
@@ -230,16 +229,10 @@ def _read(written: _Written) -> Sensitivity:
             return Attempt(mutant, part, target, Outcome(said), Fate.KILLED)
         return Attempt(mutant, part, target, written.outcome, Fate(said))
 
-    parts: tuple[tuple[Part, dict[str, dict[str, str]]], ...] = ("method", written.method), ("task", written.task)
-    return Sensitivity(
-        outcome=written.outcome,
-        fingerprint=written.fingerprint,
-        methods=tuple(written.method),
-        attempts=tuple(
-            attempt(part, target, mutant, said)
-            for part, targets in parts
-            for target, faults in targets.items()
-            for mutant, said in faults.items()
-        ),
-        untried=written.untried,
+    attempts = (
+        attempt(part, target, mutant, said)
+        for part in get_args(Part)
+        for target, faults in getattr(written, part).items()
+        for mutant, said in faults.items()
     )
+    return Sensitivity(written.outcome, written.fingerprint, tuple(written.method), tuple(attempts), written.untried)

@@ -29,8 +29,3 @@ class Tally(StrEnum):
     def symbol(self) -> str:
         """One character for tables: the outcome's."""
         return (Outcome.SUPPORTED if self is Tally.INSENSITIVE else Outcome(self.value)).symbol
-
-
-def tally(outcome: Outcome, tried: Tried) -> Tally:
-    """Return what a claim counts as."""
-    return Tally.INSENSITIVE if (outcome, tried) == (Outcome.SUPPORTED, Tried.INSENSITIVE) else Tally(outcome.value)
