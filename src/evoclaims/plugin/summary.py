@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -85,34 +86,30 @@ class Summary:
             from evoclaims.report import table_cells
 
             self.reports = table_cells.ordered(self.reports)
-        for finish in (
-            self._compare,
-            self._compare_with_predecessors,
-            self._compare_with_accepted,
-            self._write_json,
-        ):
-            try:
-                finish()
-            except UserError as error:
-                self._troubles.append(str(error))
+            with self._telling():
+                self._drift = make_session(self._config).drift(self.reports)
+            with self._telling():
+                self._upgrade = make_session(self._config).upgrade(self.reports)
+            with self._telling():
+                self._compare_with_accepted()
+        with self._telling():
+            self._write_json()
         if refused and not self.reports:
             session.exitstatus = pytest.ExitCode.USAGE_ERROR
         elif session.exitstatus == pytest.ExitCode.OK:
             session.exitstatus = self._status()
 
-    def _compare(self) -> None:
-        """Compare the store's trials behind the claims with the reference trials."""
-        if self.reports:
-            self._drift = make_session(self._config).drift(self.reports)
-
-    def _compare_with_predecessors(self) -> None:
-        """Compare the trials of this environment with the store's trials of other versions."""
-        if self.reports:
-            self._upgrade = make_session(self._config).upgrade(self.reports)
+    @contextmanager
+    def _telling(self) -> Iterator[None]:
+        """Tell of an error when the run has ended, and go on."""
+        try:
+            yield
+        except UserError as error:
+            self._troubles.append(str(error))
 
     def _compare_with_accepted(self) -> None:
         """Compare the verdicts with the last accepted ones, which are for the protocol itself, not for a variant."""
-        if self.reports and not self._config.getoption("claims_variant"):
+        if not self._config.getoption("claims_variant"):
             from evoclaims.verdicts.regression import regression
 
             folder = make_session(self._config).reproduction.folder

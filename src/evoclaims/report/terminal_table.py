@@ -6,7 +6,6 @@ import io
 import os
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Final, Literal
 
@@ -44,18 +43,16 @@ def verdict_table(reports: Sequence[ClaimReport], width: int, colour: bool) -> s
     out, the evidence first.
     """
     ordered = table_cells.ordered(reports)
-    names = Column("claim", [printable(report.name) for report in ordered], most=width // 2)
-    verdicts = Column("verdict", [table_cells.verdict_of_versions(report) for report in ordered])
+    names = _column("claim", [printable(report.name) for report in ordered], most=width // 2)
+    verdicts = _column("verdict", [table_cells.verdict_of_versions(report) for report in ordered])
     columns = next((found for found in _choices(ordered) if _room(width, names, verdicts, *found) >= SENTENCE), ())
     room = max(_room(width, names, verdicts, *columns), len(_CLAIMED))
-    sentences = Column(_CLAIMED, [_shortened(f"{one.statement} ({one.where})", room) for one in ordered], width=room)
-    shown = (names, sentences, verdicts, *columns)
-    lines = [Text(_GAP.join(column.padded(column.heading) for column in shown), style="bold")]
-    for row, report in enumerate(ordered):
-        line = Text(_GAP.join(column.padded(column.cells[row]) for column in shown[:2]) + _GAP)
-        line.append(verdicts.padded(verdicts.cells[row]), style=_COLOURS[report.outcome])
-        line.append("".join(_GAP + column.padded(column.cells[row]) for column in columns))
-        lines.append(line)
+    sentences = _column(_CLAIMED, [_shortened(f"{one.statement} ({one.where})", room) for one in ordered])
+    heading, *rows = zip(names, sentences, verdicts, *columns, strict=True)
+    lines = [Text(_GAP.join(heading), style="bold")]
+    for report, (name, sentence, verdict, *rest) in zip(ordered, rows, strict=True):
+        said = (verdict, _COLOURS[report.outcome])
+        lines.append(Text.assemble(name + _GAP + sentence + _GAP, said, *(_GAP + cell for cell in rest)))
     folders = sorted({os.path.relpath(Path(report.evidence).parent) for report in reports if report.evidence})
     captions = [f"evidence: {printable(folder)}/<claim>.json" for folder in folders]
     if any(report.as_expected for report in reports):
@@ -66,42 +63,24 @@ def verdict_table(reports: Sequence[ClaimReport], width: int, colour: bool) -> s
     return "\n".join([*(_rendered(line, width, colour).rstrip() for line in lines), *captions])
 
 
-@dataclass(frozen=True)
-class Column:
-    """A column of the table.
+def _column(heading: str, cells: Sequence[str], *, right: bool = False, most: int = 10_000) -> list[str]:
+    """Return a heading and the cells below it, padded to one width, at the left where they end at the `right`.
 
-    Attributes:
-        heading: its name.
-        cells: one for each claim.
-        right: whether they end at the right.
-        most: greatest width in columns of a terminal; a longer cell pushes the rest of its line to the right.
-        width: fixed width; 0 for that of the longest cell.
+    A cell longer than `most` columns of a terminal pushes the rest of its line to the right.
     """
-
-    heading: str
-    cells: Sequence[str]
-    right: bool = False
-    most: int = 10_000
-    width: int = 0
-
-    @property
-    def wide(self) -> int:
-        """The column's width."""
-        return self.width or min(max(map(cell_len, (self.heading, *self.cells))), max(self.most, len(self.heading)))
-
-    def padded(self, text: str) -> str:
-        """Return a text with spaces up to the column's width."""
-        spaces = " " * (self.wide - cell_len(text))
-        return spaces + text if self.right else text + spaces
+    texts = [heading, *cells]
+    wide = min(max(map(cell_len, texts)), max(most, len(heading)))
+    padded = ((text, " " * (wide - cell_len(text))) for text in texts)
+    return [spaces + text if right else text + spaces for text, spaces in padded]
 
 
-def _choices(reports: Sequence[ClaimReport]) -> Iterator[tuple[Column, ...]]:
+def _choices(reports: Sequence[ClaimReport]) -> Iterator[tuple[list[str], ...]]:
     """Yield the columns that may follow the verdict, all of them first, then fewer and shorter ones."""
-    n = Column("n", [table_cells.trials(report) for report in reports], right=True)
-    effect = Column("A12", [table_cells.effect(report) for report in reports], right=True)
-    attainable = Column("p (attainable)", [table_cells.p(report) for report in reports])
-    p = Column("p", [table_cells.p(report, attainable=False) for report in reports])
-    evidence = Column("evidence", [printable(Path(report.evidence).name) for report in reports])
+    n = _column("n", [table_cells.trials(report) for report in reports], right=True)
+    effect = _column("A12", [table_cells.effect(report) for report in reports], right=True)
+    attainable = _column("p (attainable)", [table_cells.p(report) for report in reports])
+    p = _column("p", [table_cells.p(report, attainable=False) for report in reports])
+    evidence = _column("evidence", [printable(Path(report.evidence).name) for report in reports])
     if any(report.evidence for report in reports):
         yield n, effect, attainable, evidence
     yield n, effect, attainable
@@ -110,9 +89,9 @@ def _choices(reports: Sequence[ClaimReport]) -> Iterator[tuple[Column, ...]]:
     yield (n,)
 
 
-def _room(width: int, *columns: Column) -> int:
+def _room(width: int, *columns: list[str]) -> int:
     """Return how many columns of a terminal are left for the sentence."""
-    return width - sum(column.wide + len(_GAP) for column in columns)
+    return width - sum(cell_len(column[0]) + len(_GAP) for column in columns)
 
 
 def _shortened(text: str, room: int) -> str:
