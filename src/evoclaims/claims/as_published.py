@@ -24,13 +24,9 @@ Numbers = dict[str, dict[str, Any]]
 
 @dataclass(frozen=True)
 class AsPublished:
-    """Instead of trials, as many records as are asked for, each with the published means: a `Fetch`.
+    """Instead of trials of a tier's conditions, as many records as are asked for, with the published means: a `Fetch`.
 
     What the paper has not published, no record has: an assertion that reads it cannot be judged.
-
-    Attributes:
-        reproduction: of the paper.
-        tier: whose conditions are asked for.
     """
 
     reproduction: Reproduction

@@ -77,14 +77,7 @@ class Asserted:
 
 @dataclass(frozen=True)
 class ClaimPower:
-    """A claim's power, or why it cannot be told.
-
-    Attributes:
-        name: such as "G1[n_parity]".
-        expected: the outcome that it should have.
-        power: None if it cannot be told.
-        trouble: why.
-    """
+    """A claim's power and the outcome that it should have; or, as its `trouble`, why the power cannot be told."""
 
     name: str
     expected: Outcome

@@ -174,12 +174,7 @@ class Session:
 
 @dataclass
 class Verdicts:
-    """The `verdict` fixture: takes exactly one assertion per test and keeps its report.
-
-    Attributes:
-        settle: judges it.
-        report: what came of it; None so far.
-    """
+    """The `verdict` fixture: takes exactly one assertion per test, settles it, and keeps its report."""
 
     settle: Callable[[Assertion], ClaimReport]
     report: ClaimReport | None = None

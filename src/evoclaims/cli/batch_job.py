@@ -30,12 +30,7 @@ class BatchJob:
     """Batches that one job runs, one after the other."""
 
     def __init__(self, commands: Sequence[Sequence[str]], folder: str) -> None:
-        """Run nothing yet.
-
-        Args:
-            commands: a command for each batch.
-            folder: where they run.
-        """
+        """Run nothing yet: `commands`, one for each batch, will run in `folder`."""
         self.commands = [list(command) for command in commands]
         self.folder = folder
         self.process = 0

@@ -17,13 +17,7 @@ from evoclaims.trials.time_limit import answers
 
 @dataclass(frozen=True)
 class MissingBatch:
-    """The missing trials of one condition: no two processes run trials of one condition at a time.
-
-    Attributes:
-        job: names the condition.
-        seeds: those of the missing trials.
-        estimate: about how long they take.
-    """
+    """The missing trials of one condition: no two processes run trials of one condition at a time."""
 
     job: Job
     seeds: tuple[int, ...]

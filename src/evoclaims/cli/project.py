@@ -26,13 +26,7 @@ ALL_TIERS: Final = "all"
 
 @dataclass(frozen=True)
 class Project:
-    """A project, and the store that a command was given.
-
-    Attributes:
-        config: its settings.
-        reproduction: the paper under test.
-        storage: folder of the store, relative to the current one.
-    """
+    """A project, and the folder of the store that a command was given, relative to the current one."""
 
     config: SuiteConfig
     reproduction: Reproduction

@@ -22,13 +22,7 @@ from evoclaims.trials.spec import Condition
 
 @dataclass(frozen=True)
 class Running:
-    """How a command runs trials.
-
-    Attributes:
-        project: what is run.
-        order: what the conditions have in common.
-        host: the processes and GPUs that may be used.
-    """
+    """How a command runs trials: whose, in which order, and with which processes and GPUs."""
 
     project: Project
     order: Order

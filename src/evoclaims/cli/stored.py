@@ -29,15 +29,7 @@ FIGURES: Final = Path("figures")
 
 @dataclass(frozen=True)
 class Stored:
-    """A trial out of the store.
-
-    Attributes:
-        title: names what was run.
-        condition: what was run.
-        result: its record.
-        parameters: of its champion (see `champions.load`).
-        file: where the champion is.
-    """
+    """A trial out of the store: its record, its champion's parameters (see `champions.load`), and where these are."""
 
     title: str
     condition: Condition

@@ -24,12 +24,7 @@ JobId = Annotated[str, Meta(pattern=r"\A[0-9]{1,19}(_[0-9]{1,19})?\Z")]
 
 @dataclass(frozen=True)
 class Batch:
-    """A condition's missing trials, as one process runs them.
-
-    Attributes:
-        method, task: the condition's names.
-        condition: its id.
-    """
+    """A condition's missing trials, as one process runs them; `condition` is its id."""
 
     method: Name
     task: Name

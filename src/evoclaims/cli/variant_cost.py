@@ -19,10 +19,6 @@ def to_run(running: Running, names: Sequence[Names]) -> list[Names]:
     """Print what the conditions of a variant cost here, and return those that are not committed.
 
     Times are upper bounds, by earlier trials of the variant or of the protocol on such a device.
-
-    Args:
-        running: how they are run.
-        names: of the conditions that the variant changes.
     """
     reproduction, store = running.project.reproduction, running.project.store
     tier, variant, seeds = running.order.tier, running.order.variant, running.order.seeds

@@ -15,14 +15,7 @@ from evoclaims.verdicts.mutation_matrix import Part
 
 @dataclass(frozen=True)
 class Planted:
-    """A fault in one method, or one task, of a tier.
-
-    Attributes:
-        mutant: the fault's name.
-        part: what has it.
-        target: the method or task that has it.
-        conditions: the faulty ones.
-    """
+    """A fault in one method, or one task, of a tier, with the faulty conditions."""
 
     mutant: str
     part: Part

@@ -48,14 +48,7 @@ def network(
 def champion_of(
     store: Store, condition: Condition, trials: Sequence[TrialSummary], draws: Sequence[Draw]
 ) -> ShownChampion:
-    """Return the champion of the median trial, with the first drawing that can be made of it.
-
-    Args:
-        store: may hold the champion's parameters.
-        condition: of the trials.
-        trials: of one condition.
-        draws: ways of drawing, in the order in which they are tried.
-    """
+    """Return the champion of the median trial, with the first of `draws`, in their order, that can be made."""
     chosen = typical(trials)
     if chosen is None:
         return ShownChampion("No trial has run to its end, so there is no champion to show.")

@@ -32,11 +32,7 @@ class LiveLine:
     ) -> None:
         """Draw with `write`: in place on a terminal of `columns` columns, or as a log if None.
 
-        Args:
-            write: takes text as it is.
-            columns: of the terminal.
-            clock: tells seconds.
-            log_seconds: least time between two lines of a log.
+        A log has a line each `log_seconds` at most, by a `clock` of seconds.
         """
         self._write = write
         self._width = None if columns is None else max(columns - 1, 20)

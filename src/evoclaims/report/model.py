@@ -24,12 +24,7 @@ from evoclaims.verdicts.sensitivity import Tally
 
 @dataclass(frozen=True)
 class ShownChampion:
-    """The best individual of a condition's typical trial.
-
-    Attributes:
-        says: which trial, or why there is no picture.
-        picture: an SVG's bytes; empty without one.
-    """
+    """The best individual of a condition's typical trial: which, or why it has no picture; an SVG's bytes, or none."""
 
     says: str
     picture: bytes = b""
@@ -96,12 +91,7 @@ class Section:
 
 @dataclass(frozen=True)
 class Board:
-    """The scoreboard of a tier.
-
-    Attributes:
-        tier: its name.
-        sections: its claims.
-    """
+    """The claims of a tier, and how they are counted."""
 
     tier: str
     sections: tuple[Section, ...]
@@ -121,12 +111,7 @@ class Board:
 
 @dataclass(frozen=True)
 class PaperFigure:
-    """A figure of the paper, redrawn.
-
-    Attributes:
-        title, says: what it shows.
-        picture: an SVG's bytes.
-    """
+    """A figure of the paper, redrawn: what it shows, and the bytes of an SVG."""
 
     title: str
     says: str

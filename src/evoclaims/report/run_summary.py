@@ -14,12 +14,7 @@ COLUMNS = ("claim", "what is claimed", "verdict", "n", "p", "why")
 
 
 def run_summary(reports: Sequence[ClaimReport], notes: Sequence[str] = ()) -> str:
-    """Return a table of verdicts, their totals, and further lines about them.
-
-    Args:
-        reports: of a run.
-        notes: plain texts, such as changes against the accepted verdicts.
-    """
+    """Return a table of verdicts, their totals, and plain `notes`, such as changes against the accepted verdicts."""
     rows = (map(literal, _cells(report)) for report in table_cells.ordered(reports))
     lines = ["## Claims", "", f"**{literal(table_cells.totals(reports))}**", ""]
     lines += [table(COLUMNS, rows, numbers=("n", "p"))]

@@ -36,8 +36,7 @@ class Regression:
     def lines(self, reasons: Mapping[tuple[str, str], str]) -> list[str]:
         """Return the counts, and a line for each verdict that differs from the accepted one; empty if there is none.
 
-        Args:
-            reasons: why changed verdicts may have done so, by tier and claim.
+        Changed verdicts have their `reasons` behind them, by tier and claim.
         """
         if not self.transitions:
             return []

@@ -33,12 +33,7 @@ class Robustness:
 
 
 def matrix(plain: Sequence[ClaimReport], variants: Mapping[str, Sequence[ClaimReport]]) -> tuple[Robustness, ...]:
-    """Return a row for each claim that some variant touches.
-
-    Args:
-        plain: reports under the protocol itself.
-        variants: reports by variant.
-    """
+    """Return a row for each claim that some variant touches, from reports under the protocol itself and by variant."""
     found = {
         (report.tier, report.name, name): report.outcome
         for name, reports in variants.items()

@@ -48,13 +48,7 @@ Standings = Mapping[tuple[str, str], Standing]
 
 @dataclass(frozen=True)
 class Transition:
-    """One claim's old and new verdict at one tier.
-
-    Attributes:
-        tier, claim: of the verdict.
-        kind: how it changed.
-        old, new: the verdicts; None where there is none.
-    """
+    """One claim's old and new verdict at one tier; None where there is none."""
 
     tier: str
     claim: str

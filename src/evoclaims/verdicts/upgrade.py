@@ -57,12 +57,7 @@ class Succession:
 
 @dataclass(frozen=True)
 class Upgrade:
-    """All conditions of a run that also have trials of an older environment.
-
-    Attributes:
-        successions: one for each condition.
-        drift: drift of the new trials from the old, judged together.
-    """
+    """All conditions of a run that also have trials of an older environment, judged together for drift."""
 
     successions: tuple[Succession, ...]
     drift: DriftReport
