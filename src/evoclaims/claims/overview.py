@@ -8,7 +8,7 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from evoclaims.claims.workload import Workload, scale_of
+from evoclaims.claims.workload import Workload, scale_of, seconds_of
 from evoclaims.trials.running import Running, running
 from evoclaims.trials.store import DamagedFileError, Store
 
@@ -101,8 +101,5 @@ def remaining(took: tuple[float | None, float | None], scale: float | None, now:
     """
     if now is not None and now.progress.seconds_left is not None:
         return now.progress.seconds_left
-    here, elsewhere = took
-    if here is None and (scale is None or elsewhere is None):
-        return None
-    whole = here if here is not None else (elsewhere or 0.0) * (scale or 0.0)
-    return whole if now is None else max(whole - (time.time() - now.since), 0.0)
+    whole = seconds_of(*took, scale)
+    return whole if now is None or whole is None else max(whole - (time.time() - now.since), 0.0)

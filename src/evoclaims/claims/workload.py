@@ -91,7 +91,7 @@ def weights(works: Iterable[Work]) -> dict[Work, float]:
     """
     works = list(works)
     scale = scale_of((work.here, work.elsewhere) for work in works) or 1.0
-    known = {work: _known(work, scale) for work in works if work.missing}
+    known = {work: seconds_of(work.here, work.elsewhere, scale) for work in works if work.missing}
     paces = [took / work.environment_steps for work, took in known.items() if took and work.environment_steps]
     pace = median(paces) if paces else 1e-6
     return dict.fromkeys(works, 0.0) | {
@@ -105,11 +105,11 @@ def scale_of(pairs: Iterable[tuple[float | None, float | None]]) -> float | None
     return sum(here for here, _ in both) / sum(elsewhere for _, elsewhere in both) if both else None
 
 
-def _known(work: Work, scale: float) -> float | None:
-    """Return the seconds that trials of a condition tell."""
-    if work.here is not None:
-        return work.here
-    return None if work.elsewhere is None else work.elsewhere * scale
+def seconds_of(here: float | None, elsewhere: float | None, scale: float | None) -> float | None:
+    """Return a condition's seconds here, where trials tell: those of here, or else of elsewhere (see `scale_of`)."""
+    if here is not None:
+        return here
+    return None if elsewhere is None or scale is None else elsewhere * scale
 
 
 def _needed(session: Session, item: pytest.Item, test: ClaimTest) -> Sequence[TrialGroup]:

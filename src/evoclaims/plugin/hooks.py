@@ -12,9 +12,12 @@ import pytest
 
 from evoclaims.core.errors import UserError
 from evoclaims.core.printable import shown
-from evoclaims.plugin import options, own_gpu
+from evoclaims.plugin import options
 from evoclaims.plugin.distribution import Distribution, prepare
 from evoclaims.plugin.options import TIERS
+from evoclaims.plugin.options import pytest_addoption as pytest_addoption
+from evoclaims.plugin.own_gpu import pytest_load_initial_conftests as pytest_load_initial_conftests
+from evoclaims.plugin.own_gpu import pytest_xdist_auto_num_workers as pytest_xdist_auto_num_workers
 from evoclaims.plugin.progress import QUIET, ProgressLine, progress_of
 from evoclaims.plugin.run_session import make_session
 from evoclaims.plugin.summary import ATTRIBUTE, KNOWN, TROUBLE, Summary
@@ -28,23 +31,6 @@ if TYPE_CHECKING:
 
 _verdicts: pytest.StashKey[Verdicts] = pytest.StashKey()
 _ended: pytest.StashKey[pytest.Session] = pytest.StashKey()
-
-
-def pytest_addoption(parser: pytest.Parser) -> None:
-    """Add the options."""
-    options.add(parser)
-
-
-@pytest.hookimpl(tryfirst=True)
-def pytest_load_initial_conftests(early_config: pytest.Config) -> None:
-    """Give a worker of pytest-xdist its own GPU before anything can import jax."""
-    own_gpu.take(early_config)
-
-
-@pytest.hookimpl(optionalhook=True)
-def pytest_xdist_auto_num_workers(config: pytest.Config) -> int | None:
-    """Let `-n auto` start a worker for each GPU."""
-    return own_gpu.workers(config)
 
 
 def pytest_configure(config: pytest.Config) -> None:

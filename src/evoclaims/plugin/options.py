@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 TIERS: Final = ("smoke", "full")
 
 
-def add(parser: pytest.Parser) -> None:
+def pytest_addoption(parser: pytest.Parser) -> None:
     """Add the options."""
     group = parser.getgroup("claims", "claims of a paper (evoclaims)")
     group.addoption("--claims-storage", metavar="DIR", help="folder of trials (.evoclaims in the project's root)")

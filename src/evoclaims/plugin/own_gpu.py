@@ -13,14 +13,16 @@ from evoclaims.core.errors import UserError
 from evoclaims.trials.gpus import environment_of_worker, gpus
 
 
-def take(config: pytest.Config) -> None:
-    """Let a worker of a project with claims see its GPU alone; its options are parsed, and nothing else is loaded."""
-    environment = environment_of_worker(config.known_args_namespace.claims_device, os.environ)
-    if environment and _has_claims(config):
+@pytest.hookimpl(tryfirst=True)
+def pytest_load_initial_conftests(early_config: pytest.Config) -> None:
+    """Let a worker of a project with claims see its GPU alone, before anything can import jax; options are parsed."""
+    environment = environment_of_worker(early_config.known_args_namespace.claims_device, os.environ)
+    if environment and _has_claims(early_config):
         os.environ.update(environment)
 
 
-def workers(config: pytest.Config) -> int | None:
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_auto_num_workers(config: pytest.Config) -> int | None:
     """Return how many workers `-n auto` means in a project with claims: one for each GPU; None without GPUs."""
     found = gpus(config.getoption("claims_device"))
     return len(found) if found and _has_claims(config) else None

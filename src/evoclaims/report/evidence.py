@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from statistics import median
 from typing import Final
@@ -153,12 +153,6 @@ def _least(sample: Sample, statistic: Callable[[Sequence[float]], float]) -> flo
     return statistic(sample.capped) if sample.limit is not None and math.isinf(statistic(sample.values)) else None
 
 
-def _iqms(samples: Sequence[Sample]) -> Iterator[tuple[str, str]]:
-    """Yield the interquartile mean of each sample."""
-    names = in_short([clean(sample.label) for sample in samples])
-    yield from ((f"IQM of {name}", _iqm(sample)) for name, sample in zip(names, samples, strict=True))
-
-
 def _iqm(sample: Sample) -> str:
     """Return the interquartile mean of a sample, and its interval, as rliable has them: description only."""
     least = _least(sample, iqm)
@@ -177,6 +171,8 @@ def _numbers(evidence: Evidence) -> tuple[tuple[str, str], ...]:
     ]
     if evidence.direction is Direction.AGAINST:
         tests.reverse()
+    samples = () if evidence.events else evidence.samples
+    names = in_short([clean(sample.label) for sample in samples])
     effects = (("A12", evidence.a12), ("Cliff’s δ", evidence.cliffs_delta))
     return (
         ("n a side", str(evidence.n)),
@@ -185,5 +181,5 @@ def _numbers(evidence: Evidence) -> tuple[tuple[str, str], ...]:
         *((name, number(value)) for name, value in effects if value is not None),
         *((interval.of, f"{number(interval.low)} to {number(interval.high)}") for interval in evidence.intervals),
         *((bound.name, number(bound.value)) for bound in evidence.bounds if not bound.on_axis),
-        *(() if evidence.events else _iqms(evidence.samples)),
+        *((f"IQM of {name}", _iqm(sample)) for name, sample in zip(names, samples, strict=True)),
     )

@@ -6,6 +6,7 @@ import math
 import re
 from collections import Counter
 from collections.abc import Iterable
+from itertools import chain, count
 from typing import Final
 
 from evoclaims.core.printable import printable
@@ -81,9 +82,7 @@ class Anchors:
         """Return a name such as "G1-n_parity-full"."""
         slugs = [re.sub(r"[^A-Za-z0-9_.-]+", "-", part).strip("-.") for part in parts]
         name = "-".join(slug for slug in slugs if slug) or "claim"
-        candidate, again = name, 1
-        while candidate in self._given:
-            again += 1
-            candidate = f"{name}-{again}"
-        self._given.add(candidate)
-        return candidate
+        again = (f"{name}-{index}" for index in count(2))
+        new = next(one for one in chain([name], again) if one not in self._given)
+        self._given.add(new)
+        return new
