@@ -175,6 +175,8 @@ def _claims(reports: Sequence[ClaimReport], costs: Costs) -> Table:
     kinds = _kinds(costs)
     took = [f"took on one\n{kind}" for kind in kinds]
     table = plain_table(("claim", "n", "α", "p for", "p against", "can be decided", *took), ())
+    for column in table.columns:
+        column.no_wrap = column is table.columns[0]  # words in the other columns can be broken, a claim's name cannot
     for report in reports:
         used = [(source.method, source.task) for source in report.sources]
         for look in report.attainable:
