@@ -33,6 +33,7 @@ class GroupKernel:
         numbers: the expressions that it computes.
         one_lane: whether `write` goes through all rows of a group itself, one after the other, rather than computing a
             vector of them.
+        for_gpus: whether it is faster than `function` on GPUs too.
     """
 
     name: str
@@ -43,6 +44,7 @@ class GroupKernel:
     write: Writer
     numbers: Sequence[Any] = ()
     one_lane: bool = False
+    for_gpus: bool = True
 
     def __call__(self, *leaves: Array) -> list[Array]:
         """Compute it, for any batch. With only the rows batched, or the groups, these are not copied."""
@@ -102,7 +104,9 @@ class GroupKernel:
         return self._call(leaves, call)
 
     def on_gpu(self, *leaves: Array) -> list[Array]:
-        """Call the kernel for NVIDIA's GPUs, for every element of a batch."""
+        """Call the kernel for NVIDIA's GPUs, or the function if that is faster there, for every element of a batch."""
+        if not self.for_gpus:
+            return self.as_it_is(*leaves)
 
         def call(groups: int, rows: int, own: list[bool], operands: list[Array], shapes: Shapes) -> Any:
             text = group_kernel.gpu_text(self.write, self.numbers, self.sizes, groups, rows, own)

@@ -36,21 +36,12 @@ def fast(key: PRNGKeyArray) -> PRNGKeyArray:
 
 def _random_bits(key: Array, bit_width: int, shape: tuple[int, ...]) -> Array:
     """Return random bits, given a key's numbers, uint32."""
-
-    def default(key: Array) -> Array:
-        bits: Array = threefry_prng_impl.random_bits(key, bit_width, shape)
-        return bits
-
     size = math.prod(shape)
     if bit_width != 32 or not size:
-        return default(key)
-
-    def by_kernel(key: Array) -> Array:
-        (bits,) = _kernel(size)(jax.lax.bitcast_convert_type(key, jnp.int32))
-        return jax.lax.bitcast_convert_type(bits, jnp.uint32).reshape(shape)
-
-    made: Array = jax.lax.platform_dependent(key, cpu=by_kernel, default=default)
-    return made
+        drawn: Array = threefry_prng_impl.random_bits(key, bit_width, shape)
+        return drawn
+    (bits,) = _kernel(size)(jax.lax.bitcast_convert_type(key, jnp.int32))
+    return jax.lax.bitcast_convert_type(bits, jnp.uint32).reshape(shape)
 
 
 _GENERATOR: Final = define_prng_impl(
@@ -73,7 +64,8 @@ def _kernel(size: int) -> GroupKernel:
         return [jax.lax.bitcast_convert_type(bits, jnp.int32)]
 
     key, bits = (jax.ShapeDtypeStruct((count,), jnp.int32) for count in (2, size))
-    return GroupKernel("The drawing of random numbers", function, (key,), (), (bits,), partial(_write, size))
+    write = partial(_write, size)
+    return GroupKernel("The drawing of random numbers", function, (key,), (), (bits,), write, for_gpus=False)
 
 
 def _write(size: int, rows: Rows, groups: Sequence[str], given: Sequence[str], results: Sequence[str]) -> None:

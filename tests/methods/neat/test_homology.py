@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
-from pathlib import Path
 from typing import Any
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from assembler import assemble, kernels_for_gpus
+from assembler import kernels_for_gpus
 from genomes import at, dags, made, read, same, stacked
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -131,7 +130,6 @@ def test_numbers_are_moved_as_bits() -> None:
 
 
 @pytest.mark.parametrize("name", MAPS)
-def test_nvidias_assembler_takes_the_kernel(name: str, tmp_path: Path) -> None:
+def test_gpus_search_without_the_kernel_which_is_slower_there(name: str) -> None:
     genomes = stacked([made([0, 1, 2], {(0, 2): 1.0})] * 3)
-    (text,) = kernels_for_gpus(MAPS[name], *_in_batch(name, genomes, genomes))
-    assemble(text, tmp_path)
+    assert not kernels_for_gpus(MAPS[name], *_in_batch(name, genomes, genomes))

@@ -59,6 +59,7 @@ def _search(nodes: int, connections: int) -> GroupKernel:
         outputs=(slots, of_nodes, of_nodes, slots, of_connections),
         write=partial(write_search, (nodes, connections)),
         one_lane=True,
+        for_gpus=False,
     )
 
 

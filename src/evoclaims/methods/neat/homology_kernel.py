@@ -1,6 +1,6 @@
 """The search for homologous genes as a kernel: one genome's genes in hash tables, looked up for many others.
 
-On processors a call goes through all genomes that are compared with the same one; on a GPU a thread is a pair.
+A call goes through all genomes that are compared with the same one.
 """
 
 from __future__ import annotations
