@@ -17,11 +17,15 @@ from reproductions.nisioti2025 import REPRODUCTION
 pytestmark = pytest.mark.slow
 
 CONDITIONS = REPRODUCTION.tier("full").conditions
-# One of each method with each kind of task and robot: what differs beyond is a number.
-KINDS = {(type(c.method), type(c.task), getattr(c.task, "robot", None)): names for names, c in CONDITIONS.items()}
+# Each method with each kind of task, and each kind of task with each robot: what differs beyond is a number.
+KINDS = {(type(c.method), type(c.task)): names for names, c in CONDITIONS.items()}
+ROBOTS = {(type(c.task), getattr(c.task, "robot", None)): names for names, c in CONDITIONS.items()}
 
 
-@pytest.mark.parametrize("condition", [pytest.param(CONDITIONS[n], id="-".join(n)) for n in KINDS.values()])
+@pytest.mark.parametrize(
+    "condition",
+    [pytest.param(CONDITIONS[n], id="-".join(n)) for n in dict.fromkeys([*KINDS.values(), *ROBOTS.values()])],
+)
 def test_a_condition_of_the_full_tier_traces_a_step_of_two_trials(condition: Condition) -> None:
     method, task = condition.method, condition.task
     keys = jax.random.split(jax.random.key(0), 2)

@@ -23,6 +23,8 @@ from evoclaims.envs.gates.circuit import Circuit, Sampling
 from evoclaims.envs.gates.parity import NParity
 from evoclaims.envs.gates.truth_table import TruthTable
 
+pytestmark = pytest.mark.newest
+
 gates = pytest.mark.parametrize("gate", GATES.values(), ids=list(GATES))
 few = pytest.mark.parametrize("gate", [GATES[name] for name in list(GATES)[1::3]], ids=list(GATES)[1::3])
 """The parities of 3 and 6, and two of the ALUs: enough where the rows have been checked one by one."""

@@ -12,6 +12,8 @@ from probes import CONSTANT, COPY, CURRICULUM, DELAYED, PROBES, SURVIVAL, Probe
 
 from evoclaims.envs.base import Episode, PolicyFn
 
+pytestmark = pytest.mark.newest
+
 YES: PolicyFn = lambda observation: jnp.ones(1)  # noqa: E731
 REPEAT: PolicyFn = lambda observation: observation[:1]  # noqa: E731
 EXCLUSIVE_OR: PolicyFn = lambda observation: -jnp.prod(observation, keepdims=True)  # noqa: E731

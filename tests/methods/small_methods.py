@@ -40,6 +40,7 @@ class Entry:
         keeps_the_best: whether its best policy never gets worse on a deterministic task.
         learns: whether a step draws from its key and changes the numbers that the method goes on with.
         examines: whether a step reports what its policy does.
+        sees_rewards: whether it learns from single rewards, and not from the fitness of whole episodes alone.
         needs: a package that is no dependency.
     """
 
@@ -51,6 +52,7 @@ class Entry:
     keeps_the_best: bool = True
     learns: bool = True
     examines: bool = True
+    sees_rewards: bool = False
     needs: str | None = None
 
 
@@ -116,6 +118,7 @@ METHODS = {
         task=NParity(3, "sampled"),
         cost=8 * 2 * 2,
         keeps_the_best=False,
+        sees_rewards=True,
         other=Ppo(
             policy_layers=(16,),
             value_layers=(16,),

@@ -22,6 +22,8 @@ from evoclaims.envs.gates.parity import NParity
 from evoclaims.methods.cma_es import CmaEs, ordinal_weights
 from evoclaims.networks.all_skips import AllSkips
 
+pytestmark = pytest.mark.newest
+
 DIMENSIONS, POPULATION = 5, 16
 Vector = NDArray[np.float64]
 

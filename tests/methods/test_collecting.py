@@ -14,6 +14,8 @@ from evoclaims.core.keys import streams
 from evoclaims.envs.gates.parity import NParity
 from evoclaims.methods.collect import Interaction, collect
 
+pytestmark = pytest.mark.newest
+
 ENVIRONMENTS, ROUNDS, UNROLL = 3, 4, 2
 LEVEL = jnp.zeros((), jnp.int32)
 

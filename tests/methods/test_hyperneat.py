@@ -24,6 +24,8 @@ from evoclaims.networks.genome import EMPTY, Connections, Genome, Nodes
 from evoclaims.networks.graph import GraphNetwork
 from evoclaims.networks.substrate import Substrate, layered, on_circle
 
+pytestmark = pytest.mark.newest
+
 NAMES = (*CPPN_FUNCTIONS, "sigmoid")
 FUNCTIONS: dict[str, Callable[[float], float]] = {
     "tanh": np.tanh,

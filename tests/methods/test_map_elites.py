@@ -22,6 +22,8 @@ from evoclaims.methods.map_elites import MapElites, beaten, lecun_uniform
 from evoclaims.networks.mlp import Mlp
 from evoclaims.trials.result_making import is_sound
 
+pytestmark = pytest.mark.newest
+
 LEVEL = jnp.zeros((), jnp.int32)
 
 

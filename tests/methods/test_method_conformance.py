@@ -10,6 +10,7 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import numpy as np
+import pytest
 from small_methods import METHODS, Entry
 from workbench import Workbench, close, same_bits
 
@@ -64,6 +65,7 @@ def test_another_key_gives_another_state_where_a_method_learns(entry: Entry, ben
     assert same_bits(one, other) != entry.learns
 
 
+@pytest.mark.newest  # the plain step compiles each of its operations alone
 def test_a_compiled_step_is_the_plain_step(bench: Workbench) -> None:
     state, _ = bench.run(1)
     close(

@@ -16,6 +16,8 @@ from evoclaims.core.errors import UserError
 from evoclaims.envs.gates.parity import NParity
 from evoclaims.methods.ppo import LevelTest, Ppo
 
+pytestmark = pytest.mark.newest
+
 SMALL = Ppo(policy_layers=(3,), value_layers=(3,), environments=4, batch_size=4, minibatches=1, updates_per_batch=1)
 ALWAYS_RIGHT = Probe("always_right", cases=((((0.0,), None),),), cases_at_level=(1,))
 

@@ -16,6 +16,8 @@ from evoclaims.methods.champion import first_champion
 from evoclaims.methods.cma_es import CmaEs, CmaEsState
 from evoclaims.methods.seldom_decomposed_cma_es import SeldomDecomposedCmaEs
 
+pytestmark = pytest.mark.newest
+
 GENERATIONS = 40
 FEW = 6
 """Generations before rounding makes two programs differ."""

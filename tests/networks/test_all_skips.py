@@ -16,6 +16,8 @@ from numpy.typing import NDArray
 from evoclaims.core.errors import UserError
 from evoclaims.networks.all_skips import AllSkips
 
+pytestmark = pytest.mark.newest
+
 SIZES = [(1, 0, 1), (2, 1, 1), (6, 24, 1), (8, 5, 4), (3, 7, 2)]
 sizes = pytest.mark.parametrize(("inputs", "hidden", "outputs"), SIZES)
 

@@ -16,6 +16,8 @@ from evoclaims.networks.genome import EMPTY, Connections, Genome, Nodes
 from evoclaims.networks.graph import GraphNetwork
 from evoclaims.networks.wiring import Wiring
 
+pytestmark = pytest.mark.newest
+
 Gene = tuple[int, float, float, int]
 """Key, bias, response, activation."""
 

@@ -16,6 +16,8 @@ from evoclaims.trials.lanes import Lanes
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.store import Store
 
+pytestmark = pytest.mark.oldest
+
 
 def test_a_checkpoint_of_another_platform_is_passed_over(
     store: Store,

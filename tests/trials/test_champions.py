@@ -33,6 +33,8 @@ from evoclaims.trials.runner import run
 from evoclaims.trials.spec import Condition
 from evoclaims.trials.store import DamagedFileError, Store
 
+pytestmark = pytest.mark.newest
+
 SMALL = Settings(population=16, nodes=12, connections=24, activations=("tanh", "sin"), species=Species(most=4))
 METHODS = {
     "neat": Neat(SMALL),

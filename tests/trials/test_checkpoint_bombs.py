@@ -21,6 +21,8 @@ from evoclaims.trials.integrity import verify
 from evoclaims.trials.runner import run
 from evoclaims.trials.store import DamagedFileError, Store
 
+pytestmark = pytest.mark.oldest
+
 CONDITION = walk(chance=0.35)
 LARGE = 1 << 28
 """Bytes that a bomb unpacks to: enough to be seen, little enough for a machine on which the test fails."""

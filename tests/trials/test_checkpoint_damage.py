@@ -22,6 +22,8 @@ from evoclaims.trials.integrity import verify
 from evoclaims.trials.runner import run
 from evoclaims.trials.store import DamagedFileError, Store
 
+pytestmark = pytest.mark.oldest
+
 CONDITION = walk(chance=0.35)
 
 

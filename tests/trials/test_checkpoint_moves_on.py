@@ -17,6 +17,8 @@ from evoclaims.trials.progress import RunProgress
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.store import DamagedFileError, Store
 
+pytestmark = pytest.mark.oldest
+
 
 def between_header_and_state(meanwhile: Callable[[], None]) -> Callable[[RunProgress], None]:
     """Return a watcher that does something once, when the batch is about to be compiled and gone on with."""

@@ -25,6 +25,8 @@ from evoclaims.trials.program import Program
 from evoclaims.trials.spec import Condition
 from reproductions.nisioti2025 import REPRODUCTION
 
+pytestmark = pytest.mark.newest
+
 SMOKE: Final = REPRODUCTION.tiers["smoke"].conditions
 ELSEWHERE: Final = frozenset({"evoclaims", *ALWAYS})
 """What every trial depends on, or what revisions tell of."""

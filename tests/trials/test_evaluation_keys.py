@@ -22,6 +22,8 @@ from evoclaims.trials.budget import Budget
 from evoclaims.trials.program import Program
 from evoclaims.trials.spec import Condition
 
+pytestmark = pytest.mark.newest
+
 Key = tuple[int, ...]
 _seen: set[Key] = set()
 

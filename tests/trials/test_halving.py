@@ -15,6 +15,8 @@ from evoclaims.trials.lanes import Lanes
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.store import Store
 
+pytestmark = pytest.mark.oldest
+
 Small = Callable[..., None]
 
 

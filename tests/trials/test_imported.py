@@ -19,6 +19,8 @@ from evoclaims.trials.result_codec import dump, parse
 from evoclaims.trials.runner import run
 from evoclaims.trials.store import Store
 
+pytestmark = pytest.mark.oldest
+
 TABLE = """\
 seed,algo,lr,return,length
 42,sac,0.001,30.5,100

@@ -18,6 +18,8 @@ from evoclaims.trials.notice import announced, notice_path
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.store import Store
 
+pytestmark = pytest.mark.oldest
+
 Make = Callable[..., TrialResult]
 Edit = Callable[..., None]
 

@@ -20,6 +20,8 @@ from evoclaims.trials.runner import run
 from evoclaims.trials.spec import TrialSpec
 from evoclaims.trials.store import DamagedFileError, Store
 
+pytestmark = pytest.mark.oldest
+
 SCRIPT = Path(__file__).with_name("kill_me.py")
 
 

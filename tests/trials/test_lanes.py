@@ -19,6 +19,8 @@ from evoclaims.trials.lanes import Compiled, Lanes, picked, width_for
 from evoclaims.trials.runner import run
 from evoclaims.trials.store import Store
 
+pytestmark = pytest.mark.oldest
+
 
 def _lanes(devices: int, layout: str = "vector") -> Lanes:
     """Return lanes over devices that need not exist."""

@@ -21,6 +21,8 @@ from evoclaims.trials.merging import Merged, merge_trials
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.store import Store
 
+pytestmark = pytest.mark.oldest
+
 Make = Callable[..., TrialResult]
 
 

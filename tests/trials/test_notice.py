@@ -25,6 +25,8 @@ from evoclaims.trials.notice import announced, notice_path, sweep
 from evoclaims.trials.progress import RunProgress, ignore
 from evoclaims.trials.store import Store
 
+pytestmark = pytest.mark.oldest
+
 CONDITION, OTHER = "c0" * 32, "0c" * 32
 GONE = 2**22 + 1
 SCRIPT = """

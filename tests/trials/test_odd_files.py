@@ -19,6 +19,8 @@ from evoclaims.trials.result import TrialResult
 from evoclaims.trials.store import DamagedFileError, Store
 from evoclaims.verdicts import history
 
+pytestmark = pytest.mark.oldest
+
 
 @pytest.fixture(autouse=True)
 def impatient() -> Iterator[None]:

@@ -22,6 +22,8 @@ from evoclaims.trials.runner import run
 from evoclaims.trials.spec import Condition, TrialSpec
 from evoclaims.trials.store import Store
 
+pytestmark = pytest.mark.oldest
+
 SEEDS = range(6)
 
 

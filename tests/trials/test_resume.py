@@ -20,6 +20,8 @@ from evoclaims.trials.result import TrialResult
 from evoclaims.trials.spec import Condition
 from evoclaims.trials.store import Store
 
+pytestmark = pytest.mark.newest
+
 
 def test_the_toy_ends_in_every_way(uninterrupted: list[TrialResult]) -> None:
     steps = {result.metrics["steps"] for result in uninterrupted if result.status == "done"}

@@ -19,6 +19,8 @@ from evoclaims.trials.result import TrialResult
 from evoclaims.trials.spec import TrialSpec
 from evoclaims.trials.store import Store
 
+pytestmark = pytest.mark.oldest
+
 
 def test_stored_trials_are_never_run_again(
     store: Store, cpus: list[Any], monkeypatch: pytest.MonkeyPatch, puts: Counter[int]

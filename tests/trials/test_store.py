@@ -22,6 +22,8 @@ from evoclaims.trials.result import TrialResult
 from evoclaims.trials.store import DamagedFileError, Store
 from evoclaims.trials.store_mark import mark
 
+pytestmark = pytest.mark.oldest
+
 Make = Callable[..., TrialResult]
 
 numbers = st.floats(allow_nan=True, allow_infinity=True) | st.integers(-(2**60), 2**60)

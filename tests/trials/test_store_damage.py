@@ -19,6 +19,8 @@ from evoclaims.trials.result_codec import dump, parse
 from evoclaims.trials.result_schema import RecordError
 from evoclaims.trials.store import DamagedFileError, Store
 
+pytestmark = pytest.mark.oldest
+
 Make = Callable[..., TrialResult]
 Edit = Callable[..., None]
 

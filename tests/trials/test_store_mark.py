@@ -17,6 +17,8 @@ from evoclaims.trials.result import TrialResult
 from evoclaims.trials.store import Store
 from evoclaims.trials.store_mark import MARK, check_store, mark
 
+pytestmark = pytest.mark.oldest
+
 Make = Callable[..., TrialResult]
 
 

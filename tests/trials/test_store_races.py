@@ -19,6 +19,8 @@ from evoclaims.trials.integrity import verify
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.store import Store
 
+pytestmark = pytest.mark.oldest
+
 Make = Callable[..., TrialResult]
 ORDERS = sorted({"".join(order) for order in permutations("AABB")})
 """Every order in which two processes can take the two steps of storing: champion, then record."""

@@ -22,6 +22,8 @@ from evoclaims.core.errors import UserError
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.store import DamagedFileError, Store
 
+pytestmark = pytest.mark.oldest
+
 Make = Callable[..., TrialResult]
 
 

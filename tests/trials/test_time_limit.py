@@ -22,6 +22,8 @@ from evoclaims.trials.runner import run
 from evoclaims.trials.store import Store
 from evoclaims.trials.time_limit import DEFAULT_LIMIT, answers, is_final, seconds_of
 
+pytestmark = pytest.mark.oldest
+
 Make = Callable[..., TrialResult]
 
 

@@ -17,6 +17,8 @@ from evoclaims.envs.ecorobot.obstacles import FurthestRun, Obstacles
 from evoclaims.envs.ecorobot.pose import Pose
 from evoclaims.envs.ecorobot.robots import ANT, HOPPER, HUMANOID, ROBOTS, WALKER2D, Robot
 
+pytestmark = pytest.mark.newest
+
 BRAX = {"ant": "Ant", "half_cheetah": "Halfcheetah", "hopper": "Hopper", "humanoid": "Humanoid", "walker2d": "Walker2d"}
 
 

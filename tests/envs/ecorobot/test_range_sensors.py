@@ -18,6 +18,8 @@ from evoclaims.envs.ecorobot.robots import ANT, SIMPLE_ROB, Robot
 from evoclaims.envs.ecorobot.scene import WORLD_GROUP, Scene, scene
 from evoclaims.envs.ecorobot.sensors import ARENA, PieSlices, Rangefinders, distances
 
+pytestmark = pytest.mark.newest
+
 ANGLES = np.linspace(-180.0, 150.0, 12)
 FREE = scene(SIMPLE_ROB)
 

@@ -24,6 +24,8 @@ from evoclaims.envs.ecorobot.robots import ANT, HOPPER, SIMPLE_ROB, Robot
 from evoclaims.envs.ecorobot.scene import Places, Scene
 from evoclaims.envs.ecorobot.stones import STONES, SteppingStones, StonesCrossed
 
+pytestmark = pytest.mark.newest
+
 LEVEL = jnp.zeros((), jnp.int32)
 PAID = replace(SIMPLE_ROB, control_cost=0.1, healthy_reward=0.5, forward_reward=2.0, velocity_limit=0.5)
 MASS = 5 * 4 / 3 * math.pi * 0.2**3 + 1.0  # kg: density 5 kg/m³, and the joints' armature

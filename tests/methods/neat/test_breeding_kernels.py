@@ -69,7 +69,9 @@ def test_nvidias_assembler_takes_the_kernels(tmp_path: Path) -> None:
         assemble(text, tmp_path)
 
 
-@pytest.mark.parametrize("most_nodes", [NODES, pytest.param(40, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    "most_nodes", [pytest.param(NODES, marks=pytest.mark.oldest), pytest.param(40, marks=pytest.mark.slow)]
+)
 def test_thirty_generations_are_the_same_to_the_bit(most_nodes: int) -> None:
     """Of genomes that reach the limits of their arrays, in several species; two trials at once."""
     task = NParity(3)

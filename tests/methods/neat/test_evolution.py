@@ -19,6 +19,8 @@ from evoclaims.methods.neat.neat import Neat
 from evoclaims.methods.neat.settings import Attribute, LevelUp, Mutation, Settings, Species
 from evoclaims.networks.genome import resized
 
+pytestmark = pytest.mark.newest
+
 TASK, POPULATION, GENERATIONS = NParity(3), 24, 8
 PEAK = 10.0
 """A record that no fitness on parity, at most 0, can beat."""

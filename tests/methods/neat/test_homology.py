@@ -19,6 +19,8 @@ from without_kernels import BREEDING, without_kernels
 from evoclaims.methods.neat.homology import Counterparts, counterparts
 from evoclaims.networks.genome import Genome
 
+pytestmark = pytest.mark.newest
+
 _counterparts = jax.jit(counterparts)
 MAPS: dict[str, Any] = {
     "pairs": jax.vmap(counterparts),

@@ -24,6 +24,8 @@ from evoclaims.trials.runner import run
 from evoclaims.trials.spec import Condition
 from evoclaims.trials.store import Store
 
+pytestmark = pytest.mark.newest
+
 SETTINGS = Settings(
     population=20,
     nodes=10,

@@ -16,6 +16,8 @@ from evoclaims.core.errors import UserError
 from evoclaims.methods.neat.population import Population, first_population, forget_records
 from evoclaims.methods.neat.settings import Attribute, Mutation, Settings, Species
 
+pytestmark = pytest.mark.newest
+
 INITIAL = Settings(
     population=200,
     nodes=8,

@@ -19,6 +19,8 @@ from evoclaims.methods.neat.reproduction import choose_parents, offspring, survi
 from evoclaims.methods.neat.settings import Species
 from evoclaims.methods.neat.species import SpeciesState
 
+pytestmark = pytest.mark.newest
+
 MOST, POPULATION, GENERATION = 5, 24, 40
 SETTINGS = Species(most=MOST, stagnation=3, survival=0.4)
 _survive = jax.jit(lambda species, fitness: survive(SETTINGS, species, fitness, jnp.asarray(GENERATION, jnp.int32)))

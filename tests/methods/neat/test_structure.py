@@ -30,6 +30,8 @@ from evoclaims.methods.neat.structure import (
 )
 from evoclaims.networks.genome import Genome
 
+pytestmark = pytest.mark.newest
+
 INPUTS, OUTPUTS, NEW = 2, 2, 2**24 + 1
 _add_node = jax.jit(add_node)
 _delete_node = jax.jit(lambda u, genome: delete_node(u, genome, INPUTS, OUTPUTS))

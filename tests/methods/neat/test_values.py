@@ -15,6 +15,8 @@ from evoclaims.methods.neat.settings import Attribute, Mutation
 from evoclaims.methods.neat.values import draw, mutate, mutate_values
 from evoclaims.networks.genome import Genome, resized
 
+pytestmark = pytest.mark.newest
+
 KEYS = 300
 ORDER = list(range(20))
 PAIRS = [(s, t) for t in range(2, 20) for s in range(t)][:60]

@@ -20,6 +20,8 @@ from evoclaims.envs.ecorobot.stones import STONES, SteppingStones
 from evoclaims.envs.ecorobot.views.painting import PATHS, STONE, TARGET, WALL, paint_ground, paint_paths
 from evoclaims.envs.ecorobot.views.pictures import draw, draw_elites
 
+pytestmark = pytest.mark.newest
+
 MAZE = SteppingStones()
 PATH = np.stack([np.linspace(-3.0, 2.0, 30), np.linspace(1.0, 1.5, 30), np.full(30, 0.2)], axis=1)
 
