@@ -127,8 +127,7 @@ def test_coverage_is_the_share_of_reachable_cells_that_hold_an_elite(
 ) -> None:
     rows = [(1.0, *_centre(*cell)) for cell in cells]
     state = INSERT(BENCH.init(), _population(1), _episodes(rows + [(np.nan, *_centre(3, 1))] * (8 - len(rows))))
-    still = Workbench(SMALL, _Frozen())
-    _, (progress,) = still.run(1, state=state)
+    _, (progress,) = FROZEN.run(1, state=state)
     assert float(progress.metrics["elites"]) == elites
     assert float(progress.metrics["coverage"]) == pytest.approx(covered / (X * Y - 2))
 
@@ -138,6 +137,9 @@ class _Frozen(Plane):
 
     def episode(self, policy: Any, key: Any, level: Any) -> Episode:
         return replace(super().episode(policy, key, level), fitness=jnp.array(jnp.nan))
+
+
+FROZEN = Workbench(SMALL, _Frozen())
 
 
 class _Everywhere(Plane):
@@ -156,12 +158,12 @@ def test_a_full_map_is_covered_exactly_and_without_a_target_nothing_is_reached()
 
 
 def test_what_is_invalid_stays_out_and_an_empty_archive_says_so() -> None:
-    for task in (_Frozen(), Plane(walled=False, stride=100.0)):
-        state, reports = Workbench(SMALL, task).run(2)
+    for bench in (FROZEN, Workbench(SMALL, Plane(walled=False, stride=100.0))):
+        state, reports = bench.run(2)
         assert float(reports[-1].fitness) == -np.inf
         assert float(reports[-1].metrics["elites"]) == 0
         assert float(reports[-1].metrics["reached"]) == 0.0
-        assert np.isfinite(SMALL.best(task, state)(jnp.ones(2))).all()
+        assert np.isfinite(SMALL.best(bench.task, state)(jnp.ones(2))).all()
 
 
 def test_every_elite_does_what_the_archive_says_of_it() -> None:
@@ -227,18 +229,25 @@ def test_the_far_corner_is_found_by_variation_and_not_without() -> None:
 def _batches(
     method: MapElites, state: Any, monkeypatch: pytest.MonkeyPatch, steps: int = 1, seed: int = 0
 ) -> list[Any]:
-    """Take steps without compiling; return the batches that were evaluated."""
+    """Take steps; return the batches that were evaluated."""
     seen: list[Any] = []
     original = MapElites.insert
 
     def watched(self: Any, task: Any, state: Any, population: Any, episodes: Any) -> Any:
-        seen.append(np.asarray(population))
+        seen.append(population)
         return original(self, task, state, population, episodes)
 
+    @jax.jit
+    def step(key: Any, state: Any) -> Any:
+        following, _ = method.step(key, Plane(), LEVEL, state)
+        return following, seen.pop()
+
     monkeypatch.setattr(MapElites, "insert", watched)
+    batches = []
     for number in range(steps):
-        state, _ = method.step(jax.random.key(seed + number), Plane(), LEVEL, state)
-    return seen
+        state, batch = step(jax.random.key(seed + number), state)
+        batches.append(np.asarray(batch))
+    return batches
 
 
 def test_the_first_batches_are_drawn_anew_and_the_next_vary_elites(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -75,6 +75,7 @@ def test_a_compiled_step_is_the_plain_step(bench: Workbench) -> None:
     )
 
 
+@pytest.mark.newest  # smoke compiles each method's trials side by side
 def test_trials_side_by_side_are_the_trials_one_by_one(bench: Workbench) -> None:
     seeds = (3, 8)
     alone = [bench.run(1, seed=seed)[0] for seed in seeds]
