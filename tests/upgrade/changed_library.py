@@ -36,6 +36,7 @@ CHANGES: Final = (
         "evosax", "evosax", "algorithms/distribution_based/cma_es.py", "Params(", "(1.0)", "(1e-6)", "cma_es on parity"
     ),
     Change("brax", "brax", "training/agents/ppo/losses.py", "v_loss = jnp.mean(", "0.5", "0.4", "ppo on parity"),
+    Change("optax", "optax", "_src/alias.py", "\ndef adam(", "= 0.999", "= 0.99", "ppo on parity"),
     Change(
         "qdax",
         "qdax",
