@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import clock_jumps
+import crowd
 import full_disk
 import killing
 import stopping_and_continuing
@@ -33,6 +34,7 @@ class Attack:
 
 
 ATTACKS = {
+    "crowd": Attack(crowd.attack, "crowd", "processes that work on one store at once, killed and started again", 50),
     "killing": Attack(killing.attack, "kills", "blows at processes in the middle of trials", 100),
     "stopping": Attack(stopping_and_continuing.attack, "stops", "rounds of stopping and continuing", 5),
     "hosts": Attack(two_hosts.attack, "hosts", "stores shared by two hosts, each with two workers", 6),

@@ -26,6 +26,12 @@ PATIENCE = 300.0
 LEASE = 3.0
 """Seconds that a notice counts for, instead of 60, so that nobody has to wait for long."""
 
+TRIALS = 10
+"""Trials of a condition of the tortured paper."""
+
+REPORTS = 50
+"""Reports of each."""
+
 PYPROJECT = """
 [tool.evoclaims]
 reproduction = "tortured_paper"
@@ -61,6 +67,13 @@ def test_quick_is_above_steady(trials, verdict):
 @says("steady-fragile")
 def test_steady_is_above_fragile(trials, verdict):
     verdict(trials("steady", on="parity").last_success > trials("fragile", on="parity").last_success)
+"""
+
+
+CLAIM = """
+@says("{name}")
+def test_{name}(trials, verdict):
+    verdict(trials("{name}", on="parity").solves_every_level.in_most_trials())
 """
 
 
@@ -144,11 +157,15 @@ class Bench:
 
     Attributes:
         pause: seconds that a process rests at every report.
+        walkers: how many methods the paper has beside its three, each with a condition and a claim.
+        lease: seconds that a notice counts for.
         kept: whether the folder is to stay, since something was found.
     """
 
     folder: Path
     pause: float = 0.04
+    walkers: int = 0
+    lease: float = LEASE
     kept: bool = False
     started: list[Running] = field(default_factory=list)
     _events: list[dict[str, Any]] = field(default_factory=list)
@@ -158,16 +175,23 @@ class Bench:
     def __post_init__(self) -> None:
         (self.folder / "claims").mkdir(parents=True)
         (self.folder / "pyproject.toml").write_text(PYPROJECT)
-        (self.folder / "claims" / "test_claims.py").write_text(CLAIMS)
+        (self.folder / "claims" / "test_claims.py").write_text(
+            CLAIMS + "".join(CLAIM.format(name=name) for name in self.walker_names)
+        )
+
+    @property
+    def walker_names(self) -> list[str]:
+        """The further methods, none of whose names is a part of another."""
+        return [f"walker{number:05}" for number in range(self.walkers)]
 
     @property
     def store(self) -> Path:
         return self.folder / ".evoclaims"
 
-    def pytest(self, workers: int = 2, **surroundings: Any) -> Running:
-        """Start pytest with so many workers; 0 for none."""
+    def pytest(self, workers: int = 2, arguments: Sequence[str] = (), **surroundings: Any) -> Running:
+        """Start pytest with so many workers, 0 for none, and further arguments."""
         name = self.folder / f"verdicts-{next(self._numbers)}.json"
-        options = [f"--claims-json={name}", *([f"-n{workers}"] if workers else ())]
+        options = [f"--claims-json={name}", *([f"-n{workers}"] if workers else ()), *arguments]
         return self._start(["-m", "pytest", *options], json_file=name, **surroundings)
 
     def evoclaims(self, *arguments: str, **surroundings: Any) -> Running:
@@ -188,7 +212,8 @@ class Bench:
             "COLUMNS": "200",
             "TORTURE_LOG": str(self.folder / "log"),
             "TORTURE_PAUSE": str(self.pause),
-            "TORTURE_LEASE": str(LEASE),
+            "TORTURE_LEASE": str(self.lease),
+            "TORTURE_WALKERS": str(self.walkers),
             **({"TORTURE_CLOCK": str(clock)} if clock else {}),
         }
         for name in ("PYTEST_ADDOPTS", "PYTEST_XDIST_WORKER", "PYTEST_CURRENT_TEST", "GITHUB_STEP_SUMMARY"):
@@ -266,15 +291,20 @@ class Truth:
 
 @dataclass
 class Laboratory:
-    """Where attacks take place, and the truth that they must not change."""
+    """Where attacks take place, and the truth that they must not change.
+
+    Attributes:
+        seconds: how long an attack lasts that is not counted in blows.
+    """
 
     folder: Path
+    seconds: float = 480.0
     _numbers: Iterator[int] = field(default_factory=itertools.count)
 
     @contextmanager
-    def bench(self, pause: float = 0.04) -> Iterator[Bench]:
+    def bench(self, pause: float = 0.04, walkers: int = 0, lease: float = LEASE) -> Iterator[Bench]:
         """Give a new project; it goes when nothing was found, and stays to be looked at when something was."""
-        bench = Bench(self.folder / f"bench-{next(self._numbers)}", pause)
+        bench = Bench(self.folder / f"bench-{next(self._numbers)}", pause, walkers, lease)
         try:
             yield bench
         finally:
@@ -284,15 +314,19 @@ class Laboratory:
 
     @functools.cached_property
     def truth(self) -> Truth:
-        """Run everything undisturbed."""
-        with self.bench(pause=0.0) as bench:
-            running = bench.pytest(workers=0)
+        """What the paper's three methods come to."""
+        return self.undisturbed()
+
+    def undisturbed(self, walkers: int = 0, workers: int = 0) -> Truth:
+        """Run everything undisturbed, with so many further methods, and with so many workers."""
+        with self.bench(pause=0.0, walkers=walkers) as bench:
+            running = bench.pytest(workers)
             running.end()
             digests = digests_of(bench.records())
             truth = Truth(digests, running.verdicts())
             outcomes = {claim["outcome"] for claim in truth.verdicts}
-            assert len(digests) == 30, running.output
-            assert len(truth.verdicts) == 5, running.output
+            assert len(digests) == TRIALS * (3 + walkers), running.output
+            assert len(truth.verdicts) == 5 + walkers, running.output
             assert len(outcomes - {"error"}) > 1, running.output
         return truth
 

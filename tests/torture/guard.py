@@ -6,6 +6,7 @@ import io
 from collections import Counter
 from contextlib import redirect_stdout
 from dataclasses import dataclass, field
+from typing import Any
 
 from bench import Bench, Running, Truth, digests_of
 from tally import Tally
@@ -19,18 +20,26 @@ class Guard:
 
     Attributes:
         once: whether no trial may be run twice; where a live process was taken for dead it may.
+        lost: ids of trials that were stored, and at some moment were not there.
     """
 
     bench: Bench
     truth: Truth
     tally: Tally
     once: bool = True
+    lost: set[str] = field(default_factory=set)
     _seen: dict[str, bytes] = field(default_factory=dict)
+
+    @property
+    def repeated(self) -> Counter[str]:
+        """How often trials were run again, by id."""
+        return Counter(line["id"] for line in self._puts()) - Counter({line["id"] for line in self._puts()})
 
     def look(self) -> None:
         """Nothing that was stored is lost or changed; to be called at any moment."""
-        said = {line["id"] for line in self.bench.events() if line["what"] == "put"}
+        said = {line["id"] for line in self._puts()}
         records = self.bench.records()
+        self.lost |= (said | self._seen.keys()) - records.keys()
         for name, data in self._seen.items():
             self.tally.demand(name in records, f"the finished trial {name[:8]} was lost")
             self.tally.demand(records.get(name, data) == data, f"the record of trial {name[:8]} was written again")
@@ -45,13 +54,10 @@ class Guard:
         self.look()
         missing = len(self.truth.digests.keys() - self._seen.keys())
         self.tally.demand(missing == 0, f"{missing} trials are missing at the end")
-        events = self.bench.events()
-        puts = [line for line in events if line["what"] == "put"]
-        for line in puts:
+        for line in self._puts():
             self.tally.demand(line["became"] != "differs", f"trial {line['id'][:8]} came out differently")
         if self.once:
-            times = Counter(line["id"] for line in puts)
-            self.tally.demand(max(times.values()) == 1, f"trials were run again: {times.most_common(3)}")
+            self.tally.demand(not self.repeated, f"trials were run again: {self.repeated.most_common(3)}")
         self._went_on()
         self.tally.done["trials compared"] += len(self._seen)
         with redirect_stdout(io.StringIO()) as shown:
@@ -80,6 +86,9 @@ class Guard:
         self.tally.demand(text in shown, f"{text!r} was not said: {shown[-2000:]}")
         for word in ("Traceback", "INTERNALERROR"):
             self.tally.demand(word not in shown, f"{word} was shown: {shown[-3000:]}")
+
+    def _puts(self) -> list[dict[str, Any]]:
+        return [line for line in self.bench.events() if line["what"] == "put"]
 
     def _went_on(self) -> None:
         """Whoever takes over a batch begins where the one before has said that it was, or later."""

@@ -23,6 +23,7 @@ def main() -> int:
         parser.add_argument(
             f"--{attack.option}", type=int, default=attack.large, help=f"{attack.says} ({attack.large})"
         )
+    parser.add_argument("--seconds", type=float, default=480.0, help="how long a crowd works (480)")
     parser.add_argument("--only", choices=[*attacks.ATTACKS], action="append", help="make this attack alone")
     parser.add_argument(
         "--folder", type=Path, help="an empty one, which keeps the projects in which something was found"
@@ -38,7 +39,7 @@ def main() -> int:
         os.environ.setdefault("JAX_NUM_CPU_DEVICES", "2")
         os.environ.setdefault("JAX_COMPILATION_CACHE_DIR", str(Path(aside, "compiled")))
         os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", "0.1")
-        laboratory = Laboratory(folder)
+        laboratory = Laboratory(folder, options.seconds)
         for name in options.only or attacks.ATTACKS:
             attack, began = attacks.ATTACKS[name], time.monotonic()
             times, draw = getattr(options, attack.option), random.Random(f"{options.seed} {name}")

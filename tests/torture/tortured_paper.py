@@ -15,11 +15,13 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from bench import REPORTS, TRIALS
 from trial_toys import Walker
 
 from evoclaims.claims import fetching
 from evoclaims.envs.gates.parity import NParity
 from evoclaims.judging.design import Design
+from evoclaims.methods.base import Method
 from evoclaims.paper.reproduction import Reproduction, Tier
 from evoclaims.trials.budget import Budget
 from evoclaims.trials.progress import RunProgress, Watcher
@@ -27,10 +29,14 @@ from evoclaims.trials.result import TrialResult
 from evoclaims.trials.spec import Condition
 from evoclaims.trials.store import Store
 
-TRIALS = 10
-METHODS = {"quick": Walker(chance=0.09), "steady": Walker(chance=0.03), "fragile": Walker(0.03, hazard=0.004)}
+METHODS: dict[str, Method[Any]] = {
+    "quick": Walker(chance=0.09),
+    "steady": Walker(chance=0.03),
+    "fragile": Walker(0.03, hazard=0.004),
+}
+METHODS |= {f"walker{n:05}": Walker(0.02 + 1e-5 * n) for n in range(int(os.environ.get("TORTURE_WALKERS", "0")))}
 CONDITIONS = {
-    (name, "parity"): Condition(method, NParity(4), "curriculum", Budget(generations=100, reports=50))
+    (name, "parity"): Condition(method, NParity(4), "curriculum", Budget(generations=100, reports=REPORTS))
     for name, method in METHODS.items()
 }
 REPRODUCTION = Reproduction(
@@ -39,6 +45,8 @@ REPRODUCTION = Reproduction(
     folder=Path(__file__).parent,
     tiers={name: Tier(CONDITIONS, Design.fixed(TRIALS)) for name in ("smoke", "full")},
 )
+
+NAMES = {condition.id: name for (name, _), condition in CONDITIONS.items()}
 
 _log = os.open(os.environ["TORTURE_LOG"], os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o644)
 _held = Path(f"{os.environ['TORTURE_LOG']}-held-{os.getpgrp()}")
@@ -70,7 +78,7 @@ def _slowly(
 
 def _telling(store: Store, result: TrialResult, champion: Any) -> Any:
     became = _put(store, result, champion)
-    say("put", condition=result.condition, id=result.id, became=became)
+    say("put", condition=result.condition, name=NAMES[result.condition], id=result.id, became=became)
     return became
 
 
