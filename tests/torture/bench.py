@@ -17,6 +17,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from tortured_project import PYPROJECT, TRIALS, claims
+
 import evoclaims
 
 HERE = Path(__file__).parent
@@ -25,56 +27,6 @@ PATIENCE = 300.0
 
 LEASE = 3.0
 """Seconds that a notice counts for, instead of 60, so that nobody has to wait for long."""
-
-TRIALS = 10
-"""Trials of a condition of the tortured paper."""
-
-REPORTS = 50
-"""Reports of each."""
-
-PYPROJECT = """
-[tool.evoclaims]
-reproduction = "tortured_paper"
-
-[tool.pytest.ini_options]
-testpaths = ["claims"]
-addopts = "--strict-markers --strict-config -p no:cacheprovider"
-filterwarnings = ["error"]
-"""
-
-CLAIMS = """
-from evoclaims import claim
-
-def says(name):
-    return claim(name, says=f"{name} at full size", where="§1", smoke=f"{name} in small")
-
-@says("quick")
-def test_quick(trials, verdict):
-    verdict(trials("quick", on="parity").solves_every_level.in_most_trials())
-
-@says("steady")
-def test_steady(trials, verdict):
-    verdict(trials("steady", on="parity").solves_every_level.in_most_trials())
-
-@says("fragile")
-def test_fragile(trials, verdict):
-    verdict(trials("fragile", on="parity").solves_every_level.in_most_trials())
-
-@says("quick-steady")
-def test_quick_is_above_steady(trials, verdict):
-    verdict(trials("quick", on="parity").last_success > trials("steady", on="parity").last_success)
-
-@says("steady-fragile")
-def test_steady_is_above_fragile(trials, verdict):
-    verdict(trials("steady", on="parity").last_success > trials("fragile", on="parity").last_success)
-"""
-
-
-CLAIM = """
-@says("{name}")
-def test_{name}(trials, verdict):
-    verdict(trials("{name}", on="parity").solves_every_level.in_most_trials())
-"""
 
 
 class HangError(Exception):
@@ -175,14 +127,7 @@ class Bench:
     def __post_init__(self) -> None:
         (self.folder / "claims").mkdir(parents=True)
         (self.folder / "pyproject.toml").write_text(PYPROJECT)
-        (self.folder / "claims" / "test_claims.py").write_text(
-            CLAIMS + "".join(CLAIM.format(name=name) for name in self.walker_names)
-        )
-
-    @property
-    def walker_names(self) -> list[str]:
-        """The further methods, none of whose names is a part of another."""
-        return [f"walker{number:05}" for number in range(self.walkers)]
+        (self.folder / "claims" / "test_claims.py").write_text(claims(self.walkers))
 
     @property
     def store(self) -> Path:

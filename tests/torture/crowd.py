@@ -8,9 +8,10 @@ import signal
 import time
 from collections import Counter
 
-from bench import REPORTS, TRIALS, Bench, Laboratory, Running
+from bench import Bench, Laboratory, Running
 from guard import Guard
 from tally import Tally
+from tortured_project import REPORTS, TRIALS, walkers
 
 LIFE = 20.0
 """Seconds after which a process is killed on average, its start included."""
@@ -30,10 +31,10 @@ BLOWS = {signal.SIGKILL: 4, signal.SIGTERM: 1}
 def attack(laboratory: Laboratory, times: int, draw: random.Random, life: float = LIFE, pause: float = PAUSE) -> Tally:
     """Let so many processes work on one store for the laboratory's seconds, with more to do than they can finish."""
     tally = Tally(f"{times} processes on one store for {laboratory.seconds:.0f} s")
-    walkers = max(times, round(times * laboratory.seconds / (REPORTS * pause)))
+    methods = max(times, round(times * laboratory.seconds / (REPORTS * pause)))
     workers = min(times, os.cpu_count() or 1)
-    truth = laboratory.undisturbed(walkers, workers)
-    with laboratory.bench(pause, walkers, lease=60.0) as bench:
+    truth = laboratory.undisturbed(methods, workers)
+    with laboratory.bench(pause, methods, lease=60.0) as bench:
         guard = Guard(bench, truth, tally)
         _Crowd(bench, guard, draw, times, life).work(laboratory.seconds)
         tally.done["trials finished under attack"] = len(bench.records())
@@ -104,7 +105,7 @@ class _Crowd:
         (kind,) = self._draw.choices([*KINDS], [*KINDS.values()])
         self._guard.tally.done["processes started"] += 1
         stored = Counter(line["name"] for line in self._bench.events() if line["what"] == "put")
-        open_ones = [name for name in self._bench.walker_names if stored[name] < TRIALS][: self._size]
+        open_ones = [name for name in walkers(self._bench.walkers) if stored[name] < TRIALS][: self._size]
         if kind.startswith("evoclaims") and open_ones:
             return self._bench.evoclaims("run", self._draw.choice(open_ones))
         if "four" in kind and open_ones:

@@ -15,7 +15,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from bench import REPORTS, TRIALS
+from tortured_project import REPORTS, TRIALS, walkers
 from trial_toys import Walker
 
 from evoclaims.claims import fetching
@@ -34,7 +34,8 @@ METHODS: dict[str, Method[Any]] = {
     "steady": Walker(chance=0.03),
     "fragile": Walker(0.03, hazard=0.004),
 }
-METHODS |= {f"walker{n:05}": Walker(0.02 + 1e-5 * n) for n in range(int(os.environ.get("TORTURE_WALKERS", "0")))}
+for number, name in enumerate(walkers(int(os.environ.get("TORTURE_WALKERS", "0")))):
+    METHODS[name] = Walker(chance=0.02 + 1e-5 * number)
 CONDITIONS = {
     (name, "parity"): Condition(method, NParity(4), "curriculum", Budget(generations=100, reports=REPORTS))
     for name, method in METHODS.items()
