@@ -109,14 +109,14 @@ class Bench:
 
     Attributes:
         pause: seconds that a process rests at every report.
-        walkers: how many methods the paper has beside its three, each with a condition and a claim.
+        further: how many methods the paper has beside its three, each with a condition and a claim.
         lease: seconds that a notice counts for.
         kept: whether the folder is to stay, since something was found.
     """
 
     folder: Path
     pause: float = 0.04
-    walkers: int = 0
+    further: int = 0
     lease: float = LEASE
     kept: bool = False
     started: list[Running] = field(default_factory=list)
@@ -127,7 +127,7 @@ class Bench:
     def __post_init__(self) -> None:
         (self.folder / "claims").mkdir(parents=True)
         (self.folder / "pyproject.toml").write_text(PYPROJECT)
-        (self.folder / "claims" / "test_claims.py").write_text(claims(self.walkers))
+        (self.folder / "claims" / "test_claims.py").write_text(claims(self.further))
 
     @property
     def store(self) -> Path:
@@ -158,7 +158,7 @@ class Bench:
             "TORTURE_LOG": str(self.folder / "log"),
             "TORTURE_PAUSE": str(self.pause),
             "TORTURE_LEASE": str(self.lease),
-            "TORTURE_WALKERS": str(self.walkers),
+            "TORTURE_FURTHER": str(self.further),
             **({"TORTURE_CLOCK": str(clock)} if clock else {}),
         }
         for name in ("PYTEST_ADDOPTS", "PYTEST_XDIST_WORKER", "PYTEST_CURRENT_TEST", "GITHUB_STEP_SUMMARY"):
@@ -247,9 +247,9 @@ class Laboratory:
     _numbers: Iterator[int] = field(default_factory=itertools.count)
 
     @contextmanager
-    def bench(self, pause: float = 0.04, walkers: int = 0, lease: float = LEASE) -> Iterator[Bench]:
+    def bench(self, pause: float = 0.04, further: int = 0, lease: float = LEASE) -> Iterator[Bench]:
         """Give a new project; it goes when nothing was found, and stays to be looked at when something was."""
-        bench = Bench(self.folder / f"bench-{next(self._numbers)}", pause, walkers, lease)
+        bench = Bench(self.folder / f"bench-{next(self._numbers)}", pause, further, lease)
         try:
             yield bench
         finally:
@@ -262,16 +262,16 @@ class Laboratory:
         """What the paper's three methods come to."""
         return self.undisturbed()
 
-    def undisturbed(self, walkers: int = 0, workers: int = 0) -> Truth:
+    def undisturbed(self, further: int = 0, workers: int = 0) -> Truth:
         """Run everything undisturbed, with so many further methods, and with so many workers."""
-        with self.bench(pause=0.0, walkers=walkers) as bench:
+        with self.bench(pause=0.0, further=further) as bench:
             running = bench.pytest(workers)
             running.end()
             digests = digests_of(bench.records())
             truth = Truth(digests, running.verdicts())
             outcomes = {claim["outcome"] for claim in truth.verdicts}
-            assert len(digests) == TRIALS * (3 + walkers), running.output
-            assert len(truth.verdicts) == 5 + walkers, running.output
+            assert len(digests) == TRIALS * (3 + further), running.output
+            assert len(truth.verdicts) == 5 + further, running.output
             assert len(outcomes - {"error"}) > 1, running.output
         return truth
 

@@ -11,7 +11,9 @@ from collections import Counter
 from bench import Bench, Laboratory, Running
 from guard import Guard
 from tally import Tally
-from tortured_project import REPORTS, TRIALS, walkers
+from tortured_project import REPORTS, TRIALS, methods
+
+from evoclaims.trials.notice import FRESH_SECONDS
 
 LIFE = 20.0
 """Seconds after which a process is killed on average, its start included."""
@@ -28,24 +30,30 @@ BLOWS = {signal.SIGKILL: 4, signal.SIGTERM: 1}
 """Ways to strike, and how often each is drawn."""
 
 
-def attack(laboratory: Laboratory, times: int, draw: random.Random, life: float = LIFE, pause: float = PAUSE) -> Tally:
-    """Let so many processes work on one store for the laboratory's seconds, with more to do than they can finish."""
-    tally = Tally(f"{times} processes on one store for {laboratory.seconds:.0f} s")
-    methods = max(times, round(times * laboratory.seconds / (REPORTS * pause)))
-    workers = min(times, os.cpu_count() or 1)
-    truth = laboratory.undisturbed(methods, workers)
-    with laboratory.bench(pause, methods, lease=60.0) as bench:
+def attack(
+    laboratory: Laboratory,
+    times: int,
+    draw: random.Random,
+    seconds: float | None = None,
+    life: float = LIFE,
+    pause: float = PAUSE,
+) -> Tally:
+    """Let so many processes work on one store, which has more to do than they can finish; then finish undisturbed."""
+    seconds = laboratory.seconds if seconds is None else seconds
+    tally = Tally(f"{times} processes on one store for {seconds:.0f} s")
+    further = max(0, round(times * seconds / (REPORTS * pause)) - len(methods(0)))
+    workers = min(further, os.cpu_count() or 1)
+    truth = laboratory.undisturbed(further, workers) if further else laboratory.truth
+    with laboratory.bench(pause, further, lease=FRESH_SECONDS) as bench:
         guard = Guard(bench, truth, tally)
-        _Crowd(bench, guard, draw, times, life).work(laboratory.seconds)
-        tally.done["trials finished under attack"] = len(bench.records())
+        _Crowd(bench, guard, draw, times, life).work(seconds)
+        tally.done["trials finished in the crowd"] = len(bench.records())
         bench.pause = 0.0
         running = bench.pytest(workers)
         running.end()
         guard.judged(running)
         guard.plainly(running)
         guard.finish()
-        _again(bench, tally)
-        bench.kept = bool(tally.violations)
         tally.done["trials finished"] = len(bench.records())
         tally.done["lost"] = len(guard.lost)
         tally.done["repeated"] = guard.repeated.total()
@@ -83,7 +91,7 @@ class _Crowd:
         self._guard.look()
 
     def _interval(self) -> float:
-        return self._draw.expovariate(self._size / self._life)
+        return self._draw.uniform(0.5, 1.5) * self._life / self._size
 
     def _collect(self) -> None:
         """Forget what has ended; what nobody has struck must have ended well."""
@@ -105,23 +113,10 @@ class _Crowd:
         (kind,) = self._draw.choices([*KINDS], [*KINDS.values()])
         self._guard.tally.done["processes started"] += 1
         stored = Counter(line["name"] for line in self._bench.events() if line["what"] == "put")
-        open_ones = [name for name in walkers(self._bench.walkers) if stored[name] < TRIALS][: self._size]
+        open_ones = [name for name in methods(self._bench.further) if stored[name] < TRIALS][: self._size]
         if kind.startswith("evoclaims") and open_ones:
             return self._bench.evoclaims("run", self._draw.choice(open_ones))
         if "four" in kind and open_ones:
             names = self._draw.sample(open_ones, min(4, len(open_ones)))
             return self._bench.pytest(0, ["-k", " or ".join(names)])
         return self._bench.pytest(0, ["-m", "smoke"])
-
-
-def _again(bench: Bench, tally: Tally) -> None:
-    """Demand that nobody trains a condition on whose trials are all stored, but for the process that ends it."""
-    stored: Counter[str] = Counter()
-    enders: dict[str, int] = {}
-    for line in bench.events():
-        if line["what"] == "put":
-            stored[line["condition"]] += 1
-            enders[line["condition"]] = line["pid"]
-        elif line["what"] == "training" and stored[line["condition"]] >= TRIALS:
-            own = line["pid"] == enders[line["condition"]]
-            tally.demand(own, f"condition {line['condition'][:8]} was trained on when all its trials were stored")

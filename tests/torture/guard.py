@@ -10,6 +10,7 @@ from typing import Any
 
 from bench import Bench, Running, Truth, digests_of
 from tally import Tally
+from tortured_project import TRIALS
 
 from evoclaims.cli.main import main as evoclaims
 
@@ -58,6 +59,7 @@ class Guard:
             self.tally.demand(line["became"] != "differs", f"trial {line['id'][:8]} came out differently")
         if self.once:
             self.tally.demand(not self.repeated, f"trials were run again: {self.repeated.most_common(3)}")
+            self._trained_no_longer()
         self._went_on()
         self.tally.done["trials compared"] += len(self._seen)
         with redirect_stdout(io.StringIO()) as shown:
@@ -89,6 +91,19 @@ class Guard:
 
     def _puts(self) -> list[dict[str, Any]]:
         return [line for line in self.bench.events() if line["what"] == "put"]
+
+    def _trained_no_longer(self) -> None:
+        """Nobody trains on when all trials of a condition are stored, but for whoever has just stored the last."""
+        owed = Counter({line["condition"]: TRIALS for line in self._puts()})
+        last: dict[str, int] = {}
+        for line in self.bench.events():
+            condition = line.get("condition", "")
+            if line["what"] == "put":
+                owed[condition] -= 1
+                last[condition] = line["pid"]
+            elif line["what"] == "training" and condition in last and owed[condition] <= 0:
+                own = line["pid"] == last[condition]
+                self.tally.demand(own, f"condition {condition[:8]} was trained again when all its trials were stored")
 
     def _went_on(self) -> None:
         """Whoever takes over a batch begins where the one before has said that it was, or later."""

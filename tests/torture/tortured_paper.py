@@ -15,7 +15,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from tortured_project import REPORTS, TRIALS, walkers
+from tortured_project import REPORTS, TRIALS, methods
 from trial_toys import Walker
 
 from evoclaims.claims import fetching
@@ -34,8 +34,8 @@ METHODS: dict[str, Method[Any]] = {
     "steady": Walker(chance=0.03),
     "fragile": Walker(0.03, hazard=0.004),
 }
-for number, name in enumerate(walkers(int(os.environ.get("TORTURE_WALKERS", "0")))):
-    METHODS[name] = Walker(chance=0.02 + 1e-5 * number)
+for number, name in enumerate(methods(int(os.environ.get("TORTURE_FURTHER", "0")))):
+    METHODS.setdefault(name, Walker(chance=0.02 + 1e-5 * number))
 CONDITIONS = {
     (name, "parity"): Condition(method, NParity(4), "curriculum", Budget(generations=100, reports=REPORTS))
     for name, method in METHODS.items()

@@ -53,11 +53,11 @@ def test_{name}(trials, verdict):
 """
 
 
-def walkers(number: int) -> list[str]:
-    """Return the names of so many methods beside the paper's three, none of which is a part of another."""
-    return [f"walker{one:05}" for one in range(number)]
+def methods(further: int) -> list[str]:
+    """Return the names of the paper's three methods and of so many further ones."""
+    return ["quick", "steady", "fragile", *(f"walker{number:05}" for number in range(further))]
 
 
-def claims(number: int) -> str:
-    """Return the module of claims, with one for each of so many further methods."""
-    return CLAIMS + "".join(CLAIM.format(name=name) for name in walkers(number))
+def claims(further: int) -> str:
+    """Return the module of claims: those on the three methods, and one on each further method."""
+    return CLAIMS + "".join(CLAIM.format(name=name) for name in methods(further)[3:])
