@@ -7,8 +7,9 @@ import random
 import signal
 import time
 from collections import Counter
+from collections.abc import Sequence
 
-from bench import Bench, Laboratory, Running
+from bench import Bench, Laboratory, Running, until
 from guard import Guard
 from tally import Tally
 from tortured_project import REPORTS, TRIALS, methods
@@ -21,10 +22,10 @@ LIFE = 20.0
 PAUSE = 1.0
 """Seconds between two reports of a batch: a batch lasts longer than a process, so that several go on with it."""
 
-SECONDS_BETWEEN_LOOKS = 5.0
+STAGGER = 0.2
+"""Seconds between two starts, so that processes are in different phases; but no process is missing for long."""
 
-KINDS = {"evoclaims run of one condition": 5, "pytest of four claims": 4, "pytest -m smoke of all claims": 1}
-"""What a process does, and how often each is drawn."""
+SECONDS_BETWEEN_LOOKS = 5.0
 
 BLOWS = {signal.SIGKILL: 4, signal.SIGTERM: 1}
 """Ways to strike, and how often each is drawn."""
@@ -54,10 +55,23 @@ def attack(
         guard.judged(running)
         guard.plainly(running)
         guard.finish()
-        tally.done["trials finished"] = len(bench.records())
-        tally.done["lost"] = len(guard.lost)
-        tally.done["repeated"] = guard.repeated.total()
     return tally
+
+
+def _run_one(bench: Bench, names: Sequence[str], draw: random.Random) -> Running:
+    return bench.evoclaims("run", draw.choice(names))
+
+
+def _judge_some(bench: Bench, names: Sequence[str], draw: random.Random) -> Running:
+    return bench.pytest(0, ["-k", " or ".join(draw.sample(names, min(4, len(names))))])
+
+
+def _judge_all(bench: Bench, names: Sequence[str], draw: random.Random) -> Running:
+    return bench.pytest(0, ["-m", "smoke"])
+
+
+STARTS = {_run_one: 5, _judge_some: 4, _judge_all: 1}
+"""What a process does, given what is unfinished, and how often each is drawn."""
 
 
 class _Crowd:
@@ -67,16 +81,15 @@ class _Crowd:
         self._bench, self._guard, self._draw, self._size, self._life = bench, guard, draw, size, life
         self._living: list[Running] = []
         self._struck: set[int] = set()
+        self._next_start = 0.0
 
     def work(self, seconds: float) -> None:
-        """Start, strike and look until the time is over; then kill all that still run."""
+        """Start, strike and look for so long from the first report on; then kill all that still run."""
+        until(self._filled, "the first report of a crowd")
         now = time.monotonic()
-        end, start, strike, look = now + seconds, now, now + self._interval(), now
+        end, strike, look = now + seconds, now + self._interval(), now
         while (now := time.monotonic()) < end:
-            self._collect()
-            if len(self._living) < self._size and now >= start:
-                self._living.append(self._started())
-                start = now + min(0.2, self._life / self._size)  # staggered, so that they are in different phases
+            self._filled()
             if self._living and now >= strike:
                 self._strike()
                 strike = now + self._interval()
@@ -92,6 +105,14 @@ class _Crowd:
 
     def _interval(self) -> float:
         return self._draw.uniform(0.5, 1.5) * self._life / self._size
+
+    def _filled(self) -> bool:
+        """Start a process if one is lacking, and return whether any has ever reported."""
+        self._collect()
+        if len(self._living) < self._size and time.monotonic() >= self._next_start:
+            self._living.append(self._started())
+            self._next_start = time.monotonic() + min(STAGGER, self._life / self._size)
+        return bool(self._bench.events())
 
     def _collect(self) -> None:
         """Forget what has ended; what nobody has struck must have ended well."""
@@ -110,13 +131,9 @@ class _Crowd:
 
     def _started(self) -> Running:
         """Start a process on what is not finished yet; there are as many such conditions in sight as processes."""
-        (kind,) = self._draw.choices([*KINDS], [*KINDS.values()])
         self._guard.tally.done["processes started"] += 1
         stored = Counter(line["name"] for line in self._bench.events() if line["what"] == "put")
-        open_ones = [name for name in methods(self._bench.further) if stored[name] < TRIALS][: self._size]
-        if kind.startswith("evoclaims") and open_ones:
-            return self._bench.evoclaims("run", self._draw.choice(open_ones))
-        if "four" in kind and open_ones:
-            names = self._draw.sample(open_ones, min(4, len(open_ones)))
-            return self._bench.pytest(0, ["-k", " or ".join(names)])
-        return self._bench.pytest(0, ["-m", "smoke"])
+        names = methods(self._bench.further)
+        names = [name for name in names if stored[name] < TRIALS][: self._size] or names
+        (start,) = self._draw.choices([*STARTS], [*STARTS.values()])
+        return start(self._bench, names, self._draw)

@@ -21,7 +21,7 @@ class Guard:
 
     Attributes:
         once: whether no trial may be run twice; where a live process was taken for dead it may.
-        lost: ids of trials that were stored, and at some moment were not there.
+        lost: ids of trials that were stored and at some moment were not there, or are missing at the end.
     """
 
     bench: Bench
@@ -34,7 +34,8 @@ class Guard:
     @property
     def repeated(self) -> Counter[str]:
         """How often trials were run again, by id."""
-        return Counter(line["id"] for line in self._puts()) - Counter({line["id"] for line in self._puts()})
+        times = Counter(line["id"] for line in self._puts())
+        return times - Counter(times.keys())
 
     def look(self) -> None:
         """Nothing that was stored is lost or changed; to be called at any moment."""
@@ -53,15 +54,18 @@ class Guard:
     def finish(self) -> None:
         """All trials are there, each once, none was begun anew that had a checkpoint, and the store is sound."""
         self.look()
-        missing = len(self.truth.digests.keys() - self._seen.keys())
-        self.tally.demand(missing == 0, f"{missing} trials are missing at the end")
+        missing = self.truth.digests.keys() - self._seen.keys()
+        self.lost |= missing
+        self.tally.demand(not missing, f"{len(missing)} trials are missing at the end")
         for line in self._puts():
             self.tally.demand(line["became"] != "differs", f"trial {line['id'][:8]} came out differently")
         if self.once:
             self.tally.demand(not self.repeated, f"trials were run again: {self.repeated.most_common(3)}")
             self._trained_no_longer()
         self._went_on()
-        self.tally.done["trials compared"] += len(self._seen)
+        self.tally.done["finished trials compared"] += len(self._seen)
+        self.tally.done["lost"] += len(self.lost)
+        self.tally.done["repeated"] += self.repeated.total()
         with redirect_stdout(io.StringIO()) as shown:
             evoclaims(["verify", "--dry-run", "--storage", str(self.bench.store)])
         bad = [
@@ -93,17 +97,17 @@ class Guard:
         return [line for line in self.bench.events() if line["what"] == "put"]
 
     def _trained_no_longer(self) -> None:
-        """Nobody trains on when all trials of a condition are stored, but for whoever has just stored the last."""
-        owed = Counter({line["condition"]: TRIALS for line in self._puts()})
+        """Nobody trains a condition whose trials are all stored, but for whoever has just stored the last."""
+        stored: Counter[str] = Counter()
         last: dict[str, int] = {}
+        again = set()
         for line in self.bench.events():
-            condition = line.get("condition", "")
             if line["what"] == "put":
-                owed[condition] -= 1
-                last[condition] = line["pid"]
-            elif line["what"] == "training" and condition in last and owed[condition] <= 0:
-                own = line["pid"] == last[condition]
-                self.tally.demand(own, f"condition {condition[:8]} was trained again when all its trials were stored")
+                stored[line["condition"]] += 1
+                last[line["condition"]] = line["pid"]
+            elif line["what"] == "training" and stored[line["condition"]] >= TRIALS:
+                again |= {line["condition"][:8]} if line["pid"] != last[line["condition"]] else set()
+        self.tally.demand(not again, f"conditions were trained when all their trials were stored: {sorted(again)}")
 
     def _went_on(self) -> None:
         """Whoever takes over a batch begins where the one before has said that it was, or later."""
