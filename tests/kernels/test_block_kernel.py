@@ -85,7 +85,7 @@ def test_a_loop_in_a_loop_is_left_to_one_warp() -> None:
 
 @pytest.mark.parametrize(
     ("elements", "warps", "teams"),
-    [(1, 8, 1), (132 * 32, 8, 1), (132 * 32 + 1, 4, 2), (10_240, 2, 3), (20_480, 1, 5), (32_768, 1, 8), (10**6, 1, 8)],
+    [(1, 8, 1), (132 * 32, 8, 1), (132 * 32 + 1, 4, 2), (10_240, 2, 3), (4 * 132 * 32, 2, 4)],
 )
 def test_blocks_have_eight_warps_that_all_run_at_once(
     elements: int, warps: int, teams: int, monkeypatch: pytest.MonkeyPatch
@@ -96,16 +96,16 @@ def test_blocks_have_eight_warps_that_all_run_at_once(
     assert (shape.warps, shape.teams) == (warps, teams)
 
 
-def test_a_team_without_enough_shared_memory_is_one_warp(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_warp_has_elements_of_its_own_where_sharing_is_no_faster_or_impossible(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    results = _kernel(lambda x: jnp.sin(x) * x[::-1], (jnp.ones((1, 4)),)).results
+    assert block_shape.chosen(results, 1) is None  # its code is small
     monkeypatch.setattr(block_shape, "SMALL", 10)
+    assert block_shape.chosen(results, 1) is not None
+    assert block_shape.chosen(results, 4 * 132 * 32 + 1) is None  # elements enough for all warps
     monkeypatch.setattr(block_shape, "_of_device", lambda name, usual: 132 if name == "core_count" else 127)
-    shape = block_shape.chosen(_kernel(lambda x: jnp.sin(x) * x[::-1], (jnp.ones((1, 4)),)).results, 1)
-    assert shape is not None
-    assert (shape.warps, shape.teams, shape.shared_bytes) == (1, 1, 0)
-
-
-def test_small_kernels_are_left_as_they_are() -> None:
-    assert block_shape.chosen(_kernel(lambda x: jnp.sin(x), (jnp.ones((1, 4)),)).results, 1) is None
+    assert block_shape.chosen(results, 1) is None  # too little shared memory
 
 
 @st.composite
