@@ -22,7 +22,7 @@ from tiny_project import REPRODUCTION, Evoclaims, Project
 from evoclaims.cli import seats, workers
 from evoclaims.cli.missing import MissingBatch
 from evoclaims.cli.seats import Host, Seat, host_of, useful_processes
-from evoclaims.cli.worker import Ended, Order
+from evoclaims.cli.worker import Ended, WorkOrder
 from evoclaims.cli.workers import ATTEMPTS, Workers, in_queue
 from evoclaims.core.errors import UserError
 from evoclaims.envs.gates.parity import NParity
@@ -35,7 +35,7 @@ from evoclaims.trials.integrity import verify
 from evoclaims.trials.spec import Condition
 from evoclaims.trials.store import Store
 
-ORDER = Order("store", "smoke", "cpu", 0, 10)
+ORDER = WorkOrder("store", "smoke", "cpu", 0, 10)
 
 
 def _batch(name: str, work: float, compile_seconds: float = 0.0, layout: str = "vector") -> MissingBatch:
@@ -94,7 +94,7 @@ def test_four_workers_end_a_hundred_small_batches_within_15_percent_of_their_sha
 class FakeProcess:
     """A process that dies of some conditions some times, or of being started."""
 
-    order: Order
+    order: WorkOrder
     environment: dict[str, str]
     log: list[tuple[str, str]]
     deadly: Counter[str]
@@ -144,7 +144,7 @@ def run(monkeypatch: pytest.MonkeyPatch) -> Run:
         log: list[tuple[str, str]] = []
         deaths = Counter(deadly or {})
 
-        def process(order: Order, environment: dict[str, str]) -> FakeProcess:
+        def process(order: WorkOrder, environment: dict[str, str]) -> FakeProcess:
             return FakeProcess(order, environment, log, deaths, broken, took)
 
         monkeypatch.setattr(workers, "Process", process)
@@ -369,7 +369,7 @@ def test_a_worker_ends_with_the_command_that_has_started_it(evoclaims: Evoclaims
     )
     assert worker.stdin is not None
     assert worker.stdout is not None
-    for line in (Order(".evoclaims", "smoke", "cpu", 0, 1), Job("", "slow", "parity")):
+    for line in (WorkOrder(".evoclaims", "smoke", "cpu", 0, 1), Job("", "slow", "parity")):
         worker.stdin.write(msgspec.json.encode(line) + b"\n")
     worker.stdin.flush()
     deadline = time.monotonic() + 120

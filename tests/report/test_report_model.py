@@ -21,7 +21,7 @@ from evoclaims.report.formatting import Anchors
 from evoclaims.report.markdown import markdown
 from evoclaims.report.model import ShownChampion
 from evoclaims.report.trial_summary import Reader
-from evoclaims.verdicts.history import Entry
+from evoclaims.verdicts.history import AcceptedVerdict
 
 
 def test_a_section_holds_what_was_claimed_judged_and_looked_at(filled: Laboratory) -> None:
@@ -164,12 +164,14 @@ def test_the_history_says_when_rules_changed_and_what_differs_now(filled: Labora
     report = filled.judge(better_wins)
     now = report.fingerprint
 
-    def entry(outcome: Outcome, fingerprint: str, date: str) -> Entry:
-        return Entry(outcome, "why", 6, 0.5, fingerprint, date, {"jax": "0.10.2"}, "cpu", "a" * 40 + "-dirty", "")
+    def entry(outcome: Outcome, fingerprint: str, date: str) -> AcceptedVerdict:
+        return AcceptedVerdict(
+            outcome, "why", 6, 0.5, fingerprint, date, {"jax": "0.10.2"}, "cpu", "a" * 40 + "-dirty", ""
+        )
 
     old, same = entry(Outcome.SUPPORTED, "f" * 64, "2026-01-01"), entry(Outcome.REFUTED, now, "2026-02-02")
 
-    def shown(*entries: Entry) -> Any:
+    def shown(*entries: AcceptedVerdict) -> Any:
         return filled.section(report, history={("full", "T1"): entries})
 
     section = shown(old, same)

@@ -11,11 +11,11 @@ from hypothesis import strategies as st
 
 from evoclaims.core.errors import UserError
 from evoclaims.judging.verdict import Outcome
-from evoclaims.verdicts.history import Entry, dump, eras, in_order, load, parse
+from evoclaims.verdicts.history import AcceptedVerdict, dump, eras, in_order, load, parse
 
 TEXT = st.text(max_size=12)
 ENTRIES = st.builds(
-    Entry,
+    AcceptedVerdict,
     outcome=st.sampled_from(Outcome),
     reason=TEXT,
     n=st.integers(0, 100),
@@ -29,12 +29,14 @@ ENTRIES = st.builds(
 )
 HISTORIES = st.dictionaries(st.tuples(TEXT, TEXT), st.lists(ENTRIES, min_size=1, max_size=3).map(tuple), max_size=4)
 
-ENTRY = Entry(Outcome.REFUTED, "p = 1", 10, 1.0, "f" * 64, "2025-11-02", {"jax": "0.10.2"}, "cpu", "a" * 40, "d" * 64)
+ENTRY = AcceptedVerdict(
+    Outcome.REFUTED, "p = 1", 10, 1.0, "f" * 64, "2025-11-02", {"jax": "0.10.2"}, "cpu", "a" * 40, "d" * 64
+)
 
 
 @given(HISTORIES)
 def test_a_history_comes_back_as_it_was_whatever_the_names_in_it(
-    history: dict[tuple[str, str], tuple[Entry, ...]],
+    history: dict[tuple[str, str], tuple[AcceptedVerdict, ...]],
 ) -> None:
     assert parse(dump(history).encode(), "verdicts.toml") == history
 

@@ -10,12 +10,12 @@ from hand_made_verdicts import report
 from evoclaims.judging.baseline import DriftReport, DriftRow
 from evoclaims.judging.tripwire import DigestChange, DigestCheck
 from evoclaims.judging.verdict import Outcome
-from evoclaims.verdicts.history import Entry
+from evoclaims.verdicts.history import AcceptedVerdict
 from evoclaims.verdicts.reasons import reason
 from evoclaims.verdicts.source_trials import SourceTrials
 
 REPORT = replace(report(), sources=(SourceTrials("a", "t", "c" * 64, ("1",), {}, ()),))
-OLD = Entry(
+OLD = AcceptedVerdict(
     outcome=Outcome.REFUTED,
     reason="",
     n=10,
@@ -33,7 +33,9 @@ ELSEWHERE = replace(FINE, label="b on t (smoke)", status="drift")
 SAME = DigestCheck(10, ())
 
 
-def _why(new: Entry = NEW, rows: tuple[DriftRow, ...] = (FINE, ELSEWHERE), digests: DigestCheck = SAME) -> str:
+def _why(
+    new: AcceptedVerdict = NEW, rows: tuple[DriftRow, ...] = (FINE, ELSEWHERE), digests: DigestCheck = SAME
+) -> str:
     return reason(REPORT, OLD, new, DriftReport(rows, 0.01), digests)
 
 

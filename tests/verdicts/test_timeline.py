@@ -11,12 +11,14 @@ from evoclaims.core.errors import UnknownNameError, UserError
 from evoclaims.judging.verdict import Outcome
 from evoclaims.report.charts_of_verdicts import timeline_chart
 from evoclaims.report.verdict_chart import svg
-from evoclaims.verdicts.history import Entry
+from evoclaims.verdicts.history import AcceptedVerdict
 from evoclaims.verdicts.timeline import timeline
 
 SVG = "{http://www.w3.org/2000/svg}"
 VERSIONS = {"jax": "0.10.2", "python": "3.11.7", "numpy": "2.4"}
-FIRST = Entry(Outcome.SUPPORTED, "so", 10, 0.0282, "f" * 64, "2025-01-02", VERSIONS, "cpu", "a" * 40, "d" * 64)
+FIRST = AcceptedVerdict(
+    Outcome.SUPPORTED, "so", 10, 0.0282, "f" * 64, "2025-01-02", VERSIONS, "cpu", "a" * 40, "d" * 64
+)
 
 
 def test_a_claims_verdicts_come_by_date_with_the_versions_that_differ() -> None:

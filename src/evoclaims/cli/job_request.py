@@ -44,7 +44,7 @@ OURS: Final = {
 
 
 @dataclass(frozen=True)
-class Request:
+class JobRequest:
     """What each job asks for.
 
     Attributes:
@@ -88,7 +88,7 @@ class _Table:
     setup: tuple[str, ...] = ()
 
 
-def requested(options: argparse.Namespace, table: Mapping[str, object]) -> Request:
+def requested(options: argparse.Namespace, table: Mapping[str, object]) -> JobRequest:
     """Return what the jobs of a call ask for.
 
     Args:
@@ -109,7 +109,7 @@ def requested(options: argparse.Namespace, table: Mapping[str, object]) -> Reque
     own = {key: value for key, value in table.items() if key not in _Table.__dataclass_fields__ and not local}
     more = {**dict(_option(key, value) for key, value in own.items()), **dict(map(_given, options.slurm))}
     time = options.time or site.time
-    return Request(
+    return JobRequest(
         cluster=options.cluster,
         partition=site.partition if options.partition is None else options.partition,
         gpus=_count("--gpus", site.gpus if options.gpus is None else options.gpus, 0),

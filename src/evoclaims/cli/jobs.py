@@ -10,7 +10,7 @@ from typing import Final
 
 from evoclaims.cli.job_states import GONE, Seen, State, states
 from evoclaims.cli.project import Project, open_project
-from evoclaims.cli.submitted import Batch, Submission, SubmittedJob, load_all, log_of
+from evoclaims.cli.submitted import Submission, SubmittedBatch, SubmittedJob, load_all, log_of
 from evoclaims.core.errors import UserError
 from evoclaims.trials.batches import StoredTrials
 from evoclaims.trials.notice import is_announced
@@ -27,11 +27,11 @@ class Place:
     name: str
     submission: Submission
     job: SubmittedJob
-    batch: Batch
+    batch: SubmittedBatch
 
 
 @dataclass(frozen=True)
-class Row(Place):
+class JobRow(Place):
     """What has become of a batch: "queued", "running", "done" or "failed", why, if that is known, and its output."""
 
     state: str
@@ -67,7 +67,7 @@ def active(project: Project) -> dict[str, str]:
     }
 
 
-def _rows(project: Project) -> Iterator[Row]:
+def _rows(project: Project) -> Iterator[JobRow]:
     """Yield what has become of each batch that was submitted."""
     latest: dict[str, Place] = {}
     for name, submission in load_all(project.store.root).items():
@@ -82,10 +82,10 @@ def _rows(project: Project) -> Iterator[Row]:
     for condition, place in latest.items():
         log, found = log_of(project.store.root, place.name, place.job), seen.get((place.name, place.job.id), GONE)
         if condition not in owed or (found.state is State.ENDED and not _lacks(project, place)):  # it ended meanwhile
-            yield Row(**vars(place), state="done", reason="", log=log)
+            yield JobRow(**vars(place), state="done", reason="", log=log)
         else:
             state, reason = _told(project, place, found, log)
-            yield Row(**vars(place), state=state, reason=reason, log=log)
+            yield JobRow(**vars(place), state=state, reason=reason, log=log)
 
 
 def _lacks(project: Project, place: Place) -> bool:

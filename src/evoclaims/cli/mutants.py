@@ -8,9 +8,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from evoclaims.cli.project import Project, open_project
-from evoclaims.cli.running import Running
+from evoclaims.cli.running import Execution
 from evoclaims.cli.seats import Host, host_of
-from evoclaims.cli.worker import Order
+from evoclaims.cli.worker import WorkOrder
 from evoclaims.core.errors import UnknownNameError, UserError
 from evoclaims.core.files import write_atomically
 from evoclaims.mutants import catalogue
@@ -94,8 +94,8 @@ def _chosen(every: Sequence[Planted], options: argparse.Namespace) -> list[Plant
 def _run(project: Project, wanted: Mapping[Job, Condition], options: argparse.Namespace, host: Host) -> frozenset[Job]:
     """Run conditions that lack trials, and return those that have failed."""
     design = project.reproduction.tier(options.tier).design
-    order = Order(options.storage, options.tier, options.device, design.first_seed, design.last.n)
-    running = Running(project, order, host)
+    order = WorkOrder(options.storage, options.tier, options.device, design.first_seed, design.last.n)
+    running = Execution(project, order, host)
     running.check()
     failed = frozenset(ended.job for ended in running.run(wanted, lambda text: None) if ended.error)
     if failed:

@@ -11,10 +11,10 @@ from evoclaims.claims.fetching import StoredOnly
 from evoclaims.claims.power import Asserted, Listening, Pilots, asserted, only
 from evoclaims.cli.project import Project, open_project
 from evoclaims.cli.reference import of_one_environment
-from evoclaims.cli.running import Running
+from evoclaims.cli.running import Execution
 from evoclaims.cli.seats import Host, host_of
 from evoclaims.cli.terminal import styled
-from evoclaims.cli.worker import Order
+from evoclaims.cli.worker import WorkOrder
 from evoclaims.core.errors import UserError
 from evoclaims.core.packages import recorded
 from evoclaims.judging.counting import MAX_TRIALS
@@ -94,8 +94,8 @@ def _make(
         for names, condition in wanted.items():
             _write(project, pilots, names, condition, seeds)
         return
-    order = Order(options.storage, options.tier, options.device, seeds[0], options.trials)
-    running = Running(project, order, host)
+    order = WorkOrder(options.storage, options.tier, options.device, seeds[0], options.trials)
+    running = Execution(project, order, host)
     if wanted:
         running.check()
     for ended in running.run({Job("", *names): one for names, one in wanted.items()}, lambda text: print(f"  {text}")):

@@ -7,11 +7,11 @@ import sys
 from collections.abc import Sequence
 
 from evoclaims.cli.project import Project, open_project
-from evoclaims.cli.running import Running
+from evoclaims.cli.running import Execution
 from evoclaims.cli.seats import host_of
 from evoclaims.cli.stored import describe
 from evoclaims.cli.variant_cost import to_run
-from evoclaims.cli.worker import Order
+from evoclaims.cli.worker import WorkOrder
 from evoclaims.core.errors import UnknownNameError, UserError
 from evoclaims.judging.counting import MAX_TRIALS
 from evoclaims.mutants.conditions import Job
@@ -38,8 +38,8 @@ def main(options: argparse.Namespace) -> int:
     seeds = range(options.first_seed, options.first_seed + n)
     for names in chosen[:1]:  # an invalid seed is so for every condition: it is reported once, and nothing is run
         _ = [TrialSpec(tier.condition(*names), seed) for seed in seeds]
-    order = Order(options.storage, options.tier, options.device, seeds[0], n, options.variant, options.time_limit)
-    running = Running(project, order, host)
+    order = WorkOrder(options.storage, options.tier, options.device, seeds[0], n, options.variant, options.time_limit)
+    running = Execution(project, order, host)
     running.check()
     if options.variant and not (options.method and options.on):
         chosen = to_run(running, chosen)

@@ -12,7 +12,7 @@ from evoclaims.cli.missing import missing_batches
 from evoclaims.cli.project import Project
 from evoclaims.cli.seats import Host
 from evoclaims.cli.terminal import terminal
-from evoclaims.cli.worker import Ended, Order, run_jobs
+from evoclaims.cli.worker import Ended, WorkOrder, run_jobs
 from evoclaims.cli.workers import Workers, in_queue
 from evoclaims.mutants.conditions import Job
 from evoclaims.report.live_line import LiveLine, duration
@@ -21,11 +21,11 @@ from evoclaims.trials.spec import Condition
 
 
 @dataclass(frozen=True)
-class Running:
+class Execution:
     """How a command runs trials: whose, in which order, and with which processes and GPUs."""
 
     project: Project
-    order: Order
+    order: WorkOrder
     host: Host
     line: LiveLine = field(default_factory=lambda: LiveLine(*terminal()))
 

@@ -15,13 +15,13 @@ from pathlib import Path
 from typing import Any, Final
 
 from evoclaims.cli.batch_job import SIGNAL_SECONDS, BatchJob
-from evoclaims.cli.job_request import Request, clock, requested
+from evoclaims.cli.job_request import JobRequest, clock, requested
 from evoclaims.cli.job_states import JOB_NAME
 from evoclaims.cli.jobs import active
 from evoclaims.cli.missing import MissingBatch, missing_batches
 from evoclaims.cli.project import Project, open_project
 from evoclaims.cli.run import choose
-from evoclaims.cli.submitted import SCHEMA, Batch, Submission, SubmittedJob, folder_of, new_name, save
+from evoclaims.cli.submitted import SCHEMA, Submission, SubmittedBatch, SubmittedJob, folder_of, new_name, save
 from evoclaims.core.canonical import content_hash
 from evoclaims.core.errors import UserError
 from evoclaims.mutants.conditions import Job
@@ -60,7 +60,7 @@ def main(options: argparse.Namespace) -> int:
 
 
 def _plan(
-    project: Project, options: argparse.Namespace, request: Request, conditions: Mapping[Job, Condition]
+    project: Project, options: argparse.Namespace, request: JobRequest, conditions: Mapping[Job, Condition]
 ) -> list[list[MissingBatch]]:
     """Print and return the jobs that are to be submitted, each with its batches."""
     design = project.reproduction.tier(options.tier).design
@@ -92,7 +92,7 @@ def _plan(
     return jobs
 
 
-def _cost(seconds: Sequence[float], request: Request, platform: str) -> str:
+def _cost(seconds: Sequence[float], request: JobRequest, platform: str) -> str:
     """Return a sentence on the hours of all batches."""
     each = f"{request.gpus} GPUs" if request.gpus > 1 else "a GPU" if platform == "gpu" else "a job"
     hours = max(sum(seconds) / 3600, 0.1)
@@ -115,7 +115,7 @@ def dealt(batches: Sequence[MissingBatch], jobs: int) -> list[list[MissingBatch]
 def _submitted(
     project: Project,
     options: argparse.Namespace,
-    request: Request,
+    request: JobRequest,
     name: str,
     jobs: Sequence[Sequence[MissingBatch]],
     conditions: Mapping[Job, Condition],
@@ -141,13 +141,13 @@ def _submitted(
     work = [BatchJob([command(one) for one in job], str(project.config.root.absolute())) for job in jobs]
     sent = _send(request, folder, requeues, work)
     made = tuple(
-        SubmittedJob(id_, tuple(Batch(*one.job.names, conditions[one.job].id) for one in job))
+        SubmittedJob(id_, tuple(SubmittedBatch(*one.job.names, conditions[one.job].id) for one in job))
         for id_, job in zip(sent, jobs, strict=True)
     )
     return Submission(SCHEMA, request.cluster, socket.gethostname(), options.tier, made, options.variant)
 
 
-def _send(request: Request, folder: Path, requeues: int, work: Sequence[BatchJob]) -> list[str]:
+def _send(request: JobRequest, folder: Path, requeues: int, work: Sequence[BatchJob]) -> list[str]:
     """Hand jobs to submitit, and return their ids."""
     try:
         import submitit
@@ -186,7 +186,7 @@ def _send(request: Request, folder: Path, requeues: int, work: Sequence[BatchJob
         raise UserError(f"The jobs were not submitted: {said or type(error).__name__}") from error
 
 
-def _setup_here(request: Request) -> list[str]:
+def _setup_here(request: JobRequest) -> list[str]:
     """Return the lines of shell that jobs of this machine begin with.
 
     They let go of the terminal, or of the pipe that would not end before them; and without --gpus they see the GPUs

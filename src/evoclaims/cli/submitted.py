@@ -23,7 +23,7 @@ JobId = Annotated[str, Meta(pattern=r"\A[0-9]{1,19}(_[0-9]{1,19})?\Z")]
 
 
 @dataclass(frozen=True)
-class Batch:
+class SubmittedBatch:
     """A condition's missing trials, as one process runs them; `condition` is its id."""
 
     method: Name
@@ -46,7 +46,7 @@ class SubmittedJob:
     """
 
     id: JobId
-    batches: tuple[Batch, ...]
+    batches: tuple[SubmittedBatch, ...]
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from evoclaims.cli.running import Running
+from evoclaims.cli.running import Execution
 from evoclaims.paper import references
 from evoclaims.paper.cost import known_pace
 from evoclaims.paper.variant import Names
@@ -15,7 +15,7 @@ from evoclaims.trials.batches import StoredTrials
 from evoclaims.trials.result import COMPLETE
 
 
-def to_run(running: Running, names: Sequence[Names]) -> list[Names]:
+def to_run(running: Execution, names: Sequence[Names]) -> list[Names]:
     """Print what the conditions of a variant cost here, and return those that are not committed.
 
     Times are upper bounds, by earlier trials of the variant or of the protocol on such a device.

@@ -1,7 +1,7 @@
 """The running of named conditions one after the other, in this process or in a worker process of `--numprocesses N`.
 
-A worker (`python -m evoclaims.cli.worker`) reads an `Order` and then conditions from its standard input, a line of JSON
-each, and answers on its standard output when each has ended; it judges nothing. It ends with its input.
+A worker (`python -m evoclaims.cli.worker`) reads a `WorkOrder` and then conditions from its standard input, a line of
+JSON each, and answers on its standard output when each has ended; it judges nothing. It ends with its input.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ TOLD_SECONDS: Final = 60.0
 
 
 @dataclass(frozen=True)
-class Order:
+class WorkOrder:
     """What the conditions that are run have in common.
 
     Attributes:
@@ -83,7 +83,7 @@ class Ended(msgspec.Struct, frozen=True, tag=True):
 Reply = Told | Ended
 
 
-def condition_of(project: Project, order: Order, job: Job) -> Condition:
+def condition_of(project: Project, order: WorkOrder, job: Job) -> Condition:
     """Return the condition that a job names.
 
     Raises:
@@ -95,7 +95,7 @@ def condition_of(project: Project, order: Order, job: Job) -> Condition:
     return jobs(sound, plantings(sound, catalogue.load(project.reproduction)))[job]
 
 
-def run_jobs(project: Project, order: Order, asked: Iterable[Job], line: LiveLine) -> Iterator[Ended]:
+def run_jobs(project: Project, order: WorkOrder, asked: Iterable[Job], line: LiveLine) -> Iterator[Ended]:
     """Run the missing trials of conditions one after the other; an error in one does not stop the others."""
     fetch = RunMissing(project.store, order.device, line, project.config.seconds(order.time_limit))
     for job in asked:
@@ -120,7 +120,7 @@ def main() -> int:
     def reply(one: Reply) -> None:
         replies.write(msgspec.json.encode(one) + b"\n")
 
-    order = msgspec.json.decode(sys.stdin.buffer.readline(), type=Order)
+    order = msgspec.json.decode(sys.stdin.buffer.readline(), type=WorkOrder)
     try:
         project = open_project(order.storage)
     except UserError as error:

@@ -12,14 +12,14 @@ from collections.abc import Callable, Mapping
 
 import msgspec
 
-from evoclaims.cli.worker import Ended, Order, Reply, Told
+from evoclaims.cli.worker import Ended, Reply, Told, WorkOrder
 from evoclaims.mutants.conditions import Job
 
 
 class Process:
     """A process that runs one condition after the other, as it is asked to."""
 
-    def __init__(self, order: Order, environment: Mapping[str, str]) -> None:
+    def __init__(self, order: WorkOrder, environment: Mapping[str, str]) -> None:
         """Start it, with these environment variables besides the command's own."""
         self._process = subprocess.Popen(
             [sys.executable, "-m", "evoclaims.cli.worker"],
@@ -63,7 +63,7 @@ class Process:
         """End it, whatever it does; it is still to be closed."""
         self._process.terminate()
 
-    def _ask(self, what: Order | Job) -> None:
+    def _ask(self, what: WorkOrder | Job) -> None:
         """Write a line to its standard input; a dead process is found when it does not reply."""
         with contextlib.suppress(OSError):
             self._process.stdin.write(msgspec.json.encode(what) + b"\n")

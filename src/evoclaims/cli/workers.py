@@ -11,7 +11,7 @@ from typing import Final
 
 from evoclaims.cli.missing import MissingBatch
 from evoclaims.cli.seats import Seat
-from evoclaims.cli.worker import Ended, Order
+from evoclaims.cli.worker import Ended, WorkOrder
 from evoclaims.cli.worker_process import Process
 from evoclaims.mutants.conditions import Job, sharing_programs
 from evoclaims.paper.variant import Conditions
@@ -48,7 +48,7 @@ def in_queue(batches: Sequence[MissingBatch], sound: Conditions, processes: int)
 class Workers:
     """Runs conditions in a process for each seat, several at a time."""
 
-    def __init__(self, order: Order, seats: Sequence[Seat], tell: Callable[[str], None]) -> None:
+    def __init__(self, order: WorkOrder, seats: Sequence[Seat], tell: Callable[[str], None]) -> None:
         """Start nothing yet; `tell` is told lines of progress."""
         self._order = order
         self._seats = seats

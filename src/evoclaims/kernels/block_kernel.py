@@ -8,7 +8,7 @@ from evoclaims.kernels.block_shape import BlockShape
 from evoclaims.kernels.expressions import Carried, Input, Loop, LoopResult, Number, ScalarOperation, is_known
 from evoclaims.kernels.gpu_kernel import BLOCK, Element, finished, parameters
 from evoclaims.kernels.interpreter import Numbers
-from evoclaims.kernels.llvm_ir import TYPES, Instructions, Row, either
+from evoclaims.kernels.llvm_ir import TYPES, ArrayRow, Instructions, either
 from evoclaims.kernels.shared_slots import Slots
 from evoclaims.kernels.warp_schedule import Phase, Schedule
 
@@ -17,7 +17,7 @@ SHARED = "@numbers = external addrspace(3) global [0 x i32], align 16\n"
 
 
 def text(
-    shape: BlockShape, results: Sequence[Numbers], arrays: Mapping[int, Row], shared: Mapping[int, int], rows: int
+    shape: BlockShape, results: Sequence[Numbers], arrays: Mapping[int, ArrayRow], shared: Mapping[int, int], rows: int
 ) -> str:
     """Return LLVM's text of a kernel, as `gpu_kernel.text` does.
 

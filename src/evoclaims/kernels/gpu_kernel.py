@@ -8,7 +8,7 @@ from typing import Any, Final
 
 from evoclaims.kernels.expressions import Input, in_order
 from evoclaims.kernels.interpreter import Numbers
-from evoclaims.kernels.llvm_ir import BYTES, STORED, Instructions, Row
+from evoclaims.kernels.llvm_ir import BYTES, STORED, ArrayRow, Instructions
 from evoclaims.kernels.machine_code import llvm
 
 ENTRY: Final = "kernel"
@@ -18,7 +18,7 @@ CAPABILITY: Final = 8.0
 """The compute capability needed; every GPU from there on runs what is written for it."""
 
 
-def text(results: Sequence[Numbers], arrays: Mapping[int, Row], shared: Mapping[int, int], rows: int) -> str:
+def text(results: Sequence[Numbers], arrays: Mapping[int, ArrayRow], shared: Mapping[int, int], rows: int) -> str:
     """Return LLVM's text of a kernel; its parameters are the addresses of the arrays read, then of the results.
 
     Args:
@@ -43,7 +43,7 @@ class Element:
     Addresses are computed where they are first used; `forget` has them computed again, where they are not at hand.
     """
 
-    def __init__(self, page: Instructions, row: str, arrays: Mapping[int, Row], shared: Mapping[int, int]) -> None:
+    def __init__(self, page: Instructions, row: str, arrays: Mapping[int, ArrayRow], shared: Mapping[int, int]) -> None:
         """Remember what `text` was given; `row` is the register with the element's number."""
         self._page = page
         self._row = row
@@ -83,7 +83,7 @@ class Element:
         return self._addresses[parameter]
 
 
-def parameters(arrays: Mapping[int, Row], results: int) -> list[str]:
+def parameters(arrays: Mapping[int, ArrayRow], results: int) -> list[str]:
     """Return the names of a kernel's parameters."""
     return [*(f"%a{a}" for a in arrays), *(f"%z{z}" for z in range(results))]
 

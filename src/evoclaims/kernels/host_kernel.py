@@ -11,14 +11,14 @@ from typing import Final
 
 from evoclaims.kernels.expressions import Input, in_order
 from evoclaims.kernels.interpreter import Numbers
-from evoclaims.kernels.llvm_ir import BYTES, STORED, SUFFIXES, Instructions, Row
+from evoclaims.kernels.llvm_ir import BYTES, STORED, SUFFIXES, ArrayRow, Instructions
 from evoclaims.kernels.xla_handler import handler
 
 WIDE: Final = 'nounwind "prefer-vector-width"="512" "min-legal-vector-width"="512"'
 """Attributes of a function that uses the widest vectors there are."""
 
 
-def text(results: Sequence[Numbers], arrays: Mapping[int, Row], lanes: int) -> str:
+def text(results: Sequence[Numbers], arrays: Mapping[int, ArrayRow], lanes: int) -> str:
     """Return the text of a kernel.
 
     Its arguments are an array of int32, [rows of the batch, and of each array read how many consecutive rows share one
@@ -39,7 +39,7 @@ def text(results: Sequence[Numbers], arrays: Mapping[int, Row], lanes: int) -> s
     return "\n".join(page.declared) + "\n" + block + _loop(given, lanes) + called
 
 
-def _block(page: Instructions, results: Sequence[Numbers], arrays: Mapping[int, Row]) -> None:
+def _block(page: Instructions, results: Sequence[Numbers], arrays: Mapping[int, ArrayRow]) -> None:
     """Write the computation of rows `row`, `row` + 1, … to at most `last`, one per lane.
 
     Lanes beyond `last` compute the last row, and store nothing.
@@ -82,7 +82,7 @@ def _block(page: Instructions, results: Sequence[Numbers], arrays: Mapping[int, 
     page.write("ret void")
 
 
-def _rows(page: Instructions, array: int, row: Row, lane: str) -> tuple[str, str]:
+def _rows(page: Instructions, array: int, row: ArrayRow, lane: str) -> tuple[str, str]:
     """Return registers: the address of the first lane's row of an array, and each lane's offset from it, in numbers."""
     first = page.put(f"udiv i64 %row, %shared{array}")
     skipped = page.put(f"urem i64 %row, %shared{array}")

@@ -62,10 +62,10 @@ class Kernel:
         return [place for place, result in enumerate(self.results) if result.size]
 
     @cached_property
-    def read(self) -> dict[int, llvm_ir.Row]:
+    def read(self) -> dict[int, llvm_ir.ArrayRow]:
         """The rows of the arguments that the results depend on."""
         used = {e.array for e in everything(n for r in self.results for n in r.flat) if isinstance(e, Input)}
-        return {i: llvm_ir.Row(math.prod(self.shapes[i].shape), self.shapes[i].dtype.kind) for i in sorted(used)}
+        return {i: llvm_ir.ArrayRow(math.prod(self.shapes[i].shape), self.shapes[i].dtype.kind) for i in sorted(used)}
 
     @cached_property
     def _host_text(self) -> str:

@@ -81,7 +81,7 @@ OTHERS: Final = {
 
 
 @dataclass(frozen=True)
-class Row:
+class ArrayRow:
     """A row of an array that a kernel reads: what one element of the batch has of it.
 
     Attributes:

@@ -65,7 +65,7 @@ def known_pace(
 
 
 @dataclass(frozen=True)
-class Batch:
+class RecordedBatch:
     """Trials that ran together, as their records say.
 
     Attributes:
@@ -89,18 +89,18 @@ class Batch:
         return self.compile + self.run * (trials / len(self.trials) if self.layout == "alone" else 1)
 
 
-def took(trials: Iterable[TrialResult], platform: str) -> Batch | None:
+def took(trials: Iterable[TrialResult], platform: str) -> RecordedBatch | None:
     """Return the largest batch among trials of one condition on a platform; None if there is none."""
     return _largest_batch(trial for trial in trials if trial.device.get("platform") == platform)
 
 
-def _largest_batch(trials: Iterable[TrialResult]) -> Batch | None:
+def _largest_batch(trials: Iterable[TrialResult]) -> RecordedBatch | None:
     """Return the largest batch of trials that came to an end; None if there is none."""
     ended = by_batch(trial for trial in trials if trial.status in COMPLETE)
     return max(ended, key=lambda batch: len(batch.trials), default=None)
 
 
-def by_batch(trials: Iterable[TrialResult]) -> list[Batch]:
+def by_batch(trials: Iterable[TrialResult]) -> list[RecordedBatch]:
     """Return trials by batch, in the order of the first of each."""
     batches: dict[tuple[str, str], list[TrialResult]] = defaultdict(list)
     for trial in trials:
@@ -108,7 +108,7 @@ def by_batch(trials: Iterable[TrialResult]) -> list[Batch]:
     found = []
     for each in batches.values():
         compiling, running = (max(float(trial.timing[name]) for trial in each) for name in ("compile", "run"))
-        found.append(Batch(each, compiling, running, layout_on(str(each[0].device["platform"]))))
+        found.append(RecordedBatch(each, compiling, running, layout_on(str(each[0].device["platform"]))))
     return found
 
 

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from evoclaims.paper import references
-from evoclaims.paper.cost import Batch, by_batch
+from evoclaims.paper.cost import RecordedBatch, by_batch
 from evoclaims.paper.reproduction import Reproduction
 from evoclaims.trials.result import TrialResult
 
@@ -58,6 +58,6 @@ def _core_pace(trials: Iterable[TrialResult]) -> float | None:
     return sum(batch.core_seconds for batch in batches) / steps if steps else None
 
 
-def _batches(trials: Iterable[TrialResult]) -> list[Batch]:
+def _batches(trials: Iterable[TrialResult]) -> list[RecordedBatch]:
     """Return trials by batch, without those that did not end by themselves or do not name their device."""
     return by_batch(trial for trial in trials if trial.status == "done" and trial.device)

@@ -24,7 +24,7 @@ from evoclaims.report.trial_summary import Reader, TrialSummary
 from evoclaims.trials.store import Store
 from evoclaims.verdicts.acceptance import UNDECIDED
 from evoclaims.verdicts.claim_report import ClaimReport
-from evoclaims.verdicts.history import Entry, History, eras, key_of
+from evoclaims.verdicts.history import AcceptedVerdict, History, eras, key_of
 from evoclaims.verdicts.mutation_matrix import Matrix, described
 from evoclaims.verdicts.source_trials import SourceTrials
 
@@ -168,7 +168,7 @@ def _parts(report: ClaimReport, read: Mapping[str, Sequence[TrialSummary]]) -> t
     return tuple(unjudged_part(label, trials) for label, trials in read.items() if trials)
 
 
-def _change(entries: Sequence[Entry], report: ClaimReport) -> str:
+def _change(entries: Sequence[AcceptedVerdict], report: ClaimReport) -> str:
     """Say what differs from the last accepted verdict; empty if there is nothing to say."""
     if not entries or report.verdict is None or report.outcome in UNDECIDED:
         return ""

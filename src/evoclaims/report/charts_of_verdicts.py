@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from evoclaims.report import across_table
-from evoclaims.report.verdict_chart import Mark, VerdictChart
+from evoclaims.report.verdict_chart import VerdictChart, VerdictMark
 from evoclaims.verdicts import timeline
 from evoclaims.verdicts.across import Across, Cell
 from evoclaims.verdicts.history import History
@@ -26,7 +26,7 @@ def timeline_chart(history: History, claim: str = "") -> VerdictChart:
         UserError: as `timeline.timeline` does.
     """
     columns: dict[str, str] = {}
-    rows: dict[str, dict[str, Mark]] = {}
+    rows: dict[str, dict[str, VerdictMark]] = {}
     for tier, name in timeline.chosen(history, claim):
         marks = rows.setdefault(f"{name} ({tier})", {})
         before = None
@@ -35,15 +35,15 @@ def timeline_chart(history: History, claim: str = "") -> VerdictChart:
             column = f"{entry.accepted}: {versions}"
             columns[column] = f"{entry.accepted}, jax {entry.versions.get('jax', 'unknown')}"
             ringed = before is not None and before.fingerprint != entry.fingerprint
-            marks[column] = Mark(entry.outcome, timeline.described(before, entry), ringed=ringed)
+            marks[column] = VerdictMark(entry.outcome, timeline.described(before, entry), ringed=ringed)
             before = entry
     title, note = "Accepted verdicts by date", "ring: other rules than before"
     return VerdictChart(title, note, dict(sorted(columns.items())), rows)
 
 
-def _mark(cell: Cell | None, trouble: str) -> Mark:
+def _mark(cell: Cell | None, trouble: str) -> VerdictMark:
     """Return the mark of a claim in an environment, which says what the table says."""
     if cell is None:
-        return Mark(None, trouble or "no verdict")
+        return VerdictMark(None, trouble or "no verdict")
     a12 = 0.5 if cell.drift is None or cell.drift.a12 is None else cell.drift.a12
-    return Mark(cell.outcome, "; ".join(across_table.said(cell)), a12, cell.drifted)
+    return VerdictMark(cell.outcome, "; ".join(across_table.said(cell)), a12, cell.drifted)

@@ -17,7 +17,7 @@ from evoclaims.report.origin import Origin
 from evoclaims.report.training_curves import CurvePanel
 from evoclaims.report.verdict_chart import VerdictChart
 from evoclaims.verdicts.claim_report import ClaimReport
-from evoclaims.verdicts.history import Entry
+from evoclaims.verdicts.history import AcceptedVerdict
 from evoclaims.verdicts.robustness import Robustness
 from evoclaims.verdicts.sensitivity import Tally
 
@@ -79,7 +79,7 @@ class Section:
     conditions: tuple[str, ...] = ()
     made: Counter[Origin] = field(default_factory=Counter)
     warnings: tuple[str, ...] = ()
-    history: tuple[tuple[Entry, ...], ...] = ()
+    history: tuple[tuple[AcceptedVerdict, ...], ...] = ()
     change: str = ""
     faults: str = ""
 

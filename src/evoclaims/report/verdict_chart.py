@@ -28,7 +28,7 @@ _COLOURS: Final = {
 
 
 @dataclass(frozen=True)
-class Mark:
+class VerdictMark:
     """One verdict, or the lack of one.
 
     Attributes:
@@ -58,7 +58,7 @@ class VerdictChart:
     title: str
     note: str
     columns: Mapping[str, str]
-    rows: Mapping[str, Mapping[str, Mark]]
+    rows: Mapping[str, Mapping[str, VerdictMark]]
 
     @property
     def row(self) -> int:
@@ -98,7 +98,7 @@ def _pieces(chart: VerdictChart, width: int) -> Iterator[str]:
         )
 
 
-def _drawn(mark: Mark, x: float, middle: float) -> str:
+def _drawn(mark: VerdictMark, x: float, middle: float) -> str:
     """Return a mark in the column around `x` and the row around `middle`."""
     title = f"<title>{_text(mark.said)}</title>"
     if mark.outcome is None:

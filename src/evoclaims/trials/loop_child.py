@@ -13,7 +13,7 @@ from typing import Final
 
 import msgspec
 
-from evoclaims.trials.loop_messages import Answer, Reported, Request, decode, encode, last_lines
+from evoclaims.trials.loop_messages import Answer, LoopReport, LoopRequest, decode, encode, last_lines
 
 _READ: Final = 4000
 
@@ -21,7 +21,7 @@ _READ: Final = 4000
 class Child:
     """A process that runs one trial."""
 
-    def __init__(self, request: Request, environment: Mapping[str, str]) -> None:
+    def __init__(self, request: LoopRequest, environment: Mapping[str, str]) -> None:
         """Start it, as the leader of a group of its own, with these environment variables besides this process's."""
         self._said = tempfile.TemporaryFile()  # noqa: SIM115  (closed by `close`)
         self._process = subprocess.Popen(
@@ -47,7 +47,7 @@ class Child:
             except (msgspec.MsgspecError, ValueError):  # it died in the middle of a line
                 return
             yield answer
-            if not isinstance(answer, Reported):
+            if not isinstance(answer, LoopReport):
                 return
 
     def stop(self) -> None:

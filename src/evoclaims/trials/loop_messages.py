@@ -14,7 +14,7 @@ _LAST_LINES: Final = 8
 _LONGEST_LINE: Final = 500
 
 
-class Request(msgspec.Struct, frozen=True):
+class LoopRequest(msgspec.Struct, frozen=True):
     """One trial.
 
     Attributes:
@@ -30,7 +30,7 @@ class Request(msgspec.Struct, frozen=True):
     seed: int
 
 
-class Reported(msgspec.Struct, frozen=True, tag=True):
+class LoopReport(msgspec.Struct, frozen=True, tag=True):
     """How far training is; `kept` says whether this is a point of the training curve."""
 
     step: int
@@ -66,10 +66,10 @@ class Failed(msgspec.Struct, frozen=True, tag=True):
     reason: str
 
 
-Answer = Reported | Trained | Failed
+Answer = LoopReport | Trained | Failed
 
 
-def encode(message: Request | Answer) -> bytes:
+def encode(message: LoopRequest | Answer) -> bytes:
     """Return a message as one line of JSON, in which NaN and the infinities are words."""
     return json.dumps(as_plain(msgspec.to_builtins(message)), allow_nan=False).encode("ascii") + b"\n"
 

@@ -23,7 +23,7 @@ from evoclaims.core.errors import UserError
 from evoclaims.core.portable import from_plain, resolve
 from evoclaims.envs.foreign.scoring import ForeignTask
 from evoclaims.methods.training_loop import wants_report
-from evoclaims.trials.loop_messages import Answer, Failed, Reported, Request, Scores, Trained, encode, last_lines
+from evoclaims.trials.loop_messages import Answer, Failed, LoopReport, LoopRequest, Scores, Trained, encode, last_lines
 
 COUNTS: Final = ("steps", "environment_steps")
 """Metrics that are counts; all others are any numbers."""
@@ -65,7 +65,7 @@ class Reporter:
         if kept:
             self._next = (step // self._every + 1) * self._every
         self._told = time.monotonic()
-        self._answer(Reported(step, numbers(values), kept))
+        self._answer(LoopReport(step, numbers(values), kept))
 
 
 def numbers(values: Mapping[str, Any]) -> dict[str, Any]:
@@ -95,7 +95,7 @@ def _scalar(value: Any) -> Any:
         return value
 
 
-def train(request: Request, answer: Callable[[Answer], None]) -> Trained:
+def train(request: LoopRequest, answer: Callable[[Answer], None]) -> Trained:
     """Call the function, and examine its policy."""
     function, task, budget = resolve(request.function), from_plain(request.task), from_plain(request.budget)
     report = Reporter(budget.chunk(1), answer)
@@ -123,7 +123,7 @@ def main() -> None:
     asked, replies, one_at_a_time = _requests(), os.fdopen(os.dup(1), "wb", buffering=0), threading.Lock()
     os.dup2(2, 1)  # what the function prints is no answer
     os.register_at_fork(after_in_child=replies.close)  # else the pipe does not end with this process
-    request = msgspec.json.decode(asked.readline(), type=Request)
+    request = msgspec.json.decode(asked.readline(), type=LoopRequest)
     threading.Thread(target=_end_with_parent, args=(asked.detach(),), daemon=True).start()
 
     def answer(message: Answer) -> None:

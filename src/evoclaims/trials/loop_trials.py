@@ -24,7 +24,7 @@ from evoclaims.trials.allowance import Allowance, OutOfTimeError
 from evoclaims.trials.batches import StoredTrials
 from evoclaims.trials.devices import layout_on, usable_cores
 from evoclaims.trials.loop_child import Child
-from evoclaims.trials.loop_messages import Failed, Reported, Request, Trained
+from evoclaims.trials.loop_messages import Failed, LoopReport, LoopRequest, Trained
 from evoclaims.trials.loop_record import trained_record
 from evoclaims.trials.progress import RunProgress, Watcher
 from evoclaims.trials.result_making import make_unfinished
@@ -35,7 +35,7 @@ _ONE_THREAD: Final = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "
 
 
 @dataclass
-class Running:
+class RunningLoop:
     """A trial that is running, as the thread that waits for it has heard.
 
     Attributes:
@@ -49,8 +49,8 @@ class Running:
 
     spec: TrialSpec
     began: str = ""
-    points: list[Reported] = field(default_factory=list)
-    newest: Reported | None = None
+    points: list[LoopReport] = field(default_factory=list)
+    newest: LoopReport | None = None
     seconds: float = 0.0
     outcome: Trained | Failed | Literal["late"] | None = None
 
@@ -89,7 +89,7 @@ class LoopTrials:
             "budget": to_plain(stored.condition.budget),
             "settings": to_plain(dict(self._method.settings)),
         }
-        self._events: queue.SimpleQueue[Running | BaseException] = queue.SimpleQueue()
+        self._events: queue.SimpleQueue[RunningLoop | BaseException] = queue.SimpleQueue()
         self._lock = threading.Lock()  # of what follows
         self._children = set[Child]()
         self._stopping = False
@@ -97,7 +97,7 @@ class LoopTrials:
     def make(self, owed: Sequence[int], tell: Watcher) -> None:
         """Run trials and store each as it ends; those that have ended stay when anything is raised."""
         at_a_time = usable_cores() if layout_on(self._devices[0].platform) == "alone" else 1
-        running = [Running(TrialSpec(self._stored.condition, seed)) for seed in owed]
+        running = [RunningLoop(TrialSpec(self._stored.condition, seed)) for seed in owed]
         began, stored = time.monotonic(), set[int]()
         with ThreadPoolExecutor(at_a_time) as pool:
             try:
@@ -119,11 +119,11 @@ class LoopTrials:
                         child.stop()
                 raise
 
-    def _attend(self, one: Running) -> None:
+    def _attend(self, one: RunningLoop) -> None:
         """Run a trial's process to its end, on a thread of its own; what happens becomes an event each."""
         try:
             began, one.began = time.monotonic(), datetime.now(UTC).isoformat(timespec="seconds")
-            child = Child(Request(seed=one.spec.seed, **self._request), self._environment())
+            child = Child(LoopRequest(seed=one.spec.seed, **self._request), self._environment())
             with self._lock:
                 self._children.add(child)
                 if self._stopping:
@@ -143,10 +143,10 @@ class LoopTrials:
         except BaseException as error:
             self._events.put(error)
 
-    def _listen(self, child: Child, one: Running) -> Trained | Failed | None:
+    def _listen(self, child: Child, one: RunningLoop) -> Trained | Failed | None:
         """Note what a process reports, and return its last answer; None if it ended without one."""
         for answer in child.answers():
-            if not isinstance(answer, Reported):
+            if not isinstance(answer, LoopReport):
                 return answer
             one.newest = answer
             one.points += [answer] * answer.kept
@@ -165,7 +165,7 @@ class LoopTrials:
             return {**chosen, "JAX_PLATFORMS": "cpu", "CUDA_VISIBLE_DEVICES": ""}
         return {**chosen, "XLA_PYTHON_CLIENT_PREALLOCATE": "false"}  # this process has taken most of the memory
 
-    def _store(self, one: Running, tell: Watcher) -> None:
+    def _store(self, one: RunningLoop, tell: Watcher) -> None:
         """Store a trial that has ended."""
         timing = {"run": one.seconds, "compile": 0.0, "batch": 1, "started": one.began}
         failed = ""
@@ -183,7 +183,7 @@ class LoopTrials:
             tell(RunProgress(self._stored.condition.label, f"seed {one.spec.seed} {failed}", 0, remark=True))
         self._stored.store.put(result, {})
 
-    def _progress(self, running: Sequence[Running], ended: int, seconds: float) -> RunProgress:
+    def _progress(self, running: Sequence[RunningLoop], ended: int, seconds: float) -> RunProgress:
         """Return how far all trials are."""
         condition = self._stored.condition
         steps = [condition.steps if one.outcome else one.newest.step if one.newest else 0 for one in running]

@@ -12,7 +12,7 @@ from evoclaims.judging.verdict import Outcome
 from evoclaims.paper.archive import Archive
 from evoclaims.trials.result import TrialResult
 from evoclaims.verdicts.claim_report import ClaimReport
-from evoclaims.verdicts.history import Entry, History, key_of
+from evoclaims.verdicts.history import AcceptedVerdict, History, key_of
 
 UNDECIDED = (Outcome.NOT_RUN, Outcome.ERROR)
 """Outcomes that say nothing about a claim and are never accepted."""
@@ -67,7 +67,7 @@ def accept(history: History, reports: Sequence[ClaimReport], archive: Archive, t
     return Acceptance(grown, tuple(accepted), tuple(retired), tuple(left))
 
 
-def entry_of(report: ClaimReport, archive: Archive, today: str) -> Entry:
+def entry_of(report: ClaimReport, archive: Archive, today: str) -> AcceptedVerdict:
     """Return the entry that records a judged claim.
 
     Raises:
@@ -76,7 +76,7 @@ def entry_of(report: ClaimReport, archive: Archive, today: str) -> Entry:
     preferred = {trial: source.installed for source in report.sources for trial in source.trials}
     found = (archive.get(trial, versions) for trial, versions in preferred.items())
     trials = [trial for trial in found if trial is not None]
-    return Entry(
+    return AcceptedVerdict(
         outcome=report.outcome,
         reason=printable(report.reason),
         n=report.n,
@@ -97,7 +97,7 @@ def versions_of(trials: Sequence[TrialResult]) -> dict[str, str]:
     return {printable(name): _joined(packages.get(name) for packages in made_with) for name in names}
 
 
-def difference(old: Entry | None, new: Entry) -> str:
+def difference(old: AcceptedVerdict | None, new: AcceptedVerdict) -> str:
     """Describe what a new entry changes; empty if it need not be recorded."""
     if old is None:
         return f"{new.outcome}, the first verdict"
@@ -110,7 +110,7 @@ def difference(old: Entry | None, new: Entry) -> str:
     return f"still {new.outcome}{by}" if moved else ""
 
 
-def changes(old: Entry, new: Entry) -> list[str]:
+def changes(old: AcceptedVerdict, new: AcceptedVerdict) -> list[str]:
     """Describe the packages whose versions differ, such as "jax 0.10.2 -> 0.11.2", and the device."""
     names = sorted(old.versions.keys() | new.versions.keys())
     pairs = [(name, old.versions.get(name, "none"), new.versions.get(name, "none")) for name in names]

@@ -27,7 +27,7 @@ _MEND: Final = "Restore the file from version control; `evoclaims accept` goes o
 
 
 @dataclass(frozen=True)
-class Entry:
+class AcceptedVerdict:
     """An accepted verdict.
 
     Attributes:
@@ -60,7 +60,7 @@ class Entry:
         return ", ".join(sha[:digits] + dash + state for sha, dash, state in parts) or "unknown"
 
 
-History = Mapping[tuple[str, str], tuple[Entry, ...]]
+History = Mapping[tuple[str, str], tuple[AcceptedVerdict, ...]]
 """Accepted verdicts by tier and claim, such as ("full", "G1[n_parity]"); oldest first, so that the last one counts."""
 
 
@@ -81,7 +81,7 @@ def ordered(reports: Iterable[ClaimReport]) -> list[ClaimReport]:
     return sorted(reports, key=lambda report: in_order(key_of(report)))
 
 
-def eras(entries: Sequence[Entry]) -> tuple[tuple[Entry, ...], ...]:
+def eras(entries: Sequence[AcceptedVerdict]) -> tuple[tuple[AcceptedVerdict, ...], ...]:
     """Split entries where the fingerprint changes: before that, something else was judged."""
     return tuple(tuple(group) for _, group in itertools.groupby(entries, key=lambda entry: entry.fingerprint))
 
@@ -114,7 +114,7 @@ def parse(data: bytes, name: str) -> History:
     if plain.get("schema") != SCHEMA or isinstance(plain["schema"], bool):
         raise _torn(name, f"its schema is {plain.get('schema')!r} and this version of evoclaims reads schema {SCHEMA}")
     environments, verdicts = (_table(plain.get(part, {}), name, part) for part in ("environments", "verdicts"))
-    history: dict[tuple[str, str], tuple[Entry, ...]] = {}
+    history: dict[tuple[str, str], tuple[AcceptedVerdict, ...]] = {}
     for tier, claims in verdicts.items():
         for claim, rows in _table(claims, name, tier).items():
             if not isinstance(rows, list) or not rows:
@@ -139,10 +139,10 @@ def dump(history: History) -> str:
     return "# Written by `evoclaims accept`: verdicts as last accepted, oldest first.\n" + tomli_w.dumps(plain)
 
 
-def _entry(row: object, environments: Mapping[str, Any], name: str, claim: str) -> Entry:
+def _entry(row: object, environments: Mapping[str, Any], name: str, claim: str) -> AcceptedVerdict:
     """Return one accepted verdict, with every field checked."""
     plain = _table(row, name, claim)
-    expected = {field.name for field in fields(Entry)} - {"versions"} | {"environment"}
+    expected = {field.name for field in fields(AcceptedVerdict)} - {"versions"} | {"environment"}
     if plain.keys() | {"p"} != expected:
         strange = ", ".join(sorted((plain.keys() | {"p"}) ^ expected))
         raise _torn(name, f"{claim} lacks these entries, or has them beyond the known ones: {strange}")
@@ -151,7 +151,7 @@ def _entry(row: object, environments: Mapping[str, Any], name: str, claim: str) 
         raise _torn(name, f"{claim} names the environment {environment}, which is not among the environments")
     try:
         convert(plain["accepted"], date)
-        return convert({"p": None, **plain, "versions": environments[environment]}, Entry)
+        return convert({"p": None, **plain, "versions": environments[environment]}, AcceptedVerdict)
     except ValidationError as error:
         problem, _, path = str(error).partition(" - at `$")
         raise _torn(name, f"{path.strip('.`') or 'accepted'} of {claim} is not as it was written: {problem}") from error

@@ -6,10 +6,12 @@ from evoclaims.judging.baseline import DriftReport
 from evoclaims.judging.tripwire import DigestCheck
 from evoclaims.verdicts.acceptance import changes
 from evoclaims.verdicts.claim_report import ClaimReport
-from evoclaims.verdicts.history import Entry
+from evoclaims.verdicts.history import AcceptedVerdict
 
 
-def reason(report: ClaimReport, old: Entry, new: Entry, drift: DriftReport, digests: DigestCheck) -> str:
+def reason(
+    report: ClaimReport, old: AcceptedVerdict, new: AcceptedVerdict, drift: DriftReport, digests: DigestCheck
+) -> str:
     """Return in a sentence why a claim's verdict may have changed.
 
     Args:

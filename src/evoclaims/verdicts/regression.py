@@ -9,7 +9,7 @@ from pathlib import Path
 from evoclaims.core.errors import UserError
 from evoclaims.verdicts import history, transitions
 from evoclaims.verdicts.claim_report import ClaimReport
-from evoclaims.verdicts.history import Entry
+from evoclaims.verdicts.history import AcceptedVerdict
 from evoclaims.verdicts.transitions import Kind, Transition
 
 
@@ -25,10 +25,10 @@ class Regression:
 
     transitions: tuple[Transition, ...]
     matched: tuple[Transition, ...]
-    accepted: Mapping[tuple[str, str], Entry]
+    accepted: Mapping[tuple[str, str], AcceptedVerdict]
 
     @property
-    def changed(self) -> dict[tuple[str, str], Entry]:
+    def changed(self) -> dict[tuple[str, str], AcceptedVerdict]:
         """The accepted verdicts that differ from the run's, by tier and claim."""
         keys = [(one.tier, one.claim) for one in self.transitions if one.kind is Kind.CHANGED]
         return {key: self.accepted[key] for key in keys}

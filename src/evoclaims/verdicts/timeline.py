@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from evoclaims.core.errors import UnknownNameError, UserError
 from evoclaims.core.printable import printable
 from evoclaims.verdicts.acceptance import changes
-from evoclaims.verdicts.history import Entry, History, eras, in_order
+from evoclaims.verdicts.history import AcceptedVerdict, History, eras, in_order
 
 SHORT = 12
 """Digits of a hash that are shown."""
@@ -33,10 +33,10 @@ def chosen(history: History, claim: str) -> list[tuple[str, str]]:
     return found
 
 
-def _claim(tier: str, claim: str, entries: Sequence[Entry]) -> Iterator[str]:
+def _claim(tier: str, claim: str, entries: Sequence[AcceptedVerdict]) -> Iterator[str]:
     """Yield the lines of one claim."""
     yield f"{printable(claim)} ({printable(tier)})"
-    before: Entry | None = None
+    before: AcceptedVerdict | None = None
     for era in eras(entries):
         if before is not None:
             yield (
@@ -48,20 +48,20 @@ def _claim(tier: str, claim: str, entries: Sequence[Entry]) -> Iterator[str]:
             before = entry
 
 
-def described(before: Entry | None, entry: Entry) -> str:
+def described(before: AcceptedVerdict | None, entry: AcceptedVerdict) -> str:
     """Return an entry in one line, with what has changed since the entry before."""
     p = "" if entry.p is None else f", p = {entry.p:.2g}"
     behind = _first(entry) if before is None else _changes(before, entry)
     return printable(f"{entry.accepted}  {entry.outcome} (n = {entry.n}{p}){behind and '  '}{behind}")
 
 
-def _first(entry: Entry) -> str:
+def _first(entry: AcceptedVerdict) -> str:
     """Return versions and device of the first verdict's trials."""
     made_by = [f"{name} {entry.versions[name]}" for name in ("python", "jax") if name in entry.versions]
     return ", ".join([*made_by, *filter(None, [entry.device])])
 
 
-def _changes(before: Entry, entry: Entry) -> str:
+def _changes(before: AcceptedVerdict, entry: AcceptedVerdict) -> str:
     """Return what differs from the entry before."""
     moved = changes(before, entry)
     if before.revision != entry.revision:
