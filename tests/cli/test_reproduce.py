@@ -123,3 +123,10 @@ def test_without_matplotlib_it_is_said_how_to_install_it(evoclaims: Evoclaims, m
     assert status == 2
     assert 'pip install "evoclaims[pictures]"' in err
     assert not Path("figures").exists()
+
+
+def test_a_figure_under_a_variant_shows_its_trials_in_a_folder_of_its_own(evoclaims: Evoclaims, stored: Store) -> None:
+    status, out, err = evoclaims("reproduce", "fig1", "--variant", "traded")
+    assert (status, err) == (0, "")
+    assert out.splitlines()[0] == "fig1: wrote figures/smoke-traded/fig1.png, .svg and .csv"
+    assert "under traded" in Path("figures/smoke-traded/fig1.svg").read_text()

@@ -187,6 +187,7 @@ def _parser() -> argparse.ArgumentParser:
     reproduce = add("reproduce", "redraw figures and tables of the paper from the trials at hand; run nothing")
     reproduce.add_argument("figure", help="its name, such as fig3; all for every one")
     reproduce.add_argument("--out", metavar="DIR", help="folder for PNG, SVG and CSV (figures/TIER)")
+    reproduce.add_argument("--variant", metavar="NAME", default="", help="under this variant of the protocol")
 
     replicate = add("replicate", "put the numbers that the paper has published beside those of the trials at hand")
     replicate.add_argument(

@@ -19,14 +19,15 @@ def main(options: argparse.Namespace) -> int:
     """Draw, write and say what is missing; 1 when no requested figure shows a number of ours."""
     project = open_project(options.storage)
     reproduction = project.reproduction
-    reproduction.tier(options.tier)
+    reproduction.tier(options.tier, options.variant)
     known = catalogue.names(reproduction)
     names = known if options.figure == ALL and known else (options.figure,)
     figures = [catalogue.load(reproduction, name) for name in names]
-    folder = FIGURES / options.tier if options.out is None else Path(options.out)
+    at = f"{options.tier}-{options.variant}" if options.variant else options.tier
+    folder = FIGURES / at if options.out is None else Path(options.out)
     shown = 0
     for figure in figures:
-        drawing = figure.draw(project.archive, reproduction, options.tier)
+        drawing = figure.draw(project.archive, reproduction, options.tier, options.variant)
         for ending, data in files.contents(drawing).items():
             write(folder / f"{figure.name}.{ending}", data, "folder", ours=options.out is None)
         print(f"{figure.name}: wrote {folder / figure.name}.png, .svg and .csv")

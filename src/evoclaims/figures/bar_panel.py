@@ -179,7 +179,7 @@ def paint(axis: Any, layout: Layout) -> None:
     for bar, slot, middle in zip(one.bars, layout.slots, layout.bars, strict=True):
         _paint_bar(axis, bar, middle, 0.64 if one.shows_reported else 0.84)
         if one.shows_reported and bar.reported:
-            _paint_reported(axis, bar.reported, slot + 0.34)
+            _paint_reported(axis, bar.reported, slot + 0.34, bar.bar.series.colour)
     for comparison, height in layout.brackets:
         ends = sorted((layout.bars[comparison.left], layout.bars[comparison.right]))
         brackets.paint(axis, (ends[0], ends[1]), height, layout.bracket, comparison.asterisks)
@@ -248,9 +248,10 @@ def _paint_bar(axis: Any, filled: Filled, middle: float, width: float) -> None:
         axis.annotate(count, top, xytext=(0, 1.5), textcoords="offset points", **words)
 
 
-def _paint_reported(axis: Any, reported: Reported, place: float) -> None:
-    """Paint a published number."""
-    style = {"elinewidth": 0.7, "capsize": 1.2, "ecolor": FAINT, "clip_on": False, **_DIAMOND}
+def _paint_reported(axis: Any, reported: Reported, place: float, colour: str) -> None:
+    """Paint a published number in its method's colour."""
+    style = {"elinewidth": 0.7, "capsize": 1.2, "ecolor": colour, "clip_on": False, **_DIAMOND}
+    style |= {"markeredgecolor": colour, "markeredgewidth": 1.0}
     axis.errorbar(place, reported.value, yerr=reported.error or None, **style)
 
 

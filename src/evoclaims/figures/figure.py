@@ -108,13 +108,16 @@ class Figure:
     where: str
     paint: Painter
 
-    def draw(self, archive: Archive, reproduction: Reproduction, tier: str) -> Drawing:
+    def draw(self, archive: Archive, reproduction: Reproduction, tier: str, variant: str = "") -> Drawing:
         """Draw the figure from a tier's trials; the figure itself says which trials are missing.
 
+        Conditions that the variant does not change are drawn as they are under the protocol itself.
+
         Raises:
-            UnknownNameError: for another tier.
+            UnknownNameError: for another tier or variant.
             UserError: when a record is damaged, or matplotlib is not installed.
         """
-        scope = Scope(archive, reproduction, tier)
-        reproduction.tier(tier)
-        return self.paint(scope, Heading(self.title, f"{self.where} – {SIZES.get(tier, tier)}"))
+        scope = Scope(archive, reproduction, tier, variant)
+        reproduction.tier(tier, variant)
+        under = f", under {variant}" if variant else ""
+        return self.paint(scope, Heading(self.title, f"{self.where} – {SIZES.get(tier, tier)}{under}"))
