@@ -79,7 +79,7 @@ class _Warp:
             if at + 1 < len(segments):
                 following = segments[at + 1].loop
                 assert following
-                self._leave(following, following.start)
+                self._leave(following, self._values(following.start))
                 self._barrier()
         self._store(results, inside)
 
@@ -93,7 +93,7 @@ class _Warp:
                 self._page.compute([operation], registers, self._element.load)
                 self._own[id(operation)] = registers[id(operation)]
                 if id(operation) in self._slots.of:
-                    self._put(operation, registers[id(operation)], self._slots.of[id(operation)])
+                    self._put(operation, registers[id(operation)])
 
     def _repeat(self, around: Loop, phases: Sequence[Phase]) -> None:
         """Write a loop; its carry stays in slots."""
@@ -103,45 +103,42 @@ class _Warp:
         page.label(again)
         head, rounds = len(page.lines), page.register()
         self._compute(phases)
-        following = [self._value(number, place) for place, number in enumerate(around.results)]
+        following = self._values(around.results)
         self._barrier()
-        for place, value in enumerate(following):
-            if value:
-                self._put(around.carried[place], value, self._slots.of[id(around.carried[place])])
+        self._leave(around, following)
         self._barrier()
         more = page.put(f"add i32 {rounds}, 1")
         page.lines.insert(head, either(rounds, "i32", ("0", before), (more, page.block)))
         page.write(f"br i1 {page.put(f'icmp ult i32 {more}, {around.rounds}')}, label %{again}, label %{after}")
         page.label(after)
 
-    def _leave(self, around: Loop, numbers: Sequence[Number]) -> None:
-        """Leave a loop's carry in its slots."""
-        for place, number in enumerate(numbers):
-            value = self._value(number, place)
+    def _leave(self, around: Loop, values: Sequence[str]) -> None:
+        """Leave a loop's carry in its slots, as far as this warp is responsible for it."""
+        for carried, value in zip(around.carried, values, strict=True):
             if value:
-                self._put(around.carried[place], value, self._slots.of[id(around.carried[place])])
+                self._put(carried, value)
 
     def _store(self, results: Sequence[Numbers], inside: str) -> None:
         """Write the results that this warp is responsible for."""
-        values, place = [], 0
-        for z, result in enumerate(results):
-            for at, number in enumerate(result.flat):
-                value = self._value(number, place)
-                if value:
-                    values.append((value, number.dtype.kind, z, at, result.size))
-                place += 1
+        places = [(z, at, result.size) for z, result in enumerate(results) for at in range(result.size)]
+        numbers = [number for result in results for number in result.flat]
+        values = self._values(numbers)
         self._page.write(f"br i1 {inside}, label %{self._page.block}.store, label %done")
         self._page.label(f"{self._page.block}.store")
         self._element.forget()
-        for value in values:
-            self._element.store(*value)
+        for number, value, place in zip(numbers, values, places, strict=True):
+            if value:
+                self._element.store(value, number.dtype.kind, *place)
         self._page.write("br label %done")
 
-    def _value(self, number: Number, place: int) -> str:
-        """Return a number, or "" if another warp is responsible for it."""
-        if self._plan.responsible(number, place) != self._number:
-            return ""
-        return self._page.operand(number, {} if is_known(number) else {id(number): self._register(number)})
+    def _values(self, numbers: Sequence[Number]) -> list[str]:
+        """Return numbers, with "" for those that another warp is responsible for."""
+
+        def value(number: Number) -> str:
+            return self._page.operand(number, {} if is_known(number) else {id(number): self._register(number)})
+
+        mine = [self._plan.responsible(number, place) == self._number for place, number in enumerate(numbers)]
+        return [value(number) if is_mine else "" for number, is_mine in zip(numbers, mine, strict=True)]
 
     def _register(self, number: Number) -> str:
         """Return the register with a number; read it from the arrays, or from its slot, if need be."""
@@ -157,19 +154,20 @@ class _Warp:
         """Return the register with a number read from its slot."""
         type_ = TYPES[number.dtype.kind]
         stored = "i32" if type_ == "i1" else type_
-        value = self._page.put(f"load {stored}, ptr addrspace(3) {self._slot(self._slots.of[id(number)])}, align 4")
+        value = self._page.put(f"load {stored}, ptr addrspace(3) {self._slot(number)}, align 4")
         return self._page.put(f"icmp ne i32 {value}, 0") if type_ == "i1" else value
 
-    def _put(self, number: ScalarOperation | Carried, value: str, slot: int) -> None:
+    def _put(self, number: ScalarOperation | Carried, value: str) -> None:
         """Write a number to a slot."""
         type_ = TYPES[number.dtype.kind]
         if type_ == "i1":
             value, type_ = self._page.put(f"zext i1 {value} to i32"), "i32"
-        self._page.write(f"store {type_} {value}, ptr addrspace(3) {self._slot(slot)}, align 4")
+        self._page.write(f"store {type_} {value}, ptr addrspace(3) {self._slot(number)}, align 4")
 
-    def _slot(self, slot: int) -> str:
-        """Return the address of the lane's word of a slot."""
-        return self._page.put(f"getelementptr i32, ptr addrspace(3) {self._words}, i32 {slot * BLOCK}")
+    def _slot(self, number: ScalarOperation | Carried) -> str:
+        """Return the address of the lane's word of a number's slot."""
+        first = self._slots.of[id(number)] * BLOCK
+        return self._page.put(f"getelementptr i32, ptr addrspace(3) {self._words}, i32 {first}")
 
     def _barrier(self) -> None:
         """Wait for the other warps."""

@@ -86,9 +86,9 @@ def loop(rounds: int, carried: Sequence[Carried], start: Sequence[Number], resul
     inside: set[int] = {id(c) for c in carried}
     taken: dict[int, Expression] = {}
     for expression in in_order(results):
-        if any(id(p) in inside for p in _parents(expression)):
+        if any(id(p) in inside for p in operands_of(expression)):
             inside.add(id(expression))
-            taken.update((id(p), p) for p in _parents(expression) if id(p) not in inside)
+            taken.update((id(p), p) for p in operands_of(expression) if id(p) not in inside)
     taken.update((id(r), r) for r in results if not is_known(r) and id(r) not in inside)
     return Loop(rounds, tuple(carried), tuple(start), tuple(results), tuple(taken.values()))
 
@@ -100,7 +100,7 @@ def in_order(numbers: Iterable[Number]) -> list[Expression]:
     waiting = [n for n in numbers if not is_known(n)][::-1]
     while waiting:
         expression = waiting[-1]
-        missing = [p for p in _parents(expression) if id(p) not in made] if id(expression) not in made else []
+        missing = [p for p in operands_of(expression) if id(p) not in made] if id(expression) not in made else []
         if missing:
             waiting.extend(reversed(missing))
             continue
@@ -139,8 +139,8 @@ def products_to_fuse(results: Sequence[Number]) -> frozenset[int]:
     return frozenset(chosen)
 
 
-def _parents(expression: Expression) -> list[Expression]:
-    """Return its operands."""
+def operands_of(expression: Expression) -> list[Expression]:
+    """Return the expressions that it reads."""
     match expression:
         case ScalarOperation(operands=operands):
             return [o for o in operands if not is_known(o)]

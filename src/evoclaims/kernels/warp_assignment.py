@@ -36,8 +36,8 @@ def assign(groups: Sequence[Group], warps: int) -> list[int]:
     Each is placed with what it reads, as far as its stretch allows. Then groups are moved, one after the other, as
     long as fewer numbers are read from other warps: local search, as in Kernighan and Lin's partitioning of graphs.
     """
-    if not groups or warps == 1:
-        return [0] * len(groups)
+    if not groups:
+        return []
     stretch = _stretches(groups)
     share = sum(group.instructions for group in groups) / STRETCHES / warps
     load = [[0] * warps for _ in range(STRETCHES)]

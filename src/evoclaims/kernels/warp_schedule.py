@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import heapq
 from collections import Counter, defaultdict
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -23,6 +23,7 @@ from evoclaims.kernels.expressions import (
     ScalarOperation,
     in_order,
     is_known,
+    operands_of,
     products_to_fuse,
 )
 from evoclaims.kernels.warp_assignment import Group, assign
@@ -119,20 +120,10 @@ def _body(around: Loop) -> list[Expression]:
     inside = set(map(id, around.carried))
     body = []
     for expression in in_order(around.results):
-        if id(expression) not in inside and any(id(p) in inside for p in _operands(expression)):
+        if id(expression) not in inside and any(id(p) in inside for p in operands_of(expression)):
             inside.add(id(expression))
             body.append(expression)
     return body
-
-
-def _operands(expression: Expression) -> Iterable[Number]:
-    """Return the numbers that an expression reads."""
-    match expression:
-        case ScalarOperation(operands=operands):
-            return operands
-        case LoopResult(loop=around):
-            return (*around.start, *around.taken)
-    return ()
 
 
 def _groups(
@@ -168,10 +159,7 @@ def _groups(
 def _phases(
     operations: Sequence[ScalarOperation], warps: int, owner: dict[int, int], fused: frozenset[int]
 ) -> tuple[Phase, ...]:
-    """Share operations among warps; `owner` gets them.
-
-    The longest chains come first; one warp alone keeps to the order, in which few numbers are alive at a time.
-    """
+    """Share operations among warps, the longest chains first; `owner` gets them."""
     groups, members = _groups(operations, fused)
     warp_of = assign(groups, warps)
     for at, together in enumerate(members):
@@ -181,10 +169,9 @@ def _phases(
     for at, makers in enumerate(before):
         for maker in makers:
             users[maker].append(at)
-    turn = list(range(len(groups)))  # lower ones come first
-    if warps > 1:
-        for at in reversed(turn):
-            turn[at] = min((turn[user] for user in users[at]), default=0) - groups[at].instructions
+    turn = [0] * len(groups)  # lower ones come first: the instructions from here to the end, negated
+    for at in reversed(range(len(groups))):
+        turn[at] = min((turn[user] for user in users[at]), default=0) - groups[at].instructions
     missing = [len(makers) for makers in before]
     phase_of: dict[int, int] = {}
     phases: list[Phase] = []
