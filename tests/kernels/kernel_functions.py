@@ -27,6 +27,17 @@ def _carries(x: Any, y: Any) -> Any:
     return jax.lax.scan(swap, (x, x * 2, y, jnp.int32(0), jnp.zeros((), bool)), None, length=5)[0]
 
 
+def _with_numbers_from_outside(x: Any, y: Any) -> Any:
+    sine, total = jnp.sin(x), jnp.sum(jnp.cos(y))
+
+    def following(carry: Any, _: None) -> Any:
+        near = carry * sine + total  # first: what is from outside must be there again in the next round
+        far = jnp.cos(near) + jnp.cos(near[::-1] * 2.0)
+        return jnp.cos(far + far[::-1]) + jnp.sum(far) * 0.1, None
+
+    return jax.lax.scan(following, x, None, length=3)[0]
+
+
 def _nested(x: Any) -> Any:
     def outer(a: Any, _: None) -> Any:
         inner = jax.lax.scan(lambda b, _: (b * 0.5 + x * 3 + jnp.sqrt(a * a), None), x, None, length=3)[0]
@@ -147,6 +158,7 @@ FUNCTIONS: dict[str, tuple[Callable[..., Any], tuple[Any, ...]]] = {
         (X,),
     ),
     "a loop": (_carries, (X, Y)),
+    "a loop with numbers from outside": (_with_numbers_from_outside, (X, Y)),
     "loops in a loop": (_nested, (X,)),
     "no rounds": (lambda x: jax.lax.fori_loop(0, 0, lambda _, c: c + 1, x), (X,)),
     "calls": (lambda x: jax.jit(jnp.linalg.norm)(x) + jax.nn.relu(x), (X,)),
