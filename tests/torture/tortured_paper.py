@@ -48,6 +48,7 @@ REPRODUCTION = Reproduction(
 )
 
 NAMES = {condition.id: name for (name, _), condition in CONDITIONS.items()}
+"""Of conditions; the paper that runs on SLURM has others, and imports this one for what it says."""
 
 _log = os.open(os.environ["TORTURE_LOG"], os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o644)
 _held = Path(f"{os.environ['TORTURE_LOG']}-held-{os.getpgrp()}")
@@ -79,7 +80,7 @@ def _slowly(
 
 def _telling(store: Store, result: TrialResult, champion: Any) -> Any:
     became = _put(store, result, champion)
-    say("put", condition=result.condition, name=NAMES[result.condition], id=result.id, became=became)
+    say("put", condition=result.condition, name=NAMES.get(result.condition), id=result.id, became=became)
     return became
 
 
