@@ -20,6 +20,7 @@ from typing import Any
 
 import pytest
 from cluster import Cluster, lacks
+from filelock import FileLock
 
 from evoclaims.trials.store import Store
 
@@ -35,15 +36,16 @@ if lacks():
 
 @pytest.fixture(scope="module")
 def cluster() -> Iterator[Cluster]:
-    """SLURM with two nodes of one core each."""
-    folder = Path(tempfile.mkdtemp(prefix="slurm-"))
-    one = Cluster(folder)
-    try:
-        one.start()
-        yield one
-    finally:
-        one.stop()
-        shutil.rmtree(folder, ignore_errors=True)
+    """SLURM with two nodes of one core each; a machine has one at a time, also where workers share these tests."""
+    with FileLock(Path(tempfile.gettempdir()) / "evoclaims-slurm.lock"):
+        folder = Path(tempfile.mkdtemp(prefix="slurm-"))
+        one = Cluster(folder)
+        try:
+            one.start()
+            yield one
+        finally:
+            one.stop()
+            shutil.rmtree(folder, ignore_errors=True)
 
 
 class Paper:
