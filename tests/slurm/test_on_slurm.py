@@ -87,7 +87,7 @@ class Paper:
     def running(self, node: str = "node[0-1]") -> list[str]:
         """Return the jobs whose trials are in the middle, on a node or on any."""
         asked = self.cluster.ask("squeue", "-h", "-r", "--states=running", f"--nodelist={node}", "--format=%i").split()
-        return [job for job in asked if "trials ended" in self.log(job)]
+        return [job for job in asked if "walker on " in self.log(job)]  # the first line of progress
 
     def sbatch(self, *options: str) -> None:
         """Submit a job that is not ours."""
