@@ -107,7 +107,7 @@ def finished(page: Instructions, names: Sequence[str], warps: int = 1, teams: in
     page.write("ret void")
     given = ", ".join(f"ptr addrspace(1) {name}" for name in names)
     body = "\n".join(page.lines)
-    attributes = f'nounwind "nvvm.maxntid"="{BLOCK},{warps},{teams}"'
+    attributes = f'nounwind "nvvm.maxntid"="{BLOCK},{warps},{teams}" "nvvm.minctasm"="1"'
     kernel = f"define ptx_kernel void @{ENTRY}({given}) {attributes} {{\n{body}\n}}\n"
     return 'target triple = "nvptx64-nvidia-cuda"\n' + "\n".join(page.declared) + "\n" + kernel
 
