@@ -85,9 +85,9 @@ def test_a_loop_in_a_loop_is_left_to_one_warp() -> None:
 
 @pytest.mark.parametrize(
     ("elements", "warps", "teams"),
-    [(1, 8, 1), (132 * 32, 8, 1), (132 * 32 + 1, 4, 2), (10_240, 2, 3), (4 * 132 * 32, 2, 4)],
+    [(1, 8, 1), (132 * 32, 8, 1), (132 * 32 + 1, 8, 2), (10_240, 4, 3), (3 * 132 * 32, 4, 3)],
 )
-def test_blocks_have_eight_warps_that_all_run_at_once(
+def test_all_elements_are_computed_at_once_by_as_many_warps_as_have_registers(
     elements: int, warps: int, teams: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(block_shape, "SMALL", 10)
@@ -103,9 +103,26 @@ def test_a_warp_has_elements_of_its_own_where_sharing_is_no_faster_or_impossible
     assert block_shape.chosen(results, 1) is None  # its code is small
     monkeypatch.setattr(block_shape, "SMALL", 10)
     assert block_shape.chosen(results, 1) is not None
-    assert block_shape.chosen(results, 4 * 132 * 32 + 1) is None  # elements enough for all warps
-    monkeypatch.setattr(block_shape, "_of_device", lambda name, usual: 132 if name == "core_count" else 127)
-    assert block_shape.chosen(results, 1) is None  # too little shared memory
+    assert block_shape.chosen(results, 3 * 132 * 32 + 1) is None  # elements enough for all warps
+
+
+def test_fewer_warps_share_the_work_where_shared_memory_is_scarce(monkeypatch: pytest.MonkeyPatch) -> None:
+    def function(x: Any) -> Any:
+        sums = jnp.cumsum(jnp.sin(x) * x[::-1])
+        return sums * jnp.cos(sums)
+
+    monkeypatch.setattr(block_shape, "SMALL", 10)
+    results = _kernel(function, (jnp.ones((1, 16)),)).results
+    widest = block_shape.chosen(results, 1)
+    assert widest is not None
+    memory = widest.shared_bytes - 1
+    monkeypatch.setattr(block_shape, "_of_device", lambda name, usual: 132 if name == "core_count" else memory)
+    narrower = block_shape.chosen(results, 1)
+    assert narrower is not None
+    assert (widest.warps, narrower.warps) == (8, 4)
+    assert narrower.shared_bytes <= memory
+    memory = 127  # not even one number for each of a team's elements
+    assert block_shape.chosen(results, 1) is None
 
 
 @st.composite

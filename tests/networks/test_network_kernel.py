@@ -232,7 +232,7 @@ def test_nvidias_assembler_takes_the_kernels(own: int | None, tmp_path: Path) ->
     texts = kernels_for_gpus(jax.vmap(both, (0, own)), genomes, rows)
     assert len(texts) == 2  # sorting and walking
     for text in texts:
-        assert re.search(r"\.visible \.entry kernel\(", text)
+        assert re.search(r"\.visible \.entry the_forward_pass_of_genomes\(", text)
         assemble(text, tmp_path)
 
 

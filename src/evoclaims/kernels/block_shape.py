@@ -1,9 +1,10 @@
 """How the blocks of a GPU's kernel are made up: how many warps share the work for 32 elements, and how many such teams.
 
 A processor of a GPU executes a large kernel no faster than it fetches instructions. Warps with different parts of the
-code fetch side by side; warps with the same code that barriers keep in step fetch it once. A block has eight warps, as
-many as have registers on a processor: as many teams as are needed for all elements to be computed at once, and as many
-warps in a team as that leaves. Where that is one, keeping in step gains nothing (obstacles with 32,768 robots).
+code fetch side by side; warps with the same code that barriers keep in step fetch it once. A block has as many teams as
+are needed for all elements to be computed at once, up to three: beyond, keeping in step gains nothing (obstacles with
+32,768 robots). The more warps share the work, the less each waits, and the fewer numbers each keeps; registers and
+shared memory set the limit.
 """
 
 from __future__ import annotations
@@ -22,8 +23,8 @@ from evoclaims.kernels.warp_schedule import Schedule, schedule
 
 SMALL: Final = 8_000
 """Operations of a kernel whose code fits an instruction cache; it is faster as it is."""
-WARPS: Final = 8
-"""Warps of a block."""
+WARPS: Final = {1: 8, 2: 8, 3: 4}
+"""Most warps of a team, by the teams of a block: more have too few registers each."""
 MEMORY: Final = "shared_memory_per_block_optin"
 """jax's name for the bytes of shared memory that a block may have."""
 
@@ -65,13 +66,16 @@ def chosen(results: Sequence[Numbers], elements: int) -> BlockShape | None:
         return None
     processors, memory = (_of_device(name, usual) for name, usual in (("core_count", 132), (MEMORY, 99 * 1024)))
     teams = -(-elements // (BLOCK * processors))
-    if teams > WARPS // 2:
-        return None
-    plan = schedule(numbers, WARPS // teams)
-    if plan is None:
-        return None
-    shape = BlockShape(plan, slots(plan, numbers), teams)
-    return shape if shape.shared_bytes <= memory else None
+    warps = WARPS.get(teams, 1)
+    while warps > 1:
+        plan = schedule(numbers, warps)
+        if plan is None:
+            return None
+        shape = BlockShape(plan, slots(plan, numbers), teams)
+        if shape.shared_bytes <= memory:
+            return shape
+        warps //= 2  # fewer leave fewer numbers for each other
+    return None
 
 
 def _of_device(name: str, usual: int) -> int:

@@ -15,7 +15,7 @@ from jax.interpreters import ad, batching, mlir
 from jaxtyping import Array
 
 from evoclaims.kernels import gpu_kernel, machine_code
-from evoclaims.kernels.block_shape import BlockShape
+from evoclaims.kernels.gpu_kernel import Program
 from evoclaims.kernels.xla_handler import ENTRY
 
 GPU_TARGET: Final = "__gpu$xla.gpu.ptx"
@@ -51,36 +51,28 @@ def on_host(text: str, layout: Sequence[int], operands: Sequence[Array], shapes:
     return jax.ffi.ffi_call(_host_target(text), shapes)(np.array(layout, np.int32), *operands)
 
 
-def on_gpu(
-    text: str,
-    operands: Sequence[Array],
-    shapes: Shapes,
-    elements: int,
-    shape: BlockShape | None = None,
-) -> Any:
-    """Call a kernel of NVIDIA's GPUs, given as LLVM's text.
+def on_gpu(program: Program, operands: Sequence[Array], shapes: Shapes, elements: int) -> Any:
+    """Call a kernel of NVIDIA's GPUs.
 
     Args:
-        text: of the kernel.
+        program: the kernel.
         operands: the arrays it reads.
         shapes: of its results.
         elements: of the batch, one for each lane of a team.
-        shape: of its blocks; by default they are single warps, each with elements of its own.
     """
     one = np.int32(1)
-    warps, teams, memory = (shape.warps, shape.teams, shape.shared_bytes) if shape else (1, 1, 0)
     return jax.ffi.ffi_call(GPU_TARGET, shapes)(
         *operands,
-        name=gpu_kernel.ENTRY,
+        name=program.name,
         kernel_type="ptx",
-        kernel_data=gpu_kernel.ptx(text),
-        grid_x=np.int32(-(-elements // (gpu_kernel.BLOCK * teams))),
+        kernel_data=program.ptx,
+        grid_x=np.int32(-(-elements // (gpu_kernel.BLOCK * program.teams))),
         grid_y=one,
         grid_z=one,
         block_x=np.int32(gpu_kernel.BLOCK),
-        block_y=np.int32(warps),
-        block_z=np.int32(teams),
-        shared_mem_bytes=np.int32(memory),
+        block_y=np.int32(program.warps),
+        block_z=np.int32(program.teams),
+        shared_mem_bytes=np.int32(program.shared_bytes),
     )
 
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from functools import cache
 from typing import Any, Final
 
@@ -101,7 +103,11 @@ def begin(page: Instructions, threads: int) -> str:
 
 
 def finished(page: Instructions, names: Sequence[str], warps: int = 1, teams: int = 1) -> str:
-    """Return the text of a kernel that has begun; its parameters are addresses of these names."""
+    """Return the text of a kernel that has begun; its parameters are addresses of these names.
+
+    A block of several warps may have all registers of a processor: without `minctasm` the assembler keeps some free for
+    a second block, and spills.
+    """
     page.write("br label %done")
     page.label("done")
     page.write("ret void")
@@ -112,11 +118,31 @@ def finished(page: Instructions, names: Sequence[str], warps: int = 1, teams: in
     return 'target triple = "nvptx64-nvidia-cuda"\n' + "\n".join(page.declared) + "\n" + kernel
 
 
-def ptx(text: str) -> str:
-    """Return LLVM's text as PTX, the assembly language of NVIDIA's GPUs."""
-    module = llvm.parse_assembly(text)
+@dataclass(frozen=True)
+class Program:
+    """A kernel as NVIDIA's GPUs get it.
+
+    Attributes:
+        ptx: the assembly language of these GPUs.
+        name: of the kernel in it, which profilers show.
+        warps: of a team, which share the work for 32 elements.
+        teams: of a block.
+        shared_bytes: of a block's memory.
+    """
+
+    ptx: str
+    name: str
+    warps: int = 1
+    teams: int = 1
+    shared_bytes: int = 0
+
+
+def program(text: str, name: str, warps: int = 1, teams: int = 1, shared_bytes: int = 0) -> Program:
+    """Return LLVM's text of a kernel as a program; for the rest see `Program`."""
+    symbol = re.sub(r"\W+", "_", name.lower()).strip("_")
+    module = llvm.parse_assembly(text.replace(f"@{ENTRY}(", f"@{symbol}("))
     module.verify()
-    return str(_target().emit_assembly(module))
+    return Program(str(_target().emit_assembly(module)), symbol, warps, teams, shared_bytes)
 
 
 @cache

@@ -13,7 +13,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array
 
-from evoclaims.kernels import calls, group_kernel, machine_code
+from evoclaims.kernels import calls, gpu_kernel, group_kernel, machine_code
 from evoclaims.kernels.group_kernel import Sizes, Writer
 from evoclaims.kernels.unsupported import Unsupported
 
@@ -25,7 +25,7 @@ class GroupKernel:
     """A function of some arrays of a group and some of a row, of float32 and int32.
 
     Attributes:
-        name: what it is part of, for the warning that it cannot be had; kernels of one name warn once.
+        name: what it is part of, for profilers and the warning that it cannot be had; kernels of one name warn once.
         function: it in jax: takes all arrays, and returns a list.
         groups, rows: shapes of the group's arguments, and the row's.
         outputs: shapes of the results, none of them empty.
@@ -110,7 +110,7 @@ class GroupKernel:
 
         def call(groups: int, rows: int, own: list[bool], operands: list[Array], shapes: Shapes) -> Any:
             text = group_kernel.gpu_text(self.write, self.numbers, self.sizes, groups, rows, own)
-            return calls.on_gpu(text, operands, shapes, groups * rows)
+            return calls.on_gpu(gpu_kernel.program(text, self.name), operands, shapes, groups * rows)
 
         return self._call(leaves, call)
 

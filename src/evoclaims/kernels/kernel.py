@@ -26,7 +26,7 @@ class Kernel:
     """A function of arrays of given shapes.
 
     Attributes:
-        name: what it computes, for the warning.
+        name: what it computes, for the warning and for profilers.
         shapes: its arguments' leaves, without batch dimensions.
         outputs: its results' leaves.
         structure: its results' tree.
@@ -39,6 +39,7 @@ class Kernel:
         self._traced, shape = jax.make_jaxpr(function, return_shape=True)(*jax.tree.unflatten(treedef, shapes))
         self.outputs: Shapes = tuple(jax.ShapeDtypeStruct(x.shape, x.dtype) for x in jax.tree.leaves(shape))
         self.structure = jax.tree.structure(shape)
+        self._gpu_programs: dict[tuple[int, tuple[int, ...]], gpu_kernel.Program] = {}
 
     @cached_property
     def supported(self) -> bool:
@@ -116,15 +117,23 @@ class Kernel:
         """Call the kernel for NVIDIA's GPUs, for every element of a batch."""
 
         def call(rows: int, shared: list[int], shapes: Shapes) -> Any:
-            given = {i: shared[i] for i in self.read}
-            operands, results = [leaves[i] for i in self.read], [self.results[i] for i in self.written]
-            shape = block_shape.chosen(results, rows)
-            if shape is None:
-                return calls.on_gpu(gpu_kernel.text(results, self.read, given, rows), operands, shapes, rows)
-            text = block_kernel.text(shape, results, self.read, given, rows)
-            return calls.on_gpu(text, operands, shapes, rows, shape)
+            program = self._gpu_program(rows, tuple(shared[i] for i in self.read))
+            return calls.on_gpu(program, [leaves[i] for i in self.read], shapes, rows)
 
         return self._call(leaves, call)
+
+    def _gpu_program(self, rows: int, shared: tuple[int, ...]) -> gpu_kernel.Program:
+        """Return the kernel for NVIDIA's GPUs: for how many elements, how many of which share a row of each array."""
+        if (rows, shared) not in self._gpu_programs:  # a legged robot's takes seconds
+            results, given = [self.results[i] for i in self.written], dict(zip(self.read, shared, strict=True))
+            shape = block_shape.chosen(results, rows)
+            if shape is None:
+                made = gpu_kernel.program(gpu_kernel.text(results, self.read, given, rows), self.name)
+            else:
+                text = block_kernel.text(shape, results, self.read, given, rows)
+                made = gpu_kernel.program(text, self.name, shape.warps, shape.teams, shape.shared_bytes)
+            self._gpu_programs[rows, shared] = made
+        return self._gpu_programs[rows, shared]
 
     def _call(self, leaves: Sequence[Array], call: Callable[..., Any]) -> list[Array]:
         """Return the results of a kernel for every element of a batch.

@@ -24,7 +24,7 @@ def one_kernel(function: Callable[..., Any], name: str) -> Callable[..., Any]:
 
     Args:
         function: takes trees of small arrays (float32, int32, bool); pure.
-        name: what it computes, for the warning.
+        name: what it computes, for the warning and for profilers.
     """
 
     @cache
