@@ -17,7 +17,22 @@ NOBODY_RUNS_YET = (
     smoke=None,
     because=NOBODY_RUNS_YET,
 )
-@pytest.mark.parametrize("other", ["hyperneat", "cma_es", "ppo"])
+@pytest.mark.parametrize(
+    "other",
+    [
+        "hyperneat",
+        "cma_es",
+        pytest.param(
+            "ppo",
+            marks=expected(
+                Outcome.REFUTED,
+                tier="full",
+                because="NEAT's champions collect -92 to 1,406 (mean 576), PPO's policies 414 to 974 (609); in the "
+                "paper's plot 4,250 and 3,540",
+            ),
+        ),
+    ],
+)
 def test_neat_is_best_over_obstacles(trials, verdict, other):
     neat = trials("neat", on="obstacles")
     rest = trials(other, on="obstacles")
@@ -78,6 +93,12 @@ def test_medium_obstacles_hold_back_neat_alone(trials, verdict):
     where="§5.2.1, Fig. 8",
     smoke=None,
     because=NOBODY_RUNS_YET,
+)
+@expected(
+    Outcome.REFUTED,
+    tier="full",
+    because="NEAT passes 6 to 11 obstacles, PPO at most 1.4 in nine trials of ten, as the paper says; but it collects "
+    "less than PPO (-66 to 409, PPO 56 to 710): its control costs 374 to 581, PPO's 32 to 196",
 )
 def test_high_obstacles_stop_ppo(trials, verdict):
     neat = trials("neat", on="obstacles_high")
