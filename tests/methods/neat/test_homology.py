@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from assembler import kernels_for_gpus
+from assembler import assemble, kernels_for_gpus
 from genomes import at, dags, made, read, same, stacked
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -132,6 +133,8 @@ def test_numbers_are_moved_as_bits() -> None:
 
 
 @pytest.mark.parametrize("name", MAPS)
-def test_gpus_search_without_the_kernel_which_is_slower_there(name: str) -> None:
+def test_on_gpus_a_thread_searches_for_one_node(name: str, tmp_path: Path) -> None:
     genomes = stacked([made([0, 1, 2], {(0, 2): 1.0})] * 3)
-    assert not kernels_for_gpus(MAPS[name], *_in_batch(name, genomes, genomes))
+    (ptx,) = kernels_for_gpus(MAPS[name], *_in_batch(name, genomes, genomes))
+    assert ".entry the_search_for_homologous_nodes(" in ptx
+    assemble(ptx, tmp_path)

@@ -10,6 +10,7 @@ from jaxtyping import Array, Bool, Float, Int
 
 from evoclaims.core.pytree import pytree
 from evoclaims.kernels.grouped import GroupKernel
+from evoclaims.kernels.one_kernel import one_kernel
 from evoclaims.methods.neat.homology_kernel import write_search
 from evoclaims.networks.genome import Connections, Genome, Nodes
 
@@ -69,12 +70,19 @@ def _searched(*leaves: Array) -> list[Array]:
     key, source, target, node_count, connection_count = leaves[9:]
     size = key.shape[0]
     has_node, has_connection = jnp.arange(size) < node_count, jnp.arange(source.shape[0]) < connection_count
-    same = (key[:, None] == other.nodes.key[None, :]) & has_node[:, None]
-    # One reduction; the comparison is never written to memory. -1 where nothing matches.
-    slot: Int[Array, " nodes"] = jnp.max(jnp.where(same, jnp.arange(size, dtype=jnp.int32), -1), axis=1)
+    found: Int[Array, " nodes"] = jax.vmap(_slot, (0, None))(key, other.nodes.key)
+    slot = jnp.where(has_node, found, -1)
     there = has_connection & (slot[source] >= 0) & (slot[target] >= 0)
     weight = jnp.where(there, _matrix(other)[slot[target], slot[source]], jnp.nan)
     return [slot, *(leaf[slot] for leaf in leaves[1:4]), weight]
+
+
+def _place(key: Int[Array, ""], keys: Int[Array, " nodes"]) -> Int[Array, ""]:
+    """Return where a key is among others; -1 if it is not."""
+    return jnp.max(jnp.where(keys == key, jnp.arange(keys.shape[0], dtype=jnp.int32), -1))
+
+
+_slot = one_kernel(_place, "The search for homologous nodes")
 
 
 def _matrix(genome: Genome) -> Float[Array, "nodes nodes"]:
