@@ -150,7 +150,8 @@ class Bench:
         """Start Python in the project; on a host of this name, and with a clock that is wrong by what a file says."""
         command = [sys.executable, *arguments]
         source = Path(evoclaims.__file__).parents[1]
-        paths = [HERE / "shims", HERE, HERE.parent / "trials", source]
+        given = filter(None, os.environ.get("PYTHONPATH", "").split(os.pathsep))
+        paths = [HERE / "shims", HERE, HERE.parent / "trials", source, *given]
         environment = {
             **os.environ,
             "PYTHONPATH": os.pathsep.join(map(str, paths)),
