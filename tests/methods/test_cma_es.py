@@ -167,6 +167,15 @@ def test_it_starts_from_a_standard_normal_distribution_whatever_the_key(benches:
     np.testing.assert_array_equal(state.C, np.eye(len(state.mean)))
 
 
+def test_the_state_between_generations_holds_one_matrix(benches: dict[str, Any]) -> None:
+    """A checkpoint is no larger than it needs to be: the eigenvectors follow from the covariance matrix."""
+    bench = benches["cma_es"]
+    state, _ = bench.run(2, seed=1)
+    for distribution in (bench.init().distribution, state.distribution):
+        size = distribution.mean.size
+        assert sum(leaf.size for leaf in jax.tree.leaves(distribution)) < size**2 + 10 * size
+
+
 def _watched_generation(method: Any, task: Any, monkeypatch: pytest.MonkeyPatch) -> Any:
     """Return a compiled (key, state) -> (state, population, error): a step, and what evosax was told in it."""
     seen: list[Any] = []

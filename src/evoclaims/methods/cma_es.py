@@ -23,7 +23,7 @@ from evoclaims.networks.base import Network
 
 @pytree
 class CmaEsState:
-    """The search distribution (evosax's own state) and the best individual seen."""
+    """The search distribution (evosax's own state, without eigenvectors) and the best individual seen."""
 
     distribution: Any
     champion: Champion
@@ -67,7 +67,7 @@ class CmaEs:
         mean = jnp.zeros(self.network.size(task.observation_size, task.action_size))
         with implicit_promotions():
             distribution = search.init(key, mean, params)
-        return CmaEsState(distribution=strong(distribution), champion=first_champion(mean))
+        return CmaEsState(distribution=self._kept(strong(distribution)), champion=first_champion(mean))
 
     def step(
         self, key: PRNGKeyArray, task: Task, level: Int[Array, ""], state: CmaEsState
@@ -89,7 +89,7 @@ class CmaEs:
             healthy=healthy & jnp.all(jnp.isfinite(distribution.mean)),
             metrics={"step_size": distribution.std},
         )
-        return CmaEsState(distribution=strong(distribution), champion=champion), progress
+        return CmaEsState(distribution=self._kept(strong(distribution)), champion=champion), progress
 
     def best(self, task: Task, state: CmaEsState) -> Policy:
         """Return the champion."""
@@ -107,6 +107,13 @@ class CmaEs:
         )
         with implicit_promotions():
             return search, search.default_params
+
+    def _kept(self, distribution: Any) -> Any:
+        """Return what the next generation needs of a distribution.
+
+        evosax decomposes the covariance matrix before it samples; the eigenvectors would be half of a checkpoint.
+        """
+        return distribution.replace(B=jnp.zeros((0, 0)), D=jnp.zeros((0,)))
 
     @property
     def _algorithm(self) -> Callable[..., CMA_ES]:

@@ -45,6 +45,10 @@ class SeldomDecomposedCmaEs(CmaEs):
         if not 0.0 <= self.replaced < 1.0:
             raise UserError(f"The share of the covariance matrix is at least 0 and below 1, not {self.replaced}.")
 
+    def _kept(self, distribution: Any) -> Any:
+        """Return all of it: the next generations sample with these eigenvectors."""
+        return distribution
+
     @property
     def _algorithm(self) -> Callable[..., CMA_ES]:
         """Return what makes the search."""
