@@ -55,12 +55,13 @@ def main(options: argparse.Namespace) -> int:
     console = PlainSpokenConsole(file=styled())
     where = f"as they took on one {kind}" if options.like else f"on {len(chosen)} × {kind}"
     console.print(f"Conditions of the {options.tier} tier, {where}")
-    console.print(_conditions(tier, store, used, paces, costs, project.config.seconds(None)))
-    own = sum(_has_run(store, tier, names) for names in used)
-    if not options.like and own < len(used):
+    console.print_whole(_conditions(tier, store, used, paces, costs, project.config.seconds(None)))
+    own, timed = sum(_has_run(store, tier, names) for names in used), sum(pace is not None for pace in paces.values())
+    if not options.like and own < timed:
         console.print(
-            f"Times are by this store's own trials for {own} of {len(used)} conditions, for others by reference trials "
-            "on such a device, perhaps of another machine. A trial that has solved every level stops earlier."
+            f"Times are by this store's own trials for {own} of {len(used)} conditions, for {timed - own} by "
+            f"{'a few steps timed now, or by ' if options.measure else ''}reference trials on such a device, perhaps "
+            "of another machine. A trial that has solved every level stops earlier."
         )
     for names in read:
         if names not in used:
@@ -71,7 +72,7 @@ def main(options: argparse.Namespace) -> int:
     for sentence in _about({names: costs[names] for names in used}, tier.design.last.n):
         console.print(sentence)
     console.print(f"\nClaims: the smallest p that the design allows (n trials a side, α {tier.design.alpha:g})")
-    console.print(_claims(reports, costs))
+    console.print_whole(_claims(reports, costs))
     for report in reports:
         if report.outcome is Outcome.ERROR and not report.attainable:
             console.print(f"{report.name}: error: {report.reason}")
@@ -121,7 +122,7 @@ def _conditions(
         "",
         "",
         f"{steps:,}",
-        duration(seconds) + (" and more" if unknown else ""),
+        "unknown" if unknown and not seconds else duration(seconds) + (" and more" if unknown else ""),
         *(_took(costs, used, kind) for kind in kinds),
         *([_core_hours(sum(filter(None, needed.values())))] if cores else []),
         style="bold",

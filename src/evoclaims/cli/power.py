@@ -50,7 +50,7 @@ def main(options: argparse.Namespace) -> int:
         told = "; ".join(power_cells.troubles(powers)[:1]) or "no claim has a test"
         raise UserError(" ".join([f"No power can be told at the {options.tier} tier: {told}.", *advice]))
     console = PlainSpokenConsole(file=styled())
-    console.print(plain_table(power_cells.HEADINGS, map(power_cells.cells, powers)))
+    console.print_whole(plain_table(power_cells.HEADINGS, map(power_cells.cells, powers)))
     for sentence in (*power_cells.about(powers, design.last.n), *power_cells.troubles(powers)):
         console.print(sentence)
     for sentence in _versions(pilots, wanted):

@@ -6,13 +6,21 @@ Rich itself drops five control characters and lets all others through, including
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import Any
+from typing import Any, Final
 
+from rich.cells import cell_len
 from rich.console import Console, ConsoleOptions, RenderableType
+from rich.measure import Measurement
 from rich.segment import Segment
 from rich.table import Table
 
 from evoclaims.core.printable import shown
+
+_GAP: Final = 2
+"""Columns of the terminal between those of a table."""
+
+_WIDEST: Final = 10_000
+"""More columns of a terminal than any table needs."""
 
 
 class PlainSpokenConsole(Console):
@@ -26,6 +34,22 @@ class PlainSpokenConsole(Console):
         """Yield the pieces that content is made of, each safe to print."""
         for segment in super().render(renderable, options):
             yield segment if segment.control else segment._replace(text=shown(segment.text))
+
+    def print_whole(self, table: Table) -> None:
+        """Print a table of texts without cutting one: where the terminal is too narrow for it, lines are longer.
+
+        A column that may be broken needs room for its longest word, another for its longest line.
+        """
+        columns = [(column.no_wrap, map(str, (column.header, *column.cells))) for column in table.columns]
+        needed = sum(max(cell_len(part) for text in texts for part in _parts(text, whole)) for whole, texts in columns)
+        if needed + _GAP * (len(columns) - 1) > self.width:
+            table.width = Measurement.get(self, self.options.update(max_width=_WIDEST), table).maximum
+        self.print(table, crop=False)
+
+
+def _parts(text: str, whole: bool) -> list[str]:
+    """Return the parts of a cell that stay together: its lines, or its words."""
+    return (text.splitlines() if whole else text.split()) or [""]
 
 
 def plain_table(headings: Sequence[str], rows: Iterable[Sequence[str]], names: int = 1) -> Table:
