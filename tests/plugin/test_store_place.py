@@ -40,6 +40,20 @@ def test_a_store_that_is_named_is_relative_to_the_current_folder(project: Any, e
     assert not (project.path / ".evoclaims").exists()
 
 
+@pytest.mark.parametrize("option", ["--claims-storage", "--claims-json"])
+def test_a_path_after_a_space_that_moves_pytests_root_is_a_sentence(
+    project: Any, sentence: Sentence, tmp_path_factory: pytest.TempPathFactory, option: str
+) -> None:
+    project.write(a="supported")
+    there = tmp_path_factory.mktemp("there")
+    result = project.run(option, str(there), own_store=True)
+    assert result.ret == pytest.ExitCode.USAGE_ERROR
+    sentence(result, f"not {project.path}, where the project is")
+    sentence(result, f"Write {option} with =, as in {option}=PATH.")
+    project.run(option, "inside", own_store=True)
+    assert project.run(option, "inside", own_store=True).ret == 0  # it exists now, and is below the project's root
+
+
 def test_commands_find_the_projects_store_from_a_folder_below(
     project: Any, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -15,6 +15,9 @@ if TYPE_CHECKING:
 
 TIERS: Final = ("smoke", "full")
 
+_PATHS: Final = ("--claims-storage", "--claims-json")
+"""Options whose values are paths."""
+
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     """Add the options."""
@@ -65,6 +68,7 @@ def check(config: pytest.Config) -> None:
     """
     tier, changes = config.getoption("claims_tier"), config.getoption("claims_compare_fail")
     try:
+        _check_root(config)
         if tier is not None and tier not in TIERS:
             raise UnknownNameError("tier", tier, TIERS)
         if changes is not None:
@@ -95,6 +99,29 @@ def wanted_claims(config: pytest.Config, tests: Iterable[ClaimTest]) -> set[str]
     from evoclaims.claims.selection import selected
 
     return selected(option, ids | {test.key[1] for test in tests})
+
+
+def _check_root(config: pytest.Config) -> None:
+    """Refuse a root above the project's.
+
+    pytest looks for its root before it knows the options of plugins: in `--claims-storage DIR` an existing DIR outside
+    of the project is a place of tests to it.
+    """
+    spaced = [option for option in _PATHS if option in config.invocation_params.args]
+    if not spaced:
+        return
+    from evoclaims.paper.config import find_root
+
+    try:
+        project = find_root(config.invocation_params.dir)
+    except UserError:
+        return
+    if not config.rootpath.is_relative_to(project):
+        raise UserError(
+            f"pytest takes {config.rootpath} for the root of this run, not {project}, where the project is, since it "
+            f"reads an existing path after a space as a place of tests. Write {' and '.join(spaced)} with =, as in "
+            f"{spaced[0]}=PATH."
+        )
 
 
 def _check_changes(config: pytest.Config, changes: str) -> None:
