@@ -60,6 +60,8 @@ def test_one_case_of_a_claim_is_selected_by_its_name(project: Any, sentence: Sen
     sentence(
         project.run("--claims-only=a[z]"), "There is no claim named 'a[z]'. Did you mean 'a[y]'? Known: a[x], a[y]."
     )
+    project.write(a="supported")
+    sentence(project.run("--claims-only=a[x]"), "There is no claim named 'a[x]'. Known: a.")
 
 
 def test_naming_the_test_itself_does_not_start_the_full_tier(project: Any) -> None:

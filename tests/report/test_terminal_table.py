@@ -137,7 +137,7 @@ def test_the_comparison_with_the_references_says_what_drifted_and_what_it_did_no
 
 def test_where_nothing_could_be_compared_to_the_bit_nothing_is_said_to_be_unchanged() -> None:
     assert drift_lines(DriftReport((), 0.01), changed=[], compared=0).splitlines()[-1] == (
-        "to the bit: no trial could be compared, since none of the references has the same machine and versions"
+        "to the bit: no trial could be compared, since none has a reference of the same machine and versions"
     )
 
 

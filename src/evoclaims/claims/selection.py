@@ -24,7 +24,7 @@ def selected(option: str, known: Collection[str]) -> set[str]:
         found = {name} & set(known) or begun
         if not found:
             alike = {one for one in known if ("[" in one) == ("[" in name)}
-            raise UnknownNameError("claim", name, alike or {"(none collected)"})
+            raise UnknownNameError("claim", name, alike or known or {"(none collected)"})
         chosen |= found
     if not chosen:
         raise UserError(f"{option!r} names no claim: name some, such as G1 or G1,S2, or leave the option out.")

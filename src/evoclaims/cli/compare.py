@@ -44,6 +44,7 @@ def main(options: argparse.Namespace) -> int:
         print(timeline(asked, options.timeline))
         if options.out is not None:
             write(Path(options.out), svg(timeline_chart(asked, options.timeline)).encode())
+            print(f"wrote {options.out}")
         return 0
     if options.out is not None:
         raise UserError("--out draws what --timeline lists: add --timeline.")

@@ -126,7 +126,7 @@ def drift_lines(drift: DriftReport, changed: Sequence[str], compared: int) -> st
     bits = (
         f"to the bit: {compared} trials compared with the same machine and versions, {len(changed)} changed{where}"
         if compared
-        else "to the bit: no trial could be compared, since none of the references has the same machine and versions"
+        else "to the bit: no trial could be compared, since none has a reference of the same machine and versions"
     )
     return "\n".join([head, *drift.lines, bits])
 
