@@ -20,7 +20,7 @@ from evoclaims.envs.gates.truth_table import TruthTable
 from evoclaims.methods.base import Policy, Progress
 from evoclaims.methods.hand_built import HandBuilt
 from evoclaims.trials.budget import Budget
-from evoclaims.trials.compatibility import traced_progress
+from evoclaims.trials.compatibility import CURVES, METRICS, traced_progress
 from evoclaims.trials.program import Program
 from evoclaims.trials.runner import run
 from evoclaims.trials.spec import Condition
@@ -121,6 +121,10 @@ STEPS: dict[str, Any] = {
     "float32 afterwards.": lambda state, told: (jnp.zeros(5), told),
     "'walker' changes its state by a step: it is of shape (4,) and type float32 before and of shape (4,) and type "
     "int32 afterwards.": lambda state, told: (jnp.zeros(4, jnp.int32), told),
+    "a step of 'walker' reports a metric 'level', which is a name of the engine's own numbers: give it another name.": (
+        lambda state, told: (state, replace(told, metrics={"level": told.fitness}))
+    ),
+    "a step of 'walker' returns a Progress, not two values: state, Progress(...).": lambda state, told: told,
     "'walker' changes its state by a step: its structure is another one afterwards.": (
         lambda state, told: ((state, state), told)
     ),
@@ -180,6 +184,37 @@ def test_a_task_that_gives_something_else_is_refused(what: str, only: str) -> No
     assert str(caught.value) == f"{BOTH}the {only} of 'n_parity' gives {what}"
 
 
+@pytest.mark.parametrize("only", ["reset", "step"])
+def test_a_task_that_gives_no_task_state_is_refused(only: str) -> None:
+    task = Bent(3, bend=lambda made: (made.observation, made.reward), only=only)
+    with pytest.raises(UserError, match=f"{BOTH}the {only} of 'n_parity' gives a tuple, not a TaskState"):
+        traced_progress(Walker(), task)
+
+
+@pytest.mark.parametrize("size", ["action_size", "horizon", "levels"])
+def test_a_task_without_actions_time_or_levels_is_refused(size: str) -> None:
+    empty = type("Empty", (NParity,), {size: 0})
+    with pytest.raises(UserError, match=f"{BOTH}'n_parity' has {size} = 0, and it takes at least 1"):
+        traced_progress(Walker(), empty(3))
+
+
+@pytest.mark.parametrize("cost", [0, -1, 2.5, None])
+@pytest.mark.parametrize("budget", [Budget(generations=1), Budget(environment_steps=8)], ids=["generations", "steps"])
+def test_a_step_that_costs_no_whole_number_of_environment_steps_is_refused(
+    cost: Any, budget: Budget, tmp_path: Any, cpus: list[Any]
+) -> None:
+    """Else its trials would be stored as having spent none, and a claim about steps would read that."""
+    method = type("Costing", (Walker,), {"cost": lambda self, task: cost})()
+    with pytest.raises(UserError, match=rf"A step of 'walker' on 'n_parity' costs {cost} environment steps"):
+        run(Condition(method, TASK, "direct", budget), [0], Store(tmp_path), cpus)
+
+
+def test_the_engine_keeps_the_names_of_all_its_own_numbers(tmp_path: Any, cpus: list[Any]) -> None:
+    (trial,) = run(Condition(Walker(), TASK, "direct", Budget(generations=1)), [0], Store(tmp_path), cpus)
+    assert sorted(trial.metrics) == sorted(METRICS)
+    assert set(trial.curves) - {"first"} == set(CURVES)
+
+
 def test_a_task_whose_step_changes_its_state_is_refused() -> None:
     task = Bent(3, bend=lambda made: replace(made, inner=replace(made.inner, level=made.reward)), only="step")
     with pytest.raises(UserError, match=r"'n_parity' changes its state by a step: \.level is of shape \(\) and type"):
@@ -203,6 +238,8 @@ class Examining(NParity):
         (lambda e: replace(e, fitness=e.fitness[None]), "a fitness of shape (2, 1) and type float32, not"),
         (lambda e: replace(e, success=e.success > 0), "a success of shape (2,) and type bool, not of shape (2,)"),
         (lambda e: replace(e, metrics={"x": jnp.zeros(3)}), "a metric 'x' of shape (2, 3) and type float32"),
+        (lambda e: replace(e, metrics={"steps": e.fitness}), "a metric 'steps', which is a name of the engine's own"),
+        (lambda e: (e.fitness, e.success), "a tuple, not an Episode"),
     ],
 )
 def test_an_examination_that_gives_something_else_is_refused(give: Any, what: str, cpus: list[Any]) -> None:

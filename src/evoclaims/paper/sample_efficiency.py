@@ -36,7 +36,7 @@ def steps_to(source: Source, condition: Condition, curve: str, value: float, lev
         raise UserError(f"{source.label}: a curve is asked when it reaches a finite value, unlike {value}.")
     if not 0 <= wanted < levels:
         raise UserError(f"{source.label} has levels 0 to {levels - 1}, not {wanted}.")
-    cost, budget = condition.method.cost(condition.task), float(condition.environment_steps)
+    cost, budget = condition.cost, float(condition.environment_steps)
     chunk = condition.budget.chunk(cost)
     imported = condition.existing is not None
     advice = "" if imported else "give the condition the progression 'whole_budget', or "

@@ -5,9 +5,9 @@ jax broadcasts silently. A policy whose action is a scalar would be scored wrong
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, Final
 
 import jax
 import jax.numpy as jnp
@@ -21,6 +21,15 @@ from evoclaims.envs.base import Episode, MisfitError, Task, TaskState, fitting
 from evoclaims.methods.base import Method, Policy, Progress
 
 _NUMBER = jax.ShapeDtypeStruct((), jnp.int32)
+
+CURVES: Final = ("steps", "environment_steps", "level", "fitness", "success")
+"""Names of a training curve that the engine writes."""
+
+METRICS: Final = (
+    *("mean_success", "last_success", "last_fitness", "furthest_solved", "furthest_reached"),
+    *("steps", "environment_steps"),
+)
+"""Names of a result's metrics that the engine writes."""
 
 
 @contextmanager
@@ -45,6 +54,9 @@ def traced_progress(method: Method[Any], task: Task) -> Progress:
         UserError: when something has a wrong shape, type or structure; names both.
     """
     with both_named(method, task):
+        for name in ("action_size", "horizon", "levels"):
+            if getattr(task, name) < 1:
+                raise MisfitError(f"{task.name!r} has {name} = {getattr(task, name)}, and it takes at least 1")
         shown: TaskState = jax.eval_shape(lambda seed, level: task.reset(_key(seed), level), _NUMBER, _NUMBER)
         _check_task_state(task, "reset", shown)
         before = jax.eval_shape(lambda seed: strong(method.init(_key(seed), task)), _NUMBER)
@@ -55,7 +67,12 @@ def traced_progress(method: Method[Any], task: Task) -> Progress:
         _check_unchanged(f"{task.name!r} changes its state by a step", shown.inner, following.inner)
 
         def step(seed: Int[Array, ""], level: Int[Array, ""], state: Any) -> tuple[Any, Progress]:
-            after, progress = method.step(_key(seed), task, level, state)
+            told: object = method.step(_key(seed), task, level, state)
+            if not (isinstance(told, tuple) and len(told) == 2):
+                raise MisfitError(
+                    f"a step of {method.name!r} returns a {type(told).__name__}, not two values: state, Progress(...)"
+                )
+            after, progress = told
             return strong(after), progress
 
         after, progress = jax.eval_shape(step, _NUMBER, _NUMBER, before)
@@ -80,9 +97,11 @@ def check_scores(task: Task, final: Episode) -> None:
         MisfitError: when one is not a number for each level.
     """
     what = f"the examination by {task.name!r} gives"
+    if not isinstance(final, Episode):
+        raise MisfitError(f"{what} a {type(final).__name__}, not an Episode")
     for name, leaf in (("fitness", final.fitness), ("success", final.success)):
         _check(f"{what} a {name}", leaf, (task.levels,), jnp.float32)
-    _check_numbers(f"{what} a metric", final.metrics, (task.levels,))
+    _check_numbers(f"{what} a metric", final.metrics, (task.levels,), METRICS)
 
 
 def _key(seed: Int[Array, ""]) -> Array:
@@ -93,6 +112,8 @@ def _key(seed: Int[Array, ""]) -> Array:
 def _check_task_state(task: Task, function: str, state: TaskState) -> None:
     """Check the task state that `reset` or `step` returns."""
     what = f"the {function} of {task.name!r} gives"
+    if not isinstance(state, TaskState):
+        raise MisfitError(f"{what} a {type(state).__name__}, not a TaskState")
     _check(f"{what} an observation", state.observation, (task.observation_size,), jnp.float32)
     _check(f"{what} a reward", state.reward, (), jnp.float32)
     _check(f"{what} a mark `terminated`", state.terminated, (), jnp.bool_)
@@ -107,13 +128,15 @@ def _checked_progress(method: Method[Any], progress: object) -> Progress:
     _check(f"{what} a fitness", progress.fitness, (), jnp.float32)
     _check(f"{what} a success", progress.success, (), jnp.float32)
     _check(f"{what} a mark `healthy`", progress.healthy, (), jnp.bool_)
-    _check_numbers(f"{what} a metric", progress.metrics, ())
+    _check_numbers(f"{what} a metric", progress.metrics, (), CURVES)
     return progress
 
 
-def _check_numbers(what: str, metrics: Mapping[str, Any], shape: tuple[int, ...]) -> None:
-    """Check that metrics are real numbers of one shape."""
+def _check_numbers(what: str, metrics: Mapping[str, Any], shape: tuple[int, ...], taken: Collection[str]) -> None:
+    """Check that metrics are real numbers of one shape, and that none hides one of the engine's names in `taken`."""
     for name, leaf in metrics.items():
+        if name in taken:
+            raise MisfitError(f"{what} {name!r}, which is a name of the engine's own numbers: give it another name")
         if leaf.shape != shape or not (np.can_cast(leaf.dtype, np.float64) or leaf.dtype == jnp.bfloat16):
             raise MisfitError(f"{what} {name!r} of {_described(leaf)}, not a real number of shape {shape}")
 

@@ -55,7 +55,7 @@ def make_result(
     The task's own metrics of the final policy on the last level are added. Even if its last step was healthy, a trial
     has diverged when its final policy uses parameters or gets scores that are not finite.
     """
-    cost = spec.condition.method.cost(spec.condition.task)
+    cost = spec.condition.cost
     success, fitness = np.asarray(score.final.success)[lane], np.asarray(score.final.fitness)[lane]
     solved_at = np.asarray(score.solved_at)[lane]
     solved = np.flatnonzero(solved_at != NEVER)

@@ -176,7 +176,7 @@ def _advance(run: Run, batch: Batch, allowance: Allowance, strides: Strides) -> 
     Returns:
         The batch, the device's report, and whether a chunk (or every running trial) has ended.
     """
-    cost = run.condition.method.cost(run.condition.task)
+    cost = run.condition.cost
     end = min((batch.header.chunks + 1) * run.condition.budget.chunk(cost), run.condition.steps)
     until = strides.after(batch.steps, end)
     began, compiled = time.perf_counter(), run.lanes.seconds

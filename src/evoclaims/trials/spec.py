@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, is_dataclass
 from functools import cached_property
+from numbers import Real
 from typing import Any, Literal, get_args
 
 from evoclaims.core.canonical import as_plain, content_hash
@@ -108,14 +109,29 @@ class Condition:
         return f"{self.method.name} on {self.task.name}" + " (direct)" * (self.progression == "direct")
 
     @property
+    def cost(self) -> int:
+        """Environment steps that a step of the method spends.
+
+        Raises:
+            UserError: when the method gives no whole number from 1 up.
+        """
+        cost = self.method.cost(self.task)
+        if not (isinstance(cost, Real) and cost >= 1 and cost % 1 == 0):
+            raise UserError(
+                f"A step of {self.method.name!r} on {self.task.name!r} costs {cost!r} environment steps by its `cost`, "
+                "which has to return a whole number of them, at least 1."
+            )
+        return cost
+
+    @property
     def steps(self) -> int:
         """Steps of the method in the whole budget."""
-        return self.budget.steps(self.method.cost(self.task))
+        return self.budget.steps(self.cost)
 
     @property
     def environment_steps(self) -> int:
         """Environment steps of one trial that spends the whole budget."""
-        return self.steps * self.method.cost(self.task)
+        return self.steps * self.cost
 
 
 @dataclass(frozen=True)
