@@ -88,6 +88,18 @@ def test_a_users_mistake_is_one_sentence_and_status_2(
     assert text in err
 
 
+@pytest.mark.parametrize("command", [("status",), ("new", "here")])
+def test_an_option_that_a_command_lacks_is_told_with_its_usage(
+    command: tuple[str, ...], capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main([*command, "--teir", "full"])
+    assert ended.value.code == 2
+    err = capsys.readouterr().err
+    assert err.startswith(f"usage: evoclaims {command[0]} [-h]")
+    assert f"evoclaims {command[0]}: error: unrecognized arguments: --teir" in err
+
+
 @pytest.mark.parametrize("command", ["plan", "run", "status", "reference"])
 def test_outside_of_a_project_a_command_says_what_is_missing(
     evoclaims: Evoclaims, tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch, command: str

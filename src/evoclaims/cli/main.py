@@ -46,7 +46,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _ended(arguments: Sequence[str] | None) -> int:
     """Run one command to its end, or print the sentence that says why it failed."""
-    options = _parser().parse_args(arguments)
+    options, unknown = _parser().parse_known_args(arguments)
+    if unknown:
+        options.refuse(f"unrecognized arguments: {' '.join(unknown)}")
     try:
         from evoclaims.cli.storage import storage_of
 
@@ -65,13 +67,14 @@ def _ended(arguments: Sequence[str] | None) -> int:
 
 
 def _parser() -> argparse.ArgumentParser:
-    """Build the parser."""
+    """Build the parser; its options have `refuse`, which ends the program with the usage of their command."""
     parser = argparse.ArgumentParser(prog="evoclaims", description="Claims of a paper, judged by real trials.")
     parser.add_argument("--version", action="version", version=f"evoclaims {metadata.version('evoclaims')}")
     commands = parser.add_subparsers(dest="command", required=True, metavar="command")
 
     def add(name: str, text: str, kept: str = ".evoclaims") -> argparse.ArgumentParser:
         command = commands.add_parser(name, help=text, description=text)
+        command.set_defaults(refuse=command.error)
         command.add_argument("--storage", metavar="DIR", help=f"folder of trials ({kept} in the project's root)")
         if name not in _WITHOUT_TIER:
             default, known = _TIERS.get(name, ("smoke", "smoke (default) or full"))
@@ -84,7 +87,7 @@ def _parser() -> argparse.ArgumentParser:
 
     text = "write a project that runs, with a method, a task and two claims; or, with --from, that of a paper"
     new = commands.add_parser("new", help=text, description=text)
-    new.set_defaults(storage=None)  # it reads no trials
+    new.set_defaults(storage=None, refuse=new.error)  # it reads no trials
     new.add_argument("folder", metavar="DIR", help="where to: a folder that is new or empty")
     new.add_argument("--from", dest="project", metavar="PAPER", default="skeleton", help="a paper, such as nisioti2025")
 
