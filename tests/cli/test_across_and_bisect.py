@@ -78,7 +78,9 @@ def test_an_end_that_cannot_be_judged_is_an_error(evoclaims: Evoclaims, outcomes
     outcomes["1.8"] = "no wheel"
     status, _, err = evoclaims(*BISECT)
     assert status == 2
-    assert "pebble 1.8, named by --bad, cannot be judged (no wheel): name another one." in err
+    assert (
+        "pebble 1.8, named by --bad, cannot be judged: no wheel. If the release is to blame, name another one." in err
+    )
 
 
 def test_the_table_is_printed_and_written_and_the_status_says_that_something_changed(

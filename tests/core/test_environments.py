@@ -167,6 +167,10 @@ def test_without_such_a_python_that_is_said(make_one: Make, tmp_path: Path, monk
             "  × No solution found:\n  ╰─▶ Because there is\n      no x, no.\n",
             "No solution found: ╰─▶ Because there is no x, no",
         ),
+        (
+            "pyenv: python3.99: command not found\n\nNote: See 'pyenv help global' for tips\n      to be found.\n",
+            "python3.99: command not found",
+        ),
         ("Traceback\nValueError: bad\n", "ValueError: bad"),
         ("", ""),
     ],

@@ -50,8 +50,8 @@ _LIST: Final = (
 LONGEST: Final = 300
 """Most characters of a reason."""
 
-_ERROR: Final = re.compile(r"^((\S+: )?(?i:error)\s*:\s+|E\s{2,}|\s*×\s+)")
-"""How pip, uv and pytest begin a line that says what was wrong."""
+_ERROR: Final = re.compile(r"^((\S+: )?(?i:error)\s*:\s+|E\s{2,}|\s*×\s+|pyenv:\s+)")
+"""How pip, uv, pytest and pyenv begin a line that says what was wrong."""
 
 
 class NotInstallableError(UserError):
