@@ -220,7 +220,7 @@ def test_a_timeline_shows_the_versions_that_differ(accepted: Evoclaims) -> None:
     status, out, _ = accepted("compare", "--timeline", "a")
     first, second, third = out.splitlines()
     assert (status, first) == (0, "a (smoke)")
-    assert second.startswith("  2020-01-01  supported (n = 10, p = 0.028)  ")
+    assert second.startswith("  2020-01-01  supported (n = 10: p = 0.0282 <= alpha = 0.05)  ")
     assert f"jax 0.4.0 -> {now.versions['jax']}" in third
     assert accepted("compare", "--timeline", "--out=it.svg")[1].splitlines()[5:] == ["wrote it.svg"]
     assert Path("it.svg").read_text().count("<path") == 0 < Path("it.svg").read_text().count("supported (n = 10")

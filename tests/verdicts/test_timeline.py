@@ -17,7 +17,16 @@ from evoclaims.verdicts.timeline import timeline
 SVG = "{http://www.w3.org/2000/svg}"
 VERSIONS = {"jax": "0.10.2", "python": "3.11.7", "numpy": "2.4"}
 FIRST = AcceptedVerdict(
-    Outcome.SUPPORTED, "so", 10, 0.0282, "f" * 64, "2025-01-02", VERSIONS, "cpu", "a" * 40, "d" * 64
+    Outcome.SUPPORTED,
+    "p = 0.0282 <= alpha = 0.04 at n = 10",
+    10,
+    0.0282,
+    "f" * 64,
+    "2025-01-02",
+    VERSIONS,
+    "cpu",
+    "a" * 40,
+    "d" * 64,
 )
 
 
@@ -25,19 +34,20 @@ def test_a_claims_verdicts_come_by_date_with_the_versions_that_differ() -> None:
     second = replace(
         FIRST,
         outcome=Outcome.REFUTED,
+        reason="p = 0.00865 against it <= alpha = 0.04 at n = 10",
         accepted="2025-03-04",
         versions={**VERSIONS, "jax": "0.11.2"},
         device="NVIDIA H200",
         revision=f"{'b' * 40}-dirty",
     )
-    third = replace(second, p=None, n=0, accepted="2025-05-06", fingerprint="e" * 64)
+    third = replace(second, reason="no trial has ended", p=None, n=0, accepted="2025-05-06", fingerprint="e" * 64)
     assert timeline({("full", "G1"): (FIRST, second, third)}).splitlines() == [
         "G1 (full)",
-        "  2025-01-02  supported (n = 10, p = 0.028)  python 3.11.7, jax 0.10.2, cpu",
-        "  2025-03-04  refuted (n = 10, p = 0.028)  jax 0.10.2 -> 0.11.2, device cpu -> NVIDIA H200, "
-        "revision aaaaaaaaaaaa -> bbbbbbbbbbbb-dirty",
+        "  2025-01-02  supported (n = 10: p = 0.0282 <= alpha = 0.04)  python 3.11.7, jax 0.10.2, cpu",
+        "  2025-03-04  refuted (n = 10: p = 0.00865 against it <= alpha = 0.04)  jax 0.10.2 -> 0.11.2, "
+        "device cpu -> NVIDIA H200, revision aaaaaaaaaaaa -> bbbbbbbbbbbb-dirty",
         "  a new history: what is judged has changed (fingerprint ffffffffffff -> eeeeeeeeeeee)",
-        "  2025-05-06  refuted (n = 0)",
+        "  2025-05-06  refuted (n = 0: no trial has ended)",
     ]
 
 

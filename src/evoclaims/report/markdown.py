@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from evoclaims.figures.replication import Replication
 from evoclaims.report import replication_cells, table_cells
 from evoclaims.report.fault_grid import LEGEND
-from evoclaims.report.formatting import p_value, plural
+from evoclaims.report.formatting import plural
 from evoclaims.report.markdown_text import literal, table
 from evoclaims.report.model import Board, Page, Section
 from evoclaims.verdicts.sensitivity import Tally
@@ -146,9 +146,9 @@ def _section(section: Section, page: Page) -> Iterator[str]:
         )
     if section.history:
         yield table(
-            ("accepted", "verdict", "n", "p", "rules"),
+            ("accepted", "verdict", "why", "rules"),
             (
-                map(literal, (e.accepted, e.outcome, str(e.n), p_value(e.p), e.fingerprint[:9] + " (new)" * (e is new)))
+                map(literal, (e.accepted, e.outcome, e.reason, e.fingerprint[:9] + " (new)" * (e is new)))
                 for new, era in ((era[0] if index else None, era) for index, era in enumerate(section.history))
                 for e in era
             ),

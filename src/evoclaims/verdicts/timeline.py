@@ -50,9 +50,9 @@ def _claim(tier: str, claim: str, entries: Sequence[AcceptedVerdict]) -> Iterato
 
 def described(before: AcceptedVerdict | None, entry: AcceptedVerdict) -> str:
     """Return an entry in one line, with what has changed since the entry before."""
-    p = "" if entry.p is None else f", p = {entry.p:.2g}"
+    why = entry.reason.removesuffix(f" at n = {entry.n}")
     behind = _first(entry) if before is None else _changes(before, entry)
-    return printable(f"{entry.accepted}  {entry.outcome} (n = {entry.n}{p}){behind and '  '}{behind}")
+    return printable(f"{entry.accepted}  {entry.outcome} (n = {entry.n}: {why}){behind and '  '}{behind}")
 
 
 def _first(entry: AcceptedVerdict) -> str:
