@@ -191,5 +191,22 @@ CURRICULUM: Final = Probe(
     cases_at_level=(2, 4),
 )
 """Repeat the second bit (level 0); negate it where the first is set (level 1): does the level go up when solved?"""
+_ANSWERS: Final = "0001111110000000"
+_GATE, *_BEHIND = (
+    (tuple(float(place == shown) for place in range(len(_ANSWERS))), int(_ANSWERS[shown]))
+    for shown in sorted(range(len(_ANSWERS)), key=lambda place: place != 5)
+)
+SELECTION: Final = Probe(
+    "probe_selection",
+    cases=tuple((_GATE, question) for question in _BEHIND),
+    cases_at_level=(len(_BEHIND),),
+    error_ends=True,
+)
+"""Know 16 answers by heart, one of which opens the way to the others: are the better policies bred?
 
-PROBES: Final = {probe.name: probe for probe in (CONSTANT, COPY, DELAYED, SURVIVAL, CURRICULUM)}
+These are too many answers for a policy drawn at random, though the best of thousands is judged. Who breeds the worst
+gets policies that are wrong at the gate, not everywhere: a mutation that negates all answers would make those right.
+The answers change only twice along the inputs, so that HyperNEAT can draw the weights.
+"""
+
+PROBES: Final = {probe.name: probe for probe in (CONSTANT, COPY, DELAYED, SURVIVAL, CURRICULUM, SELECTION)}

@@ -8,7 +8,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from probes import CONSTANT, COPY, CURRICULUM, DELAYED, PROBES, SURVIVAL, Probe
+from probes import CONSTANT, COPY, CURRICULUM, DELAYED, PROBES, SELECTION, SURVIVAL, Probe
 
 from evoclaims.envs.base import Episode, PolicyFn
 
@@ -17,6 +17,7 @@ pytestmark = pytest.mark.newest
 YES: PolicyFn = lambda observation: jnp.ones(1)  # noqa: E731
 REPEAT: PolicyFn = lambda observation: observation[:1]  # noqa: E731
 EXCLUSIVE_OR: PolicyFn = lambda observation: -jnp.prod(observation, keepdims=True)  # noqa: E731
+MIDDLE: PolicyFn = lambda observation: observation[3:9].sum(keepdims=True) - 0.5  # noqa: E731
 SECOND_BIT: PolicyFn = lambda observation: observation[1:]  # noqa: E731
 RIGHT = {
     "probe_constant": YES,
@@ -24,6 +25,7 @@ RIGHT = {
     "probe_delayed": REPEAT,
     "probe_survival": REPEAT,
     "probe_curriculum": EXCLUSIVE_OR,
+    "probe_selection": MIDDLE,
 }
 BEST = {
     "probe_constant": 1.0,
@@ -31,6 +33,7 @@ BEST = {
     "probe_delayed": 1.0,
     "probe_survival": 2.0,
     "probe_curriculum": 1.0,
+    "probe_selection": 2.0,
 }
 
 
@@ -51,7 +54,7 @@ def _play(probe: Probe, observation: tuple[float, ...], actions: list[float]) ->
     return seen
 
 
-def test_the_probes_are_the_five_with_known_answers() -> None:
+def test_the_probes_are_the_six_with_known_answers() -> None:
     assert list(PROBES) == list(RIGHT) == list(BEST)
     for name, probe in PROBES.items():
         assert probe.name == name
@@ -113,6 +116,14 @@ def test_survival_forfeits_what_an_ended_episode_does_not_reach() -> None:
     assert float(episode.fitness) == (0.0 - 1.0) / 2
 
 
+def test_selection_pays_nothing_for_right_answers_behind_a_wrong_one() -> None:
+    wrong_at_the_gate: PolicyFn = lambda observation: MIDDLE(observation) * (1 - 2 * observation[5])  # noqa: E731
+    for policy in (wrong_at_the_gate, lambda observation: -jnp.ones(1)):
+        assert float(_examine(SELECTION, policy).fitness) == -1.0
+        assert float(_examine(SELECTION, policy).success) == 0.0
+    assert float(_examine(SELECTION, YES).fitness) == pytest.approx((5 * 2 + 10 * 0) / 15)
+
+
 def test_the_curriculums_first_level_is_solved_by_what_its_second_is_not() -> None:
     assert float(_examine(CURRICULUM, SECOND_BIT, 0).success) == 1.0
     assert float(_examine(CURRICULUM, SECOND_BIT, 1).success) == 0.5
@@ -122,11 +133,11 @@ def test_the_curriculums_first_level_is_solved_by_what_its_second_is_not() -> No
 def test_episodes_start_on_every_case_of_the_level_alike_and_on_no_other(name: str) -> None:
     probe = PROBES[name]
     for level, cases in enumerate(probe.cases_at_level):
-        keys = jax.random.split(jax.random.key(level), 400)
+        keys = jax.random.split(jax.random.key(level), 200 * cases)
         states = jax.vmap(probe.reset, in_axes=(0, None))(keys, jnp.asarray(level, jnp.int32))
         counts = np.bincount(np.asarray(states.inner.case))
         assert len(counts) == cases
-        assert counts.min() > 0.7 * 400 / cases
+        assert counts.min() > 0.7 * 200
 
 
 @pytest.mark.parametrize("name", RIGHT)
@@ -136,7 +147,7 @@ def test_the_examination_is_what_episodes_pay_on_average(name: str, policy: Poli
     level = jnp.asarray(probe.levels - 1, jnp.int32)
     step = jax.jit(lambda state: probe.step(state, policy(state.observation)))
     returns: dict[int, float] = {}
-    for key in jax.random.split(jax.random.key(0), 64):
+    for key in jax.random.split(jax.random.key(0), 16 * probe.cases_at_level[-1]):
         state = probe.reset(key, level)
         case, total = int(state.inner.case), 0.0
         if case in returns:

@@ -37,6 +37,7 @@ class Entry:
         cost: environment steps of one of its steps on `task`, worked out by hand.
         other: the method with other hyperparameters: at a size that solves every probe, if it is one that does.
         curriculum: steps that the probe with two levels may take; 0 for a method that no probe is for.
+        selection: steps that the probe of selection may take; 0 for a method that breeds none of its policies.
         keeps_the_best: whether its best policy never gets worse on a deterministic task.
         learns: whether a step draws from its key and changes the numbers that the method goes on with.
         examines: whether a step reports what its policy does.
@@ -49,6 +50,7 @@ class Entry:
     cost: int
     other: Any
     curriculum: int = 0
+    selection: int = 0
     keeps_the_best: bool = True
     learns: bool = True
     examines: bool = True
@@ -62,8 +64,8 @@ SMALL = Settings(population=24, nodes=12, connections=36, species=Species(most=3
 LARGE_STEPS = Attribute(mutate_rate=0.6, power=0.5)
 PROBING = Settings(
     population=150,
-    nodes=12,
-    connections=36,
+    nodes=24,
+    connections=72,
     mutation=Mutation(weight=LARGE_STEPS, bias=LARGE_STEPS, node_delete=0.05, connection_delete=0.1),
     species=Species(most=5, survival=0.2),
 )
@@ -82,6 +84,7 @@ METHODS = {
         cost=12 * 8,
         other=CmaEs(256, network=AllSkips(8)),
         curriculum=200,
+        selection=40,
     ),
     "seldom_decomposed_cma_es": Entry(
         method=SeldomDecomposedCmaEs(12, network=AllSkips(3)),
@@ -89,6 +92,7 @@ METHODS = {
         cost=12 * 8,
         other=SeldomDecomposedCmaEs(256, network=AllSkips(8), replaced=0.1),
         curriculum=200,
+        selection=40,
     ),
     "neat": Entry(
         method=Neat(SMALL),
@@ -96,6 +100,7 @@ METHODS = {
         cost=24 * 8,
         other=Neat(PROBING),
         curriculum=3000,
+        selection=30,
     ),
     "hyperneat": Entry(
         method=HyperNeat(replace(SMALL, activations=CPPN_FUNCTIONS), hidden=(4,)),
@@ -103,6 +108,7 @@ METHODS = {
         cost=24 * 8,
         other=HyperNeat(replace(PROBING, activations=CPPN_FUNCTIONS), hidden=(8,), extent="unit"),
         curriculum=3000,
+        selection=300,
     ),
     "ppo": Entry(
         method=Ppo(
