@@ -41,6 +41,15 @@ def test_nvidias_assembler_takes_every_kernel(case: str, tmp_path: Path) -> None
     assemble(ptx, tmp_path)
 
 
+@pytest.mark.parametrize(("name", "symbol"), [("A step of 3 Übungen!", "a_step_of_3_bungen"), ("3 β", "kernel_3")])
+def test_a_kernel_is_named_after_what_it_computes_in_letters_that_the_assembler_takes(
+    name: str, symbol: str, tmp_path: Path
+) -> None:
+    (ptx,) = kernels_for_gpus(jax.vmap(one_kernel(lambda x: x + 1, name)), jnp.ones((5, 2)))
+    assert f".visible .entry {symbol}(" in ptx
+    assemble(ptx, tmp_path)
+
+
 def test_a_kernel_is_written_once_for_all_programs_that_call_it(monkeypatch: pytest.MonkeyPatch) -> None:
     calls: list[int] = []
     chosen = block_shape.chosen

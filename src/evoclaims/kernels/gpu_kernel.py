@@ -139,7 +139,9 @@ class Program:
 
 def program(text: str, name: str, warps: int = 1, teams: int = 1, shared_bytes: int = 0) -> Program:
     """Return LLVM's text of a kernel as a program; for the rest see `Program`."""
-    symbol = re.sub(r"\W+", "_", name.lower()).strip("_")
+    symbol = re.sub(r"\W+", "_", name.lower(), flags=re.ASCII).strip("_")
+    if not symbol[:1].isalpha():
+        symbol = f"{ENTRY}_{symbol}"
     module = llvm.parse_assembly(text.replace(f"@{ENTRY}(", f"@{symbol}("))
     module.verify()
     return Program(str(_target().emit_assembly(module)), symbol, warps, teams, shared_bytes)
