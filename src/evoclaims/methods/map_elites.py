@@ -6,21 +6,13 @@ import math
 from dataclasses import dataclass
 from functools import partial
 from itertools import pairwise
-from typing import Any, ClassVar, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol, runtime_checkable
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float, Int, PRNGKeyArray
 from numpy.typing import NDArray
-from qdax.core.containers.mapelites_repertoire import (
-    MapElitesRepertoire,
-    compute_euclidean_centroids,
-    get_cells_indices,
-)
-from qdax.core.emitters.mutation_operators import isoline_variation
-from qdax.core.emitters.standard_emitters import MixingEmitter
-from qdax.core.map_elites import MAPElites
 
 from evoclaims.core.errors import UserError, require_at_least
 from evoclaims.core.foreign import implicit_promotions
@@ -30,6 +22,9 @@ from evoclaims.envs.base import Episode, Task, share
 from evoclaims.methods.base import Policy, Progress
 from evoclaims.methods.champion import policy_of
 from evoclaims.networks.mlp import Mlp
+
+if TYPE_CHECKING:  # where it is used it is imported: it imports scikit-learn, which takes half a second
+    from qdax.core.map_elites import MAPElites
 
 
 @runtime_checkable
@@ -109,6 +104,8 @@ class MapElites:
         Raises:
             UserError: for a task without an area to map.
         """
+        from qdax.core.containers.mapelites_repertoire import MapElitesRepertoire, compute_euclidean_centroids
+
         (x_min, x_max), (y_min, y_max) = _mapped(task).area
         size = self.network.size(task.observation_size, task.action_size)
         with implicit_promotions():
@@ -149,6 +146,8 @@ class MapElites:
 
         An individual becomes its cell's elite when it is fitter than the old one; within a batch, the first best one.
         """
+        from qdax.core.containers.mapelites_repertoire import get_cells_indices
+
         descriptors = jnp.stack([episodes.metrics["x"], episodes.metrics["y"]], axis=-1)
         low, high = jnp.asarray(_mapped(task).area, jnp.float32).T
         inside = jnp.all((descriptors >= low[None]) & (descriptors <= high[None]), axis=1)  # NaN is not
@@ -195,6 +194,10 @@ class MapElites:
 
     def _algorithm(self) -> MAPElites:
         """Build QDax's algorithm for ask and tell: it evaluates nothing itself."""
+        from qdax.core.emitters.mutation_operators import isoline_variation
+        from qdax.core.emitters.standard_emitters import MixingEmitter
+        from qdax.core.map_elites import MAPElites
+
         variation = partial(isoline_variation, iso_sigma=self.iso_sigma, line_sigma=self.line_sigma)
         emitter = MixingEmitter(
             mutation_fn=None, variation_fn=variation, variation_percentage=1.0, batch_size=self.batch
