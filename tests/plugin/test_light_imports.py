@@ -57,3 +57,7 @@ def test_the_reproduction_is_imported_without_drawing_or_judging() -> None:
     loaded = _imported("import reproductions.nisioti2025", ROOT)
     assert "jax" in loaded
     assert not {"matplotlib", "qdax", "statsmodels"} & loaded
+
+
+def test_a_worker_process_is_ready_without_what_judges() -> None:
+    assert not {"pandas", "scipy", "statsmodels"} & _imported("import evoclaims.cli.worker", ROOT)

@@ -9,8 +9,6 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Literal, get_args
 
-from scipy.stats import binomtest
-
 from evoclaims.judging.counting import Counts, digit_width
 
 Alternative = Literal["greater", "less"]
@@ -101,6 +99,8 @@ def binomial_test(k: int, n: int, p0: float, alternative: Alternative = "greater
         raise ValueError(f"No alternative {alternative!r}; known: {', '.join(get_args(Alternative))}.")
     if not 0 < p0 < 1:
         raise ValueError(f"The null's probability lies strictly between 0 and 1, unlike {p0}.")
+    from scipy.stats import binomtest  # its import takes longer than a worker, which runs trials alone, should wait
+
     extreme = n if alternative == "greater" else 0
     return ExactTest(
         p=float(binomtest(k, n, p0, alternative).pvalue),
@@ -122,5 +122,7 @@ def clopper_pearson(k: int, n: int, alpha: float = 0.05) -> tuple[float, float]:
 
     So 10 of 10 at 0.05 gives (0.741, 1.0): the level of the whole interval is 1 - 2 alpha.
     """
+    from scipy.stats import binomtest  # as above
+
     interval = binomtest(k, n).proportion_ci(confidence_level=1 - 2 * alpha, method="exact")
     return float(interval.low), float(interval.high)

@@ -11,7 +11,6 @@ from typing import ClassVar, Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import rankdata
 
 from evoclaims.core.errors import UserError
 from evoclaims.judging.assertion import Assertion, Finding
@@ -134,6 +133,8 @@ def kruskal_wallis_test(groups: Sequence[Sequence[float]]) -> ExactTest:
     """
     if not all(map(len, groups)) or any(math.isnan(value) for group in groups for value in group):
         raise ValueError("A Kruskal-Wallis test needs at least one value in each group, and none that is NaN.")
+    from scipy.stats import rankdata  # as in `judging.exact`
+
     sizes = tuple(map(len, groups))
     ranks = 2 * rankdata([value for group in groups for value in group])  # whole numbers, mid-ranks too
     observed = _spread(ranks, _splits_as_given(sizes), sizes)[0]
