@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-from dataclasses import replace
+from dataclasses import make_dataclass, replace
 from typing import Any
 
 import pytest
@@ -102,12 +102,19 @@ OTHERS = {
     ("body", "what"),
     [
         ({"name": "mine"}, r"Mine has no revision, .*: write `revision: ClassVar\[int\] = …`"),
+        ({"name": "mine", "revision": "1"}, r"Mine has '1' as its revision, .*: write `revision: ClassVar\[int\] = …`"),
         ({"name": "mine", "revision": 1}, r"Mine is no dataclass: write @dataclass\(frozen=True\)"),
     ],
 )
 def test_what_a_method_lacks_to_be_told_apart_is_a_sentence(body: dict[str, Any], what: str) -> None:
     with pytest.raises(UserError, match=what):
         _ = Condition(type("Mine", (), body)(), NParity(3), "direct", Budget(generations=1)).id
+
+
+def test_a_method_that_can_be_changed_after_its_trials_have_an_id_is_a_sentence() -> None:
+    mine: Any = make_dataclass("Mine", [], namespace={"name": "mine", "revision": 1})
+    with pytest.raises(UserError, match="Mine is no frozen dataclass: write @dataclass"):
+        _ = Condition(mine(), NParity(3), "direct", Budget(generations=1)).id
 
 
 def test_the_id_changes_with_everything_that_makes_a_trial_another() -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, is_dataclass
+from dataclasses import dataclass
 from functools import cached_property
 from numbers import Real
 from typing import Any, Literal, get_args
@@ -24,15 +24,19 @@ ENGINE_REVISION = 1
 def _described(component: Any) -> dict[str, Any]:
     """Return name, revision and parameters of a method or task, as plain JSON; a `UserError` says what is missing."""
     kind = type(component).__name__
-    for name, of in (("name", "str"), ("revision", "int")):
-        if not hasattr(component, name):
+    for name, of in (("name", str), ("revision", int)):
+        given = getattr(component, name, None)
+        if type(given) is not of:
+            has = "has no" if given is None else f"has {given!r} as its"
             raise UserError(
-                f"{kind} has no {name}, by which its trials are stored: write `{name}: ClassVar[{of}] = …` in it."
+                f"{kind} {has} {name}, by which its trials are stored: write `{name}: ClassVar[{of.__name__}] = …` in "
+                "it."
             )
-    if not is_dataclass(type(component)):
+    frozen = getattr(getattr(type(component), "__dataclass_params__", None), "frozen", None)
+    if not frozen:
         raise UserError(
-            f"{kind} is no dataclass: write @dataclass(frozen=True) above the class, since the fields of a method or "
-            "task tell its trials apart."
+            f"{kind} is no {'dataclass' if frozen is None else 'frozen dataclass'}: write @dataclass(frozen=True) "
+            "above the class, since the fields of a method or task tell its trials apart."
         )
     return {"name": component.name, "revision": component.revision, "parameters": as_plain(component)}
 
