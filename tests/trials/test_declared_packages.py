@@ -13,6 +13,7 @@ import grimp
 import jax
 import numpy as np
 import pytest
+import qdax.core.map_elites  # noqa: F401  (MAP-Elites imports it while it is traced; what runs then makes no program)
 from jax.extend import core as jaxprs
 
 from evoclaims.core.packages import ALWAYS, UNDECLARED, packages_of
