@@ -15,7 +15,7 @@ from jax.interpreters import ad, batching, mlir
 from jaxtyping import Array
 
 from evoclaims.kernels import gpu_kernel, machine_code
-from evoclaims.kernels.gpu_kernel import Program
+from evoclaims.kernels.gpu_kernel import GpuProgram
 from evoclaims.kernels.xla_handler import ENTRY
 
 GPU_TARGET: Final = "__gpu$xla.gpu.ptx"
@@ -51,7 +51,7 @@ def on_host(text: str, layout: Sequence[int], operands: Sequence[Array], shapes:
     return jax.ffi.ffi_call(_host_target(text), shapes)(np.array(layout, np.int32), *operands)
 
 
-def on_gpu(program: Program, operands: Sequence[Array], shapes: Shapes, elements: int) -> Any:
+def on_gpu(program: GpuProgram, operands: Sequence[Array], shapes: Shapes, elements: int) -> Any:
     """Call a kernel of NVIDIA's GPUs.
 
     Args:

@@ -119,7 +119,7 @@ def finished(page: Instructions, names: Sequence[str], warps: int = 1, teams: in
 
 
 @dataclass(frozen=True)
-class Program:
+class GpuProgram:
     """A kernel as NVIDIA's GPUs get it.
 
     Attributes:
@@ -137,14 +137,14 @@ class Program:
     shared_bytes: int = 0
 
 
-def program(text: str, name: str, warps: int = 1, teams: int = 1, shared_bytes: int = 0) -> Program:
-    """Return LLVM's text of a kernel as a program; for the rest see `Program`."""
+def program(text: str, name: str, warps: int = 1, teams: int = 1, shared_bytes: int = 0) -> GpuProgram:
+    """Return LLVM's text of a kernel as a program; for the rest see `GpuProgram`."""
     symbol = re.sub(r"\W+", "_", name.lower(), flags=re.ASCII).strip("_")
     if not symbol[:1].isalpha():
         symbol = f"{ENTRY}_{symbol}"
     module = llvm.parse_assembly(text.replace(f"@{ENTRY}(", f"@{symbol}("))
     module.verify()
-    return Program(str(_target().emit_assembly(module)), symbol, warps, teams, shared_bytes)
+    return GpuProgram(str(_target().emit_assembly(module)), symbol, warps, teams, shared_bytes)
 
 
 @cache

@@ -39,7 +39,7 @@ class Kernel:
         self._traced, shape = jax.make_jaxpr(function, return_shape=True)(*jax.tree.unflatten(treedef, shapes))
         self.outputs: Shapes = tuple(jax.ShapeDtypeStruct(x.shape, x.dtype) for x in jax.tree.leaves(shape))
         self.structure = jax.tree.structure(shape)
-        self._gpu_programs: dict[tuple[int, tuple[int, ...]], gpu_kernel.Program] = {}
+        self._gpu_programs: dict[tuple[int, tuple[int, ...]], gpu_kernel.GpuProgram] = {}
 
     @cached_property
     def supported(self) -> bool:
@@ -122,7 +122,7 @@ class Kernel:
 
         return self._call(leaves, call)
 
-    def _gpu_program(self, rows: int, shared: tuple[int, ...]) -> gpu_kernel.Program:
+    def _gpu_program(self, rows: int, shared: tuple[int, ...]) -> gpu_kernel.GpuProgram:
         """Return the kernel for NVIDIA's GPUs: for how many elements, how many of which share a row of each array."""
         if (rows, shared) not in self._gpu_programs:  # a legged robot's takes seconds
             results, given = [self.results[i] for i in self.written], dict(zip(self.read, shared, strict=True))
