@@ -141,21 +141,34 @@ def _triangular_solve(s: Scalars, equation: Any, matrix: Numbers, right: Numbers
 
 @primitive("scan")
 def _scan(s: Scalars, equation: Any, *operands: Numbers) -> Sequence[Numbers]:
-    """A loop that only carries values; scanning over the rows of arrays is not supported."""
-    inner, rounds = equation.params["jaxpr"], equation.params["length"]
-    shapes = [v.aval.shape for v in inner.jaxpr.invars]
-    fresh = len(equation.outvars)
-    if [o.shape for o in operands] != shapes or [v.aval for v in equation.outvars] != inner.out_avals:
-        raise Unsupported("a scan over rows")
-    if not rounds:
-        return operands[len(operands) - fresh :]
-    constants, start = operands[: len(operands) - fresh], operands[len(operands) - fresh :]
+    """A loop, if it only carries values; one over the rows of arrays is unrolled."""
+    p = equation.params
+    first, second = p["num_consts"], p["num_consts"] + p["num_carry"]
+    constants, start, stacks = operands[:first], operands[first:second], operands[second:]
+    if stacks or len(equation.outvars) > len(start):
+        return _unrolled(s, equation, constants, start, stacks)
+    if not p["length"]:
+        return start
     carried = [
         listed([ex.Carried(np.dtype(v.aval.dtype)) for _ in x.flat], x.shape)
         for v, x in zip(equation.outvars, start, strict=True)
     ]
-    results = s.run(inner, [*constants, *carried])
+    results = s.run(p["jaxpr"], [*constants, *carried])
     flat = [[n for array in arrays for n in array.flat] for arrays in (carried, start, results)]
-    around = ex.loop(rounds, *flat)
+    around = ex.loop(p["length"], *flat)
     outcomes = iter([ex.LoopResult(c.dtype, around, place) for place, c in enumerate(around.carried)])
     return [listed([next(outcomes) for _ in x.flat], x.shape) for x in start]
+
+
+def _unrolled(
+    s: Scalars, equation: Any, constants: Sequence[Numbers], carried: Sequence[Numbers], stacks: Sequence[Numbers]
+) -> Sequence[Numbers]:
+    """Return what a scan over the rows of `stacks` carries in the end, and the results that it stacks."""
+    p = equation.params
+    stacked = [np.empty(v.aval.shape, object) for v in equation.outvars[len(carried) :]]
+    for row in reversed(range(p["length"])) if p["reverse"] else range(p["length"]):
+        made = s.run(p["jaxpr"], [*constants, *carried, *(x[row, ...] for x in stacks)])
+        carried = made[: len(carried)]
+        for whole, part in zip(stacked, made[len(carried) :], strict=True):
+            whole[row, ...] = part
+    return [*carried, *stacked]
