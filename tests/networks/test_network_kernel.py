@@ -13,10 +13,12 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from assembler import assemble, kernels_for_gpus
+from block_machine import run
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from evoclaims.kernels import group_kernel, grouped, machine_code
+from evoclaims.kernels.gpu_kernel import GpuProgram
 from evoclaims.networks import graph, wiring
 from evoclaims.networks.genome import EMPTY, Connections, Genome, Nodes
 from evoclaims.networks.graph import GraphNetwork
@@ -151,6 +153,35 @@ def test_bits_depend_neither_on_the_batch_nor_on_the_lanes(widest: int, monkeypa
     np.testing.assert_array_equal(own, np.asarray(many)[np.arange(9), np.arange(9)])
     few = jax.jit(lambda w, r: jax.vmap(jax.vmap(NETWORK.apply, (None, 0)), (0, None))(w, r))(wirings, rows[:5])
     np.testing.assert_array_equal(few, np.asarray(many)[:, :5])
+
+
+def _on_a_gpu(kernel: Any, groups: int, rows: int, arrays: list[Any]) -> list[Any]:
+    """Return the results of a kernel's text for GPUs, on this processor; groups share their rows."""
+    shared_rows = [False] * len(kernel.rows)
+    text, shared_bytes = group_kernel.gpu_text(kernel.write, kernel.numbers, kernel.sizes, groups, rows, shared_rows)
+    results = [jax.ShapeDtypeStruct((groups * rows, *out.shape), out.dtype) for out in kernel.outputs]
+    return run(text, GpuProgram("", kernel.name, shared_bytes=shared_bytes), groups * rows, arrays, results)
+
+
+@pytest.mark.parametrize("shared_words", [group_kernel.SHARED_WORDS, 0])
+def test_a_gpus_kernels_compute_the_same_bits_in_the_blocks_memory_and_in_the_threads(
+    shared_words: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(group_kernel, "SHARED_WORDS", shared_words)
+    genomes, count = _random_genomes(8, 9), 7
+    rows = np.float32(np.random.default_rng(3).normal(size=(count, INPUTS)))
+    rows[2, 1], rows[5] = np.nan, np.inf
+    wirings = jax.jit(jax.vmap(NETWORK.express))(genomes)
+    genes = genomes.connections
+    arrays = [genes.source, genes.target, genes.weight, genomes.connection_count]
+    for made, leaf in zip(
+        _on_a_gpu(wiring._sorting(NODES, LINKS), 9, 1, arrays),
+        (wirings.source, wirings.weight, wirings.ends),
+        strict=True,
+    ):
+        np.testing.assert_array_equal(made, leaf)
+    (answers,) = _on_a_gpu(graph._kernel(NETWORK, (NODES, LINKS)), 9, count, [*jax.tree.leaves(wirings), rows])
+    np.testing.assert_array_equal(answers.reshape(9, count, OUTPUTS), _answers(genomes, rows))
 
 
 def test_trials_of_genomes_with_rows_of_their_own_or_not_are_the_genomes_alone() -> None:

@@ -33,9 +33,9 @@ def _both_ways(function: Callable[..., Any]) -> tuple[Any, Any]:
     return jax.jit(function), jax.jit(without)
 
 
-def _kept(genomes: Genome, kept: Any) -> Any:
+def _kept(genomes: Genome, kept: Any, counts: Any) -> Any:
     return jax.tree.map(
-        lambda leaf: jax.lax.bitcast_convert_type(leaf, jnp.int32), jax.vmap(packed)(genomes.connections, kept)
+        lambda leaf: jax.lax.bitcast_convert_type(leaf, jnp.int32), jax.vmap(packed)(genomes.connections, kept, counts)
     )
 
 
@@ -50,19 +50,23 @@ def test_parts_of_structural_mutation_are_the_same_to_the_bit(genomes: list[Geno
     draw, count = np.random.default_rng(seed), len(genomes)
     population = stacked(genomes)
     starts = draw.integers(0, population.node_count).astype(np.int32)
-    by_kernel, without = (np.asarray(each(population, starts)) for each in DESCENDANTS)
+    happens = draw.random(count) < 0.7
+    linked = np.where(happens, population.connection_count, 0).astype(np.int32)
+    by_kernel, without = (np.asarray(each(population, starts, linked)) for each in DESCENDANTS)
     np.testing.assert_array_equal(by_kernel, without)
     strange = population.connections.weight.view(np.uint32)
     strange[draw.random(strange.shape) < 0.2] = 0x7FC12345
     kept = draw.random((count, CONNECTIONS)) < draw.random((count, 1)) * 1.2
-    assert same(*(each(population, kept) for each in PACKED))
+    counts = np.where(happens, draw.integers(0, CONNECTIONS + 1, count), 0).astype(np.int32)
+    assert same(*(each(population, kept, counts) for each in PACKED))
 
 
 def test_nvidias_assembler_takes_the_kernels(tmp_path: Path) -> None:
     genomes = stacked([made([0, 1, 2], {(0, 2): 1.0})] * 3)
+    none = np.zeros(3, np.int32)
     texts = [
-        *kernels_for_gpus(jax.vmap(descendants), genomes, np.zeros(3, np.int32)),
-        *kernels_for_gpus(jax.vmap(packed), genomes.connections, np.zeros((3, CONNECTIONS), bool)),
+        *kernels_for_gpus(jax.vmap(descendants), genomes, none, none),
+        *kernels_for_gpus(jax.vmap(packed), genomes.connections, np.zeros((3, CONNECTIONS), bool), none),
     ]
     assert len(texts) == 2
     for text in texts:

@@ -33,11 +33,11 @@ from evoclaims.networks.genome import Genome
 pytestmark = pytest.mark.newest
 
 INPUTS, OUTPUTS, NEW = 2, 2, 2**24 + 1
-_add_node = jax.jit(add_node)
-_delete_node = jax.jit(lambda u, genome: delete_node(u, genome, INPUTS, OUTPUTS))
-_add_connection = jax.jit(lambda u, v, genome: add_connection(u, v, genome, INPUTS))
-_delete_connection = jax.jit(delete_connection)
-_descendants = jax.jit(descendants)
+_add_node = jax.jit(lambda u, genome, new_key, happens=True: add_node(happens, u, genome, new_key))
+_delete_node = jax.jit(lambda u, genome, happens=True: delete_node(happens, u, genome, INPUTS, OUTPUTS))
+_add_connection = jax.jit(lambda u, v, genome, happens=True: add_connection(happens, u, v, genome, INPUTS))
+_delete_connection = jax.jit(lambda u, genome, happens=True: delete_connection(happens, u, genome))
+_descendants = jax.jit(lambda genome, start: descendants(genome, start, genome.connection_count))
 _position_after = jax.jit(position_after)
 _packed = jax.jit(packed)
 SOME = settings(max_examples=60, deadline=None)
@@ -196,6 +196,16 @@ def test_the_connection_that_was_picked_is_deleted(genome: Genome, data: Any) ->
 
 
 @SOME
+@given(dags(), st.floats(0, 1, exclude_max=True, width=32), st.floats(0, 1, exclude_max=True, width=32))
+def test_a_mutation_that_does_not_happen_leaves_the_genome_as_it_is(genome: Genome, u: float, v: float) -> None:
+    u, v, never = np.float32(u), np.float32(v), np.bool_(False)
+    assert same(_add_node(u, genome, _new_key(), never), genome)
+    assert same(_delete_node(u, genome, never), genome)
+    assert same(_add_connection(u, v, genome, never), genome)
+    assert same(_delete_connection(u, genome, never), genome)
+
+
+@SOME
 @given(dags(), st.data())
 def test_descendants_are_found_as_by_following_every_connection(genome: Genome, data: Any) -> None:
     order = _order(genome)
@@ -220,12 +230,12 @@ def test_the_new_order_has_the_source_first_and_every_connection_forward(genome:
 
 
 @SOME
-@given(st.lists(st.booleans(), min_size=CONNECTIONS, max_size=CONNECTIONS))
-def test_packing_keeps_the_order(kept: list[bool]) -> None:
+@given(st.lists(st.booleans(), min_size=CONNECTIONS, max_size=CONNECTIONS), st.integers(0, CONNECTIONS))
+def test_packing_keeps_the_order(kept: list[bool], count: int) -> None:
     weights = {(0, 2): 1.0, (0, 3): 2.0, (1, 2): 3.0, (1, 3): 4.0}
     genes = made([0, 1, 2, 3], weights).connections
-    left = np.asarray(_packed(genes, np.array(kept)).weight)
-    wanted = [weight for weight, keep in zip(weights.values(), kept, strict=False) if keep]
+    left = np.asarray(_packed(genes, np.array(kept), np.int32(count)).weight)
+    wanted = [weight for weight, keep in zip(weights.values(), kept[:count], strict=False) if keep]
     assert left.tolist() == wanted + [0.0] * (CONNECTIONS - len(wanted))
 
 

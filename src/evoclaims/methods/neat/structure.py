@@ -1,6 +1,7 @@
 """Structural mutation (Stanley and Miikkulainen 2002, §3.1; TensorNEAT's set of four).
 
-Every function maps one genome to one genome and keeps the slots in topological order.
+Every mutation maps one genome to one genome and keeps the slots in topological order. Whether it happens is an
+argument, so that kernels can pass over the genomes to which it does not.
 """
 
 from __future__ import annotations
@@ -28,17 +29,13 @@ def mutate_structure(
     """
     # All draws in one call: they are few, and each generator call costs compile time.
     happens, which = jnp.split(jax.random.uniform(key, (9,)), [4])
-    grown = add_node(which[0], genome, new_key)
-    genome = select(happens[0] < settings.node_add, grown, genome)
-    shrunk = delete_node(which[1], genome, inputs, outputs)
-    genome = select(happens[1] < settings.node_delete, shrunk, genome)
-    linked = add_connection(which[2], which[3], genome, inputs)
-    genome = select(happens[2] < settings.connection_add, linked, genome)
-    cut = delete_connection(which[4], genome)
-    return select(happens[3] < settings.connection_delete, cut, genome)
+    genome = add_node(happens[0] < settings.node_add, which[0], genome, new_key)
+    genome = delete_node(happens[1] < settings.node_delete, which[1], genome, inputs, outputs)
+    genome = add_connection(happens[2] < settings.connection_add, which[2], which[3], genome, inputs)
+    return delete_connection(happens[3] < settings.connection_delete, which[4], genome)
 
 
-def add_node(u: Float[Array, ""], genome: Genome, new_key: Int[Array, ""]) -> Genome:
+def add_node(happens: Bool[Array, ""], u: Float[Array, ""], genome: Genome, new_key: Int[Array, ""]) -> Genome:
     """Split the connection that `u` in [0, 1) picks: in-weight 1, out-weight the old one.
 
     The new node has bias 0, response 1 and the first function. Nothing happens without a connection, or without room
@@ -72,10 +69,10 @@ def add_node(u: Float[Array, ""], genome: Genome, new_key: Int[Array, ""]) -> Ge
         node_count=genome.node_count + 1,
         connection_count=genome.connection_count + 1,
     )
-    return select((genome.connection_count > 0) & room, grown, genome)
+    return select(happens & (genome.connection_count > 0) & room, grown, genome)
 
 
-def delete_node(u: Float[Array, ""], genome: Genome, inputs: int, outputs: int) -> Genome:
+def delete_node(happens: Bool[Array, ""], u: Float[Array, ""], genome: Genome, inputs: int, outputs: int) -> Genome:
     """Delete the hidden node that `u` in [0, 1) picks, with its connections; if there is none, do nothing."""
     nodes, genes = genome.nodes, genome.connections
     slots = jnp.arange(nodes.key.shape[0])
@@ -100,16 +97,16 @@ def delete_node(u: Float[Array, ""], genome: Genome, inputs: int, outputs: int) 
             response=remove(nodes.response, 0),
             activation=remove(nodes.activation, 0),
         ),
-        connections=packed(moved, kept),
+        connections=packed(moved, kept, jnp.where(happens, genome.connection_count, 0)),
         node_count=genome.node_count - 1,
         connection_count=jnp.sum(kept, dtype=jnp.int32),
     )
-    return select(jnp.any(hidden), shrunk, genome)
+    return select(happens & jnp.any(hidden), shrunk, genome)
 
 
-def packed(genes: Connections, kept: Bool[Array, " connections"]) -> Connections:
-    """Move the kept connections to the front, in their order."""
-    return Connections(*_packing(kept.shape[0])(genes.source, genes.target, genes.weight, _one_if(kept)))
+def packed(genes: Connections, kept: Bool[Array, " connections"], count: Int[Array, ""]) -> Connections:
+    """Move those of the first `count` connections that are kept to the front, in their order."""
+    return Connections(*_packing(kept.shape[0])(genes.source, genes.target, genes.weight, _one_if(kept), count))
 
 
 @cache
@@ -117,14 +114,17 @@ def _packing(connections: int) -> GroupKernel:
     """Return the kernel of `packed`."""
 
     def function(*leaves: Array) -> list[Array]:
-        *genes, kept = leaves
+        *genes, kept, count = leaves
+        kept = jnp.where(jnp.arange(connections) < count, kept, 0)
         place = jnp.where(kept > 0, jnp.cumsum(kept, dtype=jnp.int32) - 1, connections)
         return [jnp.zeros_like(leaf).at[place].set(leaf, mode="drop") for leaf in genes]
 
     return packing_kernel(connections, function)
 
 
-def add_connection(u: Float[Array, ""], v: Float[Array, ""], genome: Genome, inputs: int) -> Genome:
+def add_connection(
+    happens: Bool[Array, ""], u: Float[Array, ""], v: Float[Array, ""], genome: Genome, inputs: int
+) -> Genome:
     """Try once to connect two nodes, with weight 0.
 
     `u` and `v` in [0, 1) pick the source from all nodes, and the target from those that are not inputs. Nothing happens
@@ -135,7 +135,7 @@ def add_connection(u: Float[Array, ""], v: Float[Array, ""], genome: Genome, inp
     exists = jnp.any((genes.source == source) & (genes.target == target) & genome.has_connection)
     room = genome.connection_count < genes.weight.shape[0]
     # A link against the order of slots is allowed only if the target does not lead to the source.
-    downstream = descendants(genome, target)
+    downstream = descendants(genome, target, jnp.where(happens, genome.connection_count, 0))
     place = position_after(downstream, target, source)
     ordered = reordered(genome, place)
     new = jnp.arange(genes.weight.shape[0]) == genome.connection_count
@@ -148,14 +148,14 @@ def add_connection(u: Float[Array, ""], v: Float[Array, ""], genome: Genome, inp
         ),
         connection_count=genome.connection_count + 1,
     )
-    return select(~exists & room & ~downstream[source], linked, genome)
+    return select(happens & ~exists & room & ~downstream[source], linked, genome)
 
 
-def descendants(genome: Genome, start: Int[Array, ""]) -> Bool[Array, " nodes"]:
-    """Return which nodes `start` leads to, itself included."""
+def descendants(genome: Genome, start: Int[Array, ""], count: Int[Array, ""]) -> Bool[Array, " nodes"]:
+    """Return which nodes `start` leads to, itself included, along the first `count` connections."""
     genes = genome.connections
     search = _search(genome.nodes.key.shape[0], genes.weight.shape[0])
-    (reached,) = search(genes.source, genes.target, genome.connection_count, start)
+    (reached,) = search(genes.source, genes.target, count, start)
     return reached > 0
 
 
@@ -205,7 +205,7 @@ def reordered(genome: Genome, place: Int[Array, " nodes"]) -> Genome:
     )
 
 
-def delete_connection(u: Float[Array, ""], genome: Genome) -> Genome:
+def delete_connection(happens: Bool[Array, ""], u: Float[Array, ""], genome: Genome) -> Genome:
     """Delete the connection that `u` in [0, 1) picks; the last one takes its place."""
     genes = genome.connections
     places = jnp.arange(genes.weight.shape[0])
@@ -217,7 +217,7 @@ def delete_connection(u: Float[Array, ""], genome: Genome) -> Genome:
         return jnp.where(last, jnp.zeros((), leaf.dtype), jnp.where(chosen, moved, leaf))
 
     cut = replace(genome, connections=jax.tree.map(move, genes), connection_count=genome.connection_count - 1)
-    return select(genome.connection_count > 0, cut, genome)
+    return select(happens & (genome.connection_count > 0), cut, genome)
 
 
 def _one_if(condition: Bool[Array, "*shape"]) -> Int[Array, "*shape"]:

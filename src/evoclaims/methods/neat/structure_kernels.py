@@ -30,13 +30,14 @@ def descendants_kernel(nodes: int, connections: int, function: Function) -> Grou
 def packing_kernel(connections: int, function: Function) -> GroupKernel:
     """Return the kernel that moves the kept connections to the front, in their order, and 0 behind them.
 
-    Its arguments are the connections' sources, targets and weights, and 1 for those that are kept, 0 for the others;
-    `function` is the same in jax.
+    Its arguments are the connections' sources, targets and weights, 1 for those that are kept, 0 for the others, and
+    how many of all these count; `function` is the same in jax.
     """
     places, numbers = (jax.ShapeDtypeStruct((connections,), dtype) for dtype in (jnp.int32, jnp.float32))
+    one = jax.ShapeDtypeStruct((), jnp.int32)
     genes = places, places, numbers
     write = partial(_write_packed, connections)
-    return GroupKernel("The breeding of genomes", function, (*genes, places), (), genes, write)
+    return GroupKernel("The breeding of genomes", function, (*genes, places, one), (), genes, write)
 
 
 def _write_descendants(
@@ -76,8 +77,8 @@ def _write_descendants(
 def _write_packed(
     connections: int, rows: Rows, groups: Sequence[str], given: Sequence[str], results: Sequence[str]
 ) -> None:
-    """Write a loop over all places; what is not kept is overwritten by the next."""
-    page, (*genes, kept) = rows.page, groups
+    """Write a loop over the places that count; what is not kept is overwritten by the next."""
+    page, (*genes, kept, number) = rows.page, groups
 
     def move(place: str, front: str) -> list[str]:
         for gene, result in zip(genes, results, strict=True):
@@ -89,5 +90,5 @@ def _write_packed(
             store(page, "0", result, place)
         return []
 
-    (count,) = repeat(page, "0", str(connections), [("i32", "0")], move)
-    repeat(page, count, str(connections), [], clear)
+    (front,) = repeat(page, "0", load(page, number), [("i32", "0")], move)
+    repeat(page, front, str(connections), [], clear)

@@ -1,4 +1,4 @@
-"""Runs a block kernel's text on this processor: a lane at a time, a thread for each warp, real barriers."""
+"""Runs the text of a GPU's kernel on this processor: a lane at a time, a thread for each warp, real barriers."""
 
 from __future__ import annotations
 
@@ -12,12 +12,15 @@ import numpy as np
 
 from evoclaims.kernels import machine_code
 from evoclaims.kernels.block_shape import BlockShape
-from evoclaims.kernels.gpu_kernel import BLOCK, ENTRY
+from evoclaims.kernels.gpu_kernel import BLOCK, ENTRY, GpuProgram
 
+NOT_A_NUMBER = 0x7FC00000
 CALLED = ctypes.CFUNCTYPE(None)
 
 
-def run(text: str, shape: BlockShape, rows: int, arrays: Sequence[Any], results: Sequence[Any]) -> list[Any]:
+def run(
+    text: str, shape: BlockShape | GpuProgram, rows: int, arrays: Sequence[Any], results: Sequence[Any]
+) -> list[Any]:
     """Return a kernel's results.
 
     Args:
@@ -34,7 +37,7 @@ def run(text: str, shape: BlockShape, rows: int, arrays: Sequence[Any], results:
     kernel = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * (len(addresses) + 1), *[ctypes.c_int32] * 4, CALLED)(code)
     for first in range(0, rows, BLOCK * shape.teams):
         for lane in range(BLOCK):
-            memory = np.full(shape.shared_bytes // 4, 0x7FC00000, np.int32)  # not a number
+            memory = np.full(shape.shared_bytes // 4, NOT_A_NUMBER, np.int32)
             barrier = threading.Barrier(shape.warps * shape.teams)
             wait = CALLED(lambda barrier=barrier: barrier.wait(60) and None)
             block = first // (BLOCK * shape.teams)
@@ -46,6 +49,8 @@ def run(text: str, shape: BlockShape, rows: int, arrays: Sequence[Any], results:
                 thread.start()
             for thread in threads:
                 thread.join()
+            of_others = np.delete(memory.reshape(-1, BLOCK), lane, axis=1)
+            assert (of_others == NOT_A_NUMBER).all(), "a lane wrote into another's words"
     return made
 
 
@@ -54,6 +59,7 @@ def _for_this_processor(text: str) -> str:
     text = re.sub(r" ?addrspace\(\d\)", "", text.replace("ptx_kernel ", ""))
     text = "\n".join(line for line in text.splitlines() if not line.startswith("declare") or "nvvm" not in line)
     text = re.sub(r"target triple.*|@numbers = .*", "", text).replace("ptr @numbers", "ptr %numbers")
+    text = text.replace("addrspacecast ", "bitcast ")
     for register, name in (("ctaid.x", "block"), ("tid.x", "lane"), ("tid.y", "warp"), ("tid.z", "team")):
         text = text.replace(f"call i32 @llvm.nvvm.read.ptx.sreg.{register}()", f"add i32 %{name}, 0")
     text = re.sub(r"call i32 @llvm.nvvm.shfl.sync.idx.i32\(i32 -1, (i32 %\w+),.*", r"add \1, 0", text)
