@@ -124,6 +124,8 @@ def test_nothing_is_judged_where_the_newest_release_is_installed(
         (("across", "--package", "pebble", "installed"), "pebble is not installed here: name a version."),
         (("across", "--package", "pebble", "1.0", "--as", "xml"), "There is no form named 'xml'."),
         (("across", "--package", "pebble", "1.0", "--tier", "tiny"), "There is no tier named 'tiny'."),
+        (("across", "--package", "pebble", "1.0", "--only", "T9"), "There is no claim named 'T9'."),
+        (("bisect", "T9", *BISECT[2:]), "There is no claim named 'T9'."),
         (("across", "--constraints", "a/pins.txt", "b/pins.txt"), "Several environments would be called pins: give"),
         (("across", "--constraints", "none.txt"), "Cannot read the constraints none.txt"),
         ((*BISECT, "--by", "luck"), "There is no kind of change named 'luck'. Known: bits, drift, verdict."),

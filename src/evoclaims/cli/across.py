@@ -13,7 +13,9 @@ from typing import Final
 
 from packaging.utils import canonicalize_name
 
+from evoclaims.claims.selection import selected
 from evoclaims.cli.elsewhere import Elsewhere
+from evoclaims.cli.project import open_project
 from evoclaims.cli.storage import open_store
 from evoclaims.cli.stored import REPORT, write
 from evoclaims.cli.terminal import styled
@@ -66,17 +68,29 @@ def main(options: argparse.Namespace) -> int:
 
 
 def opened(options: argparse.Namespace, only: str | None) -> Elsewhere:
-    """Return what judges the claims of the project around the current folder.
+    """Return what judges the claims of the project around the current folder, of which `only` names some.
 
     Raises:
-        UserError: for an unknown tier, without a project, or when the store cannot be written.
+        UserError: for an unknown tier or claim, without a project, or when the store cannot be written.
     """
     if options.tier not in TIERS:
         raise UnknownNameError("tier", options.tier, TIERS)
     config = load_config(find_root(Path.cwd()))
     store = open_store(options.storage)
     store.check_writable()
+    if only is not None and (names := _claims(options)):  # before minutes are spent on an environment
+        selected(only, names)
     return Elsewhere(config.root, config.root / config.claims, store, options.tier, only, options.device)
+
+
+def _claims(options: argparse.Namespace) -> set[str]:
+    """Return the ids and names of the project's claims; none where what is installed here cannot collect them."""
+    try:
+        project = open_project(options.storage)
+        (reports,) = project.judge_sessions([(project.as_published(options.tier), options.tier)])
+    except UserError:
+        return set()
+    return {name for report in reports for name in (report.claim, report.name)}
 
 
 def _command() -> str:
