@@ -6,11 +6,12 @@ from dataclasses import replace
 from typing import Any
 
 from evoclaims import Condition, Variant, changed
-from evoclaims.envs import CumulativeParity, NParity, RobotTask, SimpleAlu
+from evoclaims.envs import CumulativeParity, NParity, Obstacles, RobotTask, SimpleAlu
 from evoclaims.methods import CmaEs, HyperNeat, LevelTest, Neat, Ppo, SeldomDecomposedCmaEs
 from evoclaims.methods.neat import Mutation
 from evoclaims.networks import AllSkips, Mlp
 from reproductions.nisioti2025 import ecorobot, stepping_gates
+from reproductions.nisioti2025.published_course import PublishedObstacles
 
 
 def _rows_so_far(method: str, task: str, condition: Condition) -> Condition | None:
@@ -80,6 +81,23 @@ def _published_ppo(method: str, task: str, condition: Condition) -> Condition | 
     return replace(condition, method=replace(learner, unroll_length=20, discounting=0.95, updates_per_batch=8))
 
 
+def _published_course(method: str, task: str, condition: Condition) -> Condition | None:
+    """Obstacles with the published code's boxes, reward and longer examination."""
+    asked = condition.task
+    if not isinstance(asked, Obstacles):
+        return None
+    return replace(condition, task=PublishedObstacles(episode_steps=asked.episode_steps, heights=asked.heights))
+
+
+def _few_environments(method: str, task: str, condition: Condition) -> Condition | None:
+    """PPO on robots, with a thirty-second of the environments, at least 8, and a quarter of the batch."""
+    learner: Any = condition.method
+    if not isinstance(learner, Ppo) or not isinstance(condition.task, RobotTask):
+        return None
+    fewer = replace(learner, environments=max(8, learner.environments // 32), batch_size=learner.batch_size // 4)
+    return replace(condition, method=fewer)
+
+
 def _published(method: str, task: str, condition: Condition) -> Condition | None:
     """Every detail of the published code at once."""
     now = condition
@@ -91,6 +109,8 @@ def _published(method: str, task: str, condition: Condition) -> Condition | None
         _sigmoid,
         _lucky_level_up,
         _published_ppo,
+        _few_environments,
+        _published_course,
     ):
         now = change(method, task, now) or now
     return None if now is condition else now
@@ -129,6 +149,16 @@ VARIANTS = {
     "published_ppo": _variant(
         "PPO with robots unrolls 20 steps, discounts by 0.95 and updates 8 times a batch, as in the published code",
         _published_ppo,
+    ),
+    "few_environments": _variant(
+        "PPO with robots runs 128 environments and learns from batches of 512 trajectories, as in the published code "
+        "(at smoke 8 and 8)",
+        _few_environments,
+    ),
+    "published_course": _variant(
+        "Obstacles as in the published code: rough, hard boxes, no control cost, policies examined for 2,000 steps "
+        "(at smoke 200)",
+        _published_course,
     ),
     "published": _variant("Every detail of the published code at once: all the variants above", _published),
 }

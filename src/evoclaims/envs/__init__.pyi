@@ -4,6 +4,7 @@ from evoclaims.envs.base import Task as Task
 from evoclaims.envs.base import TaskState as TaskState
 from evoclaims.envs.base import fitting as fitting
 from evoclaims.envs.ecorobot.boxes import Box as Box
+from evoclaims.envs.ecorobot.boxes import Surface as Surface
 from evoclaims.envs.ecorobot.brax_env import BraxEnv as BraxEnv
 from evoclaims.envs.ecorobot.deceptive import DeceptiveMaze as DeceptiveMaze
 from evoclaims.envs.ecorobot.locomotion import Locomotion as Locomotion

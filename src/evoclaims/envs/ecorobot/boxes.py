@@ -12,6 +12,20 @@ from evoclaims.core.errors import UserError
 
 
 @dataclass(frozen=True)
+class Surface:
+    """How hard and how rough a box is, by MuJoCo's numbers for contacts; the defaults are MuJoCo's.
+
+    Attributes:
+        friction: sliding, torsional and rolling; of two surfaces that touch, the larger counts.
+        solref, solimp: stiffness and damping; of two surfaces that touch, the mean.
+    """
+
+    friction: tuple[float, float, float] = (1.0, 0.005, 0.0001)
+    solref: tuple[float, float] = (0.02, 1.0)
+    solimp: tuple[float, float, float, float, float] = (0.9, 0.95, 0.001, 0.5, 2.0)
+
+
+@dataclass(frozen=True)
 class Box:
     """A fixed box in the world: a wall, or an obstacle.
 
@@ -20,6 +34,7 @@ class Box:
         half_size: along its axis and across, m.
         angle: its axis, counterclockwise from +x, degrees.
         bottom, top: z, m.
+        surface: how it meets what touches it.
     """
 
     centre: tuple[float, float]
@@ -27,6 +42,7 @@ class Box:
     angle: float = 0.0
     bottom: float = -0.7
     top: float = 0.7
+    surface: Surface = Surface()
 
     def __post_init__(self) -> None:
         """Check that it has a volume."""

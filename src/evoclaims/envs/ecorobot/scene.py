@@ -55,7 +55,9 @@ class Scene:
 
     @cached_property
     def near(self) -> int:
-        """How many boxes are simulated."""
+        """How many boxes are simulated: those in reach, or all if their surfaces differ; only places take turns."""
+        if len({box.surface for box in self.boxes}) > 1:
+            return len(self.boxes)
         return touched_at_once(_compiled(self.robot, ()), self.boxes)
 
     @cached_property
@@ -136,9 +138,9 @@ def _compiled(robot: Robot, boxes: tuple[Box, ...]) -> mujoco.MjModel:
             quat=[math.cos(half), 0.0, 0.0, math.sin(half)],
             contype=0,
             conaffinity=1,
-            friction=[1.0, 0.005, 0.0001],
-            solref=[0.02, 1.0],
-            solimp=[0.9, 0.95, 0.001, 0.5, 2.0],
+            friction=box.surface.friction,
+            solref=box.surface.solref,
+            solimp=box.surface.solimp,
             condim=3,
             group=WORLD_GROUP,
             rgba=[0.55, 0.5, 0.45, 1.0],
