@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import threading
 import time
+import weakref
 from collections.abc import Callable
 from typing import Any
 
@@ -126,21 +127,49 @@ def test_what_the_work_raises_is_raised() -> None:
             Allowance(seconds).spend(lambda: 1 // 0)
 
 
-def test_work_that_does_not_return_is_left_behind_and_no_other_is_begun(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(allowances, "_left_behind", [])
-    ended: list[int] = []
-    monkeypatch.setattr("os._exit", ended.append)
+@pytest.fixture
+def ended(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """The statuses with which the process would have ended at once, by the work of this test alone."""
+    monkeypatch.setattr(allowances, "_working", weakref.WeakSet())
+    statuses: list[int] = []
+    monkeypatch.setattr("os._exit", statuses.append)
+    return statuses
+
+
+def test_work_that_does_not_return_is_left_behind_and_no_other_is_begun(ended: list[int]) -> None:
     allowance, release = Allowance(0.05), threading.Event()
     with pytest.raises(OutOfTimeError):
         allowance.spend(release.wait)
     with pytest.raises(OutOfTimeError):
         allowance.spend(lambda: pytest.fail("begun without time"))
-    (thread,) = allowances._left_behind
+    (thread,) = allowances._working
     allowances.end_without(7)
     release.set()
     thread.join()
     allowances.end_without(8)
     assert ended == [7]
+
+
+@pytest.mark.parametrize("step", ["start", "join"])
+def test_however_often_and_whenever_work_is_interrupted_the_process_does_not_wait_for_it(
+    step: str, ended: list[int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    release, asked = threading.Event(), getattr(threading.Thread, step)
+
+    def interrupted(thread: threading.Thread, *arguments: Any) -> None:
+        if step == "start":
+            asked(thread, *arguments)
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr(threading.Thread, step, interrupted)
+        with pytest.raises(KeyboardInterrupt):
+            Allowance(600.0).spend(release.wait)
+    allowances.end_without(130)
+    (thread,) = allowances._working
+    release.set()
+    thread.join()
+    assert ended == [130]
 
 
 def test_time_in_which_the_process_was_stopped_does_not_count(monkeypatch: pytest.MonkeyPatch) -> None:

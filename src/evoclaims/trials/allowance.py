@@ -11,6 +11,7 @@ import os
 import sys
 import threading
 import time
+import weakref
 from collections.abc import Callable
 from concurrent.futures import Future
 from typing import Any, Final, TypeVar
@@ -20,7 +21,8 @@ T = TypeVar("T")
 LOOK_SECONDS: Final = 1.0
 """Time between two looks at the clock; more than twice this is not counted: the process was stopped."""
 
-_left_behind: list[threading.Thread] = []
+_working: weakref.WeakSet[threading.Thread] = weakref.WeakSet()
+"""All threads that work; known before they start, since several interrupts may come at any time."""
 
 
 class OutOfTimeError(Exception):
@@ -52,15 +54,13 @@ class Allowance:
             raise OutOfTimeError
         made: Future[T] = Future()
         thread = threading.Thread(target=_do, args=(work, made), name="evoclaims work", daemon=True)
+        _working.add(thread)
         thread.start()
         try:
             self._wait(thread)
         except BaseException:  # on an interrupt, wait for the work, as on this thread; a second one ends the wait
             self._wait(thread)
             raise
-        finally:
-            if thread.is_alive():
-                _left_behind.append(thread)
         if not made.done():
             raise OutOfTimeError
         return made.result()
@@ -78,7 +78,7 @@ def end_without(status: int) -> None:
 
     The interpreter's normal exit would wait for such a thread, or crash it (a segmentation fault).
     """
-    if any(thread.is_alive() for thread in _left_behind):
+    if any(thread.is_alive() for thread in _working):
         sys.stdout.flush()
         sys.stderr.flush()
         os._exit(status)
