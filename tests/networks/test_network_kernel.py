@@ -158,16 +158,12 @@ def test_bits_depend_neither_on_the_batch_nor_on_the_lanes(widest: int, monkeypa
 def _on_a_gpu(kernel: Any, groups: int, rows: int, arrays: list[Any]) -> list[Any]:
     """Return the results of a kernel's text for GPUs, on this processor; groups share their rows."""
     shared_rows = [False] * len(kernel.rows)
-    text, shared_bytes = group_kernel.gpu_text(kernel.write, kernel.numbers, kernel.sizes, groups, rows, shared_rows)
+    text = group_kernel.gpu_text(kernel.write, kernel.numbers, kernel.sizes, groups, rows, shared_rows)
     results = [jax.ShapeDtypeStruct((groups * rows, *out.shape), out.dtype) for out in kernel.outputs]
-    return run(text, GpuProgram("", kernel.name, shared_bytes=shared_bytes), groups * rows, arrays, results)
+    return run(text, GpuProgram("", kernel.name), groups * rows, arrays, results)
 
 
-@pytest.mark.parametrize("shared_words", [group_kernel.SHARED_WORDS, 0])
-def test_a_gpus_kernels_compute_the_same_bits_in_the_blocks_memory_and_in_the_threads(
-    shared_words: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(group_kernel, "SHARED_WORDS", shared_words)
+def test_a_gpus_kernels_compute_the_same_bits() -> None:
     genomes, count = _random_genomes(8, 9), 7
     rows = np.float32(np.random.default_rng(3).normal(size=(count, INPUTS)))
     rows[2, 1], rows[5] = np.nan, np.inf

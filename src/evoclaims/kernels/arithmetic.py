@@ -143,9 +143,13 @@ def _triangular_solve(s: Scalars, equation: Any, matrix: Numbers, right: Numbers
 def _scan(s: Scalars, equation: Any, *operands: Numbers) -> Sequence[Numbers]:
     """A loop, if it only carries values; one over the rows of arrays is unrolled."""
     p = equation.params
-    first, second = p["num_consts"], p["num_consts"] + p["num_carry"]
+    inner = p["jaxpr"].jaxpr
+    rows = sum(o.shape != v.aval.shape for o, v in zip(operands, inner.invars, strict=True))
+    stacked = sum(o.aval.shape != v.aval.shape for o, v in zip(equation.outvars, inner.outvars, strict=True))
+    second = len(operands) - rows
+    first = second - (len(equation.outvars) - stacked)
     constants, start, stacks = operands[:first], operands[first:second], operands[second:]
-    if stacks or len(equation.outvars) > len(start):
+    if rows or stacked:
         return _unrolled(s, equation, constants, start, stacks)
     if not p["length"]:
         return start

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from evoclaims.kernels import gpu_kernel
-from evoclaims.kernels.block_kernel import SHARED
 from evoclaims.kernels.host_kernel import WIDE
 from evoclaims.kernels.llvm_ir import Instructions
 from evoclaims.kernels.xla_handler import handler
@@ -22,8 +21,6 @@ LANES: Final = 4
 """Vectors of rows computed together, so that operations that wait for each other are not all there is to do."""
 ALL: Final = 2**30
 """Rows that are given at a time to a kernel that goes through a group's rows itself."""
-SHARED_WORDS: Final = 384
-"""Words that a GPU's thread has in its block's memory: all 32 threads', 48 KiB, fit without asking for more."""
 
 
 @dataclass(frozen=True)
@@ -73,17 +70,6 @@ class Rows:
         operands = [(page.vector("float"), value), (page.vector("ptr"), where), ("i32", str(BYTES)), inside]
         page.call(page.mangled("masked.scatter", "f32", "p0"), "void", operands)
 
-    def room(self, type_: str, count: int, alignment: int) -> Callable[[str], str]:
-        """Return what gives the address of a place in fresh memory; to be asked for before any loop.
-
-        Args:
-            type_: of a place, for all lanes.
-            count: of places.
-            alignment: bytes.
-        """
-        array = self.page.allocate(type_, count, alignment)
-        return lambda place: self.page.put(f"getelementptr {type_}, ptr {array}, i32 {place}")
-
     def _addresses(self, address: str, size: int, at: int) -> str:
         """Return a register with the address of number `at` of each row."""
         page = self.page
@@ -93,39 +79,6 @@ class Rows:
         integers = page.vector("i32")
         offsets = page.put(f"mul {integers} {self._lane}, {page.splat('i32', str(size))}")
         return page.put(f"getelementptr float, ptr {base}, {integers} {offsets}")
-
-
-class ThreadsRow(Rows):
-    """The row of a GPU's thread.
-
-    Its arrays lie in the block's memory, word by word beside those of the other threads, which may each be at another
-    place without waiting for one another; in memory of their own such accesses take turns. What does not fit is there.
-
-    Attributes:
-        words: of the block's memory, for each thread.
-    """
-
-    def __init__(self, page: Instructions) -> None:
-        """Start without memory."""
-        super().__init__(page, "1")
-        self.words = 0
-        lane = page.call("llvm.nvvm.read.ptx.sreg.tid.x", "i32", [])
-        self._mine = page.put(f"getelementptr i32, ptr addrspace(3) @numbers, i32 {lane}")
-
-    def room(self, type_: str, count: int, alignment: int) -> Callable[[str], str]:
-        """Return what gives the address of a place in fresh memory; a place is a word."""
-        if self.words + count > SHARED_WORDS:
-            return super().room(type_, count, alignment)
-        page, first = self.page, self.words * gpu_kernel.BLOCK
-        self.words += count
-        array = page.put(f"getelementptr i32, ptr addrspace(3) {self._mine}, i32 {first}")
-
-        def address(place: str) -> str:
-            word = page.put(f"mul i32 {place}, {gpu_kernel.BLOCK}")
-            at = page.put(f"getelementptr i32, ptr addrspace(3) {array}, i32 {word}")
-            return page.put(f"addrspacecast ptr addrspace(3) {at} to ptr")
-
-        return address
 
 
 Writer = Callable[[Rows, Sequence[str], Sequence[str], Sequence[str]], None]
@@ -163,12 +116,10 @@ def host_text(write: Writer, numbers: Sequence[Any], sizes: Sizes, lanes: int, t
     return "\n".join(page.declared) + "\n" + block + _loops(sizes, together) + called
 
 
-def gpu_text(
-    write: Writer, numbers: Sequence[Any], sizes: Sizes, groups: int, rows: int, own: Sequence[bool]
-) -> tuple[str, int]:
-    """Return the text of a kernel for NVIDIA's GPUs, a thread per row of a group, and the bytes of a block's memory.
+def gpu_text(write: Writer, numbers: Sequence[Any], sizes: Sizes, groups: int, rows: int, own: Sequence[bool]) -> str:
+    """Return the text of a kernel for NVIDIA's GPUs, a thread per row of a group; see `host_text`.
 
-    Its parameters are the addresses of the arrays of groups, those of rows, and the results; see `host_text`.
+    Its parameters are the addresses of the arrays of groups, those of rows, and the results.
     """
     page = Instructions(1, numbers)
     of_groups, of_rows, of_results = _named(sizes)
@@ -180,10 +131,8 @@ def gpu_text(
         _moved(page, name, size, thread if is_own else row)
     for name, size in zip(of_results, sizes.results, strict=True):
         _moved(page, name, size, thread)
-    own_row = ThreadsRow(page)
-    write(own_row, of_groups, of_rows, of_results)
-    text = gpu_kernel.finished(page, [f"{name}.all" for name in (*of_groups, *of_rows, *of_results)])
-    return text + SHARED, own_row.words * gpu_kernel.BLOCK * BYTES
+    write(Rows(page, "1"), of_groups, of_rows, of_results)
+    return gpu_kernel.finished(page, [f"{name}.all" for name in (*of_groups, *of_rows, *of_results)])
 
 
 def _named(sizes: Sizes) -> tuple[list[str], list[str], list[str]]:

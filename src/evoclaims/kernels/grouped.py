@@ -109,9 +109,8 @@ class GroupKernel:
             return self.as_it_is(*leaves)
 
         def call(groups: int, rows: int, own: list[bool], operands: list[Array], shapes: Shapes) -> Any:
-            text, shared_bytes = group_kernel.gpu_text(self.write, self.numbers, self.sizes, groups, rows, own)
-            program = gpu_kernel.program(text, self.name, shared_bytes=shared_bytes)
-            return calls.on_gpu(program, operands, shapes, groups * rows)
+            text = group_kernel.gpu_text(self.write, self.numbers, self.sizes, groups, rows, own)
+            return calls.on_gpu(gpu_kernel.program(text, self.name), operands, shapes, groups * rows)
 
         return self._call(leaves, call)
 

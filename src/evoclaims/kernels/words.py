@@ -15,7 +15,7 @@ def load(page: Instructions, array: str, place: str = "0") -> str:
     return page.put(f"load i32, ptr {at(page, array, place)}, align 4")
 
 
-def store(page: Instructions, value: str, array: str, place: str = "0") -> None:
+def store(page: Instructions, value: str, array: str, place: str) -> None:
     """Change a number of an array."""
     page.write(f"store i32 {value}, ptr {at(page, array, place)}, align 4")
 

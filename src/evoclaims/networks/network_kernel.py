@@ -1,7 +1,7 @@
 """The forward pass of a genome's network as a kernel: a walk through the connections that the genome has.
 
 On processors the lanes are observations of one genome; on a GPU a thread is one observation. The values of nodes lie in
-the processor's cache, or in the memory of the thread's block; NaN there means that the node emits nothing.
+the processor's cache, or in the thread's memory; NaN there means that the node emits nothing.
 """
 
 from __future__ import annotations
@@ -95,7 +95,7 @@ class _Walk:
         self.source, self.weight, self.ends, self.bias, self.response, self.activation, self.slots, self.count = groups
         self.floats, self.bits = self.page.vector("float"), self.page.vector("i1")
         self.alignment = min(4 * self.page.lanes, ALIGNMENT)
-        self.value_at = rows.room(self.floats, nodes, self.alignment)
+        self.values = self.page.allocate(self.floats, nodes, self.alignment)
         self.nothing, self.zero = self.page.splat("float", NOTHING), self.page.splat("float", ZERO)
 
     def write(self, inputs: int, outputs: int, observation: str, result: str) -> None:
@@ -172,8 +172,10 @@ class _Walk:
 
     def _kept(self, slot: str) -> str:
         """Return a node's value."""
-        return self.page.put(f"load {self.floats}, ptr {self.value_at(slot)}, align {self.alignment}")
+        where = self.page.put(f"getelementptr {self.floats}, ptr {self.values}, i32 {slot}")
+        return self.page.put(f"load {self.floats}, ptr {where}, align {self.alignment}")
 
     def _keep(self, slot: str, value: str) -> None:
         """Keep a node's value."""
-        self.page.write(f"store {self.floats} {value}, ptr {self.value_at(slot)}, align {self.alignment}")
+        where = self.page.put(f"getelementptr {self.floats}, ptr {self.values}, i32 {slot}")
+        self.page.write(f"store {self.floats} {value}, ptr {where}, align {self.alignment}")

@@ -92,29 +92,28 @@ def _write(lanes: Rows, nodes: int, connections: int, groups: Sequence[str], res
     page = lanes.page
     source, target, weight, count_at = groups
     sorted_source, sorted_weight, ends = results
-    place_at = lanes.room("i32", nodes, 4)
+    places = page.allocate("i32", nodes, 4)
     count = page.put(f"load i32, ptr {count_at}, align 4")
 
     def clear(slot: str) -> list[str]:
-        store(page, "0", place_at(slot))
+        store(page, "0", places, slot)
         return []
 
     def tally(connection: str) -> list[str]:
-        tallied = place_at(load(page, target, connection))
-        store(page, page.put(f"add i32 {load(page, tallied)}, 1"), tallied)
+        slot = load(page, target, connection)
+        store(page, page.put(f"add i32 {load(page, places, slot)}, 1"), places, slot)
         return []
 
     def add_up(slot: str, before: str) -> list[str]:
-        first = place_at(slot)
-        after = page.put(f"add i32 {before}, {load(page, first)}")
-        store(page, before, first)
+        after = page.put(f"add i32 {before}, {load(page, places, slot)}")
+        store(page, before, places, slot)
         store(page, after, ends, slot)
         return [after]
 
     def move(connection: str) -> list[str]:
-        following = place_at(load(page, target, connection))
-        place = load(page, following)
-        store(page, page.put(f"add i32 {place}, 1"), following)
+        slot = load(page, target, connection)
+        place = load(page, places, slot)
+        store(page, page.put(f"add i32 {place}, 1"), places, slot)
         store(page, load(page, source, connection), sorted_source, place)
         store(page, load(page, weight, connection), sorted_weight, place)  # as bits
         return []
