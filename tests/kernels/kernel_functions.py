@@ -46,14 +46,6 @@ def _nested(x: Any) -> Any:
     return jax.lax.scan(outer, x, None, length=2)[0]
 
 
-def _over_rows_backwards(x: Any, y: Any) -> Any:
-    def following(carry: Any, rows: tuple[Any, Any]) -> Any:
-        of_x, of_y = rows
-        return carry * of_x + y, (of_y[::-1] * carry, jnp.int32(3))
-
-    return jax.lax.scan(following, x, (x, jnp.outer(x, y)), reverse=True)
-
-
 def _solve(x: Any, y: Any) -> Any:
     matrix = SYMMETRIC + jnp.outer(x, x)
     return jax.scipy.linalg.cho_solve(jax.scipy.linalg.cho_factor(matrix), y), jnp.linalg.cholesky(matrix)
@@ -168,8 +160,6 @@ FUNCTIONS: dict[str, tuple[Callable[..., Any], tuple[Any, ...]]] = {
     "a loop": (_carries, (X, Y)),
     "a loop with numbers from outside": (_with_numbers_from_outside, (X, Y)),
     "loops in a loop": (_nested, (X,)),
-    "a loop over rows": (lambda x: jax.lax.scan(lambda c, r: (c * 0.5 + r, c * r), 0.0, x), (X,)),
-    "a loop over rows, backwards": (_over_rows_backwards, (X, Y)),
     "no rounds": (lambda x: jax.lax.fori_loop(0, 0, lambda _, c: c + 1, x), (X,)),
     "calls": (lambda x: jax.jit(jnp.linalg.norm)(x) + jax.nn.relu(x), (X,)),
     "what is known": (lambda x: (jnp.arange(3), jnp.zeros((2, 2)), jnp.array([True, False]), jnp.zeros(0), x), (X,)),
@@ -178,6 +168,7 @@ FUNCTIONS: dict[str, tuple[Callable[..., Any], tuple[Any, ...]]] = {
 NO_KERNELS: dict[str, Callable[..., Any]] = {
     "writing at a computed place": lambda x: x.at[jnp.int32(x[0]) % 4].set(0.0),
     "a function applied at places": lambda x: x.at[1].apply(jnp.sin),
+    "a loop over rows": lambda x: jax.lax.scan(lambda c, r: (c + r, c), 0.0, x),
     "halves": lambda x: x.astype(jnp.float16),
     "known bytes": lambda x: (x, jnp.zeros(3, jnp.int8)),
     "a remainder of floats": lambda x: jax.lax.rem(x, jnp.full_like(x, 0.3)),

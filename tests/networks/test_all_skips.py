@@ -14,8 +14,6 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from evoclaims.core.errors import UserError
-from evoclaims.kernels.one_kernel import one_kernel
-from evoclaims.networks import all_skips
 from evoclaims.networks.all_skips import AllSkips
 
 pytestmark = pytest.mark.newest
@@ -120,22 +118,3 @@ def test_a_batch_matches_the_loop_plain_and_jitted() -> None:
 def test_a_negative_number_of_neurons_is_one_sentence() -> None:
     with pytest.raises(UserError, match="0 or more hidden neurons, not -1"):
         AllSkips(-1)
-
-
-@sizes
-def test_its_kernel_for_gpus_computes_the_same(
-    inputs: int, hidden: int, outputs: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(all_skips, "one_kernel", lambda function, name, for_processors: one_kernel(function, name))
-    drawn = [_drawn(inputs, hidden, outputs, seed) for seed in range(3)]
-    parameters, observations = (jnp.float32(np.stack(each)) for each in zip(*drawn, strict=True))
-    kernel = all_skips._as_kernel.__wrapped__(hidden, outputs)
-    rows = jax.vmap(jax.vmap(kernel, (None, 0)), (0, None))  # every individual meets every observation
-    expected = [[_loops(p, o, hidden, outputs) for _, o in drawn] for p, _ in drawn]
-    np.testing.assert_allclose(jax.jit(rows)(parameters, observations), expected, atol=1e-5)
-    assert "kernel" in str(jax.make_jaxpr(rows)(parameters, observations))
-
-
-def test_on_a_processor_it_is_no_kernel() -> None:
-    parameters, observation = (jnp.float32(each) for each in _drawn(3, 7, 2))
-    assert "kernel" not in str(jax.make_jaxpr(lambda *x: AllSkips(7).apply(*x, 2))(parameters, observation))

@@ -141,38 +141,21 @@ def _triangular_solve(s: Scalars, equation: Any, matrix: Numbers, right: Numbers
 
 @primitive("scan")
 def _scan(s: Scalars, equation: Any, *operands: Numbers) -> Sequence[Numbers]:
-    """A loop, if it only carries values; one over the rows of arrays is unrolled."""
-    p = equation.params
-    inner = p["jaxpr"].jaxpr
-    rows = sum(o.shape != v.aval.shape for o, v in zip(operands, inner.invars, strict=True))
-    stacked = sum(o.aval.shape != v.aval.shape for o, v in zip(equation.outvars, inner.outvars, strict=True))
-    second = len(operands) - rows
-    first = second - (len(equation.outvars) - stacked)
-    constants, start, stacks = operands[:first], operands[first:second], operands[second:]
-    if rows or stacked:
-        return _unrolled(s, equation, constants, start, stacks)
-    if not p["length"]:
-        return start
+    """A loop that only carries values; scanning over the rows of arrays is not supported."""
+    inner, rounds = equation.params["jaxpr"], equation.params["length"]
+    shapes = [v.aval.shape for v in inner.jaxpr.invars]
+    fresh = len(equation.outvars)
+    if [o.shape for o in operands] != shapes or [v.aval for v in equation.outvars] != inner.out_avals:
+        raise Unsupported("a scan over rows")
+    if not rounds:
+        return operands[len(operands) - fresh :]
+    constants, start = operands[: len(operands) - fresh], operands[len(operands) - fresh :]
     carried = [
         listed([ex.Carried(np.dtype(v.aval.dtype)) for _ in x.flat], x.shape)
         for v, x in zip(equation.outvars, start, strict=True)
     ]
-    results = s.run(p["jaxpr"], [*constants, *carried])
+    results = s.run(inner, [*constants, *carried])
     flat = [[n for array in arrays for n in array.flat] for arrays in (carried, start, results)]
-    around = ex.loop(p["length"], *flat)
+    around = ex.loop(rounds, *flat)
     outcomes = iter([ex.LoopResult(c.dtype, around, place) for place, c in enumerate(around.carried)])
     return [listed([next(outcomes) for _ in x.flat], x.shape) for x in start]
-
-
-def _unrolled(
-    s: Scalars, equation: Any, constants: Sequence[Numbers], carried: Sequence[Numbers], stacks: Sequence[Numbers]
-) -> Sequence[Numbers]:
-    """Return what a scan over the rows of `stacks` carries in the end, and the results that it stacks."""
-    p = equation.params
-    stacked = [np.empty(v.aval.shape, object) for v in equation.outvars[len(carried) :]]
-    for row in reversed(range(p["length"])) if p["reverse"] else range(p["length"]):
-        made = s.run(p["jaxpr"], [*constants, *carried, *(x[row, ...] for x in stacks)])
-        carried = made[: len(carried)]
-        for whole, part in zip(stacked, made[len(carried) :], strict=True):
-            whole[row, ...] = part
-    return [*carried, *stacked]

@@ -28,18 +28,14 @@ class Kernel:
     Attributes:
         name: what it computes, for the warning and for profilers.
         shapes: its arguments' leaves, without batch dimensions.
-        for_processors: whether it is a kernel on processors, rather than the function itself.
         outputs: its results' leaves.
         structure: its results' tree.
     """
 
-    def __init__(
-        self, function: Callable[..., Any], name: str, treedef: Any, shapes: Shapes, for_processors: bool = True
-    ) -> None:
+    def __init__(self, function: Callable[..., Any], name: str, treedef: Any, shapes: Shapes) -> None:
         """Trace the function once."""
         self.name = name
         self.shapes = shapes
-        self.for_processors = for_processors
         self._traced, shape = jax.make_jaxpr(function, return_shape=True)(*jax.tree.unflatten(treedef, shapes))
         self.outputs: Shapes = tuple(jax.ShapeDtypeStruct(x.shape, x.dtype) for x in jax.tree.leaves(shape))
         self.structure = jax.tree.structure(shape)
@@ -109,9 +105,7 @@ class Kernel:
         return list(map(moved, leaves, axes, self.shapes))
 
     def on_host(self, *leaves: Array) -> list[Array]:
-        """Call the kernel for this machine's processor, or the function itself, for every element of a batch."""
-        if not self.for_processors:
-            return self.as_it_is(*leaves)
+        """Call the kernel for this machine's processor, for every element of a batch."""
 
         def call(rows: int, shared: list[int], shapes: Shapes) -> Any:
             layout = [rows, *(shared[i] for i in self.read)]

@@ -16,7 +16,7 @@ from evoclaims.kernels import calls
 from evoclaims.kernels.kernel import Kernel, Shapes
 
 
-def one_kernel(function: Callable[..., Any], name: str, for_processors: bool = True) -> Callable[..., Any]:
+def one_kernel(function: Callable[..., Any], name: str) -> Callable[..., Any]:
     """Return `function`, run as one kernel on processors and NVIDIA's GPUs.
 
     It may be batched, any number of times; derivatives are those of the function itself. If it cannot be one kernel
@@ -25,16 +25,13 @@ def one_kernel(function: Callable[..., Any], name: str, for_processors: bool = T
     Args:
         function: takes trees of small arrays (float32, int32, bool); pure.
         name: what it computes, for the warning and for profilers.
-        for_processors: whether it is a kernel there too; if not, it runs unchanged there, to the bit.
     """
 
     @cache
     def kernel(treedef: Any, shapes: Shapes) -> Kernel:
-        return Kernel(function, name, treedef, shapes, for_processors)
+        return Kernel(function, name, treedef, shapes)
 
     def run(*arguments: Any) -> Any:
-        if not for_processors and jax.default_backend() == "cpu":
-            return function(*arguments)
         leaves, treedef = jax.tree.flatten(arguments)
         leaves = [jnp.asarray(leaf) for leaf in leaves]
         made = kernel(treedef, tuple(jax.ShapeDtypeStruct(leaf.shape, leaf.dtype) for leaf in leaves))

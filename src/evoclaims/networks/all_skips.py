@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from functools import cache, partial
-from typing import Any
 
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from evoclaims.core.errors import UserError
-from evoclaims.kernels.one_kernel import one_kernel
 
 
 @dataclass(frozen=True)
@@ -39,35 +36,21 @@ class AllSkips:
         self, parameters: Float[Array, " parameters"], observation: Float[Array, " inputs"], outputs: int
     ) -> Float[Array, " outputs"]:
         """Map one observation to outputs in (-1, 1)."""
-        out: Float[Array, " outputs"] = _as_kernel(self.hidden, outputs)(parameters, observation)
-        return out
+        inputs = observation.shape[-1]
+        neurons = self.hidden + outputs
+        first, second = neurons * (inputs + 1), neurons * (inputs + 1) + outputs * self.hidden
+        feed = parameters[:first].reshape(neurons, inputs + 1)
+        readout = parameters[first:second].reshape(outputs, self.hidden)
+        rows, columns = jnp.tril_indices(self.hidden, -1)
+        between = jnp.zeros((self.hidden, self.hidden)).at[rows, columns].set(parameters[second:])
 
+        # Inputs feed every neuron at once; then each hidden neuron in turn adds its share to all later ones.
+        potential = feed[:, :-1] @ observation + feed[:, -1]
+        recurrence = jnp.concatenate([between, readout])
 
-@cache
-def _as_kernel(hidden: int, outputs: int) -> Any:
-    """Return the forward pass; on GPUs, where XLA would launch two kernels a neuron, one kernel."""
-    return one_kernel(partial(_forward_pass, hidden, outputs), "The forward pass of all skips", for_processors=False)
+        def fire(potential: Array, neuron: tuple[Array, Array]) -> tuple[Array, None]:
+            index, outgoing = neuron
+            return potential + outgoing * jnp.tanh(potential[index]), None
 
-
-def _forward_pass(
-    hidden: int, outputs: int, parameters: Float[Array, " parameters"], observation: Float[Array, " inputs"]
-) -> Float[Array, " outputs"]:
-    """Return the outputs; for the order of the parameters see `AllSkips`."""
-    inputs = observation.shape[-1]
-    neurons = hidden + outputs
-    first, second = neurons * (inputs + 1), neurons * (inputs + 1) + outputs * hidden
-    feed = parameters[:first].reshape(neurons, inputs + 1)
-    readout = parameters[first:second].reshape(outputs, hidden)
-    rows, columns = jnp.tril_indices(hidden, -1)
-    between = jnp.zeros((hidden, hidden)).at[rows, columns].set(parameters[second:])
-
-    # Inputs feed every neuron at once; then each hidden neuron in turn adds its share to all later ones.
-    potential = feed[:, :-1] @ observation + feed[:, -1]
-    recurrence = jnp.concatenate([between, readout])
-
-    def fire(potential: Array, neuron: tuple[Array, Array]) -> tuple[Array, None]:
-        index, outgoing = neuron
-        return potential + outgoing * jnp.tanh(potential[index]), None
-
-    potential, _ = jax.lax.scan(fire, potential, (jnp.arange(hidden), recurrence.T))
-    return jnp.tanh(potential[hidden:])
+        potential, _ = jax.lax.scan(fire, potential, (jnp.arange(self.hidden), recurrence.T))
+        return jnp.tanh(potential[self.hidden :])
