@@ -249,6 +249,9 @@ def test_plan_shows_whole_numbers_on_a_narrow_terminal(evoclaims: Evoclaims, mon
     _, out, _ = evoclaims("plan")
     assert re.search(r"^right on parity +0 +10 +40 +unknown$", out, re.MULTILINE), out
     assert re.search(r"^a +10 +0.05 +0.028 +\S+ +supported or refuted$", out, re.MULTILINE), out
+    monkeypatch.setenv("COLUMNS", "0")  # a terminal that knows no size
+    _, out, _ = evoclaims("plan")
+    assert re.search(r"^right on parity +0 +10 +40 +unknown$", out, re.MULTILINE), out
 
 
 def test_plan_tells_times_as_of_a_device_that_trials_were_made_on(evoclaims: Evoclaims) -> None:

@@ -69,3 +69,31 @@ def test_a_command_that_computes_nothing_waits_for_no_large_library(
 ) -> None:
     done = _evoclaims(project.path, *arguments, code=WITHOUT_JAX)
     assert done.stdout.splitlines()[-1] == ends, done.stderr
+
+
+@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="Linux has a device that is a full disk")
+@pytest.mark.parametrize(
+    ("shell", "arguments", "ends", "out", "err"),
+    [
+        ("> /dev/full", "new made", 2, "", "evoclaims: Cannot write what is printed: No space left on device.\n"),
+        ("2> /dev/full", "status", 2, "", ""),
+        (">&-", "new made", 0, "", ""),
+        ("2>&-", "status", 2, "", ""),
+        ("", "status", 2, "", "evoclaims: The current folder cannot be used (No such file or directory): if it was"),
+    ],
+)
+def test_a_full_disk_a_closed_stream_or_a_folder_that_is_gone_gives_no_traceback(
+    tmp_path: Path, shell: str, arguments: str, ends: int, out: str, err: str
+) -> None:
+    there = "" if shell else 'rmdir "$PWD"; '
+    script = f'cd "$0"; {there}exec "$1" -c "$2" {arguments} {shell}'
+    done = subprocess.run(
+        ["sh", "-c", script, str(tmp_path), sys.executable, COMMAND],
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert (done.returncode, done.stdout) == (ends, out), done.stderr
+    assert done.stderr.startswith(err)
+    assert done.stderr.count("\n") == (err != "")

@@ -19,7 +19,7 @@ from evoclaims.cli.project import open_project
 from evoclaims.cli.storage import open_store
 from evoclaims.cli.stored import REPORT, write
 from evoclaims.cli.terminal import styled
-from evoclaims.core.environments import Recipe, checked, installed_here
+from evoclaims.core.environments import Recipe, checked, checked_name, installed_here
 from evoclaims.core.errors import UnknownNameError, UserError
 from evoclaims.core.releases import released
 from evoclaims.paper.config import find_root, load_config
@@ -104,12 +104,15 @@ def _recipes(options: argparse.Namespace) -> list[Recipe]:
     Raises:
         UserError: when none is named, or one cannot be.
     """
-    package, *named = options.package or [""]
-    package = canonicalize_name(package)
+    package, named = "", list(options.package or ())
+    if named:
+        package = checked_name(named.pop(0))
     if package and not named:
         raise UserError(f"--package {package} names no version: write such as --package {package} installed newest.")
     if not (named or options.constraints or options.python):
         raise UserError("Name what is to differ: --package NAME VERSION ..., --constraints FILE ... or --python 3.13.")
+    if "" in (options.python or ()):
+        raise UserError("'' is no version of Python: write such as 3.13.")
     versions = [_version(package, word) for word in named] or [""]
     pins: list[Path | None] = [Path(name) for name in options.constraints or ()] or [None]
     found = itertools.product(versions, options.python or [""], pins)

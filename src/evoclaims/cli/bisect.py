@@ -6,10 +6,8 @@ import argparse
 from collections.abc import Callable, Mapping
 from typing import Final
 
-from packaging.utils import canonicalize_name
-
 from evoclaims.cli.across import opened
-from evoclaims.core.environments import Recipe, checked
+from evoclaims.core.environments import Recipe, checked, checked_name
 from evoclaims.core.errors import UnknownNameError, UserError
 from evoclaims.core.releases import between, released
 from evoclaims.judging.verdict import Outcome
@@ -31,7 +29,7 @@ def main(options: argparse.Namespace) -> int:
     """Find the release and print it; 1 when nothing changed between the two that are named."""
     if options.by not in (None, *KINDS):
         raise UnknownNameError("kind of change", options.by, KINDS)
-    package, good, bad = canonicalize_name(options.package), checked(options.good), checked(options.bad)
+    package, good, bad = checked_name(options.package), checked(options.good), checked(options.bad)
     releases = between(good, bad, [checked(one) for one in options.releases or released(package)])
     elsewhere, tried = opened(options, options.claim), dict[int, Judged]()
 

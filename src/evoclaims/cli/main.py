@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import importlib
 import os
 import signal
@@ -10,7 +11,7 @@ import sys
 from collections.abc import Sequence
 from importlib import metadata
 
-from evoclaims.cli.terminal import plain_output
+from evoclaims.cli.terminal import OutputError, plain_output
 from evoclaims.core.errors import UserError
 from evoclaims.trials.allowance import end_without
 from evoclaims.trials.stopping import interrupted_by
@@ -38,10 +39,23 @@ def main(arguments: Sequence[str] | None = None) -> int:
         with plain_output():
             status = _ended(arguments)
     except BrokenPipeError:  # `evoclaims status | head`: the reader has seen enough
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        _print_no_more()
         status = CLOSED_PIPE
+    except OutputError as error:  # `evoclaims status > table.txt` on a full disk
+        with contextlib.suppress(OSError):
+            print(f"evoclaims: {error}", file=sys.stderr)
+        _print_no_more()
+        status = USER_ERROR
     end_without(status)
     return status
+
+
+def _print_no_more() -> None:
+    """Let what is not printed yet go nowhere: the interpreter would try again as it ends, and fail."""
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    for stream in filter(None, (sys.stdout, sys.stderr)):
+        with contextlib.suppress(OSError):  # a stream of a caller that has no file
+            os.dup2(nowhere, stream.fileno())
 
 
 def _ended(arguments: Sequence[str] | None) -> int:
@@ -50,6 +64,7 @@ def _ended(arguments: Sequence[str] | None) -> int:
     if unknown:
         options.refuse(f"unrecognized arguments: {' '.join(unknown)}")
     try:
+        _check_folder()
         from evoclaims.cli.storage import storage_of
 
         options.storage = storage_of(options.storage, options.command)
@@ -64,6 +79,17 @@ def _ended(arguments: Sequence[str] | None) -> int:
         print("\nevoclaims: interrupted; the same command goes on from the last checkpoint.", file=sys.stderr)
         return INTERRUPTED
     return status
+
+
+def _check_folder() -> None:
+    """Raise a `UserError` when the current folder is gone, with which every command begins."""
+    try:
+        os.getcwd()
+    except OSError as error:
+        raise UserError(
+            f"The current folder cannot be used ({error.strerror or error}): if it was deleted and made anew, go into "
+            "it again (cd .)."
+        ) from error
 
 
 def _parser() -> argparse.ArgumentParser:

@@ -2,13 +2,29 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, redirect_stderr, redirect_stdout
+from contextlib import ExitStack, contextmanager, redirect_stderr, redirect_stdout
 from typing import Any
 
 from evoclaims.core.printable import shown, spelled
+
+
+class OutputError(Exception):
+    """What is printed cannot be written, such as to a file on a full disk; the message is a sentence for the user."""
+
+
+@contextmanager
+def _written() -> Iterator[None]:
+    """Raise an `OutputError` for an error in a `with` block; a reader that has gone is none."""
+    try:
+        yield
+    except BrokenPipeError:
+        raise
+    except OSError as error:
+        raise OutputError(f"Cannot write what is printed: {error.strerror or error}.") from error
 
 
 class Styled:
@@ -19,9 +35,15 @@ class Styled:
         self.stream = stream
 
     def write(self, text: str) -> int:
-        """Write text as it is."""
-        self.stream.write(spelled(text, self.stream.encoding))
+        """Write text as it is; an `OutputError` says why that fails."""
+        with _written():
+            self.stream.write(spelled(text, self.stream.encoding))
         return len(text)
+
+    def flush(self) -> None:
+        """Write what is still in memory; raises as `write` does."""
+        with _written():
+            self.stream.flush()
 
     def __getattr__(self, name: str) -> Any:
         """Return what else the stream can do."""
@@ -38,8 +60,11 @@ class Plain(Styled):
 
 @contextmanager
 def plain_output() -> Iterator[None]:
-    """Escape control characters in all that is printed in a `with` block."""
-    with redirect_stdout(Plain(sys.stdout)), redirect_stderr(Plain(sys.stderr)):
+    """Escape control characters in all that is printed in a `with` block; a stream that is closed leads nowhere."""
+    with ExitStack() as stack:
+        for stream, redirect in ((sys.stdout, redirect_stdout), (sys.stderr, redirect_stderr)):
+            nowhere = None if stream else stack.enter_context(open(os.devnull, "w", encoding="utf-8"))
+            stack.enter_context(redirect(Plain(stream or nowhere)))
         yield
 
 

@@ -26,7 +26,7 @@ from urllib.parse import urlsplit
 from urllib.request import url2pathname
 
 from filelock import FileLock
-from packaging.utils import canonicalize_name
+from packaging.utils import InvalidName, canonicalize_name
 from packaging.version import InvalidVersion, Version
 
 from evoclaims.core.canonical import content_hash
@@ -163,6 +163,18 @@ def checked(version: str) -> str:
     except InvalidVersion as error:
         raise UserError(f"{version!r} is no version of a package: write such as 0.3.2.") from error
     return version
+
+
+def checked_name(package: str) -> str:
+    """Return the normalized name of a package.
+
+    Raises:
+        UserError: when it is none; an installer might take it for an option, or for nothing to install.
+    """
+    try:
+        return canonicalize_name(package, validate=True)
+    except InvalidName as error:
+        raise UserError(f"{package!r} is no name of a package: write such as jax.") from error
 
 
 def installed_here() -> dict[str, str]:

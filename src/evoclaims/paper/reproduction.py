@@ -104,7 +104,7 @@ class Reproduction:
         if not variant:
             return self.tiers[name]
         if variant not in self.variants:
-            raise UnknownNameError("variant", variant, self.variants or {"(none)"})
+            raise UnknownNameError("variant", variant, self.variants)
         tier, changes = self.tiers[name], self.variants[variant].conditions.get(name, {})
         return replace(tier, conditions={**tier.conditions, **changes})
 

@@ -19,6 +19,9 @@ from evoclaims.core.printable import shown
 _GAP: Final = 2
 """Columns of the terminal between those of a table."""
 
+_USUAL: Final = 80
+"""Columns of a terminal that does not say how many it has."""
+
 _WIDEST: Final = 10_000
 """More columns of a terminal than any table needs."""
 
@@ -29,6 +32,7 @@ class PlainSpokenConsole(Console):
     def __init__(self, **settings: Any) -> None:
         """Show texts as they are."""
         super().__init__(emoji=False, markup=False, highlight=False, **settings)
+        self.width = self.width or _USUAL  # COLUMNS=0, of a terminal that knows no size: rich would print nothing
 
     def render(self, renderable: RenderableType, options: ConsoleOptions | None = None) -> Iterable[Segment]:
         """Yield the pieces that content is made of, each safe to print."""

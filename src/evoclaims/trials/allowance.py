@@ -6,6 +6,7 @@ time is over, the thread is abandoned, and the process continues without it.
 
 from __future__ import annotations
 
+import contextlib
 import math
 import os
 import sys
@@ -79,8 +80,9 @@ def end_without(status: int) -> None:
     The interpreter's normal exit would wait for such a thread, or crash it (a segmentation fault).
     """
     if any(thread.is_alive() for thread in _working):
-        sys.stdout.flush()
-        sys.stderr.flush()
+        for stream in filter(None, (sys.stdout, sys.stderr)):
+            with contextlib.suppress(OSError):  # a full disk
+                stream.flush()
         os._exit(status)
 
 
