@@ -177,3 +177,13 @@ def test_a_run_that_ends_before_its_claims_has_no_verdicts_whatever_file_it_left
     assert (status, len(commands)) == (2, 1)
     assert "pebble 1.0: pytest ended with 4: no such thing\n" in out
     assert "No claim was judged in any of these environments" in err
+
+
+def test_an_environment_whose_python_is_gone_has_no_verdicts_and_stops_no_other(
+    evoclaims: Evoclaims, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr("evoclaims.cli.elsewhere.make", lambda *_: Environment(tmp_path / "gone", {}))
+    status, out, err = evoclaims("across", "--package", "pebble", "1.0", "1.1")
+    assert status == 2
+    assert out.count(": pytest cannot be run there (") == 2
+    assert "No claim was judged in any of these environments" in err

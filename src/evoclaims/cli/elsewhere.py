@@ -76,13 +76,19 @@ class Elsewhere:
         Raises:
             NotJudgedError: when it has judged none.
         """
-        with tempfile.TemporaryDirectory() as folder:  # another command may use the environment at the same time
-            verdicts = Path(folder) / "verdicts.json"
-            status, said = _watched(self._command(environment, store, verdicts), self.root, environment.folder / LOG)
-            try:
-                reports = [ClaimReport.from_json(plain) for plain in json.loads(verdicts.read_bytes())["claims"]]
-            except (OSError, ValueError, KeyError, TypeError):  # none, or those of another evoclaims
-                reports = []
+        try:
+            with tempfile.TemporaryDirectory() as folder:  # another command may use the environment at the same time
+                verdicts = Path(folder) / "verdicts.json"
+                command = self._command(environment, store, verdicts)
+                status, said = _watched(command, self.root, environment.folder / LOG)
+                try:
+                    reports = [ClaimReport.from_json(plain) for plain in json.loads(verdicts.read_bytes())["claims"]]
+                except (OSError, ValueError, KeyError, TypeError):  # none, or those of another evoclaims
+                    reports = []
+        except BrokenPipeError:  # nobody reads what this command prints
+            raise
+        except OSError as error:  # a full disk
+            raise NotJudgedError(f"pytest cannot be run there ({error})") from error
         if not reports or status not in (0, 1, 5):  # pytest's: all well, failures, and nothing measured
             raise NotJudgedError(f"pytest ended with {status}: {printable(reason(said))}")
         return reports

@@ -61,14 +61,14 @@ def _write(project: Path, folder: Path) -> None:
     """
     try:
         for part in PARTS:
-            source, target = project / part, folder / part
-            source = source if source.exists() else CHECKOUT / part
-            if source.is_dir():
-                shutil.copytree(source, target, ignore=shutil.ignore_patterns("__pycache__"))
-            else:
-                shutil.copy(source, target)
-    except (OSError, shutil.Error) as error:
-        said = getattr(error, "strerror", None) or error
+            source = project / part if (project / part).exists() else CHECKOUT / part
+            for path in sorted([source, *source.rglob("*")]):
+                target = folder / part / path.relative_to(source)
+                if path.is_file() and target.parent.name != "__pycache__":
+                    target.parent.mkdir(parents=True, exist_ok=True)
+                    shutil.copy(path, target)
+    except OSError as error:
+        said = error.strerror or error
         raise UserError(
             f"Cannot write a project to {folder}: {said}. Delete what is there, or name another."
         ) from error
