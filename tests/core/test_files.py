@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
+import threading
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from evoclaims.core.errors import UserError
-from evoclaims.core.files import write_atomically
+from evoclaims.core.files import write_atomically, write_where_named
 
 FAULTS = {"the disk is full": errno.ENOSPC, "the disk is read-only": errno.EROFS, "the disk fails": errno.EIO}
 
@@ -105,3 +106,35 @@ def test_the_new_file_is_whole_before_it_has_the_name(tmp_path: Path, monkeypatc
     monkeypatch.setattr(os, "replace", watched)
     write_atomically(path, b"whole")
     assert seen == [(b"whole", False, True)]
+
+
+def test_what_a_user_has_named_is_written_through_links_and_into_pipes_which_stay(tmp_path: Path) -> None:
+    file, link, pipe = (tmp_path / name for name in ("file", "link", "pipe"))
+    file.write_bytes(b"old")
+    link.symlink_to(file)
+    write_where_named(link, b"new")
+    assert (link.is_symlink(), file.read_bytes()) == (True, b"new")
+    os.mkfifo(pipe)
+    with pytest.raises(UserError, match=f"^Cannot write {pipe}: "):
+        write_where_named(pipe, b"nobody reads")
+    read: list[bytes] = []
+    long = bytes(1 << 20)
+    reader = threading.Thread(target=lambda: read.append(pipe.read_bytes()))
+    reader.start()
+    while reader.is_alive():
+        try:
+            write_where_named(pipe, long)
+        except UserError:  # the reader has not opened it yet
+            continue
+        reader.join(10)
+    assert (read, pipe.is_fifo()) == ([long], True)
+
+
+@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="Linux has a device that is a full disk")
+def test_a_device_that_a_user_has_named_is_not_replaced_by_a_file(tmp_path: Path) -> None:
+    device = tmp_path / "device"
+    device.symlink_to("/dev/full")
+    with pytest.raises(UserError, match="No space left on device"):
+        write_where_named(device, b"data")
+    assert device.is_symlink()
+    assert Path("/dev/full").is_char_device()

@@ -9,7 +9,7 @@ from typing import Any, Final
 
 from evoclaims.cli.project import Project
 from evoclaims.core.errors import UserError
-from evoclaims.core.files import write_atomically, write_once
+from evoclaims.core.files import write_once, write_where_named
 from evoclaims.core.printable import printable
 from evoclaims.paper.cost import known_pace
 from evoclaims.report.live_line import duration
@@ -94,4 +94,4 @@ def write(path: Path, data: bytes, name: str = "file", *, ours: bool = False) ->
         raise UserError(f"{path} is a folder; name a file in it with --out.")
     if ours and not os.path.lexists(path.parts[0]):
         write_once(Path(path.parts[0], ".gitignore"), b"*\n", f"Name another {name} with --out.")
-    write_atomically(path, data, f"Name another {name} with --out.")
+    write_where_named(path, data, f"Name another {name} with --out.")

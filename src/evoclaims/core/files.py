@@ -64,6 +64,31 @@ def write_once(path: Path, data: bytes, advice: str = ADVICE) -> bool:
     return True
 
 
+def write_where_named(path: Path, data: bytes, advice: str = ADVICE) -> None:
+    """Write `data` to what a user has named: through a link, or straight into a device or pipe such as /dev/stdout.
+
+    Any other path is written as by `write_atomically`, whose file would replace a link or device.
+
+    Raises:
+        UserError: when it cannot be written; also for a pipe that nobody reads, on which a writer could wait forever.
+    """
+    try:
+        is_file = stat.S_ISREG(os.stat(path).st_mode)
+    except OSError:  # not there yet
+        is_file = True
+    if is_file:
+        write_atomically(Path(os.path.realpath(path)) if os.path.islink(path) else path, data, advice)
+        return
+    at_once = getattr(os, "O_NONBLOCK", 0)
+    try:
+        with open(os.open(path, os.O_WRONLY | at_once), "wb") as file:
+            if at_once:
+                os.set_blocking(file.fileno(), True)
+            file.write(data)
+    except OSError as error:
+        raise UserError(f"Cannot write {path}: {error.strerror or error}. {advice}") from error
+
+
 @contextlib.contextmanager
 def _aside(path: Path, data: bytes, advice: str) -> Iterator[Path]:
     """Yield a temporary file beside `path` with `data` on disk; it is deleted after the block unless renamed."""

@@ -229,7 +229,7 @@ class Summary:
 
     def _write_json(self) -> None:
         """Write all verdicts to the file that --claims-json names; even if there are none, so no old file stays."""
-        from evoclaims.core.files import write_atomically
+        from evoclaims.core.files import write_where_named
 
         name = self._config.getoption("claims_json")
         if name is None or self._config.option.collectonly:
@@ -240,7 +240,7 @@ class Summary:
         plain = {"schema": 1, "claims": claims, "drift": drift, "upgrade": upgrade}
         path = Path(self._config.invocation_params.dir) / name
         text = json.dumps(plain, indent=1, sort_keys=True) + "\n"
-        write_atomically(path, text.encode(), "Name a file that can be written with --claims-json.")
+        write_where_named(path, text.encode(), "Name a file that can be written with --claims-json.")
 
     def _write_step_summary(self, notes: Sequence[str]) -> str:
         """Append the verdicts to GitHub's summary page of a step; return why it cannot be written, else nothing.
