@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from evoclaims.core.errors import UserError
-from evoclaims.envs.ecorobot.boxes import Box
+from evoclaims.envs.ecorobot.boxes import Box, Surface
 from evoclaims.envs.ecorobot.deceptive import DeceptiveMaze
 from evoclaims.envs.ecorobot.locomotion import Locomotion
 from evoclaims.envs.ecorobot.obstacles import Obstacles
@@ -57,6 +57,21 @@ def test_episodes_and_their_steps_are_at_least_1(kind: Any, name: str) -> None:
 def test_a_box_has_a_volume(numbers: dict[str, Any]) -> None:
     with pytest.raises(UserError, match="A box has finite numbers, half-sizes above 0"):
         Box(**{"centre": (0.0, 0.0), "half_size": (1.0, 1.0), **numbers})
+
+
+@pytest.mark.parametrize(
+    "numbers",
+    [
+        {"friction": (math.nan, 0.0, 0.0)},
+        {"friction": (-1.0, 0.0, 0.0)},
+        {"solref": (math.inf, 1.0)},
+        {"solimp": (0.9,)},
+    ],
+    ids=str,
+)
+def test_a_surface_has_numbers_that_a_simulation_can_use(numbers: dict[str, Any]) -> None:
+    with pytest.raises(UserError, match="A surface has 3 frictions of at least 0"):
+        Surface(**numbers)
 
 
 @pytest.mark.parametrize("sensor", [Rangefinders, PieSlices])

@@ -24,6 +24,16 @@ class Surface:
     solref: tuple[float, float] = (0.02, 1.0)
     solimp: tuple[float, float, float, float, float] = (0.9, 0.95, 0.001, 0.5, 2.0)
 
+    def __post_init__(self) -> None:
+        """Check its numbers: MuJoCo takes NaN, and a trial would only diverge."""
+        parts = self.friction, self.solref, self.solimp
+        numbers = [number for part in parts for number in part]
+        if tuple(map(len, parts)) != (3, 2, 5) or not all(map(math.isfinite, numbers)) or min(self.friction) < 0:
+            raise UserError(
+                "A surface has 3 frictions of at least 0, and 2 numbers of solref and 5 of solimp, all finite, unlike "
+                f"{self}."
+            )
+
 
 @dataclass(frozen=True)
 class Box:
