@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 from pathlib import Path
 
 import pytest
@@ -50,6 +51,16 @@ def test_options_for_other_runs_leave_no_claim_out(evoclaims: Evoclaims, options
     status, out, _ = evoclaims("status")
     assert (status, out.splitlines()[-1]) == (1, VERDICTS)
     assert not Path("out.json").exists()
+
+
+@pytest.mark.parametrize("name", ["a [b] c", "a::b", "$HOME"])
+def test_a_project_lies_in_a_folder_of_any_name(
+    evoclaims: Evoclaims, project: Project, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    shutil.copytree(project.path, project.path / name, ignore=lambda folder, names: {name})
+    for folder in (name, "claims"):  # a command is called anywhere in a project
+        monkeypatch.chdir(folder)
+        assert evoclaims("status")[1].splitlines()[-1] == VERDICTS
 
 
 @pytest.mark.parametrize("options", ["-x", "-p picky -n 2", "--nonsense"])

@@ -95,8 +95,9 @@ class Elsewhere:
 
     def _command(self, environment: Environment, store: Store, verdicts: Path) -> list[str]:
         """Return the command that judges."""
+        claims = os.path.join(os.curdir, os.path.relpath(self.claims, self.root))  # as in `judging`
         return [
-            *(str(environment.python), "-m", "pytest", str(self.claims), f"--rootdir={self.root}"),
+            *(str(environment.python), "-m", "pytest", claims, f"--rootdir={os.curdir}"),
             # Releases warn of different things, and the project's own options may need plugins that are not there.
             *("-pno:cacheprovider", "-Wdefault", "-oaddopts=", "-orequired_plugins="),
             *(f"-m{self.tier}", f"--claims-device={self.device}"),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import gc
 import io
+import os
 from collections.abc import Generator, Sequence
 from itertools import zip_longest
 from pathlib import Path
@@ -79,7 +80,9 @@ class _Run:
         """Start empty."""
         self.claims = config.root / config.claims
         tiers = " or ".join({tier: None for _, tier in asked})
-        self.arguments = (str(self.claims), f"--rootdir={config.root}", f"-m{tiers}", *_ALONE)
+        # From the current folder, since pytest reads [, :: and $ in an argument as more than a path.
+        claims, root = (os.path.join(os.curdir, os.path.relpath(path)) for path in (self.claims, config.root))
+        self.arguments = (claims, f"--rootdir={root}", f"-m{tiers}", *_ALONE)
         self.reports: list[list[ClaimReport]] = [[] for _ in asked]
         self.troubles: list[str] = []
         self.interrupted = False
