@@ -64,12 +64,12 @@ class PaperTrials(TrialGroup):
     @property
     def overturned(self) -> Measure:
         """Share of the final policy's steps in which the robot is upside-down."""
-        return self.measure("share of steps upside-down", lambda t: t.metrics["upside_down"])
+        return self.measure("share of steps upside-down", lambda t: t.metrics["upside_down"], better="lower")
 
     @property
     def control_cost(self) -> Measure:
         """Cost of the final policy's actions per episode."""
-        return self.measure("control cost", lambda t: t.metrics["control_cost"])
+        return self.measure("control cost", lambda t: t.metrics["control_cost"], better="lower")
 
     @property
     def champion_is_mostly_hidden(self) -> Event:
