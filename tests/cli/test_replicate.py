@@ -32,10 +32,14 @@ def _published(project: Project, stored: Store) -> None:
 def test_each_number_has_a_line_with_ours_and_the_interval(evoclaims: Evoclaims) -> None:
     status, out, err = evoclaims("replicate", "--tier=smoke")
     assert (status, err) == (0, "")
-    right, wrong, coin = (" ".join(line.split()) for line in out.splitlines() if " on parity: mean success" in line)
-    assert right.endswith("the protocol 1 1 ± 0 (10) ✓ inside 7 to 10 trials at 1, ours 10 (exact: inside)")
-    assert "0.6 ± 0.05 0 ± 0 (10) ✗ outside 0.5494 to 0.6506 (SD: outside);" in wrong
-    assert "0.5 ± 0.2 – ? cannot be said 0.2977 to 0.7023 (SD)" in coin  # a standard error would be too large
+    lines = [" ".join(line.split()) for line in out.splitlines()]
+    heading = lines.index("parity: mean success over levels")
+    assert lines[heading + 1 : heading + 5] == [
+        "published ours 95% of repetitions",
+        "✓ right 1 1 ± 0 (10) 7–10 trials at 1: ours 10",
+        "✗ wrong 0.6 ± 0.05 0 ± 0 (10) 0.5494–0.6506 SD ✗, 0.44–0.76 SE ✗",
+        "? coin 0.5 ± 0.2 – 0.2977–0.7023 SD",  # a standard error would be too large
+    ]
     assert "the protocol: 1 inside, 1 outside, 1 cannot be said" in out
 
 
@@ -57,8 +61,10 @@ def test_a_variant_shows_the_numbers_that_it_changes(evoclaims: Evoclaims) -> No
     """Under `traded` the right network is what the wrong one is."""
     out = evoclaims("replicate", "--tier=smoke", "--variant=traded")[1]
     assert "the protocol" not in out
+    assert "\nparity: mean success over levels, traded\n" in out
     assert "traded: 1 outside" in out
     both = evoclaims("replicate", "--tier=smoke", "--variant=all")[1]
+    assert both.count("\nparity: mean success over levels, the protocol\n") == 1
     assert "the protocol: 1 inside" in both
     assert "traded: 1 outside" in both
 

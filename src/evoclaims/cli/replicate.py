@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Final
 
@@ -13,8 +13,8 @@ from evoclaims.cli.terminal import styled
 from evoclaims.core.errors import UnknownNameError, UserError
 from evoclaims.figures.figure import SIZES
 from evoclaims.figures.replication import Replication, replications
-from evoclaims.report import replication_cells
-from evoclaims.report.console import PlainSpokenConsole, plain_table
+from evoclaims.report import replication_blocks, replication_cells
+from evoclaims.report.console import PlainSpokenConsole
 from evoclaims.report.markdown import numbers
 from evoclaims.verdicts import export
 
@@ -42,8 +42,10 @@ def main(options: argparse.Namespace) -> int:
     console = PlainSpokenConsole(file=styled())
     size = SIZES.get(options.tier, f"{options.tier} tier")
     console.print(f"Published numbers and ours ({size})")
-    console.print(plain_table(replication_cells.HEADINGS, _rows(found), len(replication_cells.HEADINGS)))
-    console.print(replication_cells.HOW)
+    for heading, table in replication_blocks.blocks(found, console.width):
+        console.print(f"\n{heading}", style="bold")
+        console.print(table)
+    console.print(f"\n{replication_blocks.LEGEND}. {replication_cells.HOW}")
     (reports,) = project.judge_sessions([(project.as_published(options.tier), options.tier)])
     for line in (*replication_cells.totals(found), *replication_cells.put_to_the_paper(reports)):
         console.print(line)
@@ -67,12 +69,3 @@ def _found(project: Project, tier: str, variant: str) -> tuple[Replication, ...]
             f"`evoclaims run --tier {tier} --variant {variant}` runs them."
         )
     return found
-
-
-def _rows(found: Sequence[Replication]) -> Iterator[tuple[str, ...]]:
-    """Yield the table's rows; a number's name is written once for all variants."""
-    before = ""
-    for one in found:
-        name, *rest = replication_cells.cells(one)
-        yield "" if name == before else name, *rest
-        before = name

@@ -16,7 +16,7 @@ from rich.table import Table
 
 from evoclaims.core.printable import shown
 
-_GAP: Final = 2
+GAP: Final = 2
 """Columns of the terminal between those of a table."""
 
 _USUAL: Final = 80
@@ -46,7 +46,7 @@ class PlainSpokenConsole(Console):
         """
         columns = [(column.no_wrap, map(str, (column.header, *column.cells))) for column in table.columns]
         needed = sum(max(cell_len(part) for text in texts for part in _parts(text, whole)) for whole, texts in columns)
-        if needed + _GAP * (len(columns) - 1) > self.width:
+        if needed + GAP * (len(columns) - 1) > self.width:
             table.width = Measurement.get(self, self.options.update(max_width=_WIDEST), table).maximum
         self.print(table, crop=False)
 

@@ -17,7 +17,7 @@ HEADINGS: Final = ("number", "protocol", "published", "ours", "replicates", "95%
 PROTOCOL: Final = "the protocol"
 """The protocol itself, without a variant."""
 
-_SYMBOLS: Final = {Answer.INSIDE: "✓", Answer.OUTSIDE: "✗", Answer.UNKNOWN: "?"}
+SYMBOLS: Final = {Answer.INSIDE: "✓", Answer.OUTSIDE: "✗", Answer.UNKNOWN: "?"}
 _COLOURS: Final = {
     Answer.INSIDE: Outcome.SUPPORTED,
     Answer.OUTSIDE: Outcome.REFUTED,
@@ -35,19 +35,28 @@ HOW: Final = (
 
 def cells(one: Replication) -> tuple[str, ...]:
     """Return a row, a cell per heading: "0.857 ± 0.08" is published, and "0.7742 ± 0.19 (10)" ours, of 10 trials."""
-    error = f" ± {number(one.reported.error)}" if one.reported.error else ""
-    readings, ours = one.readings, NONE
-    if readings.values:
-        spread = f" ± {number(float(f'{readings.deviation:.2g}'))}" if len(readings.values) > 1 else ""
-        ours = f"{number(readings.mean)}{spread} ({len(readings.values)})"
     predicted = "; ".join(map(_interval, one.repetition.predictions)) or NONE
-    return (one.name, one.variant or PROTOCOL, number(one.reported.value) + error, ours, answer(one), predicted)
+    return (one.name, one.variant or PROTOCOL, published(one), ours(one), answer(one), predicted)
+
+
+def published(one: Replication) -> str:
+    """Return the published number with its error bar, such as "0.857 ± 0.08"."""
+    return number(one.reported.value) + (f" ± {number(one.reported.error)}" if one.reported.error else "")
+
+
+def ours(one: Replication) -> str:
+    """Return our mean, standard deviation and number of trials, such as "0.7742 ± 0.19 (10)"."""
+    readings = one.readings
+    if not readings.values:
+        return NONE
+    spread = f" ± {number(float(f'{readings.deviation:.2g}'))}" if len(readings.values) > 1 else ""
+    return f"{number(readings.mean)}{spread} ({len(readings.values)})"
 
 
 def answer(one: Replication) -> str:
     """Return whether the number replicates, such as "✗ outside"."""
     unknown = f": {one.repetition.reason}" if one.answer is Answer.UNKNOWN and not one.repetition.predictions else ""
-    return f"{_SYMBOLS[one.answer]} {one.answer}{unknown}"
+    return f"{SYMBOLS[one.answer]} {one.answer}{unknown}"
 
 
 def colour(one: Replication) -> str:

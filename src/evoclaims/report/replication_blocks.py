@@ -1,0 +1,77 @@
+"""Published numbers beside ours as a terminal shows them: a block for each condition, measure and variant."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Final
+
+from rich.cells import cell_len
+from rich.table import Table
+
+from evoclaims.figures.replication import Replication
+from evoclaims.judging.repetition import Answer, Prediction, Spread
+from evoclaims.report.console import GAP, plain_table
+from evoclaims.report.formatting import number
+from evoclaims.report.replication_cells import PROTOCOL, SYMBOLS, ours, published
+
+LEGEND: Final = ", ".join(f"{symbol} {answer}" for answer, symbol in SYMBOLS.items())
+"""What the symbols stand for."""
+
+_HEADINGS: Final = ("", "", "published", "ours", "95% of repetitions")
+_AT: Final = " at "
+"""Stands between a profile's name and one of its levels: "success at level 4"."""
+
+_AND: Final = ", "
+"""Stands between the intervals of a number."""
+
+
+def blocks(found: Sequence[Replication], width: int) -> Iterator[tuple[str, Table]]:
+    """Yield the heading of each block and its table, whose columns have the same places in all.
+
+    A block holds the levels of one condition under one variant ("neat on n_parity: success, rows_so_far"), or where a
+    task has no levels the methods on it ("obstacles: episode reward").
+
+    Args:
+        found: the numbers.
+        width: columns of the terminal. Where it is too narrow, two readings of an error bar have a line each.
+    """
+    varied = any(one.variant for one in found)
+    made: dict[str, list[tuple[str, ...]]] = {}
+    for one in found:
+        heading, label = _place(one, varied)
+        made.setdefault(heading, []).append((SYMBOLS[one.answer], label, published(one), ours(one), _intervals(one)))
+    rows = [_HEADINGS, *(row for block in made.values() for row in block)]
+    widths = [max(map(cell_len, column)) for column in zip(*rows, strict=True)]
+    narrow = sum(widths) + GAP * (len(widths) - 1) > width
+    for place, (heading, block) in enumerate(made.items()):
+        lines = [(*row, intervals.replace(_AND, ",\n") if narrow else intervals) for *row, intervals in block]
+        table = plain_table(_HEADINGS, lines, names=len(_HEADINGS))
+        for column, least in zip(table.columns[:-1], widths, strict=False):
+            column.min_width = least
+        table.show_header = not place
+        yield heading, table
+
+
+def _place(one: Replication, varied: bool) -> tuple[str, str]:
+    """Return the heading that a number belongs to, with the variant if several are shown, and its name below it."""
+    readings = one.readings
+    measure, _, level = readings.name.partition(_AT)
+    under = f", {one.variant or PROTOCOL}" if varied else ""
+    if level:
+        return f"{readings.method} on {readings.task}: {measure}{under}", level
+    return f"{readings.task}: {measure}{under}", readings.method
+
+
+def _intervals(one: Replication) -> str:
+    """Return the interval by each reading of the published spread, or why there is none."""
+    return _AND.join(map(_interval, one.repetition.predictions)) or one.repetition.reason
+
+
+def _interval(prediction: Prediction) -> str:
+    """Return an interval, such as "0.776–0.938 SD ✗", or "7–10 trials at 1: ours 2"."""
+    ends = f"{number(prediction.low)}–{number(prediction.high)}"
+    if prediction.spread is Spread.NONE:
+        got = "" if prediction.ours is None else f": ours {number(prediction.ours)}"
+        return f"{ends} {prediction.of}{got}"
+    told = "" if prediction.answer is Answer.UNKNOWN else f" {SYMBOLS[prediction.answer]}"
+    return f"{ends} {prediction.spread.short}{told}"
