@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -29,7 +30,13 @@ def test_a_claim_notices_a_blind_task_and_no_fault_in_what_never_learns(evoclaim
     assert "parity: wrong-row" in right.named(Fate.KILLED)
     assert "right: minimizes" in right.named(Fate.EQUIVALENT)
     assert right.tried is Tried.SENSITIVE
-    assert (f"{BLIND}" in out, right.untried) == (True, ())
+    lines = out.splitlines()
+    first = lines.index("a (supported)")
+    assert re.fullmatch(r"  \d+ killed by the verdict", lines[first + 1])
+    assert lines[first + 2].startswith(f"    {BLIND}, paralysed")
+    assert "    right: learns-nothing, minimizes, " in out
+    assert max(map(len, lines[first:-2])) <= 80
+    assert right.untried == ()
     assert "planted faults change a verdict" in out.splitlines()[-2]
     before = len(stored.ids())
     assert evoclaims("mutants", "--mutant=blind")[0] == 0

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import argparse
+import shutil
 import sys
-from collections.abc import Mapping, Sequence
+import textwrap
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from evoclaims.cli.project import Project, open_project
@@ -66,7 +68,7 @@ def main(options: argparse.Namespace) -> int:
     write_atomically(path, mutation_matrix.dump(matrix).encode())
     for (on, claim), row in sorted(matrix.items()):
         if on == options.tier:
-            print(f"{claim} ({row.outcome}): {_told(row)}")
+            print("\n".join(_told(claim, row)))
     print(f"{score(matrix, options.tier)}\nwrote {path}: look at the changes and commit them")
     return int(bool(failed))
 
@@ -103,11 +105,27 @@ def _run(project: Project, wanted: Mapping[Job, Condition], options: argparse.Na
     return failed
 
 
-def _told(row: Sensitivity) -> str:
-    """Return a line on what a claim notices."""
-    said = [f"{len(row.named(one))} {one} ({', '.join(row.named(one))})" for one in Fate if row.named(one)]
+def _told(claim: str, row: Sensitivity) -> Iterator[str]:
+    """Yield the lines on what a claim notices: for each fate of faults, those of each method and task."""
+    yield f"{claim} ({row.outcome}){f': {row.tried}' * (row.tried is Tried.INSENSITIVE)}"
+    width = shutil.get_terminal_size().columns
+    for fate in Fate:
+        found: dict[str, list[str]] = {}
+        for attempt in row.attempts:
+            if attempt.fate is fate:
+                found.setdefault(attempt.target, []).append(attempt.mutant)
+        if found:
+            yield f"  {sum(map(len, found.values()))} {fate}"
+        for target, mutants in found.items():
+            yield textwrap.fill(
+                f"{target}: {', '.join(mutants)}",
+                width,
+                initial_indent=" " * 4,
+                subsequent_indent=" " * 6,
+                break_long_words=False,
+                break_on_hyphens=False,
+            )
     if row.untried:
-        said.append(f"{len(row.untried)} not tried")
+        yield f"  {len(row.untried)} not tried"
     elif row.unnoticed:
-        said.append(f"no fault of {' or '.join(row.unnoticed)} changes it")
-    return f"{f'{row.tried}; ' * (row.tried is Tried.INSENSITIVE)}{'; '.join(said)}"
+        yield f"  no fault of {' or '.join(row.unnoticed)} changes it"

@@ -71,7 +71,11 @@ def main(options: argparse.Namespace) -> int:
             console.print(said)
     for sentence in _about({names: costs[names] for names in used}, tier.design.last.n):
         console.print(sentence)
-    console.print(f"\nClaims: the smallest p that the design allows (n trials a side, α {tier.design.alpha:g})")
+    ends = ", ".join(f"{outcome.symbol} {outcome}" for outcome in (Outcome.SUPPORTED, Outcome.REFUTED))
+    console.print(
+        f"\nClaims: the smallest p that the design allows (n trials a side, α {tier.design.alpha:g}), and how each "
+        f"look can end them: {ends}, or neither (no)"
+    )
     console.print_whole(_claims(reports, costs))
     for report in reports:
         if report.outcome is Outcome.ERROR and not report.attainable:
@@ -175,21 +179,20 @@ def _claims(reports: Sequence[ClaimReport], costs: Costs) -> Table:
     """Build the table of claims."""
     kinds = _kinds(costs)
     took = [f"took on one\n{kind}" for kind in kinds]
-    table = plain_table(("claim", "n", "α", "p for", "p against", "can be decided", *took), ())
-    for column in table.columns:
-        column.no_wrap = column is table.columns[0]  # words in the other columns can be broken, a claim's name cannot
+    table = plain_table(("claim", "n", "α", "p for", "p\nagainst", "can\nend", *took), (), names=0)
+    table.columns[0].justify = "left"
     for report in reports:
         used = [(source.method, source.task) for source in report.sources]
         for look in report.attainable:
             smallest = {Outcome.SUPPORTED: look.supported, Outcome.REFUTED: look.refuted}
-            reach = [outcome for outcome, p in smallest.items() if p <= look.alpha]
+            reach = [outcome.symbol for outcome, p in smallest.items() if p <= look.alpha]
             table.add_row(
                 report.name,
                 str(look.n),
                 f"{look.alpha:g}",
                 f"{look.supported:.2g}",
                 f"{look.refuted:.2g}",
-                " or ".join(reach) or "no",
+                " ".join(reach) or "no",
                 *(_took(costs, used, kind) for kind in kinds if look is report.attainable[-1]),
             )
     return table
