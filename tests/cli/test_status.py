@@ -75,6 +75,22 @@ def test_why_a_verdict_failed_is_said_in_any_case_and_the_rest_where_it_is_asked
         assert out.splitlines()[-1] == "claims (smoke): 2 supported, 2 refuted"
 
 
+def test_a_variant_shows_the_verdicts_that_it_may_change_and_which_it_does(status: Evoclaims) -> None:
+    """Under `traded` the right network is what the wrong one is."""
+    code, out, err = status("--variant=traded")
+    assert (code, err) == (0, "")
+    assert [line.split()[0] for line in out.splitlines() if "in small" in line] == ["G1[right]", "S1"]
+    assert out.splitlines()[-2:] == [
+        "traded: The right network is wrong",
+        "verdicts that it changes: 2 of 2 (G1[right] supported -> refuted, S1 supported -> refuted)",
+    ]
+    assert "changes: 1 of 1 (S1 " in status("--variant=traded", "--only=S1")[1]
+    assert [row["outcome"] for row in json.loads(status("--variant=traded", "--as=json")[1])["rows"]] == ["refuted"] * 2
+    code, _, err = status("--variant=trade")
+    assert (code, err.count("\n")) == (2, 1)
+    assert "There is no variant named 'trade'. Did you mean 'traded'?" in err
+
+
 def test_other_programs_read_the_same_verdicts(status: Evoclaims) -> None:
     code, out, _ = status("--as=json")
     assert code == 1

@@ -53,6 +53,18 @@ def test_a_table_is_written_between_its_marks_once(committed: Evoclaims, project
     assert "variant" not in Path("page.md").read_text()
 
 
+def test_a_table_of_details_has_the_claims_that_a_variant_touches(committed: Evoclaims) -> None:
+    Path("page.md").write_text(PAGE.replace("verdicts full smoke smoke:traded", "details smoke"))
+    assert committed("tables", "page.md")[0] == 1
+    lines = Path("page.md").read_text().splitlines()
+    assert "| claim | tier | the protocol | traded |" in lines
+    assert [line for line in lines if line.startswith(("| a", "| b"))] == ["| a | smoke | supported | **refuted** |"]
+    assert not any(line.startswith("Not run") for line in lines)
+    Path("page.md").write_text(PAGE.replace("verdicts full smoke smoke:traded", "details full"))
+    committed("tables", "page.md")
+    assert "Not run: traded." in Path("page.md").read_text()
+
+
 def test_a_store_changes_no_table(committed: Evoclaims, trials_of_both: Path) -> None:
     committed("tables", "page.md")
     shutil.rmtree("reference")

@@ -177,6 +177,9 @@ def _parser() -> argparse.ArgumentParser:
 
     status = add("status", "show the verdicts that the stored trials give, one line for each claim; run nothing")
     status.add_argument("--only", metavar="IDS", help="only these claims, such as G1,G7; G: all of G1, G2, …")
+    status.add_argument(
+        "--variant", metavar="NAME", default="", help="the verdicts that this variant of the protocol may change"
+    )
     status.add_argument("--why", action="store_true", help="also say why verdicts are accepted, or inconclusive")
     status.add_argument("--as", dest="form", metavar="FORM", help="print csv, json or markdown instead of a table")
 

@@ -13,10 +13,12 @@ from evoclaims.cli.project import open_project
 from evoclaims.cli.terminal import styled
 from evoclaims.core.errors import UnknownNameError
 from evoclaims.judging.verdict import Outcome
+from evoclaims.paper.reproduction import Reproduction
 from evoclaims.report import table_cells, terminal_table
 from evoclaims.report.run_summary import run_summary
 from evoclaims.verdicts import export
 from evoclaims.verdicts.claim_report import ClaimReport
+from evoclaims.verdicts.robustness import matrix
 
 FORMS: Final[Mapping[str, Callable[[Sequence[ClaimReport]], str]]] = {
     "csv": lambda reports: export.as_csv(export.verdict_rows(reports)).decode(),
@@ -27,20 +29,38 @@ FORMS: Final[Mapping[str, Callable[[Sequence[ClaimReport]], str]]] = {
 
 
 def main(options: argparse.Namespace) -> int:
-    """Print the verdicts; 1 when something is refuted or broken without being accepted."""
+    """Print the verdicts; 1 when something is refuted or broken without being accepted, save under a variant."""
     if options.form not in (None, *FORMS):
         raise UnknownNameError("form of a table", options.form, FORMS)
     project = open_project(options.storage)
-    project.reproduction.tier(options.tier)
-    reports = table_cells.ordered(project.judge(options.tier))
+    project.reproduction.tier(options.tier, options.variant)
+    names = [options.variant, ""] if options.variant else [""]
+    judged, *plain = map(table_cells.ordered, project.judge_variants([(options.tier, name) for name in names]))
+    reports = judged
     if options.only is not None:
         wanted = selected(options.only, {name for report in reports for name in (report.claim, report.name)})
         reports = [report for report in reports if wanted & {report.claim, report.name}]
+    if options.variant:  # what it does not change, or has no trials, is left out
+        reports = [report for report in reports if report.outcome is not Outcome.NOT_RUN]
     if options.form is None:
         _print(reports, options.tier, options.why)
+        for protocol in plain:
+            print(_changes(protocol, reports, project.reproduction, options.variant))
     else:
         print(FORMS[options.form](reports), end="")
-    return int(any(report.failed for report in reports))
+    return int(not options.variant and any(report.failed for report in reports))
+
+
+def _changes(
+    plain: Sequence[ClaimReport], varied: Sequence[ClaimReport], reproduction: Reproduction, variant: str
+) -> str:
+    """Say which of the shown verdicts are others under the protocol itself."""
+    rows = [row for row in matrix(plain, {variant: varied}) if row.hangs_on]
+    changed = ", ".join(f"{row.claim} {row.plain} -> {row.outcomes[variant]}" for row in rows)
+    return (
+        f"{variant}: {reproduction.variants[variant].says}\n"
+        f"verdicts that it changes: {len(rows)} of {len(varied)}{f' ({changed})' if changed else ''}"
+    )
 
 
 def _print(reports: Sequence[ClaimReport], tier: str, why: bool) -> None:

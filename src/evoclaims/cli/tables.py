@@ -4,6 +4,7 @@ A table is between two comments, the first of which says what it shows:
 
     <!-- evoclaims: verdicts full full:published smoke -->    verdicts by tier, or by tier and variant of the protocol
     <!-- evoclaims: numbers full all -->                      published numbers and ours, under all variants
+    <!-- evoclaims: details full -->                          verdicts that variants of the protocol may change
     <!-- evoclaims: measures -->                              what claims can read from trials
     <!-- evoclaims: assertions -->                            what they can say of it, and how it is judged
     <!-- evoclaims: end -->
@@ -23,10 +24,11 @@ from evoclaims.cli.stored import write
 from evoclaims.core.errors import UnknownNameError, UserError
 from evoclaims.figures.replication import replications
 from evoclaims.report import replication_cells, vocabulary
-from evoclaims.report.markdown import numbers
+from evoclaims.report.markdown import numbers, robustness
 from evoclaims.report.markdown_text import literal
 from evoclaims.report.trial_summary import Reader
 from evoclaims.report.verdict_overview import overview
+from evoclaims.verdicts.robustness import matrix
 
 _TABLE: Final = re.compile(
     r"(?P<begin>^<!-- evoclaims: (?P<kind>\w+) (?P<words>[^>]*?) ?-->\n).*?(?P<end>^<!-- evoclaims: end -->$)",
@@ -87,6 +89,17 @@ def _verdicts(project: Project, words: list[str]) -> str:
     return overview(columns, sentences, Reader(project.archive))
 
 
+def _details(project: Project, words: list[str]) -> str:
+    """Return the verdicts of a tier under the protocol and under each variant, of the claims that a variant touches."""
+    (tier,) = words or list(project.reproduction.tiers)[-1:]
+    asked = ["", *project.reproduction.variants]
+    plain, *varied = project.judge_variants([(tier, name) for name in asked])
+    rows = matrix(plain, dict(zip(asked[1:], varied, strict=True)))
+    tried = [name for name in asked[1:] if any(name in row.outcomes for row in rows)]
+    left = ", ".join(name for name in asked[1:] if name not in tried)
+    return "\n\n".join(filter(None, (robustness(rows, tried), f"Not run: {literal(left)}." if left else "")))
+
+
 def _numbers(project: Project, words: list[str]) -> str:
     """Return the published numbers beside ours; the words are a tier and, for the variants too, "all"."""
     tier, *rest = words or list(project.reproduction.tiers)[-1:]
@@ -99,6 +112,7 @@ def _numbers(project: Project, words: list[str]) -> str:
 
 _KINDS: Final[Mapping[str, Callable[[Project, list[str]], str]]] = {
     "verdicts": _verdicts,
+    "details": _details,
     "numbers": _numbers,
     "measures": lambda project, _: vocabulary.measures(project.reproduction.trials),
     "assertions": lambda *_: vocabulary.assertions(),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
 from evoclaims.figures.replication import Replication
 from evoclaims.report import replication_cells, table_cells
@@ -10,6 +10,8 @@ from evoclaims.report.fault_grid import LEGEND
 from evoclaims.report.formatting import plural
 from evoclaims.report.markdown_text import literal, table
 from evoclaims.report.model import Board, Page, Section
+from evoclaims.report.table_cells import NONE
+from evoclaims.verdicts.robustness import Robustness
 from evoclaims.verdicts.sensitivity import Tally
 
 
@@ -25,7 +27,7 @@ def markdown(page: Page) -> str:
     if page.faults:
         blocks += ["## Which planted faults do the claims notice?", *_faults(page)]
     if page.robustness:
-        blocks += ["## Which conclusions hang on a detail?", _details(page), _robustness(page)]
+        blocks += ["## Which conclusions hang on a detail?", _details(page), robustness(page.robustness, page.tried)]
     if page.numbers:
         blocks += ["## Do the numbers replicate?", literal(replication_cells.HOW), numbers(page.numbers)]
         blocks += [literal(line) for line in (*replication_cells.totals(page.numbers), *page.put_to_the_paper)]
@@ -69,10 +71,11 @@ def _details(page: Page) -> str:
     return "\n".join(f"* {literal(name)}: {literal(says)}" for name, says in page.tried.items())
 
 
-def _robustness(page: Page) -> str:
-    """Return one line per claim and a column per variant."""
+def robustness(rows: Sequence[Robustness], variants: Iterable[str]) -> str:
+    """Return one line per claim and a column per variant; a verdict that differs from the protocol's is bold."""
+    names = list(variants)
     return table(
-        ("claim", "tier", "the protocol", *map(literal, page.tried)),
+        ("claim", "tier", "the protocol", *map(literal, names)),
         (
             (
                 literal(row.claim),
@@ -81,11 +84,11 @@ def _robustness(page: Page) -> str:
                 *(
                     f"**{literal(row.outcomes[name])}**"
                     if name in row.hangs_on
-                    else literal(row.outcomes.get(name, "–"))
-                    for name in page.tried
+                    else literal(row.outcomes.get(name, NONE))
+                    for name in names
                 ),
             )
-            for row in page.robustness
+            for row in rows
         ),
     )
 
