@@ -10,6 +10,8 @@ from pathlib import Path
 
 import pytest
 
+from evoclaims.cli import main
+
 GUIDE = (Path(__file__).parents[2] / "docs" / "extending.md").read_text(encoding="utf-8")
 FILES: dict[str, str] = dict(re.findall(r"`([\w/.]+)`:\n\n```\w+\n(.*?)```", GUIDE, flags=re.DOTALL))
 """The guide's files by name: each block follows a line that ends with its name in backquotes and a colon."""
@@ -21,6 +23,8 @@ COMMANDS = [
 ]
 LATER = {"whole_paper.py", "claims/test_climbing.py"}
 """What the guide adds after the first run."""
+BESIDE = {"with_mine.py", "claims/test_mine.py"}
+"""What it puts beside this paper's claims and conditions."""
 
 IN_ONE_PROCESS = """
 import json, pytest, sys
@@ -46,6 +50,7 @@ def _write(folder: Path, names: set[str]) -> None:
         (["corridor.py"], 30),
         (["our_paper.py", "claims/test_majority.py"], 40),
         (["whole_paper.py", "claims/test_climbing.py"], 30),
+        (["with_mine.py", "claims/test_mine.py"], 20),
     ],
 )
 def test_what_the_guide_shows_is_short(names: list[str], most: int) -> None:
@@ -55,7 +60,7 @@ def test_what_the_guide_shows_is_short(names: list[str], most: int) -> None:
 
 
 def test_the_guide_s_repository_comes_to_verdicts_and_its_commands_do_what_they_say(pytester: pytest.Pytester) -> None:
-    _write(pytester.path, set(FILES) - LATER)
+    _write(pytester.path, set(FILES) - LATER - BESIDE)
     assert COMMANDS[0] == ["pytest", "-m", "smoke"]
     result = pytester.runpytest_subprocess("-m", "smoke", "--claims-json=out.json", "-p", "no:xdist")
     assert result.ret == 0
@@ -75,3 +80,22 @@ def test_the_guide_s_repository_comes_to_verdicts_and_its_commands_do_what_they_
     ]
     for line in told:
         result.stdout.fnmatch_lines([line])
+
+
+def test_a_method_beside_those_of_the_paper_is_judged_with_the_papers_reference_trials(
+    pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert main(["new", "beside", "--from", "nisioti2025"]) == 0
+    folder = pytester.path / "beside"
+    monkeypatch.chdir(folder)
+    _write(folder, BESIDE | {"hill_climber.py"})
+    settings = folder / "pyproject.toml"
+    text = settings.read_text(encoding="utf-8")
+    assert text.count('"reproductions.nisioti2025"') == 1
+    settings.write_text(text.replace('"reproductions.nisioti2025"', '"with_mine"'), encoding="utf-8")
+    commands = [shlex.split(one) for one in re.findall(r"`(evoclaims (?:run hill|status --only H5)[^`]*)`", GUIDE)]
+    assert [words[1] for words in commands] == ["run", "status"]
+    result = pytester.run(sys.executable, "-c", IN_ONE_PROCESS, json.dumps(commands))
+    assert result.outlines[-1] == "[0, 0]"
+    assert len(list((folder / ".evoclaims" / "trials").rglob("*.json"))) == 10  # and none of CMA-ES
+    result.stdout.re_match_lines([r"H5 +It does for 3-parity \(here\) +✓ supported†? +10 "])
