@@ -40,7 +40,7 @@ def test_a_section_holds_what_was_claimed_judged_and_looked_at(filled: Laborator
     assert [one.label for one in conditions] == ["better on small", "worse on small"]
     assert ("task bits", "3") in conditions[0].settings
     assert [panel.name for panel in conditions[0].curves] == ["success"]
-    assert conditions[0].says == "6 trials. Level is 0 throughout."
+    assert conditions[0].says == "6 trials. Level is 0 throughout training."
 
 
 def test_every_trial_is_read_once_for_all_claims(filled: Laboratory, monkeypatch: pytest.MonkeyPatch) -> None:

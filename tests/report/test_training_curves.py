@@ -78,7 +78,7 @@ def test_what_never_changes_is_said_and_not_drawn(read: Any) -> None:
     trials = read(*({**_curve([0, i]), "level": (2.0, 2.0)} for i in (1, 2)))
     found, says = panels(trials)
     assert [panel.name for panel in found] == ["success"]
-    assert says == "Level is 2 throughout."
+    assert says == "Level is 2 throughout training."
 
 
 def test_trials_with_one_point_or_a_broken_axis_have_no_curve(read: Any) -> None:

@@ -121,7 +121,8 @@ def _parser() -> argparse.ArgumentParser:
     plan.add_argument("--like", metavar="KIND", help="times as of trials made on such a device, such as 'NVIDIA H200'")
     plan.add_argument("--measure", action="store_true", help="time a few steps of conditions never run here")
 
-    run = add("run", "run conditions without judging them; or what a variant of the protocol changes, and judge that")
+    text = "run missing trials and judge none; with --variant those that it changes, and say which verdicts it changes"
+    run = add("run", text)
     run.add_argument("method", nargs="?", help="only this method")
     run.add_argument("--on", metavar="TASK", help="only this task")
     run.add_argument("--variant", metavar="NAME", default="", help="run what this variant changes, then judge by it")
@@ -156,7 +157,9 @@ def _parser() -> argparse.ArgumentParser:
     mutants.add_argument("--of", metavar="TARGET", help="only faults of this method or this task")
     mutants.add_argument("--stored", action="store_true", help="run nothing: judge the trials that have run")
 
-    power = add("power", "say from a pilot how often each claim ends as expected; 1 when one does less than 0.95")
+    power = add(
+        "power", "say from a pilot how often each claim ends as expected; exit status 1 when one does less than 0.95"
+    )
     power.add_argument("--only", metavar="CLAIMS", help="only these claims, by id or name, such as G1,S2[cma_es]")
     made = power.add_mutually_exclusive_group()
     made.add_argument(
@@ -217,7 +220,7 @@ def _parser() -> argparse.ArgumentParser:
     )
 
     reproduce = add("reproduce", "redraw figures and tables of the paper from the trials at hand; run nothing")
-    reproduce.add_argument("figure", help="its name, such as fig3; all for every one")
+    reproduce.add_argument("figure", help="its name, such as fig3; all: every figure and table")
     reproduce.add_argument("--out", metavar="DIR", help="folder for PNG, SVG and CSV (figures/TIER)")
     reproduce.add_argument("--variant", metavar="NAME", default="", help="under this variant of the protocol")
 
@@ -242,7 +245,7 @@ def _parser() -> argparse.ArgumentParser:
     reference = add("reference", "write the stored trials of a tier as the committed reference trials")
     reference.add_argument("--variant", metavar="NAME", default="", help="those that only this variant has")
 
-    add("accept", "write the verdicts of now into verdicts.toml, as accepted; 1 when that changed the file")
+    add("accept", "write the verdicts of now into verdicts.toml, as accepted; exit status 1 when that changed the file")
 
     compare = add(
         "compare",
@@ -260,7 +263,7 @@ def _parser() -> argparse.ArgumentParser:
     across = add(
         "across",
         "judge claims in an environment for each release of a package, file of pins or Python, and compare with the "
-        "first; 1 when a verdict changed, trials drifted, or an environment has no verdicts",
+        "first; exit status 1 when a verdict changed, trials drifted, or an environment has no verdicts",
         ".evoclaims-releases",
     )
     across.add_argument(
@@ -294,7 +297,9 @@ def _parser() -> argparse.ArgumentParser:
     export.add_argument("--as", dest="form", metavar="FORM", default="json", help="json (default), csv or parquet")
     export.add_argument("--out", metavar="FILE", help="where to (report/trials.FORM, report/verdicts.FORM)")
 
-    tables = add("tables", "write the tables in Markdown files anew from the reference trials; 1 when one changed")
+    tables = add(
+        "tables", "write the tables in Markdown files anew from the reference trials; exit status 1 when one changed"
+    )
     tables.add_argument("files", nargs="+", metavar="FILE", help="such as README.md")
 
     badge = add("badge", "draw how many claims ended how, as a small SVG picture")

@@ -65,7 +65,7 @@ def panels(trials: Sequence[TrialSummary]) -> tuple[tuple[CurvePanel, ...], str]
     ordered = [name for name in FIRST if name in names] + sorted(names - set(FIRST))
     constant = {name: value for name in ordered if (value := _constant(usable, name)) is not None}
     varying = [name for name in ordered if name not in constant]
-    said = [f"{clean(name)} is {number(value)} throughout" for name, value in constant.items()]
+    said = [f"{clean(name)} is {number(value)} throughout training" for name, value in constant.items()]
     if len(usable) < len(trials):
         said.append(f"{len(trials) - len(usable)} of {len(trials)} trials have at most one point")
     if varying[MOST_PANELS:]:

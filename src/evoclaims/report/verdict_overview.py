@@ -26,7 +26,7 @@ HOW: Final = (
 )
 """How to read the table."""
 
-NOT_RUN: Final = "*not run*: there are no trials of it yet, or there is no test of it at this tier."
+NOT_RUN: Final = "*not run*: some of its trials are missing, or there is no test of it at this tier."
 NOT_CHANGED: Final = f"{NONE}: the variant changes none of the claim's trials, or they have not run."
 
 
