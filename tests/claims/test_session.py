@@ -101,7 +101,7 @@ def test_trials_that_may_not_be_run_end_a_claim_as_not_run(
         store.put(made(better.condition, seed, 1.0), {})
     report = stored.settle(ClaimTest(says, "smoke", ""), better.mean_success > worse.mean_success)
     assert (report.outcome, report.n, report.failed) == ("not run", 0, False)
-    assert report.reason.startswith("6 of 6 trials of hand_built_negated on n_parity are missing")
+    assert report.reason.startswith("worse on small: 6 of 6 trials are missing")
     assert len(report.fingerprint) == 64
     for seed in range(6):
         store.put(made(worse.condition, seed, 0.0), {})

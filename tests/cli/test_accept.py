@@ -69,7 +69,7 @@ def test_not_run_and_error_never_take_the_place_of_a_verdict(accepted: Evoclaims
 
 def test_both_tiers_are_accepted_unless_one_is_named(evoclaims: Evoclaims) -> None:
     _, out, _ = evoclaims("accept")
-    assert "left alone: a (full) is not run now (10 of 10 trials of hand_built on n_parity are missing)" in out
+    assert "left alone: a (full) is not run now (right on parity: 10 of 10 trials are missing)" in out
     assert "accepted: a (smoke)" in out
     assert "(full)" not in evoclaims("accept", "--tier=smoke")[1]
 

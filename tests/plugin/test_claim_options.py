@@ -91,7 +91,7 @@ def test_stored_trials_alone_are_judged_without_running_or_writing_any(project: 
     project.write(a="supported")
     result = project.run("--claims-stored", own_store=True)
     assert result.ret == pytest.ExitCode.NO_TESTS_COLLECTED
-    result.stdout.fnmatch_lines(["- a: 10 of 10 trials of hand_built on n_parity are missing"])
+    result.stdout.fnmatch_lines(["- a: right on parity: 10 of 10 trials are missing"])
     result.stdout.fnmatch_lines(["No claim was judged: nothing was measured."])
     assert not (project.path / ".evoclaims").exists()
     assert project.run(own_store=True).ret == 0

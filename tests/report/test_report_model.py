@@ -135,7 +135,7 @@ def test_a_claim_without_trials_says_why(lab: Laboratory) -> None:
     page = lab.page(lab.judge(better_solves))
     section = page.sections[0]
     assert section.report.outcome is Outcome.NOT_RUN
-    assert section.report.reason == "4 of 6 trials of hand_built on n_parity are missing"
+    assert section.report.reason == "better on small: 4 of 6 trials are missing"
     assert (section.parts, section.conditions, section.made.total()) == ((), (), 0)
     assert page.notices[0].startswith("No claim has been judged: neither the store nor the committed reference trials")
 

@@ -20,6 +20,11 @@ from evoclaims.trials.store import Store
 class NotStoredError(Exception):
     """Trials are missing and may not be run; the claim is then "not run"."""
 
+    def __init__(self, reason: str, condition: str = "") -> None:
+        """Say why; `condition` is the id of that whose trials are missing, which readers name before the reason."""
+        super().__init__(reason)
+        self.condition = condition
+
 
 @dataclass(frozen=True)
 class RunMissing:
@@ -97,5 +102,6 @@ class StoredOnly:
         """Return one trial per seed, or raise `NotStoredError`."""
         results = [result for result in self.archive.trials(condition, seeds) if result is not None]
         if len(results) < len(seeds):
-            raise NotStoredError(f"{len(seeds) - len(results)} of {len(seeds)} trials of {condition.label} are missing")
+            lacking = f"{len(seeds) - len(results)} of {len(seeds)} trials are missing"
+            raise NotStoredError(lacking, condition.id)
         return results

@@ -95,7 +95,8 @@ class Session:
             verdict = judge(assertion, design, claim=name, tier=tier)
         except NotStoredError as error:
             mark = fingerprint(assertion, design, claim=name, tier=tier)
-            verdict = Verdict(Outcome.NOT_RUN, str(error), assertion.describe(), mark)
+            of = next((f"{one.label}: " for one in assertion.sources() if one.fingerprint == error.condition), "")
+            verdict = Verdict(Outcome.NOT_RUN, f"{of}{error}", assertion.describe(), mark)
         return judged(test, assertion, design, verdict, self.again)
 
     def complete(self, report: ClaimReport, expectation: Expectation | None) -> ClaimReport:

@@ -183,7 +183,9 @@ def _parser() -> argparse.ArgumentParser:
     status.add_argument(
         "--variant", metavar="NAME", default="", help="the verdicts that this variant of the protocol may change"
     )
-    status.add_argument("--why", action="store_true", help="also say why verdicts are accepted, or inconclusive")
+    status.add_argument(
+        "--why", action="store_true", help="also say why verdicts are accepted, inconclusive or not run"
+    )
     status.add_argument("--as", dest="form", metavar="FORM", help="print csv, json or markdown instead of a table")
 
     report = add("report", "write a web page and a Markdown file about all claims from the trials at hand; run nothing")

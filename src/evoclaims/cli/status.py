@@ -67,12 +67,12 @@ def _print(reports: Sequence[ClaimReport], tier: str, why: bool) -> None:
     """Print the table, and why claims have failed; why every claim is not plainly supported where that is asked for."""
     explained = [report for report in reports if why or report.failed]
     accepted = any(report.as_expected and report.outcome is not Outcome.SUPPORTED for report in reports)
-    unexplained = accepted or any(report.outcome is Outcome.INCONCLUSIVE for report in reports)
+    unexplained = accepted or any(report.outcome in (Outcome.INCONCLUSIVE, Outcome.NOT_RUN) for report in reports)
     console = Console(file=styled())
     for part in (
         terminal_table.verdict_table(reports, console.width, console.is_terminal),
         terminal_table.explanations(explained, console.width, console.is_terminal),
-        "--why says why verdicts are accepted, or inconclusive" if unexplained and not why else "",
+        "--why says why verdicts are accepted, inconclusive or not run" if unexplained and not why else "",
         table_cells.faults(reports),
         f"claims ({tier}): {table_cells.totals(reports)}",
     ):
