@@ -86,6 +86,9 @@ def test_a_variant_shows_the_verdicts_that_it_may_change_and_which_it_does(statu
     ]
     assert "changes: 1 of 1 (S1 " in status("--variant=traded", "--only=S1")[1]
     assert [row["outcome"] for row in json.loads(status("--variant=traded", "--as=json")[1])["rows"]] == ["refuted"] * 2
+    code, out, err = status("--variant=traded", "--only=G1[wrong]")
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    assert "is judged under traded: it changes none of their trials" in err
     code, _, err = status("--variant=trade")
     assert (code, err.count("\n")) == (2, 1)
     assert "There is no variant named 'trade'. Did you mean 'traded'?" in err

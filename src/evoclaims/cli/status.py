@@ -11,7 +11,7 @@ from rich.console import Console
 from evoclaims.claims.selection import selected
 from evoclaims.cli.project import open_project
 from evoclaims.cli.terminal import styled
-from evoclaims.core.errors import UnknownNameError
+from evoclaims.core.errors import UnknownNameError, UserError
 from evoclaims.judging.verdict import Outcome
 from evoclaims.paper.reproduction import Reproduction
 from evoclaims.report import table_cells, terminal_table
@@ -35,13 +35,18 @@ def main(options: argparse.Namespace) -> int:
     project = open_project(options.storage)
     project.reproduction.tier(options.tier, options.variant)
     names = [options.variant, ""] if options.variant else [""]
-    judged, *plain = map(table_cells.ordered, project.judge_variants([(options.tier, name) for name in names]))
-    reports = judged
+    reports, *plain = map(table_cells.ordered, project.judge_variants([(options.tier, name) for name in names]))
     if options.only is not None:
         wanted = selected(options.only, {name for report in reports for name in (report.claim, report.name)})
         reports = [report for report in reports if wanted & {report.claim, report.name}]
     if options.variant:  # what it does not change, or has no trials, is left out
         reports = [report for report in reports if report.outcome is not Outcome.NOT_RUN]
+        if not reports:
+            raise UserError(
+                f"No claim of the {options.tier} tier that was asked for is judged under {options.variant}: it changes "
+                f"none of their trials, or they have not run. `evoclaims run --variant {options.variant} --tier "
+                f"{options.tier}` runs what is missing."
+            )
     if options.form is None:
         _print(reports, options.tier, options.why)
         for protocol in plain:
