@@ -110,12 +110,12 @@ def _told(claim: str, row: Sensitivity) -> Iterator[str]:
     yield f"{claim} ({row.outcome}){f': {row.tried}' * (row.tried is Tried.INSENSITIVE)}"
     width = shutil.get_terminal_size().columns
     for fate in Fate:
+        names = row.named(fate)
         found: dict[str, list[str]] = {}
-        for attempt in row.attempts:
-            if attempt.fate is fate:
-                found.setdefault(attempt.target, []).append(attempt.mutant)
-        if found:
-            yield f"  {sum(map(len, found.values()))} {fate}"
+        for target, _, mutant in (name.partition(": ") for name in names):
+            found.setdefault(target, []).append(mutant)
+        if names:
+            yield f"  {len(names)} {fate}"
         for target, mutants in found.items():
             yield textwrap.fill(
                 f"{target}: {', '.join(mutants)}",
