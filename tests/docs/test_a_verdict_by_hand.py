@@ -15,7 +15,7 @@ SECTION = (ROOT / "docs" / "judging.md").read_text(encoding="utf-8").partition("
 def test_the_verdict_computed_by_hand_is_the_accepted_one() -> None:
     (code,) = re.findall(r"```python\n(.*?)```", SECTION, re.DOTALL)
     told = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True).stdout
-    assert code.rstrip().endswith(f"  # {told.strip()}")
+    assert code.rstrip().endswith(f"\n# {told.strip()}")
     accepted = tomllib.loads((ROOT / "reproductions/nisioti2025/verdicts.toml").read_text(encoding="utf-8"))
     last = accepted["verdicts"]["full"]["O5"][-1]
     assert last["outcome"] == "refuted"
