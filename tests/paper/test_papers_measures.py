@@ -50,6 +50,18 @@ def test_a_measure_reads_its_own_number(read: Any, what: Any, name: str) -> None
 
 
 @pytest.mark.parametrize(
+    ("what", "worst"),
+    [(lambda g: g.stones, -math.inf), (lambda g: g.overturned, math.inf), (lambda g: g.control_cost, math.inf)],
+)
+def test_a_trial_that_diverged_counts_as_the_worst_robot(
+    made: Callable[..., Any], what: Callable[[PaperTrials], Measure], worst: float
+) -> None:
+    lost = replace(made(CONDITION, 0, 1.0), status="diverged")
+    group = PaperTrials("neat", "n_parity", CONDITION, lambda condition, seeds: [lost])
+    assert what(group).sample({group.fingerprint: (lost,)}).values == (worst,)
+
+
+@pytest.mark.parametrize(
     ("what", "name", "given", "held"),
     [
         (lambda g: g.crosses(7), "stones", [6.9, 7.0], (0, 1)),
