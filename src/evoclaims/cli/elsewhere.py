@@ -81,10 +81,7 @@ class Elsewhere:
                 verdicts = Path(folder) / "verdicts.json"
                 command = self._command(environment, store, verdicts)
                 status, said = _watched(command, self.root, environment.folder / LOG)
-                try:
-                    reports = [ClaimReport.from_json(plain) for plain in json.loads(verdicts.read_bytes())["claims"]]
-                except (OSError, ValueError, KeyError, TypeError):  # none, or those of another evoclaims
-                    reports = []
+                reports = _reports(verdicts)
         except BrokenPipeError:  # nobody reads what this command prints
             raise
         except OSError as error:  # a full disk
@@ -104,6 +101,14 @@ class Elsewhere:
             *(f"--claims-storage={store.root.absolute()}", f"--claims-json={verdicts}"),
             *([] if self.only is None else [f"--claims-only={self.only}"]),
         ]
+
+
+def _reports(verdicts: Path) -> list[ClaimReport]:
+    """Return the reports that a run has written; none if there is no such file, or it is another evoclaims'."""
+    try:
+        return [ClaimReport.from_json(plain) for plain in json.loads(verdicts.read_bytes())["claims"]]
+    except (OSError, ValueError, KeyError, TypeError):
+        return []
 
 
 def _watched(command: list[str], folder: Path, log: Path) -> tuple[int, str]:

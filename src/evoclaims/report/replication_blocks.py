@@ -21,9 +21,6 @@ _HEADINGS: Final = ("", "", "published", "ours", "95% of repetitions")
 _AT: Final = " at "
 """Stands between a profile's name and one of its levels: "success at level 4"."""
 
-_AND: Final = ", "
-"""Stands between the intervals of a number."""
-
 
 def blocks(found: Sequence[Replication], width: int) -> Iterator[tuple[str, Table]]:
     """Yield the heading of each block and its table, whose columns have the same places in all.
@@ -36,15 +33,16 @@ def blocks(found: Sequence[Replication], width: int) -> Iterator[tuple[str, Tabl
         width: columns of the terminal. Where it is too narrow, two readings of an error bar have a line each.
     """
     varied = any(one.variant for one in found)
-    made: dict[str, list[tuple[str, ...]]] = {}
+    made: dict[str, list[tuple[tuple[str, ...], list[str]]]] = {}
     for one in found:
         heading, label = _place(one, varied)
-        made.setdefault(heading, []).append((SYMBOLS[one.answer], label, published(one), ours(one), _intervals(one)))
-    rows = [_HEADINGS, *(row for block in made.values() for row in block)]
+        cells = SYMBOLS[one.answer], label, published(one), ours(one)
+        made.setdefault(heading, []).append((cells, _intervals(one)))
+    rows = [_HEADINGS, *((*cells, ", ".join(intervals)) for block in made.values() for cells, intervals in block)]
     widths = [max(map(cell_len, column)) for column in zip(*rows, strict=True)]
-    narrow = sum(widths) + GAP * (len(widths) - 1) > width
+    between = ",\n" if sum(widths) + GAP * (len(widths) - 1) > width else ", "
     for place, (heading, block) in enumerate(made.items()):
-        lines = [(*row, intervals.replace(_AND, ",\n") if narrow else intervals) for *row, intervals in block]
+        lines = [(*cells, between.join(intervals)) for cells, intervals in block]
         table = plain_table(_HEADINGS, lines, names=len(_HEADINGS))
         for column, least in zip(table.columns[:-1], widths, strict=False):
             column.min_width = least
@@ -62,9 +60,9 @@ def _place(one: Replication, varied: bool) -> tuple[str, str]:
     return f"{readings.task}: {measure}{under}", readings.method
 
 
-def _intervals(one: Replication) -> str:
+def _intervals(one: Replication) -> list[str]:
     """Return the interval by each reading of the published spread, or why there is none."""
-    return _AND.join(map(_interval, one.repetition.predictions)) or one.repetition.reason
+    return [*map(_interval, one.repetition.predictions)] or [one.repetition.reason]
 
 
 def _interval(prediction: Prediction) -> str:
