@@ -276,9 +276,10 @@ def test_plan_tells_what_the_reference_trials_have_cost(evoclaims: Evoclaims, st
     Path("reference/smoke/wrong-parity.jsonl").unlink()
     out = evoclaims("plan")[1]
     assert re.search(r"took on one *\n.*NVIDIA Abacus$", out, re.MULTILINE)
-    assert re.search(r"^right on parity +10 +0 +0 +0 s +2 h 00 min$", out, re.MULTILINE)
-    assert re.search(r"^wrong on parity +10 +0 +0 +0 s +not run$", out, re.MULTILINE)
-    assert re.search(r"^total +0 +0 s +2 h 00 min and more$", out, re.MULTILINE)
+    assert re.search(r"^right on parity +10 +0 +0 +0 s$", out, re.MULTILINE)
+    assert re.search(r"^right on parity +2 h 00 min$", out, re.MULTILINE)
+    assert re.search(r"^wrong on parity +not run$", out, re.MULTILINE)
+    assert re.search(r"^total +2 h 00 min *\n +and more$", out, re.MULTILINE)
     assert "Fewer than 10 reference trials: wrong on parity (0)." in out
     assert re.search(r"^a +10 +.*✓ ✗ +2 h 00 min$", out, re.MULTILINE)
     assert re.search(r"^b +10 +.*✓ ✗ +not run$", out, re.MULTILINE)
@@ -289,7 +290,8 @@ def test_plan_tells_the_hours_of_a_cpu_core(evoclaims: Evoclaims, stored: Store)
     out = evoclaims("plan", "--tier", "full")[1]
     assert re.search(r" CPU\n.* core hours$", out, re.MULTILINE)
     assert "took on one" not in out
-    assert re.search(r"^right on parity +0 +10 +80 +unknown +< 1$", out, re.MULTILINE)
+    assert re.search(r"^right on parity +0 +10 +80 +unknown$", out, re.MULTILINE)
+    assert re.search(r"^right on parity +< 1$", out, re.MULTILINE)
 
 
 def test_plan_times_a_few_steps_where_it_is_asked_to_and_stores_none(evoclaims: Evoclaims) -> None:

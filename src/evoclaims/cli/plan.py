@@ -31,6 +31,9 @@ Costs = Mapping[tuple[str, str], Spent]
 HOUR: Final = 3600
 """Seconds."""
 
+AND_MORE: Final = "\nand more"
+"""Says of a sum that some of it is unknown; on a line of its own, so that the column stays narrow."""
+
 
 def main(options: argparse.Namespace) -> int:
     """Print conditions with their cost, then claims with their attainable p."""
@@ -55,7 +58,7 @@ def main(options: argparse.Namespace) -> int:
     console = PlainSpokenConsole(file=styled())
     where = f"as they took on one {kind}" if options.like else f"on {len(chosen)} × {kind}"
     console.print(f"Conditions of the {options.tier} tier, {where}")
-    console.print_whole(_conditions(tier, store, used, paces, costs, project.config.seconds(None)))
+    console.print_whole(_conditions(tier, store, used, paces, project.config.seconds(None)))
     own, timed = sum(_has_run(store, tier, names) for names in used), sum(pace is not None for pace in paces.values())
     if not options.like and own < timed:
         console.print(
@@ -69,8 +72,7 @@ def main(options: argparse.Namespace) -> int:
             few = f", and the design looks at {n}" if len(condition.existing or ()) < n else ""
             said = f"{' on '.join(names)}: nothing to run: {where_from(condition)}{few}"
             console.print(said)
-    for sentence in _about({names: costs[names] for names in used}, tier.design.last.n):
-        console.print(sentence)
+    _print_spent(console, tier, {names: costs[names] for names in used})
     ends = ", ".join(f"{outcome.symbol} {outcome}" for outcome in (Outcome.SUPPORTED, Outcome.REFUTED))
     console.print(
         f"\nClaims: the smallest p that the design allows (n trials a side, α {tier.design.alpha:g}), and how each "
@@ -90,21 +92,15 @@ def _conditions(
     store: Store,
     used: Sequence[tuple[str, str]],
     paces: dict[tuple[str, str], Pace | None],
-    costs: Costs,
     limit: float,
 ) -> Table:
     """Build the table of conditions; steps and times are upper bounds, since a trial that has solved all levels stops.
 
-    Trials that ran out of less time than `limit` (seconds) count as missing, too. Where there are reference trials,
-    their cost is shown.
+    Trials that ran out of less time than `limit` (seconds) count as missing, too.
     """
-    kinds, cores = _kinds(costs), any(cost.core_pace for cost in costs.values())
-    measured = [f"took on one\n{kind}" for kind in kinds] + ["CPU\ncore hours"] * cores
-    headings = ("condition", "cached", "missing", "environment\nsteps", "time,\nat most", *measured)
-    table = plain_table(headings, ())
+    table = plain_table(("condition", "cached", "missing", "environment\nsteps", "time,\nat most"), ())
     seeds = tier.design.seeds(tier.design.last.n)
     steps, seconds, unknown = 0, 0.0, False
-    needed = {names: costs[names].core_seconds(tier.condition(*names).environment_steps * len(seeds)) for names in used}
     for names in used:
         condition = tier.condition(*names)
         missing = sum(map(StoredTrials(store, condition, time_limit=limit).lacks, seeds))
@@ -117,20 +113,42 @@ def _conditions(
             str(missing),
             f"{owed:,}",
             "unknown" if time is None else duration(time),
-            *(_took(costs, [names], kind) for kind in kinds),
-            *([_core_hours(needed[names])] if cores else []),
         )
         steps, seconds, unknown = steps + owed, seconds + (time or 0.0), unknown or time is None
-    table.add_row(
-        "total",
-        "",
-        "",
-        f"{steps:,}",
-        "unknown" if unknown and not seconds else duration(seconds) + (" and more" if unknown else ""),
-        *(_took(costs, used, kind) for kind in kinds),
-        *([_core_hours(sum(filter(None, needed.values())))] if cores else []),
-        style="bold",
+    whole = "unknown" if unknown and not seconds else duration(seconds) + AND_MORE * unknown
+    table.add_row("total", "", "", f"{steps:,}", whole, style="bold")
+    return table
+
+
+def _print_spent(console: PlainSpokenConsole, tier: Tier, costs: Costs) -> None:
+    """Print what the reference trials of conditions took, how to read that, and which are missing; nothing without any.
+
+    The table is apart from that of conditions, so that each fits a terminal of 80 columns.
+    """
+    if not any(cost.trials or cost.core_pace for cost in costs.values()):
+        return
+    console.print(
+        "\nMeasured on the committed reference trials: what they took, with compiling. Estimated from them: the hours "
+        "of a CPU's core that all trials' whole budgets would take, at the pace of that method and task at any tier."
     )
+    console.print_whole(_spent(tier, costs))
+    n = tier.design.last.n
+    few = [f"{' on '.join(names)} ({cost.trials})" for names, cost in costs.items() if cost.trials < n]
+    if few and any(cost.trials for cost in costs.values()):
+        console.print(f"Fewer than {n} reference trials: {', '.join(few)}.")
+
+
+def _spent(tier: Tier, costs: Costs) -> Table:
+    """Build the table of what the reference trials of conditions took, and would take on a CPU."""
+    kinds, cores = _kinds(costs), any(cost.core_pace for cost in costs.values())
+    table = plain_table(("condition", *(f"took on one\n{kind}" for kind in kinds), *["CPU\ncore hours"] * cores), ())
+    n = tier.design.last.n
+    needed = {names: cost.core_seconds(n * tier.condition(*names).environment_steps) for names, cost in costs.items()}
+    for names, seconds in needed.items():
+        hours = [_core_hours(seconds)] * cores
+        table.add_row(" on ".join(names), *(_took(costs, [names], kind) for kind in kinds), *hours)
+    hours = [_core_hours(sum(filter(None, needed.values())))] * cores
+    table.add_row("total", *(_took(costs, list(costs), kind) for kind in kinds), *hours, style="bold")
     return table
 
 
@@ -152,7 +170,7 @@ def _took(costs: Costs, names: Sequence[tuple[str, str]], kind: str) -> str:
     missing = any(not cost.trials for cost in found)
     if not seconds:
         return "not run" if missing else "–"
-    return duration(seconds) + (" and more" if missing else "")
+    return duration(seconds) + AND_MORE * missing
 
 
 def _core_hours(seconds: float | None) -> str:
@@ -161,18 +179,6 @@ def _core_hours(seconds: float | None) -> str:
         return "unknown"
     hours = seconds / HOUR
     return f"{hours:,.0f}" if hours >= 1 else "< 1"
-
-
-def _about(costs: Costs, n: int) -> list[str]:
-    """Say how to read the cost of the reference trials, and which are missing."""
-    if not any(cost.trials for cost in costs.values()):
-        return []
-    few = [f"{' on '.join(names)} ({cost.trials})" for names, cost in costs.items() if cost.trials < n]
-    sentences = [
-        "Measured on the committed reference trials: what they took, with compiling. Estimated from them: the hours of "
-        "a CPU's core that all trials' whole budgets would take, at the pace of that method and task at any tier."
-    ]
-    return [*sentences, f"Fewer than {n} reference trials: {', '.join(few)}."] if few else sentences
 
 
 def _claims(reports: Sequence[ClaimReport], costs: Costs) -> Table:
