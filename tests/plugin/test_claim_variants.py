@@ -87,6 +87,7 @@ def test_the_command_runs_what_a_variant_changes_and_says_what_hangs_on_it(
     assert main(["run", "--variant", "traded"]) == 0
     shown = capsys.readouterr().out
     assert re.search(r"^  right on parity \(smoke\): 8 trials to run, at most \d+ s$", shown, re.MULTILINE)
+    assert "  first: refuted; not run under the protocol itself" in shown.splitlines()
     assert shown.index("8 trials to run") < shown.index("\nright on parity (smoke)\n")
     assert main(["run", "wrong", "--variant", "traded"]) == 2
     assert "changes none of these conditions" in capsys.readouterr().err

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from evoclaims.judging.verdict import Outcome
 from evoclaims.report.html import html
 from evoclaims.report.markdown import markdown
@@ -34,6 +36,12 @@ def test_markdown_sets_off_what_hangs_on_a_detail() -> None:
     assert r"| G1\[&lt;b&gt;\] | smoke | refuted | **supported** | refuted |" in lines
     assert "| G2 | smoke | supported | – | supported |" in lines
     assert "* network: another &lt;network&gt;" in lines
+
+
+def test_a_verdict_stands_out_from_no_protocol_that_has_not_run() -> None:
+    alone = replace(PAGE, robustness=(Robustness("G3", "full", Outcome.NOT_RUN, {"rows": Outcome.REFUTED}),))
+    assert "<b>refuted</b>" not in html(alone)
+    assert "| G3 | full | not run | refuted |" in markdown(alone).splitlines()
 
 
 def test_without_variants_nothing_is_said_of_them() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pytest
 from hand_made_verdicts import report
 
 from evoclaims.judging.verdict import Outcome
@@ -27,6 +28,16 @@ def test_claims_that_no_variant_judged_are_left_out() -> None:
     variants = {"x": [_report("A", Outcome.NOT_RUN, "x"), _report("B", Outcome.REFUTED, "x")], "y": []}
     (row,) = matrix(PLAIN, variants)
     assert (row.claim, row.outcomes, row.hangs_on) == ("B", {"x": Outcome.REFUTED}, ())
+
+
+@pytest.mark.parametrize("plain", Outcome)
+@pytest.mark.parametrize("varied", [outcome for outcome in Outcome if outcome is not Outcome.NOT_RUN])
+def test_a_claim_hangs_on_a_variant_where_both_have_run_and_their_verdicts_differ(
+    plain: Outcome, varied: Outcome
+) -> None:
+    (row,) = matrix([_report("A", plain)], {"x": [_report("A", varied, "x")]})
+    assert (row.plain, row.outcomes) == (plain, {"x": varied})
+    assert row.hangs_on == (("x",) if plain is not Outcome.NOT_RUN and plain is not varied else ())
 
 
 def test_tiers_are_kept_apart() -> None:

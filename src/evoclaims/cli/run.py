@@ -14,6 +14,7 @@ from evoclaims.cli.variant_cost import to_run
 from evoclaims.cli.worker import WorkOrder
 from evoclaims.core.errors import UnknownNameError, UserError
 from evoclaims.judging.counting import MAX_TRIALS
+from evoclaims.judging.verdict import Outcome
 from evoclaims.mutants.conditions import Job
 from evoclaims.paper.reproduction import Reproduction, Tier
 from evoclaims.paper.variant import Names
@@ -79,7 +80,8 @@ def _print_matrix(project: Project, tier: str, variant: str) -> None:
     for row in rows:
         for name, outcome in row.outcomes.items():
             changed = f"{row.plain} -> {outcome}" if name in row.hangs_on else f"{outcome} either way"
-            print(f"  {row.claim}: {changed}")
+            alone = f"{outcome}; not run under the protocol itself"
+            print(f"  {row.claim}: {alone if row.plain is Outcome.NOT_RUN else changed}")
     if not rows:
         print("  No claim can be judged yet: each needs all trials of its tier.")
 

@@ -28,7 +28,9 @@ class Robustness:
 
     @property
     def hangs_on(self) -> tuple[str, ...]:
-        """Variants under which the outcome differs."""
+        """Variants whose verdict is another one than the protocol's; none where the protocol itself has not run."""
+        if self.plain is Outcome.NOT_RUN:
+            return ()
         return tuple(name for name, outcome in self.outcomes.items() if outcome != self.plain)
 
 
