@@ -114,7 +114,9 @@ def test_another_python_with_pins_gets_this_program_first_and_then_the_release_o
     monkeypatch.setenv("PATH", f"{uv.parent}{os.pathsep}{os.environ['PATH']}")
     monkeypatch.setenv("PYTHONPATH", "")
     pins = tmp_path / "pins.txt"
-    pins.write_text("# what we had\njax==0.10.2\nPebble == 1.0\npebble-stone==3\n")
+    hashes = " \\\n    --hash=sha256:12 \\\n    --hash=sha256:34\n"
+    kept = f"# what we had\njax==0.10.2\npebble-stone==3{hashes}    # via ours\n"
+    pins.write_text(f"Pebble == 1.0{hashes}{kept}")
     (tmp_path / "pyproject.toml").write_text('[project]\nname = "ours"\n')
 
     environment = make_one("pebble", "1.1", python="3.13", constraints=pins)
@@ -126,7 +128,22 @@ def test_another_python_with_pins_gets_this_program_first_and_then_the_release_o
     assert "evoclaims" in first or "--editable" in first
     assert first.endswith(f"--editable {tmp_path}")
     assert second == f"pip install --python {environment.python} --constraint {constraints} pebble==1.1"
-    assert constraints.read_text() == "# what we had\njax==0.10.2\npebble-stone==3\n"
+    assert constraints.read_text() == kept  # uv checks the hashes that there are
+
+
+@pytest.mark.oldest
+def test_pip_takes_pins_with_hashes_though_the_project_has_none(
+    wheels: Path, make_one: Make, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """`ours` stands in for the project and this program, which have no hash and need what is pinned."""
+    write_wheel(wheels, "ours", "1.0", "import grain", "Requires-Dist: grain\n")
+    for version in ("2.0", "2.1"):
+        write_wheel(wheels, "grain", version, "")
+    monkeypatch.setattr(environments, "_requirements", lambda project: ["ours"])
+    monkeypatch.setattr(environments.shutil, "which", lambda name: None)  # no uv
+    pins = tmp_path / "pins.txt"
+    pins.write_text(f"grain==2.0 \\\n    --hash=sha256:{'0' * 64} \\\n    --hash=sha256:{'1' * 64}\n    # via ours\n")
+    assert make_one("", "", constraints=pins).versions["grain"] == "2.0"
 
 
 @pytest.mark.parametrize(

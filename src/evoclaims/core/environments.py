@@ -33,6 +33,7 @@ from evoclaims.core.canonical import content_hash
 from evoclaims.core.errors import UserError
 from evoclaims.core.file_names import file_name
 from evoclaims.core.files import write_atomically
+from evoclaims.core.pins import without, without_hashes
 
 PROGRAM: Final = "evoclaims"
 
@@ -189,9 +190,10 @@ def _made(recipe: Recipe, empty: Environment, project: Path, pins: str) -> Envir
         _begin_layer(empty.folder)
         _run([str(empty.python), *PIP, "install", *recipe.release])
     else:
-        install = _begin_apart(recipe, empty)
+        install, by_uv = _begin_apart(recipe, empty)
         constraints = empty.folder / "constraints.txt"
-        constraints.write_text(pins, encoding="utf-8")
+        # Where a pin has a hash, pip asks for one of everything, of this program and the project, too; uv does not.
+        constraints.write_text(pins if by_uv else without_hashes(pins), encoding="utf-8")
         constrained = ["--constraint", str(constraints)] if pins else []
         _run([*install, *constrained, *_requirements(project)])
         if recipe.package:  # apart from the rest, whose metadata may ask for another release
@@ -212,17 +214,17 @@ def _begin_layer(folder: Path) -> None:
     (_place(folder, "purelib") / "layer.pth").write_text("".join(lines), encoding="utf-8")
 
 
-def _begin_apart(recipe: Recipe, empty: Environment) -> list[str]:
-    """Make an empty environment, by uv where there is one, and return the command that installs into it."""
+def _begin_apart(recipe: Recipe, empty: Environment) -> tuple[list[str], bool]:
+    """Make an empty environment, by uv where there is one; return the command to install with, and if it is uv's."""
     uv = shutil.which("uv")
     if uv is not None:
         _run([uv, "venv", "--python", recipe.python or sys.executable, str(empty.folder)])
-        return [uv, "pip", "install", "--python", str(empty.python)]
+        return [uv, "pip", "install", "--python", str(empty.python)], True
     python = shutil.which(f"python{recipe.python}") if recipe.python else sys.executable
     if python is None:
         raise NotInstallableError(f"there is no python{recipe.python} on the path, and no uv that would fetch one")
     _run([python, "-m", "venv", str(empty.folder)])
-    return [str(empty.python), *PIP, "install"]
+    return [str(empty.python), *PIP, "install"], False
 
 
 def _requirements(project: Path) -> list[str]:
@@ -252,12 +254,10 @@ def _pins(recipe: Recipe) -> str:
     if recipe.constraints is None:
         return ""
     try:
-        lines = recipe.constraints.read_text(encoding="utf-8").splitlines(keepends=True)
+        pins = recipe.constraints.read_text(encoding="utf-8")
     except (OSError, UnicodeError) as error:
         raise UserError(f"Cannot read the constraints {recipe.constraints}: {error}.") from error
-    names = ((re.match(r"\s*[\w.-]+", line), line) for line in lines)
-    own = canonicalize_name(recipe.package)
-    return "".join(line for name, line in names if not name or canonicalize_name(name[0].strip()) != own)
+    return without(pins, recipe.package)
 
 
 def _run(command: Sequence[str]) -> str:
