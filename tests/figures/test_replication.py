@@ -64,6 +64,7 @@ def test_every_published_number_is_read_once_from_the_trials_that_it_is_about(re
         "other on small: success at level 0",
         "one on large: episode reward",
     ]
+    assert [one.level for one in found.values()] == [0, 1, 0, None]
     first, second, absent, reward = found.values()
     assert (first.readings.mean, first.answer) == (pytest.approx(0.5), Answer.OUTSIDE)
     assert (second.readings.mean, second.answer) == (pytest.approx(0.5), Answer.INSIDE)

@@ -50,9 +50,7 @@ def test_cells_say_what_is_published_what_is_ours_and_whether_it_is_inside() -> 
 
 def _levels(count: int, variant: str = "") -> list[Replication]:
     first = _number([700.0, 900.0] * 5, variant=variant)
-    return [
-        replace(first, readings=replace(first.readings, name=f"success at level {level}")) for level in range(count)
-    ]
+    return [replace(first, readings=replace(first.readings, name="success"), level=level) for level in range(count)]
 
 
 @pytest.mark.parametrize(("width", "lines_each"), [(80, 1), (60, 2)])
@@ -74,6 +72,16 @@ def test_a_terminal_shows_a_block_for_each_condition_and_variant_and_breaks_only
     assert " ".join(" ".join(shown[rows][:lines_each]).split()) == (
         "✗ level 0 900 ± 20 800 ± 110 (10) 879.8–920.2 SD ✗, 836–964 SE ✗"
     )
+
+
+@pytest.mark.parametrize("name", ["speed at rest", "success at level 4", " at "])
+def test_a_measure_may_have_at_in_its_name(name: str) -> None:
+    first = _number([900.0] * 10)
+    plain = replace(first, readings=replace(first.readings, name=name))
+    ((heading, table),) = replication_blocks.blocks([plain], 80)
+    assert (heading, [*table.columns[1].cells], plain.measure) == (f"maze: {name}", ["<neat>"], name)
+    ((heading, table),) = replication_blocks.blocks([replace(plain, level=2)], 80)
+    assert (heading, [*table.columns[1].cells]) == (f"<neat> on maze: {name}", ["level 2"])
 
 
 def test_a_block_says_why_a_number_has_no_interval() -> None:

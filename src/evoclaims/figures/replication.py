@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from evoclaims.core.errors import UnknownNameError
 from evoclaims.figures.figure import Scope
 from evoclaims.figures.readings import Readings, read
-from evoclaims.judging.measure import Measure, Profile
+from evoclaims.judging.measure import Profile
 from evoclaims.judging.repetition import Answer, PublishedMean, Repetition, repetition
 from evoclaims.paper.archive import Archive
 from evoclaims.paper.reported import Published, Reported
@@ -24,8 +24,9 @@ class Replication:
         tier: at which ours were made.
         variant: of the protocol; empty for the protocol itself.
         reported: the published number.
-        readings: ours, from each trial.
+        readings: ours, from each trial; of a profile's level, named as the profile is.
         repetition: whether ours are what a repetition of the published trials would give.
+        level: of a profile, counted from 0; None for a measure without levels.
     """
 
     tier: str
@@ -33,11 +34,17 @@ class Replication:
     reported: Reported
     readings: Readings
     repetition: Repetition
+    level: int | None = None
+
+    @property
+    def measure(self) -> str:
+        """What is measured, such as "success at level 4"."""
+        return self.readings.name if self.level is None else f"{self.readings.name} at level {self.level}"
 
     @property
     def name(self) -> str:
-        """What is measured, such as "neat on n_parity: success at level 4"."""
-        return f"{self.readings.method} on {self.readings.task}: {self.readings.name}"
+        """What is measured of which trials, such as "neat on n_parity: success at level 4"."""
+        return f"{self.readings.method} on {self.readings.task}: {self.measure}"
 
     @property
     def answer(self) -> Answer:
@@ -49,7 +56,7 @@ class Replication:
         common = {
             "method": self.readings.method,
             "task": self.readings.task,
-            "measure": self.readings.name,
+            "measure": self.measure,
             "tier": self.tier,
             "variant": self.variant,
             "published.mean": self.reported.value,
@@ -96,10 +103,10 @@ def replications(
             names = method, task
             if scope.variant and plain.conditions.get(names) == changed[scope.variant].conditions.get(names):
                 continue
-            readings = _ours(scope, quantity, method, task, at)
+            readings, level = _ours(scope, quantity, method, task, at)
             if not scope.variant or readings.values:
                 judged = _judged(reported, readings, len(scope.seeds))
-                found.append(Replication(tier, scope.variant, reported, readings, judged))
+                found.append(Replication(tier, scope.variant, reported, readings, judged, level))
     return tuple(found)
 
 
@@ -127,31 +134,23 @@ def _numbers(published: Published) -> Iterator[tuple[str, str, str, int, Reporte
                         yield quantity, method, task, at, reported
 
 
-def _ours(scope: Scope, quantity: str, method: str, task: str, at: int) -> Readings:
-    """Read our trials; without any where the tier has no such condition, or its task no such level."""
+def _ours(scope: Scope, quantity: str, method: str, task: str, at: int) -> tuple[Readings, int | None]:
+    """Read our trials, and say of which level: None of a measure without levels.
+
+    There are no readings where the tier has no such condition, or its task no such level.
+    """
     try:
-        return read(scope, method, task, lambda group: _measure(group, quantity, at))
-    except _AbsentError as absent:
-        return Readings(method, task, str(absent), ())
+        found = getattr(scope.group(method, task), quantity)
     except UnknownNameError:
         if (method, task) in scope.tier.conditions:
             raise
-        return Readings(method, task, quantity, ())
-
-
-class _AbsentError(Exception):
-    """A level that a task does not have; its name."""
-
-
-def _measure(group: Any, quantity: str, at: int) -> Measure:
-    """Return the measure of a published quantity: a group's own, or one level of it."""
-    found = getattr(group, quantity)
+        return Readings(method, task, quantity, ()), None
     if not isinstance(found, Profile):
-        measure: Measure = found
-        return measure
+        return read(scope, method, task, lambda group: getattr(group, quantity)), None
     if at >= found.size:
-        raise _AbsentError(f"{found.name} at level {at}")
-    return found.at(at)
+        return Readings(method, task, found.name, ()), at
+    readings = read(scope, method, task, lambda group: getattr(group, quantity).at(at))
+    return replace(readings, name=found.name), at
 
 
 def _judged(reported: Reported, readings: Readings, planned: int) -> Repetition:

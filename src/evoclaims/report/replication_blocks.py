@@ -18,8 +18,6 @@ LEGEND: Final = ", ".join(f"{symbol} {answer}" for answer, symbol in SYMBOLS.ite
 """What the symbols stand for."""
 
 _HEADINGS: Final = ("", "", "published", "ours", "95% of repetitions")
-_AT: Final = " at "
-"""Stands between a profile's name and one of its levels: "success at level 4"."""
 
 
 def blocks(found: Sequence[Replication], width: int) -> Iterator[tuple[str, Table]]:
@@ -53,11 +51,10 @@ def blocks(found: Sequence[Replication], width: int) -> Iterator[tuple[str, Tabl
 def _place(one: Replication, varied: bool) -> tuple[str, str]:
     """Return the heading that a number belongs to, with the variant if several are shown, and its name below it."""
     readings = one.readings
-    measure, _, level = readings.name.partition(_AT)
     under = f", {one.variant or PROTOCOL}" if varied else ""
-    if level:
-        return f"{readings.method} on {readings.task}: {measure}{under}", level
-    return f"{readings.task}: {measure}{under}", readings.method
+    if one.level is None:
+        return f"{readings.task}: {readings.name}{under}", readings.method
+    return f"{readings.method} on {readings.task}: {readings.name}{under}", f"level {one.level}"
 
 
 def _intervals(one: Replication) -> list[str]:
