@@ -34,14 +34,14 @@ from evoclaims.trials.result import TrialResult  # noqa: E402
 from evoclaims.trials.spec import Condition, TrialSpec  # noqa: E402
 from evoclaims.trials.store import Store  # noqa: E402
 from reproductions.nisioti2025.ecorobot import FULL, HIERARCHICAL  # noqa: E402
-from reproductions.nisioti2025.published_course import SURFACE  # noqa: E402
+from reproductions.nisioti2025.published_course import SURFACE, PublishedObstacles, published_boxes  # noqa: E402
 
 SHORT, LONG = 1_000, 2_000
 
 
 @dataclass(frozen=True)
-class Course(Obstacles):
-    """Obstacles of some surface, and if `flat`, as deep below the floor as they are high."""
+class PartlyPublished(Obstacles):
+    """Obstacles that have some of what the published ones have: the depth, if `flat`, or a part of the surface."""
 
     flat: bool = False
     surface: Surface = Surface()
@@ -49,17 +49,15 @@ class Course(Obstacles):
     @property
     def boxes(self) -> tuple[Box, ...]:
         """The obstacles."""
-        return tuple(
-            replace(box, bottom=-box.top if self.flat else box.bottom, surface=self.surface) for box in super().boxes
-        )
+        return published_boxes(super().boxes, flat=self.flat, surface=self.surface)
 
 
 COURSES = {
-    "ours": Course(episode_steps=LONG),
-    "flat": Course(episode_steps=LONG, flat=True),
-    "rough": Course(episode_steps=LONG, surface=Surface(friction=SURFACE.friction)),
-    "hard": Course(episode_steps=LONG, surface=replace(SURFACE, friction=Surface().friction)),
-    "all three, as published": Course(episode_steps=LONG, flat=True, surface=SURFACE),
+    "ours": Obstacles(episode_steps=LONG),
+    "flat": PartlyPublished(episode_steps=LONG, flat=True),
+    "rough": PartlyPublished(episode_steps=LONG, surface=Surface(friction=SURFACE.friction)),
+    "hard": PartlyPublished(episode_steps=LONG, surface=replace(SURFACE, friction=Surface().friction)),
+    "all three, as published": PublishedObstacles(episode_steps=LONG),
 }
 
 
@@ -73,7 +71,7 @@ def stored(condition: Condition, stores: Sequence[Store]) -> Iterator[tuple[Tria
                 break
 
 
-def outings(condition: Condition, trials: Sequence[tuple[TrialResult, Any]], course: Course) -> tuple[Any, Any, Any]:
+def outings(condition: Condition, trials: Sequence[tuple[TrialResult, Any]], course: Obstacles) -> tuple[Any, Any, Any]:
     """Return x and the furthest x (m), and the sum of squared actions, after each step, [trials, episodes, steps]."""
     method, task = condition.method, condition.task
     untrained = method.best(task, method.init(trial_key(0, TRAINING), task))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from typing import ClassVar, Final
 
@@ -13,6 +13,11 @@ from evoclaims.envs import HALF_CHEETAH, Box, Episode, Obstacles, Robot, Surface
 SURFACE: Final = Surface(friction=(2.0, 0.1, 0.1), solref=(0.01, 1.0), solimp=(0.99, 0.99, 0.01, 0.5, 2.0))
 LONGER: Final = 2
 """How many times as long as its training episodes a policy is examined."""
+
+
+def published_boxes(boxes: Iterable[Box], *, flat: bool = True, surface: Surface = SURFACE) -> tuple[Box, ...]:
+    """Return boxes with a surface, the published one, and if `flat` as deep below the floor as they are high."""
+    return tuple(replace(box, bottom=-box.top if flat else box.bottom, surface=surface) for box in boxes)
 
 
 @dataclass(frozen=True)
@@ -30,7 +35,7 @@ class PublishedObstacles(Obstacles):
     @property
     def boxes(self) -> tuple[Box, ...]:
         """The obstacles."""
-        return tuple(replace(box, bottom=-box.top, surface=SURFACE) for box in super().boxes)
+        return published_boxes(super().boxes)
 
     def examine(self, policy: Callable[[Array], Array], key: PRNGKeyArray, level: Int[Array, ""]) -> Episode:
         """Run `examined_episodes`, each `LONGER` times as long as in training."""

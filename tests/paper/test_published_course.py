@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import jax
@@ -15,7 +16,7 @@ from evoclaims.envs.ecorobot.robots import HALF_CHEETAH
 from evoclaims.envs.ecorobot.scene import Scene, box_geoms
 from evoclaims.methods import Ppo
 from reproductions.nisioti2025 import REPRODUCTION
-from reproductions.nisioti2025.published_course import PublishedObstacles
+from reproductions.nisioti2025.published_course import SURFACE, PublishedObstacles, published_boxes
 
 PUBLISHED, OURS = PublishedObstacles(), Obstacles()
 
@@ -39,6 +40,15 @@ def test_the_simulated_boxes_are_as_rough_and_hard_as_the_published_ones_and_our
         assert np.allclose(model.geom_friction[geoms], friction)
         assert np.allclose(model.geom_solref[geoms], solref)
         assert np.allclose(model.geom_solimp[geoms], solimp)
+
+
+@pytest.mark.parametrize("flat", [False, True])
+@pytest.mark.parametrize("surface", [Surface(), SURFACE])
+def test_depth_and_surface_are_changed_apart_and_nothing_else(flat: bool, surface: Surface) -> None:
+    for ours, made in zip(OURS.boxes, published_boxes(OURS.boxes, flat=flat, surface=surface), strict=True):
+        assert (made.bottom == -made.top) == flat
+        assert made.surface == surface
+        assert replace(made, bottom=ours.bottom, surface=ours.surface) == ours
 
 
 def test_boxes_of_different_surfaces_do_not_take_turns() -> None:
