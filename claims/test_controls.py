@@ -73,7 +73,7 @@ def test_a_method_is_not_better_than_itself(trials, verdict, method):
     ],
 )
 def test_ppo_learns_to_run(trials, verdict, task):
-    """Asserted is more reward; how far it is more is not judged, but told (docs/protocol.md, "Limbs and obstacles")."""
+    """Only "more" is asserted; how much more stands in docs/protocol.md, "Limbs and obstacles"."""
     ppo = trials("ppo", on=task)
     random_policy = trials("random_policy", on=task)
     verdict(ppo.reward > random_policy.reward)

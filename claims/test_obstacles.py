@@ -48,7 +48,7 @@ def test_neat_is_best_over_obstacles(trials, verdict, other):
 )
 @pytest.mark.parametrize("other", ["hyperneat", "cma_es"])
 def test_ppo_is_second_over_obstacles(trials, verdict, other):
-    """Asserted is more reward than the others'; how much more is not judged, but told (docs/protocol.md)."""
+    """Only "more" is asserted; how much more stands in docs/protocol.md, "Limbs and obstacles"."""
     ppo = trials("ppo", on="obstacles")
     rest = trials(other, on="obstacles")
     verdict(ppo.reward > rest.reward)

@@ -128,9 +128,9 @@ def test_neat_collects_more_reward(trials, verdict, claim_tier, other):
     smoke="MAP-Elites collects about as little reward as PPO: both more than a random policy, but far less than NEAT",
 )
 def test_map_elites_collects_few_stones(trials, verdict, claim_tier):
-    """As bad as PPO is taken for what the paper says of PPO (S3): at most one stone. The behaviour is judged in S6.
+    """The words "equally bad" are read as what the paper says of PPO (S3): at most one stone. S6 judges the behaviour.
 
-    Smoke compares rewards: MAP-Elites' within 400 of PPO's, and less than NEAT's; how far less is not judged.
+    Smoke compares rewards: MAP-Elites' within 400 of PPO's, and less than NEAT's.
     """
     map_elites = trials("map_elites", on="stones")
     if claim_tier == "full":
