@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable
+from functools import partial
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -14,7 +16,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from evoclaims.core.errors import UserError
-from evoclaims.networks.all_skips import AllSkips
+from evoclaims.networks.all_skips import AllSkips, scanned, unrolled
 
 pytestmark = pytest.mark.newest
 
@@ -113,6 +115,83 @@ def test_a_batch_matches_the_loop_plain_and_jitted() -> None:
     for one, answer in zip(observations, batch, strict=True):
         np.testing.assert_allclose(answer, network.apply(parameters, one, 2), atol=1e-6)
         np.testing.assert_allclose(answer, jitted(one), atol=1e-6)
+
+
+@st.composite
+def _networks(draw: st.DrawFn) -> tuple[int, int, NDArray[np.float64], NDArray[np.float64]]:
+    """Draw hidden neurons, outputs, parameters and an observation."""
+    inputs, hidden, outputs = draw(st.integers(1, 4)), draw(st.integers(0, 6)), draw(st.integers(1, 3))
+    return hidden, outputs, *_drawn(inputs, hidden, outputs, draw(st.integers(0, 2**31 - 1)))
+
+
+@settings(max_examples=8, deadline=None)
+@given(_networks())
+def test_without_its_loop_it_computes_the_same(network: Any) -> None:
+    hidden, outputs, parameters, observation = network
+    given_ = jnp.float32(parameters), jnp.float32(observation)
+    answer = jax.jit(partial(unrolled, hidden, outputs))(*given_)
+    assert (answer.shape, answer.dtype) == ((outputs,), jnp.float32)
+    np.testing.assert_allclose(answer, _apply(hidden, outputs)(*given_), atol=1e-5)
+
+
+def _in_a_loop(function: Any, parameters: Any, observation: Any) -> Any:
+    """Return the answers to observations that need the answer before."""
+
+    def step(observation: Any, _: None) -> Any:
+        answer = function(parameters, observation)
+        return 0.5 * observation + 0.1 * jnp.resize(answer, observation.shape), answer
+
+    return jax.lax.scan(step, observation, None, length=4)[1]
+
+
+BATCHED: dict[str, Callable[[Any], Any]] = {
+    "individuals": lambda function: jax.vmap(jax.vmap(function)),
+    "observations of each individual": lambda function: jax.vmap(jax.vmap(function, (None, 0)), (0, None)),
+    "episodes of individuals": lambda function: jax.vmap(jax.vmap(partial(_in_a_loop, function))),
+}
+
+
+def _ways(hidden: int, outputs: int, batched: Callable[[Any], Any]) -> tuple[Any, Any, Any]:
+    """Return the network, its loop, and what GPUs compute; all for batches."""
+    network = AllSkips(hidden)
+    of_network = batched(lambda parameters, observation: network.apply(parameters, observation, outputs))
+    return of_network, *(batched(partial(way, hidden, outputs)) for way in (scanned, unrolled))
+
+
+def _batches(inputs: int, hidden: int, outputs: int, case: str) -> tuple[jax.Array, jax.Array]:
+    """Return parameters and observations for a case."""
+    draw = np.random.default_rng(0)
+    individuals = (3,) if case.startswith("observations") else (2, 3)
+    parameters = draw.normal(size=(*individuals, AllSkips(hidden).size(inputs, outputs))) / 2
+    return jnp.float32(parameters), jnp.float32(draw.normal(size=(*individuals[:2], inputs)))
+
+
+@pytest.mark.parametrize("case", BATCHED)
+@pytest.mark.parametrize(("inputs", "hidden", "outputs"), [(1, 0, 1), (2, 1, 2), (3, 2, 1), (6, 24, 2)])
+def test_batched_and_in_loops_every_way_computes_the_same(inputs: int, hidden: int, outputs: int, case: str) -> None:
+    network, loop, other = (jax.jit(way) for way in _ways(hidden, outputs, BATCHED[case]))
+    given_ = _batches(inputs, hidden, outputs, case)
+    expected = loop(*given_)
+    np.testing.assert_array_equal(network(*given_), expected)  # a processor's bits are those of the loop
+    np.testing.assert_allclose(other(*given_), expected, atol=1e-5)
+
+
+@pytest.mark.parametrize("case", BATCHED)
+def test_a_processors_program_is_the_loop_and_a_gpus_has_no_loop(case: str) -> None:
+    network, loop, _ = (jax.jit(way) for way in _ways(24, 2, BATCHED[case]))
+    traced, of_loop = (way.trace(*_batches(6, 24, 2, case)) for way in (network, loop))
+    assert _text(traced, "cpu") == _text(of_loop, "cpu")
+    steps = case.startswith("episodes")
+    assert _text(traced, "cpu").count("stablehlo.while") == 1 + steps
+    assert _text(traced, "cuda").count("stablehlo.while") == steps
+    assert "stablehlo.scatter" in _text(traced, "cpu")
+    assert "stablehlo.scatter" not in _text(traced, "cuda")
+
+
+def _text(traced: Any, platform: str) -> str:
+    """Return a program as jax gives it to XLA, without its name."""
+    text: str = traced.lower(lowering_platforms=(platform,)).as_text()
+    return text.partition("\n")[2]
 
 
 def test_a_negative_number_of_neurons_is_one_sentence() -> None:

@@ -1,14 +1,20 @@
-"""A feedforward network in which every neuron is fed by all earlier ones (the paper's CMA-ES network, §A.3)."""
+"""A feedforward network in which every neuron is fed by all earlier ones (the paper's CMA-ES network, §A.3).
+
+Processors and GPUs compute it in different ways. A loop over neurons is quick to compile, and fast on a processor; on a
+GPU each of its rounds is some launches, in every step of a robot, and writing the triangle of weights is one more.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import partial
 
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from evoclaims.core.errors import UserError
+from evoclaims.kernels.by_platform import by_platform
 
 
 @dataclass(frozen=True)
@@ -36,21 +42,54 @@ class AllSkips:
         self, parameters: Float[Array, " parameters"], observation: Float[Array, " inputs"], outputs: int
     ) -> Float[Array, " outputs"]:
         """Map one observation to outputs in (-1, 1)."""
-        inputs = observation.shape[-1]
-        neurons = self.hidden + outputs
-        first, second = neurons * (inputs + 1), neurons * (inputs + 1) + outputs * self.hidden
-        feed = parameters[:first].reshape(neurons, inputs + 1)
-        readout = parameters[first:second].reshape(outputs, self.hidden)
-        rows, columns = jnp.tril_indices(self.hidden, -1)
-        between = jnp.zeros((self.hidden, self.hidden)).at[rows, columns].set(parameters[second:])
+        ways = partial(scanned, self.hidden, outputs), partial(unrolled, self.hidden, outputs)
+        answer: Array = by_platform(*ways)(parameters, observation)
+        return answer
 
-        # Inputs feed every neuron at once; then each hidden neuron in turn adds its share to all later ones.
-        potential = feed[:, :-1] @ observation + feed[:, -1]
-        recurrence = jnp.concatenate([between, readout])
 
-        def fire(potential: Array, neuron: tuple[Array, Array]) -> tuple[Array, None]:
-            index, outgoing = neuron
-            return potential + outgoing * jnp.tanh(potential[index]), None
+def scanned(hidden: int, outputs: int, parameters: Array, observation: Array) -> Array:
+    """Return the outputs of an `AllSkips` by a loop over its hidden neurons; for its arguments see `AllSkips.apply`."""
+    inputs = observation.shape[-1]
+    neurons = hidden + outputs
+    first, second = neurons * (inputs + 1), neurons * (inputs + 1) + outputs * hidden
+    feed = parameters[:first].reshape(neurons, inputs + 1)
+    readout = parameters[first:second].reshape(outputs, hidden)
+    rows, columns = jnp.tril_indices(hidden, -1)
+    between = jnp.zeros((hidden, hidden)).at[rows, columns].set(parameters[second:])
 
-        potential, _ = jax.lax.scan(fire, potential, (jnp.arange(self.hidden), recurrence.T))
-        return jnp.tanh(potential[self.hidden :])
+    # Inputs feed every neuron at once; then each hidden neuron in turn adds its share to all later ones.
+    potential = feed[:, :-1] @ observation + feed[:, -1]
+    recurrence = jnp.concatenate([between, readout])
+
+    def fire(potential: Array, neuron: tuple[Array, Array]) -> tuple[Array, None]:
+        index, outgoing = neuron
+        return potential + outgoing * jnp.tanh(potential[index]), None
+
+    potential, _ = jax.lax.scan(fire, potential, (jnp.arange(hidden), recurrence.T))
+    return jnp.tanh(potential[hidden:])
+
+
+def unrolled(hidden: int, outputs: int, parameters: Array, observation: Array) -> Array:
+    """Return what `scanned` does, up to rounding, without a loop: sums of numbers that XLA can fuse."""
+    inputs = observation.shape[-1]
+    neurons = hidden + outputs
+    first, second = neurons * (inputs + 1), neurons * (inputs + 1) + outputs * hidden
+    feed = parameters[:first].reshape(neurons, inputs + 1)
+    readout = parameters[first:second].reshape(outputs, hidden)
+
+    potential = jnp.sum(feed[:, :-1] * observation[None], axis=1) + feed[:, -1]
+    answer, place = potential[hidden:], second
+    fired: list[Array] = []
+    for neuron in range(hidden):
+        own = _number(potential, neuron)
+        for signal in fired:
+            own, place = own + _number(parameters, place) * signal, place + 1
+        fired.append(jnp.tanh(own))
+        answer = answer + readout[:, neuron] * fired[-1]
+    return jnp.tanh(answer)
+
+
+def _number(array: Array, place: int) -> Array:
+    """Return the number at a known place; as an index in brackets, it would be traced for longer."""
+    number: Array = jax.lax.index_in_dim(array, place, keepdims=False)
+    return number
