@@ -10,6 +10,8 @@ from typing import Any
 
 import numpy as np
 
+from approximations import on_a_processor
+
 from evoclaims.kernels import machine_code
 from evoclaims.kernels.block_shape import BlockShape
 from evoclaims.kernels.gpu_kernel import BLOCK, ENTRY, GpuProgram
@@ -56,6 +58,7 @@ def run(
 
 def _for_this_processor(text: str) -> str:
     """Replace what only a GPU has by parameters: shared memory, where a thread is, and the barrier."""
+    text = on_a_processor(text, units=1)
     text = re.sub(r" ?addrspace\(\d\)", "", text.replace("ptx_kernel ", ""))
     text = "\n".join(line for line in text.splitlines() if not line.startswith("declare") or "nvvm" not in line)
     text = re.sub(r"target triple.*|@numbers = .*", "", text).replace("ptr @numbers", "ptr %numbers")

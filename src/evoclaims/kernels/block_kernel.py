@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 
 from evoclaims.kernels.block_shape import BlockShape
 from evoclaims.kernels.expressions import Carried, Input, Loop, LoopResult, Number, ScalarOperation, is_known
+from evoclaims.kernels.gpu_instructions import GpuInstructions
 from evoclaims.kernels.gpu_kernel import BLOCK, Element, finished, parameters
 from evoclaims.kernels.interpreter import Numbers
 from evoclaims.kernels.llvm_ir import TYPES, ArrayRow, Instructions, either
@@ -31,7 +32,7 @@ def text(
         rows: elements of the batch.
     """
     plan, places, teams = shape.plan, shape.slots, shape.teams
-    page = Instructions(1, [number for result in results for number in result.flat])
+    page = GpuInstructions([number for result in results for number in result.flat])
     page.label("entry")
     sources = ("ctaid.x", "tid.x", "tid.y", "tid.z")
     block, lane, own, in_block = (page.call(f"llvm.nvvm.read.ptx.sreg.{name}", "i32", []) for name in sources)

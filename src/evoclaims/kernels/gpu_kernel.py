@@ -9,6 +9,7 @@ from functools import cache
 from typing import Any, Final
 
 from evoclaims.kernels.expressions import Input, in_order
+from evoclaims.kernels.gpu_instructions import GpuInstructions
 from evoclaims.kernels.interpreter import Numbers
 from evoclaims.kernels.llvm_ir import BYTES, STORED, ArrayRow, Instructions
 from evoclaims.kernels.machine_code import llvm
@@ -29,7 +30,7 @@ def text(results: Sequence[Numbers], arrays: Mapping[int, ArrayRow], shared: Map
         shared: how many consecutive elements share a row of each.
         rows: elements of the batch.
     """
-    page = Instructions(1, [number for result in results for number in result.flat])
+    page = GpuInstructions([number for result in results for number in result.flat])
     element = Element(page, begin(page, rows), arrays, shared)
     registers: dict[int, str] = {}
     page.compute(in_order([number for result in results for number in result.flat]), registers, element.load)

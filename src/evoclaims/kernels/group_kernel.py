@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from evoclaims.kernels import gpu_kernel
+from evoclaims.kernels.gpu_instructions import GpuInstructions
 from evoclaims.kernels.host_kernel import WIDE
 from evoclaims.kernels.llvm_ir import Instructions
 from evoclaims.kernels.xla_handler import handler
@@ -121,7 +122,7 @@ def gpu_text(write: Writer, numbers: Sequence[Any], sizes: Sizes, groups: int, r
 
     Its parameters are the addresses of the arrays of groups, those of rows, and the results.
     """
-    page = Instructions(1, numbers)
+    page = GpuInstructions(numbers)
     of_groups, of_rows, of_results = _named(sizes)
     thread = gpu_kernel.begin(page, groups * rows)
     group, row = page.put(f"udiv i32 {thread}, {rows}"), page.put(f"urem i32 {thread}, {rows}")

@@ -120,6 +120,11 @@ def literal(number: Number) -> str:
     return str(int(number)) if number.dtype.kind == "i" else str(bool(number)).lower()
 
 
+def of_literal(text: str) -> float:
+    """Return the float that a literal says."""
+    return float(struct.unpack(">d", bytes.fromhex(text.removeprefix("0x")))[0])
+
+
 class Instructions:
     """The instructions written so far.
 
@@ -227,6 +232,10 @@ class Instructions:
         if name in ("add", "sub") and any(id(o) in self._fused for o in operation.operands):
             return self._sum_with_product(operation, registers)
         operands = [self.operand(o, registers) for o in operation.operands]
+        if (kind, name) == ("f", "div"):
+            return self.divided(operands[0], operands[1])
+        if (kind, name) == ("f", "sqrt"):
+            return self.root(operands[0])
         if name in BINARY[kind]:
             return self.put(f"{BINARY[kind][name]} {type_} {operands[0]}, {operands[1]}")
         if name in COMPARED[kind]:
@@ -250,6 +259,15 @@ class Instructions:
         if kind == "f":  # to an integer: no overflow, and NaN is 0
             return self.call(self.mangled("fptosi.sat", "i32", "f32"), to, [(type_, operands[0])])
         return self.put(f"{CASTS[kind + operation.dtype.kind]} {type_} {operands[0]} to {to}")
+
+    def divided(self, dividend: str, divisor: str) -> str:
+        """Write an exactly rounded quotient of floats; return its register."""
+        return self.put(f"{BINARY['f']['div']} {self.vector('float')} {dividend}, {divisor}")
+
+    def root(self, number: str) -> str:
+        """Write an exactly rounded square root of a float; return its register."""
+        type_ = self.vector("float")
+        return self.call(self.mangled(INTRINSICS["f"]["sqrt"], "f32"), type_, [(type_, number)])
 
     def _sum_with_product(self, operation: ScalarOperation, registers: dict[int, Any]) -> str:
         """Write a sum or difference of a number and a product, rounded once."""

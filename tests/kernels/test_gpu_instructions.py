@@ -1,0 +1,192 @@
+"""Quotients and roots that GPUs compute from approximations are those of IEEE 754, to the bit."""
+
+from __future__ import annotations
+
+import ctypes
+import itertools
+from collections.abc import Callable
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+from approximations import on_a_processor
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from evoclaims.kernels import machine_code
+from evoclaims.kernels.gpu_instructions import GpuInstructions
+from evoclaims.kernels.llvm_ir import literal
+
+UNITS = (-2, -1, 0, 1, 2)
+"""How far off an approximation may be."""
+MANY = 1_000_000
+F = np.float32
+
+
+@cache
+def _compiled(write: Callable[[GpuInstructions, str, str], str], units: int) -> Any:
+    """Return a function of addresses a, b, made, and a count, which computes what is written for each a and b."""
+    page = GpuInstructions([])
+    page.label("entry")
+    page.write("br label %again")
+    page.label("again")
+    page.write("%i = phi i64 [ 0, %entry ], [ %next, %again ]")
+    a, b, made = (page.put(f"getelementptr float, ptr %{name}, i64 %i") for name in ("a", "b", "made"))
+    value = write(page, page.put(f"load float, ptr {a}"), page.put(f"load float, ptr {b}"))
+    page.write(f"store float {value}, ptr {made}", "%next = add i64 %i, 1", "%more = icmp ult i64 %next, %count")
+    page.write("br i1 %more, label %again, label %done", "done:", "ret void")
+    lines = ["define void @all(ptr %a, ptr %b, ptr %made, i64 %count) {", *page.lines, "}"]
+    text = on_a_processor("\n".join([*page.declared, *lines]) + "\n", units)
+    return ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * 3, ctypes.c_int64)(machine_code.address(text, "all"))
+
+
+def _run(write: Callable[[GpuInstructions, str, str], str], units: int, a: Any, b: Any) -> Any:
+    """Return what is written for each a and b, of which there is at least one."""
+    a, b = (np.ascontiguousarray(x, F) for x in (a, b))
+    made = np.empty_like(a)
+    _compiled(write, units)(a.ctypes.data, b.ctypes.data, made.ctypes.data, a.size)
+    return made
+
+
+def _quotient(page: GpuInstructions, a: str, b: str) -> str:
+    return page.divided(a, b)
+
+
+def _root(page: GpuInstructions, a: str, b: str) -> str:
+    return page.root(a)
+
+
+def _same_bits(made: Any, wanted: Any) -> Any:
+    """Return where results are the same; all NaN are."""
+    return (made.view(np.int32) == wanted.view(np.int32)) | (np.isnan(made) & np.isnan(wanted))
+
+
+def _units_off(made: Any, wanted: Any) -> Any:
+    """Return how many numbers further a result is than it should be; 0 for two NaN."""
+    bits = [x.view(np.int32).astype(np.int64) for x in (made, wanted)]
+    ordered = [np.where(x < 0, -(x & 0x7FFFFFFF), x) for x in bits]
+    return np.where(np.isnan(made) & np.isnan(wanted), 0, np.abs(ordered[0] - ordered[1]))
+
+
+def _check(a: Any, b: Any, made: Any) -> None:
+    """Check quotients: the bits of IEEE's, except where the documentation says otherwise."""
+    a, b = F(a), F(b)
+    with np.errstate(all="ignore"):
+        wanted = a / np.where(np.abs(b) < 2.0**-128, np.copysign(F(0), b), b)
+    allowed = np.where((np.abs(a) < 2.0**-102) | (np.abs(b) > 2.0**126), 1, 0)
+    allowed = np.where(np.abs(a) < 2.0**-122, 5, allowed)
+    largest = (np.abs(wanted) > np.finfo(F).max * (1 - 2.0**-21)) & (made == np.copysign(F(np.inf), wanted))
+    wrong = (_units_off(made, wanted) > allowed) & ~largest
+    assert not wrong.any(), [(x[wrong][:3], x[wrong].size) for x in (a, b, made, wanted)]
+    assert (np.signbit(made) == np.signbit(wanted))[~np.isnan(wanted)].all()
+
+
+def _check_quotients(a: Any, b: Any, units: int) -> None:
+    _check(a, b, _run(_quotient, units, a, b))
+
+
+def _any_bits(seed: int, count: int = MANY) -> Any:
+    return np.random.default_rng(seed).integers(0, 2**32, count, np.uint32).view(F)
+
+
+@pytest.mark.parametrize("units", UNITS)
+def test_quotients_of_any_numbers_have_ieees_bits(units: int) -> None:
+    _check_quotients(_any_bits(1), _any_bits(2), units)
+
+
+@pytest.mark.parametrize("units", UNITS)
+def test_quotients_of_numbers_of_like_size_have_ieees_bits(units: int) -> None:
+    random = np.random.default_rng(3)
+    a, b = (F(random.normal(size=MANY) * 2.0 ** random.integers(-40, 40, MANY)) for _ in range(2))
+    _check_quotients(a, b, units)
+
+
+def _near_midpoints(divisor: Any) -> tuple[Any, Any]:
+    """Return pairs whose quotient is as near to the middle between two numbers as one of its divisor can be.
+
+    With whole B (24 bits, odd) and M (25 bits, odd), (B M + c) / 2^k is a whole A for M = -c / B modulo 2^k; A / B is
+    then c / (2^k B) units of M from M, the middle between two numbers of 24 bits.
+    """
+    random = np.random.default_rng(4)
+    inverse = divisor.copy()  # to three bits; each step doubles them
+    for _ in range(5):
+        inverse = inverse * (2 - divisor * inverse)
+    c = random.choice(np.array([-7, -5, -3, -1, 1, 3, 5, 7]), divisor.size).astype(np.int64).view(np.uint64)
+    bits = random.choice(np.array([24, 25], np.uint64), divisor.size)
+    middle = (np.uint64(0) - c) * inverse & ((np.uint64(1) << bits) - np.uint64(1))
+    middle |= np.where(bits == 24, np.uint64(2**24), np.uint64(0))
+    dividend = (divisor * middle + c) >> bits
+    good = (middle >= 2**24) & (dividend >= 2**23) & (dividend < 2**24)
+    return F(dividend[good]), F(divisor[good])
+
+
+ANY_ODD = np.random.default_rng(5).integers(2**22, 2**23, MANY, np.uint64) * 2 + 1
+LARGE_ODD = np.tile(2**24 - np.arange(1, 2000, 2, dtype=np.uint64), 100)
+SMALL_ODD = np.tile(2**23 + np.arange(1, 2000, 2, dtype=np.uint64), 100)
+
+
+@pytest.mark.parametrize("units", UNITS)
+@pytest.mark.parametrize("divisors", [ANY_ODD, LARGE_ODD, SMALL_ODD], ids=["any", "large", "small"])
+def test_quotients_next_to_the_middle_of_two_numbers_have_ieees_bits(divisors: Any, units: int) -> None:
+    a, b = _near_midpoints(divisors)
+    assert a.size > divisors.size / 8
+    distance = np.abs(np.float64(a) / np.float64(b) / np.spacing(a / b) % 1 - 0.5)
+    assert distance.max() < 2.0**-19
+    signs = np.random.default_rng(6).choice(F([-1, 1]), a.size)
+    for power in (0, 60, -60):  # of the divisor
+        _check_quotients(a * signs, b * F(2.0**power), units)
+
+
+SPECIAL = F(
+    [0, np.inf, 2**-149, 2**-148, 2**-127, 2**-126, 2**-125, 1 / 3, 1, 3, 2**125, 2**126, 2**127, np.finfo(F).max]
+)
+SPECIALS = np.concatenate([SPECIAL, -SPECIAL, F([np.nan]), np.nextafter(F(2**-126), F(0))[None]])
+
+
+@pytest.mark.parametrize("units", UNITS)
+def test_quotients_of_special_numbers_are_ieees(units: int) -> None:
+    a, b = np.array(list(itertools.product(SPECIALS, SPECIALS)), F).T
+    _check_quotients(a, b, units)
+
+
+PATTERNS = st.integers(0, 2**32 - 1).map(lambda bits: np.uint32(bits).view(F))
+NUMBERS = st.one_of(PATTERNS, st.sampled_from(list(SPECIALS)))
+
+
+@given(st.lists(st.tuples(NUMBERS, NUMBERS), min_size=1, max_size=20), st.sampled_from(UNITS))
+@settings(max_examples=300, deadline=None)
+def test_quotients_of_any_bit_patterns_are_ieees(pairs: list[tuple[Any, Any]], units: int) -> None:
+    a, b = np.array(pairs, F).T
+    _check_quotients(a, b, units)
+
+
+@pytest.mark.parametrize("divisor", [3.0, 0.001, 0.95440036, -11.313708, 1e-30, 3e38, 1e-44, 2.0**24, 2.0**-24, 0.0])
+def test_quotients_by_known_numbers_are_ieees(divisor: float) -> None:
+    known = F(divisor)
+
+    def by_known(page: GpuInstructions, a: str, b: str) -> str:
+        return page.divided(a, literal(known))
+
+    a = np.concatenate([SPECIALS, _any_bits(6), F(np.random.default_rng(7).normal(size=MANY))])
+    _check(a, np.broadcast_to(known, a.shape), _run(by_known, 1, a, a))
+
+
+@pytest.mark.parametrize("units", UNITS)
+def test_quotients_of_powers_of_two_by_numbers_just_below_one_have_ieees_bits(units: int) -> None:
+    a, b = F(2.0) ** np.arange(-90, 90, dtype=F), np.nextafter(F(1), F(0))  # where a step of Newton's is not enough
+    _check_quotients(a, np.broadcast_to(b, a.shape), units)
+
+
+@pytest.mark.parametrize("units", UNITS)
+def test_roots_of_all_mantissas_have_ieees_bits(units: int) -> None:
+    x = np.arange(2**24, dtype=np.uint32) + np.uint32(127 << 23)  # [1, 4): an even and an odd exponent
+    x = x.view(F)
+    assert _same_bits(_run(_root, units, x, x), np.sqrt(x)).all()
+
+
+@pytest.mark.parametrize("units", UNITS)
+def test_roots_of_any_numbers_have_ieees_bits(units: int) -> None:
+    x = np.concatenate([SPECIALS, _any_bits(8), np.abs(_any_bits(9)), np.nextafter(F(0), F(1)) * np.arange(9_999, dtype=F)])
+    with np.errstate(all="ignore"):
+        assert _same_bits(_run(_root, units, x, x), np.sqrt(x)).all()
