@@ -8,15 +8,23 @@ from collections.abc import Callable
 from functools import cache
 from typing import Any
 
+import jax
+import jax.numpy as jnp
 import numpy as np
 import pytest
 from approximations import on_a_processor
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from evoclaims.kernels import machine_code
+from evoclaims.kernels import block_kernel, gpu_kernel, group_kernel, host_kernel, machine_code
+from evoclaims.kernels.block_shape import BlockShape
+from evoclaims.kernels.expressions import Input, in_order
 from evoclaims.kernels.gpu_instructions import GpuInstructions
+from evoclaims.kernels.group_kernel import Rows, Sizes
+from evoclaims.kernels.kernel import Kernel
 from evoclaims.kernels.llvm_ir import literal
+from evoclaims.kernels.shared_slots import slots
+from evoclaims.kernels.warp_schedule import schedule
 
 UNITS = (-2, -1, 0, 1, 2)
 """How far off an approximation may be."""
@@ -168,7 +176,8 @@ def test_quotients_by_known_numbers_are_ieees(divisor: float) -> None:
     def by_known(page: GpuInstructions, a: str, b: str) -> str:
         return page.divided(a, literal(known))
 
-    a = np.concatenate([SPECIALS, _any_bits(6), F(np.random.default_rng(7).normal(size=MANY))])
+    every_mantissa = (np.arange(2**23, dtype=np.uint32) + np.uint32(127 << 23)).view(F)
+    a = np.concatenate([SPECIALS, _any_bits(6), every_mantissa])
     _check(a, np.broadcast_to(known, a.shape), _run(by_known, 1, a, a))
 
 
@@ -187,6 +196,72 @@ def test_roots_of_all_mantissas_have_ieees_bits(units: int) -> None:
 
 @pytest.mark.parametrize("units", UNITS)
 def test_roots_of_any_numbers_have_ieees_bits(units: int) -> None:
-    x = np.concatenate([SPECIALS, _any_bits(8), np.abs(_any_bits(9)), np.nextafter(F(0), F(1)) * np.arange(9_999, dtype=F)])
+    x = np.concatenate(
+        [SPECIALS, _any_bits(8), np.abs(_any_bits(9)), np.nextafter(F(0), F(1)) * np.arange(9_999, dtype=F)]
+    )
     with np.errstate(all="ignore"):
         assert _same_bits(_run(_root, units, x, x), np.sqrt(x)).all()
+
+
+def test_quotients_by_the_same_number_share_its_reciprocal_within_a_basic_block() -> None:
+    page = GpuInstructions([])
+    page.label("entry")
+    for dividend in ("%x", "%y", "%z"):
+        page.divided(dividend, "%n")
+    assert sum("rcp.approx" in line for line in page.lines) == 1
+    page.divided("%x", "%m")
+    page.label("another")
+    page.divided("%y", "%n")
+    assert sum("rcp.approx" in line for line in page.lines) == 3
+
+
+def _kernel() -> Kernel:
+    def function(x: Any, y: Any) -> Any:
+        return jnp.sqrt(x) / y + y / 3.0
+
+    number = jax.ShapeDtypeStruct((), jnp.float32)
+    return Kernel(function, "This", jax.tree.structure((0, 0)), (number, number))
+
+
+def _of_one_warp(kernel: Kernel) -> str:
+    return gpu_kernel.text(kernel.results, kernel.read, {0: 1, 1: 1}, 5)
+
+
+def _of_two_warps(kernel: Kernel) -> str:
+    numbers = list(kernel.results[0].flat)
+    plan = schedule(numbers, 2)
+    assert plan is not None
+    shape = BlockShape(plan, slots(plan, numbers), 1)
+    return block_kernel.text(shape, kernel.results, kernel.read, {0: 1, 1: 1}, 5)
+
+
+def _of_groups(kernel: Kernel) -> str:
+    (result,) = kernel.results[0].flat
+
+    def write(rows: Rows, of_groups: Any, of_rows: Any, results: Any) -> None:
+        def load(number: Input) -> str:
+            return rows.load(of_rows[number.array], 1, number.place)
+
+        registers: dict[int, str] = {}
+        rows.page.compute(in_order([result]), registers, load)
+        rows.store(results[0], 1, 0, registers[id(result)])
+
+    return group_kernel.gpu_text(write, [result], Sizes((), (1, 1), (1,)), 2, 3, [True, True])
+
+
+@pytest.mark.parametrize("text_of", [_of_one_warp, _of_two_warps, _of_groups])
+def test_a_gpus_kernels_leave_no_quotient_and_no_root_to_the_assembler(text_of: Callable[[Kernel], str]) -> None:
+    text = text_of(_kernel())
+    assert "fdiv" not in text
+    assert "@llvm.sqrt" not in text
+    ptx = gpu_kernel.program(text, "This").ptx
+    assert not {"div.rn.f32", "div.full.f32", "div.approx.f32", "rcp.rn.f32", "sqrt.rn.f32"} & set(ptx.split())
+    assert {"rcp.approx.ftz.f32", "rsqrt.approx.ftz.f32", "sqrt.approx.ftz.f32"} <= set(ptx.split())
+
+
+def test_a_processors_kernels_divide_and_take_roots_by_their_own_instructions() -> None:
+    kernel = _kernel()
+    text = host_kernel.text(kernel.results, kernel.read, 8)
+    assert text.count("fdiv <8 x float>") == 2
+    assert "@llvm.sqrt.v8f32(" in text
+    assert "approx" not in text
