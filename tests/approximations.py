@@ -1,4 +1,4 @@
-"""What a GPU's approximate instructions may return, for this processor: a right result some units in the last place off."""
+"""What a GPU's approximate instructions may return, on this processor: a right result, a few units off."""
 
 from __future__ import annotations
 

@@ -9,7 +9,6 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-
 from approximations import on_a_processor
 
 from evoclaims.kernels import machine_code
