@@ -23,10 +23,9 @@ from evoclaims.methods.neat.structure import (
     add_node,
     delete_connection,
     delete_node,
-    descendants,
     mutate_structure,
-    packed,
-    position_after,
+    order_for,
+    without_node,
 )
 from evoclaims.networks.genome import Genome
 
@@ -37,9 +36,8 @@ _add_node = jax.jit(lambda u, genome, new_key, happens=True: add_node(happens, u
 _delete_node = jax.jit(lambda u, genome, happens=True: delete_node(happens, u, genome, INPUTS, OUTPUTS))
 _add_connection = jax.jit(lambda u, v, genome, happens=True: add_connection(happens, u, v, genome, INPUTS))
 _delete_connection = jax.jit(lambda u, genome, happens=True: delete_connection(happens, u, genome))
-_descendants = jax.jit(lambda genome, start: descendants(genome, start, genome.connection_count))
-_position_after = jax.jit(position_after)
-_packed = jax.jit(packed)
+_order_for = jax.jit(lambda genome, source, target, happens=True: order_for(happens, source, target, genome))
+_without_node = jax.jit(lambda genome, chosen, happens=True: without_node(happens, chosen, genome, INPUTS + OUTPUTS))
 SOME = settings(max_examples=60, deadline=None)
 HALF = Node(0.5, 2.0)
 GENOME = made([0, 1, 7, 2, 9, 3], {(0, 7): 0.25, (7, 2): 0.5, (1, 2): -1.0, (2, 3): 2.0, (7, 9): 4.0}, {7: HALF})
@@ -207,11 +205,11 @@ def test_a_mutation_that_does_not_happen_leaves_the_genome_as_it_is(genome: Geno
 
 @SOME
 @given(dags(), st.data())
-def test_descendants_are_found_as_by_following_every_connection(genome: Genome, data: Any) -> None:
+def test_a_link_closes_a_cycle_when_its_target_leads_to_its_source(genome: Genome, data: Any) -> None:
     order = _order(genome)
-    start = data.draw(st.integers(0, len(order) - 1))
-    reached = np.asarray(_descendants(genome, np.int32(start)))
-    assert {order[slot] for slot in np.flatnonzero(reached)} == _reached(read(genome), order[start])
+    s, t = (data.draw(st.integers(0, len(order) - 1)) for _ in "st")
+    cycle, *_ = _order_for(genome, np.int32(s), np.int32(t))
+    assert bool(cycle) == (order[s] in _reached(read(genome), order[t]))
 
 
 @SOME
@@ -219,24 +217,41 @@ def test_descendants_are_found_as_by_following_every_connection(genome: Genome, 
 def test_the_new_order_has_the_source_first_and_every_connection_forward(genome: Genome, data: Any) -> None:
     order = _order(genome)
     s, t = data.draw(st.integers(0, len(order) - 1)), data.draw(st.integers(INPUTS, len(order) - 1))
-    downstream = np.asarray(_descendants(genome, np.int32(t)))
-    assume(not downstream[s])
-    place = np.asarray(_position_after(downstream, np.int32(t), np.int32(s)))
-    assert sorted(place.tolist()) == list(range(NODES))
+    cycle, place, origin = map(np.asarray, _order_for(genome, np.int32(s), np.int32(t)))
+    assume(not cycle)
+    assert origin[place].tolist() == place[origin].tolist() == list(range(NODES))
     assert place[s] < place[t]
     assert all(place[a] < place[b] for a, b, _ in _places(genome))
     outside = [slot for slot in range(NODES) if not t <= slot <= s]
     assert place[outside].tolist() == outside
+    back = [order[slot] in _reached(read(genome), order[t]) for slot in range(t, s + 1)]
+    parts = [[slot for slot, is_back in zip(range(t, s + 1), back, strict=True) if is_back == part] for part in (0, 1)]
+    assert origin[t : s + 1].tolist() == [*parts[0], *parts[1]]
+
+
+@given(dags(), st.integers(0, 3), st.integers(0, 3))
+def test_where_no_link_is_added_nothing_moves(genome: Genome, s: int, t: int) -> None:
+    cycle, *moved = _order_for(genome, np.int32(s), np.int32(t), happens=False)
+    assert not cycle
+    assert [np.asarray(each).tolist() for each in moved] == [list(range(NODES))] * 2
 
 
 @SOME
-@given(st.lists(st.booleans(), min_size=CONNECTIONS, max_size=CONNECTIONS), st.integers(0, CONNECTIONS))
-def test_packing_keeps_the_order(kept: list[bool], count: int) -> None:
-    weights = {(0, 2): 1.0, (0, 3): 2.0, (1, 2): 3.0, (1, 3): 4.0}
-    genes = made([0, 1, 2, 3], weights).connections
-    left = np.asarray(_packed(genes, np.array(kept), np.int32(count)).weight)
-    wanted = [weight for weight, keep in zip(weights.values(), kept[:count], strict=False) if keep]
-    assert left.tolist() == wanted + [0.0] * (CONNECTIONS - len(wanted))
+@given(dags(), st.booleans(), st.data())
+def test_the_connections_without_a_node_keep_their_order(genome: Genome, happens: bool, data: Any) -> None:
+    hidden = [slot for slot, key in enumerate(_order(genome)) if key >= INPUTS + OUTPUTS]
+    chosen = data.draw(st.integers(0, len(hidden)))
+    slot, genes, left = _without_node(genome, np.int32(chosen), happens)
+    kept = []
+    if happens and chosen < len(hidden):
+        assert int(slot) == hidden[chosen]
+        places = [each for each in _places(genome) if hidden[chosen] not in each[:2]]
+        kept = [(s - (s > hidden[chosen]), t - (t > hidden[chosen]), weight) for s, t, weight in places]
+    else:
+        assert int(slot) == -1
+    assert int(left) == len(kept)
+    empty = [(0, 0, 0.0)] * (CONNECTIONS - len(kept))
+    assert list(zip(*(np.asarray(leaf).tolist() for leaf in jax.tree.leaves(genes)), strict=True)) == kept + empty
 
 
 @pytest.mark.parametrize("count", [1, 3, 100, 400])

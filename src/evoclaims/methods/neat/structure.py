@@ -16,7 +16,7 @@ from jaxtyping import Array, Bool, Float, Int, PRNGKeyArray
 from evoclaims.core.pytree import select
 from evoclaims.kernels.grouped import GroupKernel
 from evoclaims.methods.neat.settings import Mutation
-from evoclaims.methods.neat.structure_kernels import descendants_kernel, packing_kernel
+from evoclaims.methods.neat.structure_kernels import PASSED_OVER, ordering_kernel, removal_kernel
 from evoclaims.networks.genome import EMPTY, Connections, Genome, Nodes
 
 
@@ -74,22 +74,15 @@ def add_node(happens: Bool[Array, ""], u: Float[Array, ""], genome: Genome, new_
 
 def delete_node(happens: Bool[Array, ""], u: Float[Array, ""], genome: Genome, inputs: int, outputs: int) -> Genome:
     """Delete the hidden node that `u` in [0, 1) picks, with its connections; if there is none, do nothing."""
-    nodes, genes = genome.nodes, genome.connections
+    nodes = genome.nodes
     slots = jnp.arange(nodes.key.shape[0])
-    hidden = nodes.key >= inputs + outputs
     chosen = _pick(u, genome.node_count - inputs - outputs)
-    slot = jnp.argmax(hidden & (jnp.cumsum(hidden, dtype=jnp.int32) == chosen + 1)).astype(jnp.int32)
+    slot, connections, left = without_node(happens, chosen, genome, inputs + outputs)
 
     def remove(leaf: Array, empty: int) -> Array:
         moved = jnp.where(slots < slot, leaf, jnp.roll(leaf, -1))
         return jnp.where(slots < genome.node_count - 1, moved, empty)
 
-    kept = genome.has_connection & (genes.source != slot) & (genes.target != slot)
-    moved = Connections(
-        source=genes.source - _one_if(genes.source > slot),
-        target=genes.target - _one_if(genes.target > slot),
-        weight=genes.weight,
-    )
     shrunk = Genome(
         nodes=Nodes(
             key=remove(nodes.key, EMPTY),
@@ -97,29 +90,45 @@ def delete_node(happens: Bool[Array, ""], u: Float[Array, ""], genome: Genome, i
             response=remove(nodes.response, 0),
             activation=remove(nodes.activation, 0),
         ),
-        connections=packed(moved, kept, jnp.where(happens, genome.connection_count, 0)),
+        connections=connections,
         node_count=genome.node_count - 1,
-        connection_count=jnp.sum(kept, dtype=jnp.int32),
+        connection_count=left,
     )
-    return select(happens & jnp.any(hidden), shrunk, genome)
+    return select(happens & (slot >= 0), shrunk, genome)
 
 
-def packed(genes: Connections, kept: Bool[Array, " connections"], count: Int[Array, ""]) -> Connections:
-    """Move those of the first `count` connections that are kept to the front, in their order."""
-    return Connections(*_packing(kept.shape[0])(genes.source, genes.target, genes.weight, _one_if(kept), count))
+def without_node(
+    happens: Bool[Array, ""], chosen: Int[Array, ""], genome: Genome, visible: int
+) -> tuple[Int[Array, ""], Connections, Int[Array, ""]]:
+    """Return the slot of hidden node number `chosen`, all connections but that node's in their order, and how many.
+
+    The slot is -1 if there is no such node. Keys from `visible` on are those of hidden nodes. Sources and targets are
+    slots without the node. If it does not happen, there are no connections.
+    """
+    genes = genome.connections
+    kernel = _removal(genome.nodes.key.shape[0], genes.weight.shape[0], visible)
+    count = jnp.where(happens, genome.connection_count, PASSED_OVER)
+    slot, left, *moved = kernel(genome.nodes.key, genes.source, genes.target, genes.weight, count, chosen)
+    places = jnp.arange(genes.weight.shape[0])
+    connections = Connections(*(jnp.where(places < left, leaf, jnp.zeros((), leaf.dtype)) for leaf in moved))
+    return slot, connections, left
 
 
 @cache
-def _packing(connections: int) -> GroupKernel:
-    """Return the kernel of `packed`."""
+def _removal(nodes: int, connections: int, visible: int) -> GroupKernel:
+    """Return the kernel of `without_node`."""
 
-    def function(*leaves: Array) -> list[Array]:
-        *genes, kept, count = leaves
-        kept = jnp.where(jnp.arange(connections) < count, kept, 0)
-        place = jnp.where(kept > 0, jnp.cumsum(kept, dtype=jnp.int32) - 1, connections)
-        return [jnp.zeros_like(leaf).at[place].set(leaf, mode="drop") for leaf in genes]
+    def function(key: Array, source: Array, target: Array, weight: Array, count: Array, chosen: Array) -> list[Array]:
+        hidden = key >= visible
+        is_it = (count != PASSED_OVER) & hidden & (jnp.cumsum(hidden, dtype=jnp.int32) == chosen + 1)
+        slot = jnp.where(jnp.any(is_it), jnp.argmax(is_it).astype(jnp.int32), -1)
+        kept = (jnp.arange(connections) < count) & (source != slot) & (target != slot) & (slot >= 0)
+        place = jnp.where(kept, jnp.cumsum(kept, dtype=jnp.int32) - 1, connections)
+        moved = source - _one_if(source > slot), target - _one_if(target > slot), weight
+        left = [jnp.zeros_like(leaf).at[place].set(leaf, mode="drop") for leaf in moved]
+        return [slot, jnp.sum(kept, dtype=jnp.int32), *left]
 
-    return packing_kernel(connections, function)
+    return removal_kernel(nodes, connections, visible, function)
 
 
 def add_connection(
@@ -134,10 +143,8 @@ def add_connection(
     genes = genome.connections
     exists = jnp.any((genes.source == source) & (genes.target == target) & genome.has_connection)
     room = genome.connection_count < genes.weight.shape[0]
-    # A link against the order of slots is allowed only if the target does not lead to the source.
-    downstream = descendants(genome, target, jnp.where(happens, genome.connection_count, 0))
-    place = position_after(downstream, target, source)
-    ordered = reordered(genome, place)
+    cycle, place, origin = order_for(happens, source, target, genome)
+    ordered = reordered(genome, place, origin)
     new = jnp.arange(genes.weight.shape[0]) == genome.connection_count
     linked = replace(
         ordered,
@@ -148,31 +155,54 @@ def add_connection(
         ),
         connection_count=genome.connection_count + 1,
     )
-    return select(happens & ~exists & room & ~downstream[source], linked, genome)
+    return select(happens & ~exists & room & ~cycle, linked, genome)
 
 
-def descendants(genome: Genome, start: Int[Array, ""], count: Int[Array, ""]) -> Bool[Array, " nodes"]:
-    """Return which nodes `start` leads to, itself included, along the first `count` connections."""
-    genes = genome.connections
-    search = _search(genome.nodes.key.shape[0], genes.weight.shape[0])
-    (reached,) = search(genes.source, genes.target, count, start)
-    return reached > 0
+def order_for(
+    happens: Bool[Array, ""], source: Int[Array, ""], target: Int[Array, ""], genome: Genome
+) -> tuple[Bool[Array, ""], Int[Array, " nodes"], Int[Array, " nodes"]]:
+    """Return whether a link would close a cycle, each slot's new place if not, and each place's present slot.
+
+    If it does not happen, nothing moves.
+    """
+    genes, slots = genome.connections, jnp.arange(genome.nodes.key.shape[0], dtype=jnp.int32)
+    kernel = _ordering(slots.shape[0], genes.weight.shape[0])
+    count = jnp.where(happens, genome.connection_count, PASSED_OVER)
+    cycle, *moved = kernel(genes.source, genes.target, count, source, target)
+    between = happens & (slots >= target) & (slots <= source)
+    place, origin = (jnp.where(between, leaf, slots) for leaf in moved)
+    return cycle > 0, place, origin
 
 
 @cache
-def _search(nodes: int, connections: int) -> GroupKernel:
-    """Return the kernel of `descendants`."""
+def _ordering(nodes: int, connections: int) -> GroupKernel:
+    """Return the kernel of `order_for`."""
 
-    def function(source: Array, target: Array, count: Array, start: Array) -> list[Array]:
-        there = jnp.arange(connections) < count
-        linked = jnp.zeros((nodes, nodes), bool).at[jnp.where(there, target, nodes), source].set(True, mode="drop")
+    def function(source: Array, target: Array, count: Array, start: Array, end: Array) -> list[Array]:
+        downstream = descendants(nodes, source, target, count, end)
+        place = position_after(downstream, end, start)
+        origin = jnp.zeros_like(place).at[place].set(jnp.arange(nodes, dtype=jnp.int32))
+        return [_one_if(downstream[start] & (count != PASSED_OVER)), place, origin]
 
-        def visit(slot: Array, reached: Array) -> Array:
-            return reached.at[slot].set(reached[slot] | jnp.any(linked[slot] & reached))
+    return ordering_kernel(nodes, connections, function)
 
-        return [_one_if(jax.lax.fori_loop(0, nodes, visit, jnp.arange(nodes) == start))]
 
-    return descendants_kernel(nodes, connections, function)
+def descendants(
+    nodes: int,
+    source: Int[Array, " connections"],
+    target: Int[Array, " connections"],
+    count: Int[Array, ""],
+    start: Int[Array, ""],
+) -> Bool[Array, " nodes"]:
+    """Return which of the slots `start` leads to, itself included, along the first `count` connections."""
+    there = jnp.arange(source.shape[0]) < count
+    linked = jnp.zeros((nodes, nodes), bool).at[jnp.where(there, target, nodes), source].set(True, mode="drop")
+
+    def visit(slot: Array, reached: Array) -> Array:
+        return reached.at[slot].set(reached[slot] | jnp.any(linked[slot] & reached))
+
+    reached: Bool[Array, " nodes"] = jax.lax.fori_loop(0, nodes, visit, jnp.arange(nodes) == start)
+    return reached
 
 
 def position_after(
@@ -191,12 +221,12 @@ def position_after(
     return jnp.where(between, moved, slots)
 
 
-def reordered(genome: Genome, place: Int[Array, " nodes"]) -> Genome:
-    """Move the node in each slot to its new place."""
+def reordered(genome: Genome, place: Int[Array, " nodes"], origin: Int[Array, " nodes"]) -> Genome:
+    """Move the node in each slot to its new place; `origin` is where the node of each place was."""
     genes = genome.connections
     return replace(
         genome,
-        nodes=jax.tree.map(lambda leaf: jnp.zeros_like(leaf).at[place].set(leaf), genome.nodes),
+        nodes=jax.tree.map(lambda leaf: leaf[origin], genome.nodes),
         connections=replace(
             genes,
             source=jnp.where(genome.has_connection, place[genes.source], 0),
