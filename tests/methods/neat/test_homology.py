@@ -12,12 +12,22 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from assembler import assemble, kernels_for_gpus
+from block_machine import run
 from genomes import at, dags, made, read, same, stacked
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from without_kernels import BREEDING, without_kernels
 
-from evoclaims.methods.neat.homology import Counterparts, counterparts
+from evoclaims.kernels import group_kernel
+from evoclaims.kernels.gpu_kernel import GpuProgram
+from evoclaims.methods.neat.homology import (
+    Counterparts,
+    _by_comparison,
+    _by_matrix,
+    _look_up,
+    counterparts,
+    counterparts_in_pairs,
+)
 from evoclaims.networks.genome import Genome
 
 pytestmark = pytest.mark.newest
@@ -29,6 +39,7 @@ MAPS: dict[str, Any] = {
     "one with all": jax.vmap(counterparts, (None, 0)),
     "all with all": jax.vmap(jax.vmap(counterparts, (0, None)), (None, 0)),
     "trials": jax.vmap(jax.vmap(counterparts, (0, None))),
+    "pairs of parents": jax.vmap(counterparts_in_pairs),
 }
 """Batches of genomes, and of others."""
 
@@ -132,9 +143,57 @@ def test_numbers_are_moved_as_bits() -> None:
     assert np.asarray(found.nodes.bias).tobytes()[:16] == biases.astype(np.float32).tobytes()[:16]
 
 
+def _ends(genomes: Genome) -> Any:
+    """Return where each connection of a genome's neighbour leads from and to, -1 where it is nowhere."""
+    draw, genes = np.random.default_rng(1), jax.tree.map(lambda leaf: np.roll(leaf, 1, 0), genomes.connections)
+    return [np.where(draw.random(leaf.shape) < 0.2, -1, leaf).astype(np.int32) for leaf in (genes.source, genes.target)]
+
+
+@jax.jit
+def _weights_both_ways(genomes: Genome, source: Any, target: Any) -> Any:
+    """Return the bits of the weights between slots, by comparison and by matrices; 0 for slots of -1."""
+    there = (source >= 0) & (target >= 0)
+    return [
+        jnp.where(there, jax.lax.bitcast_convert_type(jax.vmap(way)(genomes, source, target), jnp.int32), 0)
+        for way in (_by_comparison, _by_matrix)
+    ]
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.lists(dags(activations=3), min_size=3, max_size=3))
+def test_comparing_all_connections_finds_the_weights_that_a_matrix_has(genomes: list[Genome]) -> None:
+    by_comparison, by_matrix = _weights_both_ways(stacked(genomes), *_ends(stacked(genomes)))
+    np.testing.assert_array_equal(by_comparison, by_matrix)
+
+
+@pytest.mark.parametrize("connections", [1, 4, 7, 24])
+def test_a_gpus_threads_find_the_weight_of_a_number_and_nan_for_what_is_not_there(connections: int) -> None:
+    """In lists of all lengths, at every place; a weight of NaN is moved as it is."""
+    kernel, full = _look_up(connections), connections + -connections % 4
+    counts = np.arange(connections + 1, dtype=np.int32)
+    links = np.where(np.arange(full) < counts[:, None], 10 * np.arange(full) + counts[:, None], -2).astype(np.int32)
+    weights = np.random.default_rng(2).normal(size=(len(counts), connections)).astype(np.float32)
+    weights.view(np.uint32)[:, -1] = 0x7FC12345
+    absent = np.broadcast_to(np.int32([-1, 3, 10**6]), (len(counts), 3))
+    wanted = np.concatenate([np.where(links == -2, -1, links), absent], axis=1)
+    groups, rows = wanted.shape
+    text = group_kernel.gpu_text(kernel.write, kernel.numbers, kernel.sizes, groups, rows, [True])
+    result = [jax.ShapeDtypeStruct((groups, rows), jnp.float32)]
+    program = GpuProgram("", kernel.name)
+    (made_,) = run(text, program, groups * rows, [links, weights, counts, wanted.reshape(-1)], result)
+    expected = np.full(wanted.shape, np.nan, np.float32)
+    for group, count in enumerate(counts):
+        expected[group, :count] = weights[group, :count]
+        if count == 3:
+            expected[group, full + 1] = weights[group, 0]
+    np.testing.assert_array_equal(made_.view(np.uint32), expected.view(np.uint32))
+
+
 @pytest.mark.parametrize("name", MAPS)
 def test_on_gpus_a_thread_searches_for_one_node(name: str, tmp_path: Path) -> None:
     genomes = stacked([made([0, 1, 2], {(0, 2): 1.0})] * 3)
-    (ptx,) = kernels_for_gpus(MAPS[name], *_in_batch(name, genomes, genomes))
-    assert ".entry the_search_for_homologous_nodes(" in ptx
-    assemble(ptx, tmp_path)
+    search, *look_up = kernels_for_gpus(MAPS[name], *_in_batch(name, genomes, genomes))
+    assert ".entry the_search_for_homologous_nodes(" in search
+    assert len(look_up) == (name == "pairs of parents")
+    for ptx in (search, *look_up):
+        assemble(ptx, tmp_path)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cache, partial
+from typing import Final
 
 import jax
 import jax.numpy as jnp
@@ -11,8 +13,16 @@ from jaxtyping import Array, Bool, Float, Int
 from evoclaims.core.pytree import pytree
 from evoclaims.kernels.grouped import GroupKernel
 from evoclaims.kernels.one_kernel import one_kernel
-from evoclaims.methods.neat.homology_kernel import write_search
+from evoclaims.methods.neat.homology_kernel import write_look_up, write_search
 from evoclaims.networks.genome import Connections, Genome, Nodes
+
+Weights = Callable[[Genome, Array, Array], Array]
+"""Returns the weights of a genome's connections between pairs of slots, or NaN; of a slot of -1, anything."""
+STEP: Final = 4
+"""Connections that a GPU's thread compares at a time."""
+NONE: Final = -1
+EMPTY: Final = -2
+"""What no connection is, and what there is none at a place: numbers that differ from connections' and each other."""
 
 
 @pytree
@@ -36,8 +46,18 @@ class Counterparts:
 
 
 def counterparts(genome: Genome, other: Genome) -> Counterparts:
-    """Find the counterparts of `genome`'s genes in `other`."""
-    search = _search(genome.nodes.key.shape[-1], genome.connections.weight.shape[-1])
+    """Find the counterparts of `genome`'s genes in `other`, which many genomes of a batch have in common."""
+    return _found(_by_matrix, genome, other)
+
+
+def counterparts_in_pairs(genome: Genome, other: Genome) -> Counterparts:
+    """Find the counterparts of `genome`'s genes in `other`, where each genome of a batch has its own."""
+    return _found(_by_comparison, genome, other)
+
+
+def _found(weights: Weights, genome: Genome, other: Genome) -> Counterparts:
+    """Find counterparts; where no kernel does it all, `weights` finds those of connections."""
+    search = _search(weights, genome.nodes.key.shape[-1], genome.connections.weight.shape[-1])
     genes = genome.connections
     own = genome.nodes.key, genes.source, genes.target, genome.node_count, genome.connection_count
     slot, bias, response, activation, weight = search(*jax.tree.leaves(other), *own)
@@ -46,7 +66,7 @@ def counterparts(genome: Genome, other: Genome) -> Counterparts:
 
 
 @cache
-def _search(nodes: int, connections: int) -> GroupKernel:
+def _search(weights: Weights, nodes: int, connections: int) -> GroupKernel:
     """Return the kernel that finds counterparts in genomes of a capacity; genomes with the same other are a group."""
     (slots, places, one), (of_nodes, of_connections) = (
         [jax.ShapeDtypeStruct(shape, dtype) for shape in shapes]
@@ -54,7 +74,7 @@ def _search(nodes: int, connections: int) -> GroupKernel:
     )
     return GroupKernel(
         name="The breeding of genomes",
-        function=_searched,
+        function=partial(_searched, weights),
         groups=(slots, of_nodes, of_nodes, slots, places, places, of_connections, one, one),
         rows=(slots, places, places, one, one),
         outputs=(slots, of_nodes, of_nodes, slots, of_connections),
@@ -64,7 +84,7 @@ def _search(nodes: int, connections: int) -> GroupKernel:
     )
 
 
-def _searched(*leaves: Array) -> list[Array]:
+def _searched(weights: Weights, *leaves: Array) -> list[Array]:
     """Return the other's slot of each node or -1, its bias, response and activation, and each connection's weight."""
     other = Genome(Nodes(*leaves[:4]), Connections(*leaves[4:7]), *leaves[7:9])
     key, source, target, node_count, connection_count = leaves[9:]
@@ -72,8 +92,9 @@ def _searched(*leaves: Array) -> list[Array]:
     has_node, has_connection = jnp.arange(size) < node_count, jnp.arange(source.shape[0]) < connection_count
     found: Int[Array, " nodes"] = jax.vmap(_slot, (0, None))(key, other.nodes.key)
     slot = jnp.where(has_node, found, -1)
-    there = has_connection & (slot[source] >= 0) & (slot[target] >= 0)
-    weight = jnp.where(there, _matrix(other)[slot[target], slot[source]], jnp.nan)
+    from_slot, to_slot = jnp.where(has_connection, slot[source], -1), slot[target]
+    there = (from_slot >= 0) & (to_slot >= 0)
+    weight = jnp.where(there, weights(other, from_slot, to_slot), jnp.nan)
     return [slot, *(leaf[slot] for leaf in leaves[1:4]), weight]
 
 
@@ -85,8 +106,46 @@ def _place(key: Int[Array, ""], keys: Int[Array, " nodes"]) -> Int[Array, ""]:
 _slot = one_kernel(_place, "The search for homologous nodes")
 
 
-def _matrix(genome: Genome) -> Float[Array, "nodes nodes"]:
-    """Return weights[i, j] of the connection from slot j to slot i; NaN where there is none."""
-    size, genes = genome.nodes.key.shape[0], genome.connections
-    target = jnp.where(genome.has_connection, genes.target, size)
-    return jnp.full((size, size), jnp.nan).at[target, genes.source].set(genes.weight, mode="drop")
+def _by_matrix(
+    other: Genome, source: Int[Array, " connections"], target: Int[Array, " connections"]
+) -> Float[Array, " connections"]:
+    """Look weights up in the matrix of all pairs of slots."""
+    size, genes = other.nodes.key.shape[0], other.connections
+    place = jnp.where(other.has_connection, genes.target, size)
+    matrix = jnp.full((size, size), jnp.nan).at[place, genes.source].set(genes.weight, mode="drop")
+    weights: Float[Array, " connections"] = matrix[target, source]
+    return weights
+
+
+def _by_comparison(
+    other: Genome, source: Int[Array, " connections"], target: Int[Array, " connections"]
+) -> Float[Array, " connections"]:
+    """Compare each pair of slots with all connections: a matrix for each genome would be several times its size."""
+    size, genes = other.nodes.key.shape[0], other.connections
+    kernel = _look_up(genes.weight.shape[0])
+    if not kernel.supported:
+        return _by_matrix(other, source, target)
+    links = jnp.where(other.has_connection, genes.target * size + genes.source, EMPTY)
+    full = jnp.pad(links, (0, -links.shape[0] % STEP), constant_values=EMPTY)
+    wanted = jnp.where((source >= 0) & (target >= 0), target * size + source, NONE)
+    (weights,) = jax.vmap(kernel, (None, None, None, 0))(full, genes.weight, other.connection_count, wanted)
+    return weights
+
+
+@cache
+def _look_up(connections: int) -> GroupKernel:
+    """Return the kernel that finds a number among a genome's, up to a count, and returns the weight there, or NaN.
+
+    What is from the count on differs from all that is looked for; `NONE` is not looked for.
+    """
+    one, full = (jax.ShapeDtypeStruct(shape, jnp.int32) for shape in ((), (connections + -connections % STEP,)))
+    weights, weight = (jax.ShapeDtypeStruct(shape, jnp.float32) for shape in ((connections,), ()))
+
+    def function(links: Array, weights: Array, count: Array, link: Array) -> list[Array]:
+        place = _place(link, links)
+        return [jnp.where(place >= 0, weights[place], jnp.nan)]
+
+    write = partial(write_look_up, STEP, NONE)
+    return GroupKernel(
+        "The breeding of genomes", function, (full, weights, one), (one,), (weight,), write, one_lane=True
+    )

@@ -134,6 +134,59 @@ def write_search(
     repeat(page, "0", rows.count, [], search)
 
 
+def write_look_up(
+    step: int, none: int, rows: Rows, other: Sequence[str], wanted: Sequence[str], results: Sequence[str]
+) -> None:
+    """Write the search for numbers in a list: `step` of them are compared at a time, and none if one is `none`.
+
+    Args:
+        step: a divisor of the list's length.
+        none: a number that is not searched for.
+        rows: numbers to search for.
+        other: addresses of the list, of a weight for each of its numbers, and of how many of them count.
+        wanted: of the first number to search for.
+        results: of its weight, or NaN.
+    """
+    page, (links, weights, count_at) = rows.page, other
+    count = load(page, count_at)
+
+    def search(row: str) -> list[str]:
+        link = load(page, wanted[0], row)
+        is_searched = page.put(f"icmp ne i32 {link}, {none}")
+        end = page.put(f"select i1 {is_searched}, i32 {count}, i32 0")
+
+        def here(place: str) -> list[str]:
+            """Return which of the next numbers it is."""
+            return [page.put(f"icmp eq i32 {each}, {link}") for each in [load(page, links, at) for at in next_(place)]]
+
+        def next_(place: str) -> list[str]:
+            return [place, *(page.put(f"add i32 {place}, {more}") for more in range(1, step))]
+
+        def any_here(place: str) -> str:
+            found, *others = here(place)
+            for each in others:
+                found = page.put(f"or i1 {found}, {each}")
+            return found
+
+        def ends(place: str) -> str:
+            inside = page.put(f"icmp slt i32 {place}, {end}")
+            return when(page, inside, "i1", lambda: any_here(place), "true")
+
+        def weight(place: str) -> str:
+            at_other = place
+            for more, is_it in list(enumerate(here(place)))[1:]:
+                later = page.put(f"add i32 {place}, {more}")
+                at_other = page.put(f"select i1 {is_it}, i32 {later}, i32 {at_other}")
+            return load(page, weights, at_other)
+
+        place = walk(page, "0", ends, lambda place: page.put(f"add i32 {place}, {step}"))
+        found = page.put(f"icmp slt i32 {place}, {end}")
+        store(page, when(page, found, "i32", lambda: weight(place), NAN), results[0], row)
+        return []
+
+    repeat(page, "0", rows.count, [], search)
+
+
 def _is_place(page: Instructions, number: str) -> str:
     """Return whether a number is a place, or -1 for none."""
     return page.put(f"icmp sge i32 {number}, 0")
