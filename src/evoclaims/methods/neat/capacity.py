@@ -34,10 +34,12 @@ def in_capacity(
 ) -> Any:
     """Call `function(nodes, connections, *operands)` with the smallest of the `sizes` that fits the genomes' children.
 
-    A child may have one node and two connections more than its parent. The result must not depend on the capacity.
+    A child may have one node and two connections more than its parent, up to the largest of the sizes. The result must
+    not depend on the capacity.
     """
-    nodes = jnp.stack([jnp.max(each.node_count) for each in genomes]).max() + 1
-    connections = jnp.stack([jnp.max(each.connection_count) for each in genomes]).max() + 2
+    most = sizes[-1]
+    nodes = jnp.minimum(jnp.stack([jnp.max(each.node_count) for each in genomes]).max() + 1, most[0])
+    connections = jnp.minimum(jnp.stack([jnp.max(each.connection_count) for each in genomes]).max() + 2, most[1])
     too_small = [(nodes > n) | (connections > c) for n, c in sizes[:-1]]
     index: Int[Array, ""] = jnp.sum(jnp.array(too_small, bool), dtype=jnp.int32)
     return switch_together(index, [partial(function, *size) for size in sizes], *operands)
