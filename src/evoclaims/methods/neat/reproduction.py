@@ -80,7 +80,7 @@ def choose_parents(
     count = offspring(settings, species, population)
     children = jnp.arange(population, dtype=jnp.int32)
     ends = jnp.cumsum(count, dtype=jnp.int32)
-    family = jnp.searchsorted(ends, children, side="right").astype(jnp.int32)
+    family = jnp.sum(ends[None, :] <= children[:, None], axis=1, dtype=jnp.int32)
     rank = children - (ends - count)[family]
     # Sort members by species, then by fitness (best first), then newest first.
     order = jnp.lexsort((-children, -fitness, species.member_of)).astype(jnp.int32)

@@ -131,11 +131,12 @@ def _at(genomes: Genome, place: Any) -> Genome:
 
 def _join(grouping: _Grouping, place: Int[Array, ""], chosen: Int[Array, ""]) -> _Grouping:
     """Make the genome `chosen` the centre of the species at `place`."""
+    is_centre = jnp.arange(grouping.member_of.shape[0]) == chosen
     return replace(
         grouping,
-        centre_of=grouping.centre_of.at[place].set(chosen),
-        member_of=grouping.member_of.at[chosen].set(place),
-        nearest=grouping.nearest.at[chosen].set(0.0),
+        centre_of=jnp.where(jnp.arange(grouping.centre_of.shape[0]) == place, chosen, grouping.centre_of),
+        member_of=jnp.where(is_centre, place, grouping.member_of),
+        nearest=jnp.where(is_centre, 0.0, grouping.nearest),
     )
 
 

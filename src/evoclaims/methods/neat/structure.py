@@ -43,11 +43,11 @@ def add_node(happens: Bool[Array, ""], u: Float[Array, ""], genome: Genome, new_
     """
     nodes, genes = genome.nodes, genome.connections
     slots, places = jnp.arange(nodes.key.shape[0]), jnp.arange(genes.weight.shape[0])
-    split = places == _pick(u, genome.connection_count)
+    chosen = _pick(u, genome.connection_count)
+    split = places == chosen
     room = (genome.node_count < slots.size) & (genome.connection_count + 2 <= places.size)
     # The new node takes its target's slot; the target and all after it move up by one.
-    slot = jnp.sum(jnp.where(split, genes.target, 0))
-    weight = jnp.sum(jnp.where(split, genes.weight, 0))
+    slot, weight = genes.target[chosen], genes.weight[chosen]
 
     def insert(leaf: Array, value: Array | float) -> Array:
         return jnp.where(slots < slot, leaf, jnp.where(slots == slot, value, jnp.roll(leaf, 1)))
@@ -240,11 +240,10 @@ def delete_connection(happens: Bool[Array, ""], u: Float[Array, ""], genome: Gen
     genes = genome.connections
     places = jnp.arange(genes.weight.shape[0])
     chosen = places == _pick(u, genome.connection_count)
-    last = places == genome.connection_count - 1
+    last = genome.connection_count - 1
 
     def move(leaf: Array) -> Array:
-        moved = jnp.sum(jnp.where(last, leaf, 0))
-        return jnp.where(last, jnp.zeros((), leaf.dtype), jnp.where(chosen, moved, leaf))
+        return jnp.where(places == last, jnp.zeros((), leaf.dtype), jnp.where(chosen, leaf[last], leaf))
 
     cut = replace(genome, connections=jax.tree.map(move, genes), connection_count=genome.connection_count - 1)
     return select(happens & (genome.connection_count > 0), cut, genome)
