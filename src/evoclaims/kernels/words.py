@@ -21,6 +21,6 @@ def store(page: Instructions, value: str, array: str, place: str) -> None:
 
 
 def fill(page: Instructions, array: str, byte: int, count: int) -> None:
-    """Set every byte of the first `count` numbers of an array."""
+    """Set every byte of the first `count` numbers of an array; a GPU's thread sets one after the other."""
     operands = [("ptr", array), ("i8", str(byte)), ("i64", str(4 * count)), ("i1", "false")]
     page.call("llvm.memset.p0.i64", "void", operands)

@@ -20,8 +20,8 @@ Weights = Callable[[Genome, Array, Array], Array]
 """Returns the weights of a genome's connections between pairs of slots, or NaN; of a slot of -1, anything."""
 STEP: Final = 4
 """Connections that a GPU's thread compares at a time."""
-NONE: Final = -1
-EMPTY: Final = -2
+NOWHERE: Final = -1
+VACANT: Final = -2
 """What no connection is, and what there is none at a place: numbers that differ from connections' and each other."""
 
 
@@ -125,9 +125,9 @@ def _by_comparison(
     kernel = _look_up(genes.weight.shape[0])
     if not kernel.supported:
         return _by_matrix(other, source, target)
-    links = jnp.where(other.has_connection, genes.target * size + genes.source, EMPTY)
-    full = jnp.pad(links, (0, -links.shape[0] % STEP), constant_values=EMPTY)
-    wanted = jnp.where((source >= 0) & (target >= 0), target * size + source, NONE)
+    links = jnp.where(other.has_connection, genes.target * size + genes.source, VACANT)
+    full = jnp.pad(links, (0, -links.shape[0] % STEP), constant_values=VACANT)
+    wanted = jnp.where((source >= 0) & (target >= 0), target * size + source, NOWHERE)
     (weights,) = jax.vmap(kernel, (None, None, None, 0))(full, genes.weight, other.connection_count, wanted)
     return weights
 
@@ -136,7 +136,7 @@ def _by_comparison(
 def _look_up(connections: int) -> GroupKernel:
     """Return the kernel that finds a number among a genome's, up to a count, and returns the weight there, or NaN.
 
-    What is from the count on differs from all that is looked for; `NONE` is not looked for.
+    What is from the count on differs from all that is looked for; `NOWHERE` is not looked for.
     """
     one, full = (jax.ShapeDtypeStruct(shape, jnp.int32) for shape in ((), (connections + -connections % STEP,)))
     weights, weight = (jax.ShapeDtypeStruct(shape, jnp.float32) for shape in ((connections,), ()))
@@ -145,7 +145,7 @@ def _look_up(connections: int) -> GroupKernel:
         place = _place(link, links)
         return [jnp.where(place >= 0, weights[place], jnp.nan)]
 
-    write = partial(write_look_up, STEP, NONE)
+    write = partial(write_look_up, STEP, NOWHERE)
     return GroupKernel(
         "The breeding of genomes", function, (full, weights, one), (one,), (weight,), write, one_lane=True
     )
