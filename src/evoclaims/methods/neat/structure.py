@@ -47,7 +47,7 @@ def add_node(happens: Bool[Array, ""], u: Float[Array, ""], genome: Genome, new_
     split = places == chosen
     room = (genome.node_count < slots.size) & (genome.connection_count + 2 <= places.size)
     # The new node takes its target's slot; the target and all after it move up by one.
-    slot, weight = genes.target[chosen], genes.weight[chosen]
+    slot, weight = (jnp.sum(jnp.where(split, leaf, 0)) for leaf in (genes.target, genes.weight))
 
     def insert(leaf: Array, value: Array | float) -> Array:
         return jnp.where(slots < slot, leaf, jnp.where(slots == slot, value, jnp.roll(leaf, 1)))
@@ -170,7 +170,8 @@ def order_for(
     count = jnp.where(happens, genome.connection_count, PASSED_OVER)
     cycle, *moved = kernel(genes.source, genes.target, count, source, target)
     between = happens & (slots >= target) & (slots <= source)
-    place, origin = (jnp.where(between, leaf, slots) for leaf in moved)
+    # Without the barrier, XLA computes a place anew for each connection that asks for it.
+    place, origin = jax.lax.optimization_barrier(tuple(jnp.where(between, leaf, slots) for leaf in moved))
     return cycle > 0, place, origin
 
 
@@ -243,7 +244,8 @@ def delete_connection(happens: Bool[Array, ""], u: Float[Array, ""], genome: Gen
     last = genome.connection_count - 1
 
     def move(leaf: Array) -> Array:
-        return jnp.where(places == last, jnp.zeros((), leaf.dtype), jnp.where(chosen, leaf[last], leaf))
+        moved = jnp.sum(jnp.where(places == last, leaf, 0))
+        return jnp.where(places == last, jnp.zeros((), leaf.dtype), jnp.where(chosen, moved, leaf))
 
     cut = replace(genome, connections=jax.tree.map(move, genes), connection_count=genome.connection_count - 1)
     return select(happens & (genome.connection_count > 0), cut, genome)
