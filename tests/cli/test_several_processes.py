@@ -19,9 +19,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from tiny_project import REPRODUCTION, Evoclaims, Project
 
-from evoclaims.cli import seats, workers
+from evoclaims.cli import workers
+from evoclaims.cli.host import AUTO, Host, host_of
 from evoclaims.cli.missing import MissingBatch
-from evoclaims.cli.seats import Host, Seat, host_of, useful_processes
+from evoclaims.cli.seats import Seat, seats_of, useful_processes
 from evoclaims.cli.worker import Ended, WorkOrder
 from evoclaims.cli.workers import ATTEMPTS, Workers, in_queue
 from evoclaims.core.errors import UserError
@@ -221,7 +222,7 @@ def test_a_condition_that_dies_on_several_gpus_is_begun_again_on_one(run: Run) -
 def test_conditions_of_two_shares_have_several_gpus_and_there_are_always_enough(took: list[float], count: int) -> None:
     batches = sorted((_batch(str(i), work) for i, work in enumerate(took)), key=lambda one: -one.estimate.seconds())
     found = tuple(map(str, range(count)))
-    made = Host(seats.AUTO, found).seats(batches)
+    made = seats_of(Host(AUTO, found), batches)
     assert sorted(gpu for seat in made for gpu in seat.environment[gpus.VISIBLE].split(",")) == sorted(found)
     share = sum(took) / count
     for seat in made:
@@ -239,14 +240,14 @@ def test_processes_are_as_many_as_keep_the_cores_busy() -> None:
     assert useful_processes(running, 2) == 1
     assert useful_processes(compiling, 64) == 64
     assert useful_processes(compiling, 2) == 2
-    assert len(Host(seats.AUTO, ()).seats(compiling[:1])) == 1
-    assert len(Host(3, ()).seats(compiling)) == 3
-    assert Host(3, ()).seats([]) == []
+    assert len(seats_of(Host(AUTO, ()), compiling[:1])) == 1
+    assert len(seats_of(Host(3, ()), compiling)) == 3
+    assert seats_of(Host(3, ()), []) == []
 
 
 def test_a_number_of_processes_is_one_or_more(monkeypatch: pytest.MonkeyPatch) -> None:
     assert host_of("3", "cpu") == Host(3, ())
-    assert host_of("auto", "cpu") == Host(seats.AUTO, ())
+    assert host_of("auto", "cpu") == Host(AUTO, ())
     for text in ("0", "-1", "many", ""):
         with pytest.raises(UserError, match="--numprocesses takes a number from 1 up, or auto"):
             host_of(text, "cpu")
@@ -264,6 +265,30 @@ def test_a_command_whose_processes_have_gpus_keeps_off_these_itself(
     monkeypatch.setattr("evoclaims.trials.devices.keep_off_gpus", lambda: off.append(True))
     assert host_of(text, "auto").alone == alone
     assert off == [True] * (found > 0 and not alone)
+
+
+LOOKS = """
+import sys
+from jax._src import xla_bridge
+from evoclaims.trials import devices, gpus
+
+def keep_off_gpus():
+    print("looked before" if xla_bridge.backends_are_initialized() else "has not looked")
+    sys.exit()
+
+gpus.gpus, devices.keep_off_gpus = lambda device: ("0", "1"), keep_off_gpus
+from evoclaims.cli import main
+main(sys.argv[1:])
+"""
+
+
+@pytest.mark.parametrize("command", [["run"], ["mutants"], ["power", "--run"]])
+def test_a_command_keeps_off_gpus_before_libraries_make_arrays_as_they_are_imported(
+    command: list[str], project: Project
+) -> None:
+    call = [sys.executable, "-c", LOOKS, *command, "--numprocesses", "auto"]
+    found = subprocess.run(call, cwd=project.path, capture_output=True, text=True, check=False)
+    assert found.stdout == "has not looked\n", found.stderr
 
 
 DEADLY = '''

@@ -11,7 +11,6 @@ from dataclasses import replace
 
 from evoclaims.cli.project import Project, open_project
 from evoclaims.cli.running import Execution
-from evoclaims.cli.seats import Host, host_of
 from evoclaims.cli.worker import WorkOrder
 from evoclaims.core.errors import UnknownNameError, UserError
 from evoclaims.core.files import write_atomically
@@ -28,7 +27,6 @@ from evoclaims.verdicts.sensitivity import Tried
 
 def main(options: argparse.Namespace) -> int:
     """Run the tier under each fault, judge its claims, and write what they notice; 1 when a condition failed."""
-    host = host_of(options.numprocesses, options.device)
     project = open_project(options.storage)
     tier = project.reproduction.tier(options.tier)
     claims = project.judge(options.tier)
@@ -48,7 +46,7 @@ def main(options: argparse.Namespace) -> int:
             for source in report.sources
         }
         wanted = jobs({names: tier.condition(*names) for names in sorted(asked)}, planted)
-        failed = _run(project, wanted, options, host)
+        failed = _run(project, wanted, options)
         claims = project.judge(options.tier)
     if not any(report.n for report in claims):
         raise UserError(
@@ -93,11 +91,11 @@ def _chosen(every: Sequence[Planted], options: argparse.Namespace) -> list[Plant
     return [one for one in every if options.mutant in (None, one.mutant) and options.of in (None, one.target)]
 
 
-def _run(project: Project, wanted: Mapping[Job, Condition], options: argparse.Namespace, host: Host) -> frozenset[Job]:
+def _run(project: Project, wanted: Mapping[Job, Condition], options: argparse.Namespace) -> frozenset[Job]:
     """Run conditions that lack trials, and return those that have failed."""
     design = project.reproduction.tier(options.tier).design
     order = WorkOrder(options.storage, options.tier, options.device, design.first_seed, design.last.n)
-    running = Execution(project, order, host)
+    running = Execution(project, order, options.host)
     running.check()
     failed = frozenset(ended.job for ended in running.run(wanted, lambda text: None) if ended.error)
     if failed:

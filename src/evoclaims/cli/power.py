@@ -12,7 +12,6 @@ from evoclaims.claims.power import Asserted, Listening, Pilots, asserted, only
 from evoclaims.cli.project import Project, open_project
 from evoclaims.cli.reference import of_one_environment
 from evoclaims.cli.running import Execution
-from evoclaims.cli.seats import Host, host_of
 from evoclaims.cli.terminal import styled
 from evoclaims.cli.worker import WorkOrder
 from evoclaims.core.errors import UserError
@@ -30,7 +29,6 @@ from evoclaims.verdicts.versions import change
 
 def main(options: argparse.Namespace) -> int:
     """Print the power of each claim; 1 when one is below 0.95 or cannot be told, or a condition failed."""
-    host = host_of(options.numprocesses, options.device)
     project = open_project(options.storage)
     design = project.reproduction.tier(options.tier).design
     if options.draws < 1:
@@ -40,9 +38,7 @@ def main(options: argparse.Namespace) -> int:
     pilots = Pilots(project.reproduction, options.tier, every)
     wanted = {names: group.condition for one in chosen for names, group in one.groups.items()}
     if options.run or options.stored:
-        _make(
-            project, pilots, {names: one for names, one in wanted.items() if pilots.unfit(names)}, design, options, host
-        )
+        _make(project, pilots, {names: one for names, one in wanted.items() if pilots.unfit(names)}, design, options)
     powers = pilots.powers(chosen, options.draws)
     imported = bool(wanted) and all(condition.existing is not None for condition in wanted.values())
     advice = [] if imported else [_advice(options)]
@@ -74,7 +70,6 @@ def _make(
     wanted: Mapping[Names, Condition],
     design: Design,
     options: argparse.Namespace,
-    host: Host,
 ) -> None:
     """Make the pilots that are missing: run their trials unless they are stored, and write each that is complete."""
     seeds = range(options.first_seed, options.first_seed + options.trials)
@@ -95,7 +90,7 @@ def _make(
             _write(project, pilots, names, condition, seeds)
         return
     order = WorkOrder(options.storage, options.tier, options.device, seeds[0], options.trials)
-    running = Execution(project, order, host)
+    running = Execution(project, order, options.host)
     if wanted:
         running.check()
     for ended in running.run({Job("", *names): one for names, one in wanted.items()}, lambda text: print(f"  {text}")):

@@ -8,7 +8,6 @@ from collections.abc import Sequence
 
 from evoclaims.cli.project import Project, open_project
 from evoclaims.cli.running import Execution
-from evoclaims.cli.seats import host_of
 from evoclaims.cli.stored import describe
 from evoclaims.cli.variant_cost import to_run
 from evoclaims.cli.worker import WorkOrder
@@ -26,7 +25,6 @@ from evoclaims.verdicts.robustness import matrix
 
 def main(options: argparse.Namespace) -> int:
     """Run what is missing and list the trials; 1 when a condition failed, which does not stop the others."""
-    host = host_of(options.numprocesses, options.device)
     project = open_project(options.storage)
     reproduction, store = project.reproduction, project.store
     tier, chosen = choose(reproduction, options)
@@ -40,7 +38,7 @@ def main(options: argparse.Namespace) -> int:
     for names in chosen[:1]:  # an invalid seed is so for every condition: it is reported once, and nothing is run
         _ = [TrialSpec(tier.condition(*names), seed) for seed in seeds]
     order = WorkOrder(options.storage, options.tier, options.device, seeds[0], n, options.variant, options.time_limit)
-    running = Execution(project, order, host)
+    running = Execution(project, order, options.host)
     running.check()
     if options.variant and not (options.method and options.on):
         chosen = to_run(running, chosen)

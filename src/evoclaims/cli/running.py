@@ -8,9 +8,10 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 
 from evoclaims.claims.fetching import RunMissing
+from evoclaims.cli.host import Host
 from evoclaims.cli.missing import missing_batches
 from evoclaims.cli.project import Project
-from evoclaims.cli.seats import Host
+from evoclaims.cli.seats import seats_of
 from evoclaims.cli.terminal import terminal
 from evoclaims.cli.worker import Ended, WorkOrder, run_jobs
 from evoclaims.cli.workers import Workers, in_queue
@@ -65,7 +66,7 @@ class Execution:
         batches = missing_batches(self.project, tier, wanted, seeds, self.limit, platform)
         seconds = {batch.job: batch.estimate.seconds() for batch in batches}
         yield from (Ended(job) for job in wanted if job not in seconds)
-        seats = self.host.seats(batches)
+        seats = seats_of(self.host, batches)
         sound = self.project.reproduction.tier(tier, self.order.variant).conditions
         total, done, began = sum(seconds.values()), 0.0, time.monotonic()
         ended_jobs = Workers(self.order, seats, tell).run(in_queue(batches, sound, len(seats)))

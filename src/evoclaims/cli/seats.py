@@ -4,15 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Final
 
+from evoclaims.cli.host import AUTO, Host
 from evoclaims.cli.missing import MissingBatch
-from evoclaims.core.errors import UserError
 from evoclaims.mutants.conditions import Job
 from evoclaims.trials import devices, gpus
-
-AUTO: Final = 0
-"""As many processes as are useful."""
 
 
 @dataclass(frozen=True)
@@ -30,50 +26,16 @@ class Seat:
     then: tuple[Seat, ...] = ()
 
 
-@dataclass(frozen=True)
-class Host:
-    """What a command may use of this host.
-
-    Attributes:
-        processes: how many are asked for; 0 for as many as are useful.
-        gpus: the GPUs that they share; empty on processors.
-    """
-
-    processes: int
-    gpus: tuple[str, ...]
-
-    @property
-    def alone(self) -> bool:
-        """Whether this process runs everything, on all devices."""
-        return self.processes == 1 or (self.processes == AUTO and len(self.gpus) == 1)
-
-    def seats(self, batches: Sequence[MissingBatch]) -> list[Seat]:
-        """Return the seats of the processes that run some batches; none where there is nothing to run."""
-        if not batches:
-            return []
-        if self.gpus and self.processes == AUTO:
-            return _a_gpu_each(self.gpus, batches)
-        if self.gpus:
-            return [Seat(environment) for environment in gpus.shared(self.gpus, self.processes)]
-        processes = self.processes or useful_processes(batches, devices.usable_cores())
-        return [Seat() for _ in range(min(processes, len(batches)))]
-
-
-def host_of(numprocesses: str, device: str) -> Host:
-    """Return what a command may use; if processes are to share GPUs, jax in this process keeps off these.
-
-    Raises:
-        UserError: for a number of processes that is none.
-    """
-    if numprocesses != "auto" and (not numprocesses.isdecimal() or int(numprocesses) < 1):
-        raise UserError(
-            f"--numprocesses takes a number from 1 up, or auto (one for each GPU; without GPUs as many as the cores "
-            f"are enough for), not {numprocesses!r}."
-        )
-    host = Host(AUTO if numprocesses == "auto" else int(numprocesses), gpus.gpus(device))
-    if host.gpus and not host.alone:
-        devices.keep_off_gpus()
-    return host
+def seats_of(host: Host, batches: Sequence[MissingBatch]) -> list[Seat]:
+    """Return the seats of the processes that run some batches; none where there is nothing to run."""
+    if not batches:
+        return []
+    if host.gpus and host.processes == AUTO:
+        return _a_gpu_each(host.gpus, batches)
+    if host.gpus:
+        return [Seat(environment) for environment in gpus.shared(host.gpus, host.processes)]
+    processes = host.processes or useful_processes(batches, devices.usable_cores())
+    return [Seat() for _ in range(min(processes, len(batches)))]
 
 
 def useful_processes(batches: Sequence[MissingBatch], cores: int) -> int:

@@ -1,0 +1,51 @@
+"""What a command may use of this host: how many processes, and which GPUs.
+
+It is found out before anything else is imported: libraries make arrays as they are imported, and with the first array
+jax takes most of a GPU's memory.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+from evoclaims.core.errors import UserError
+from evoclaims.trials import devices, gpus
+
+AUTO: Final = 0
+"""As many processes as are useful."""
+
+
+@dataclass(frozen=True)
+class Host:
+    """What a command may use of this host.
+
+    Attributes:
+        processes: how many are asked for; 0 for as many as are useful.
+        gpus: the GPUs that they share; empty on processors.
+    """
+
+    processes: int
+    gpus: tuple[str, ...]
+
+    @property
+    def alone(self) -> bool:
+        """Whether this process runs everything, on all devices."""
+        return self.processes == 1 or (self.processes == AUTO and len(self.gpus) == 1)
+
+
+def host_of(numprocesses: str, device: str) -> Host:
+    """Return what a command may use; if processes are to share GPUs, jax in this process keeps off these.
+
+    Raises:
+        UserError: for a number of processes that is none.
+    """
+    if numprocesses != "auto" and (not numprocesses.isdecimal() or int(numprocesses) < 1):
+        raise UserError(
+            f"--numprocesses takes a number from 1 up, or auto (one for each GPU; without GPUs as many as the cores "
+            f"are enough for), not {numprocesses!r}."
+        )
+    host = Host(AUTO if numprocesses == "auto" else int(numprocesses), gpus.gpus(device))
+    if host.gpus and not host.alone:
+        devices.keep_off_gpus()
+    return host
