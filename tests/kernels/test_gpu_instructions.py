@@ -265,3 +265,11 @@ def test_a_processors_kernels_divide_and_take_roots_by_their_own_instructions() 
     assert text.count("fdiv <8 x float>") == 2
     assert "@llvm.sqrt.v8f32(" in text
     assert "approx" not in text
+
+
+def test_a_long_kernel_of_one_warp_leaves_quotients_and_roots_to_the_assembler(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(gpu_kernel, "SMALL", 1)
+    text = _of_one_warp(_kernel())
+    assert text.count("fdiv float") == 2
+    assert "approx" not in text
+    assert "approx" in _of_two_warps(_kernel())

@@ -16,13 +16,11 @@ from typing import Any, Final
 import jax
 
 from evoclaims.kernels.expressions import everything
-from evoclaims.kernels.gpu_kernel import BLOCK
+from evoclaims.kernels.gpu_kernel import BLOCK, SMALL
 from evoclaims.kernels.interpreter import Numbers
 from evoclaims.kernels.shared_slots import Slots, slots
 from evoclaims.kernels.warp_schedule import Schedule, schedule
 
-SMALL: Final = 8_000
-"""Operations of a kernel whose code fits an instruction cache; it is faster as it is."""
 WARPS: Final = {1: 8, 2: 8, 3: 4}
 """Most warps of a team, by the teams of a block: more have too few registers each."""
 MEMORY: Final = "shared_memory_per_block_optin"

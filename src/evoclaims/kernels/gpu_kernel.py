@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any, Final
 
-from evoclaims.kernels.expressions import Input, in_order
+from evoclaims.kernels.expressions import Input, everything, in_order
 from evoclaims.kernels.gpu_instructions import GpuInstructions
 from evoclaims.kernels.interpreter import Numbers
 from evoclaims.kernels.llvm_ir import BYTES, STORED, ArrayRow, Instructions
@@ -17,6 +17,8 @@ from evoclaims.kernels.machine_code import llvm
 ENTRY: Final = "kernel"
 BLOCK: Final = 32
 """Threads in a block: one warp, so that even few elements use many processors."""
+SMALL: Final = 8_000
+"""Operations of a kernel whose code fits an instruction cache: a warp alone executes it as fast as any."""
 CAPABILITY: Final = 8.0
 """The compute capability needed; every GPU from there on runs what is written for it."""
 
@@ -30,10 +32,13 @@ def text(results: Sequence[Numbers], arrays: Mapping[int, ArrayRow], shared: Map
         shared: how many consecutive elements share a row of each.
         rows: elements of the batch.
     """
-    page = GpuInstructions([number for result in results for number in result.flat])
+    numbers = [number for result in results for number in result.flat]
+    # Without the branches of divisions, longer code would be one block, which NVIDIA's assembler orders for minutes
+    # and spills more of.
+    page = GpuInstructions(numbers) if len(everything(numbers)) <= SMALL else Instructions(1, numbers)
     element = Element(page, begin(page, rows), arrays, shared)
     registers: dict[int, str] = {}
-    page.compute(in_order([number for result in results for number in result.flat]), registers, element.load)
+    page.compute(in_order(numbers), registers, element.load)
     for z, result in enumerate(results):
         for at, number in enumerate(result.flat):
             element.store(page.operand(number, registers), number.dtype.kind, z, at, result.size)

@@ -14,11 +14,6 @@ from evoclaims.methods.neat import capacity
 from evoclaims.methods.neat.settings import Settings
 
 
-@pytest.fixture(autouse=True)
-def _two_smaller_sizes(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(capacity, "SMALLER", ((32, 96), (100, 200)))
-
-
 @pytest.mark.parametrize(
     ("limits", "wanted"),
     [

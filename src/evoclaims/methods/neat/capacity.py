@@ -13,9 +13,11 @@ from evoclaims.core.batching import switch_together
 from evoclaims.methods.neat.settings import Settings
 from evoclaims.networks.genome import Genome
 
-SMALLER: Final = ((32, 96),)
-"""Capacities (nodes, connections) to compile for, besides the largest; each costs compile time. This one is six times
-as fast as the paper's 100 nodes and 400 connections."""
+SMALLER: Final = ((32, 96), (100, 200))
+"""Capacities (nodes, connections) to compile for, besides the largest; each costs compile time.
+
+The first is six times as fast as the paper's 100 nodes and 400 connections. The second is for grown networks, which
+have far fewer connections than they may have."""
 
 
 def capacities(settings: Settings, inputs: int, outputs: int) -> list[tuple[int, int]]:
