@@ -2,10 +2,12 @@
 
     python benchmarks/neat_against_tensorneat.py [--cases small species grown] [--rounds 5] [--generations 5]
     python benchmarks/neat_against_tensorneat.py --device gpu --cases ten ten-5000 --generations 50
+    python benchmarks/neat_against_tensorneat.py --device gpu --cases ten-5000-grown --generations 20 --alone
 
 small: 1,024 genomes, from the first generation. species: the same with the threshold of species lowered on both sides,
 so that all 20 are alive. grown: 256 genomes of 100 nodes, the same random networks on both sides. ten, ten-5000: ten
-trials of ours at once against one of theirs, in seed-generations per second; 1,024 and 5,000 genomes.
+trials of ours at once against one of theirs, in seed-generations per second; 1,024 and 5,000 genomes. ten-5000-grown:
+the same with networks as in grown. --alone: without TensorNEAT.
 
 Both sides are methods of the same trial engine, with the same hyperparameters (the paper's; 20 species); every turn
 runs the same generations from the same start, until a second has passed. TensorNEAT is spared the printing and waiting
@@ -72,6 +74,7 @@ CASES = {
     "grown": Case(sized(256), grown=True),
     "ten": Case(sized(1_024), trials=10),
     "ten-5000": Case(sized(5_000), trials=10),
+    "ten-5000-grown": Case(sized(5_000), trials=10, grown=True),
 }
 
 
@@ -164,11 +167,27 @@ class Side:
         return runs * self.trials * generations / took
 
 
+def alone(name: str, rounds: int, generations: int, device: jax.Device) -> None:
+    """Measure our side of one case and print it."""
+    ours = our_side(CASES[name], device)
+    rates = sorted(ours.rate(generations) for _ in range(rounds))
+    print(
+        f"{name}: {statistics.median(rates):,.1f}/s, from {rates[0]:,.1f} to {rates[-1]:,.1f}, on {device.device_kind}"
+    )
+    print(f"  compiled in {ours.lanes.seconds:.1f} s; at the end {ours.seen}", flush=True)
+
+
+def our_side(case: Case, device: jax.Device) -> Side:
+    """Return our side of a case."""
+    genomes = random_genomes(case.settings) if case.grown else None
+    return Side(Neat(case.settings), case, case.trials, device, partial(with_ours, case.settings, genomes))
+
+
 def compare(name: str, rounds: int, generations: int, device: jax.Device) -> None:
     """Measure one case in turns and print it."""
     case = CASES[name]
     genomes = random_genomes(case.settings) if case.grown else None
-    ours = Side(Neat(case.settings), case, case.trials, device, partial(with_ours, case.settings, genomes))
+    ours = our_side(case, device)
     theirs = Side(NeatTensorneat(case.settings), case, 1, device, partial(with_theirs, genomes))
     rows = [(ours.rate(generations), theirs.rate(generations)) for _ in range(rounds)]
     for a, b in rows:
@@ -185,12 +204,16 @@ def main() -> None:
     parser.add_argument("--rounds", type=int, default=5)
     parser.add_argument("--generations", type=int, default=5, help="in a turn")
     parser.add_argument("--device", choices=devices.DEVICE_NAMES, default="auto")
+    parser.add_argument("--alone", action="store_true", help="without TensorNEAT")
     options = parser.parse_args()
     jax.config.update("jax_enable_compilation_cache", False)
     try:
-        library()
+        if not options.alone:
+            library()
         for name in options.cases:
-            compare(name, options.rounds, options.generations, devices.choose(options.device)[0])
+            (alone if options.alone else compare)(
+                name, options.rounds, options.generations, devices.choose(options.device)[0]
+            )
     except UserError as error:
         raise SystemExit(str(error)) from None
 
