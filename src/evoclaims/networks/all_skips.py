@@ -49,13 +49,9 @@ class AllSkips:
 
 def scanned(hidden: int, outputs: int, parameters: Array, observation: Array) -> Array:
     """Return the outputs of an `AllSkips` by a loop over its hidden neurons; for its arguments see `AllSkips.apply`."""
-    inputs = observation.shape[-1]
-    neurons = hidden + outputs
-    first, second = neurons * (inputs + 1), neurons * (inputs + 1) + outputs * hidden
-    feed = parameters[:first].reshape(neurons, inputs + 1)
-    readout = parameters[first:second].reshape(outputs, hidden)
+    feed, readout, rest = _weights(hidden, outputs, parameters, observation)
     rows, columns = jnp.tril_indices(hidden, -1)
-    between = jnp.zeros((hidden, hidden)).at[rows, columns].set(parameters[second:])
+    between = jnp.zeros((hidden, hidden)).at[rows, columns].set(parameters[rest:])
 
     # Inputs feed every neuron at once; then each hidden neuron in turn adds its share to all later ones.
     potential = feed[:, :-1] @ observation + feed[:, -1]
@@ -71,14 +67,10 @@ def scanned(hidden: int, outputs: int, parameters: Array, observation: Array) ->
 
 def unrolled(hidden: int, outputs: int, parameters: Array, observation: Array) -> Array:
     """Return what `scanned` does, up to rounding, without a loop: sums of numbers that XLA can fuse."""
-    inputs = observation.shape[-1]
-    neurons = hidden + outputs
-    first, second = neurons * (inputs + 1), neurons * (inputs + 1) + outputs * hidden
-    feed = parameters[:first].reshape(neurons, inputs + 1)
-    readout = parameters[first:second].reshape(outputs, hidden)
+    feed, readout, rest = _weights(hidden, outputs, parameters, observation)
 
     potential = jnp.sum(feed[:, :-1] * observation[None], axis=1) + feed[:, -1]
-    answer, place = potential[hidden:], second
+    answer, place = potential[hidden:], rest
     fired: list[Array] = []
     for neuron in range(hidden):
         own = _number(potential, neuron)
@@ -87,6 +79,14 @@ def unrolled(hidden: int, outputs: int, parameters: Array, observation: Array) -
         fired.append(jnp.tanh(own))
         answer = answer + readout[:, neuron] * fired[-1]
     return jnp.tanh(answer)
+
+
+def _weights(hidden: int, outputs: int, parameters: Array, observation: Array) -> tuple[Array, Array, int]:
+    """Return the weights from inputs and bias, those from hidden neurons to outputs, and where the others begin."""
+    inputs = observation.shape[-1]
+    neurons = hidden + outputs
+    first, second = neurons * (inputs + 1), neurons * (inputs + 1) + outputs * hidden
+    return parameters[:first].reshape(neurons, inputs + 1), parameters[first:second].reshape(outputs, hidden), second
 
 
 def _number(array: Array, place: int) -> Array:
