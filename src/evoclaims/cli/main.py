@@ -65,11 +65,12 @@ def _ended(arguments: Sequence[str] | None) -> int:
         options.refuse(f"unrecognized arguments: {' '.join(unknown)}")
     try:
         _check_folder()
-        from evoclaims.cli.host import host_of
         from evoclaims.cli.storage import storage_of
 
         options.storage = storage_of(options.storage, options.command)
         if "numprocesses" in options:
+            from evoclaims.cli.host import host_of
+
             options.host = host_of(options.numprocesses, options.device)
         command = importlib.import_module(f"evoclaims.cli.{options.command}")  # only now: --help waits for no jax
         with interrupted_by(signal.SIGTERM):
