@@ -169,7 +169,8 @@ class Side:
 
 def alone(name: str, rounds: int, generations: int, device: jax.Device) -> None:
     """Measure our side of one case and print it."""
-    ours = our_side(CASES[name], device)
+    case = CASES[name]
+    ours = our_side(case, first_genomes(case), device)
     rates = sorted(ours.rate(generations) for _ in range(rounds))
     print(
         f"{name}: {statistics.median(rates):,.1f}/s, from {rates[0]:,.1f} to {rates[-1]:,.1f}, on {device.device_kind}"
@@ -177,17 +178,21 @@ def alone(name: str, rounds: int, generations: int, device: jax.Device) -> None:
     print(f"  compiled in {ours.lanes.seconds:.1f} s; at the end {ours.seen}", flush=True)
 
 
-def our_side(case: Case, device: jax.Device) -> Side:
+def first_genomes(case: Case) -> Genome | None:
+    """Make the first population of a case, if it is not the methods' own."""
+    return random_genomes(case.settings) if case.grown else None
+
+
+def our_side(case: Case, genomes: Genome | None, device: jax.Device) -> Side:
     """Return our side of a case."""
-    genomes = random_genomes(case.settings) if case.grown else None
     return Side(Neat(case.settings), case, case.trials, device, partial(with_ours, case.settings, genomes))
 
 
 def compare(name: str, rounds: int, generations: int, device: jax.Device) -> None:
     """Measure one case in turns and print it."""
     case = CASES[name]
-    genomes = random_genomes(case.settings) if case.grown else None
-    ours = our_side(case, device)
+    genomes = first_genomes(case)
+    ours = our_side(case, genomes, device)
     theirs = Side(NeatTensorneat(case.settings), case, 1, device, partial(with_theirs, genomes))
     rows = [(ours.rate(generations), theirs.rate(generations)) for _ in range(rounds)]
     for a, b in rows:

@@ -41,7 +41,8 @@ _DECLARED = {
 
 
 def on_a_processor(text: str, units: int) -> str:
-    """Return LLVM's text with every approximate instruction replaced; results and denormal numbers are flushed to 0.
+    """Return LLVM's text with every approximate instruction replaced; denormal arguments and
+    results are flushed to 0.
 
     Args:
         text: for a GPU.

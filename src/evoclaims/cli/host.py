@@ -1,7 +1,7 @@
 """What a command may use of this host: how many processes, and which GPUs.
 
-It is found out before anything else is imported: libraries make arrays as they are imported, and with the first array
-jax takes most of a GPU's memory.
+It is found out before the command's module and the project are imported: libraries make arrays as they are imported,
+and with the first array jax takes most of a GPU's memory.
 """
 
 from __future__ import annotations

@@ -28,7 +28,7 @@ def by_platform(function: Callable[..., Any], on_gpu: Callable[..., Any]) -> Cal
     `function`, and so are programs for other platforms. `on_gpu` is traced only when a program is lowered for a GPU.
 
     Args:
-        function: takes trees of arrays; pure.
+        function: takes trees of arrays; pure. Neither way may use traced values that are not its arguments.
         on_gpu: the same up to rounding, with results of the same tree, shapes and dtypes.
     """
 

@@ -3,15 +3,17 @@
 NVIDIA's assembler makes a branch and a call of an exactly rounded division or root, and moves nothing across them. Here
 both are made of a GPU's approximation and of remainders, which a fused multiply-add computes exactly (P. Markstein,
 "Computation of elementary functions on the IBM RISC System/6000 processor", 1990): with a reciprocal right to half a
-unit, and a quotient right to one, the quotient plus its remainder times the reciprocal is rounded as IEEE 754 says.
+unit (or a hair more), and a quotient right to one, the quotient plus its remainder times the reciprocal is rounded as
+IEEE 754 says.
 
 An approximation may be wrong by 2 units in the last place. Results have the bits of IEEE's, also for zeros of both
-signs, infinities, NaN and denormal results, except that
+signs, infinities and NaN, except that
 
 * a quotient of a dividend below 2^-102 may be wrong by a unit, and of one below 2^-122 by 5, since its remainder is not
   exact;
-* so may one by a divisor above 2^126 by a unit, since its reciprocal is denormal;
-* a divisor below 2^-128, whose reciprocal is infinite, counts as 0; and
+* so may a denormal quotient by a unit, where the exact one lies in the middle of two numbers, or below 2^-149;
+* so may one by a divisor above 2^126 by a unit, since its reciprocal is denormal, and by one of the few largest be 0;
+* a divisor of at most 2^-128, whose reciprocal is infinite, counts as 0; and
 * a quotient that is one of the few largest numbers may be infinite.
 """
 
@@ -26,14 +28,14 @@ import numpy as np
 from evoclaims.kernels.expressions import Number
 from evoclaims.kernels.llvm_ir import Instructions, literal, of_literal
 
-FOUR: Final = np.float32(4)
-"""A divisor times this, or times a fourth if it is large, is neither denormal nor is its reciprocal."""
+SCALE: Final = np.float32(4)
+"""Divisors up to 1 are multiplied by this, others divided: so neither they nor their reciprocals are denormal."""
 UPWARD: Final = np.float32(2**-43)
 """More than the square of an approximation's relative error, by which a step of Newton's makes a reciprocal too small.
 
 Reciprocals of numbers just below a power of two are just above the middle of two numbers, and have to be rounded up.
 """
-SMALL: Final = np.float32(2**-60)
+SMALL_SQUARE: Final = np.float32(2**-60)
 """The remainders of roots of smaller numbers may be denormal, so that these are scaled."""
 GROWN: Final = np.float32(2**64)
 """By so much; the root shrinks by the root of it."""
@@ -87,7 +89,7 @@ class GpuInstructions(Instructions):
                 return _Divisor(reciprocal, reciprocal)
         one = literal(np.float32(1))
         large = self.put(f"fcmp ogt float {self._size(divisor)}, {one}")
-        scale = self._either(large, 1 / FOUR, FOUR)
+        scale = self._either(large, 1 / SCALE, SCALE)
         rough = self._product(self._approximate("rcp", self._product(divisor, scale)), scale)
         missing = self._fma(self._negative(divisor), rough, one)
         missing = self.put(f"fadd float {missing}, {literal(UPWARD)}")
@@ -96,7 +98,7 @@ class GpuInstructions(Instructions):
     def root(self, number: str) -> str:
         """Write a square root of a float; return its register."""
         half = literal(np.float32(0.5))
-        small = self.put(f"fcmp olt float {number}, {literal(SMALL)}")
+        small = self.put(f"fcmp olt float {number}, {literal(SMALL_SQUARE)}")
         x = self._product(number, self._either(small, GROWN, np.float32(1)))
         reciprocal = self._approximate("rsqrt", x)
         root, slope = self._product(x, reciprocal), self._product(reciprocal, half)

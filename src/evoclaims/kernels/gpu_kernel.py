@@ -18,7 +18,7 @@ ENTRY: Final = "kernel"
 BLOCK: Final = 32
 """Threads in a block: one warp, so that even few elements use many processors."""
 SMALL: Final = 8_000
-"""Operations of a kernel whose code fits an instruction cache: a warp alone executes it as fast as any."""
+"""Operations of a kernel whose code fits an instruction cache: a warp alone executes it as fast as several would."""
 CAPABILITY: Final = 8.0
 """The compute capability needed; every GPU from there on runs what is written for it."""
 

@@ -1,8 +1,9 @@
 """Scalar expressions as LLVM instructions on vectors: one vector lane per element of the batch.
 
 The instructions are the same for processors and GPUs, where a thread is one lane; only quotients and roots are made of
-others there (`gpu_instructions`). Each is exactly rounded IEEE arithmetic. Products to be fused with a sum are chosen
-here, not by LLVM. So bits do not depend on the number of lanes, the machine or LLVM's version.
+others there (`gpu_instructions`, which says where these differ). Each is exactly rounded IEEE arithmetic. Products to
+be fused with a sum are chosen here, not by LLVM. So bits do not depend on the number of lanes, the machine or LLVM's
+version.
 """
 
 from __future__ import annotations

@@ -42,8 +42,8 @@ class AllSkips:
         self, parameters: Float[Array, " parameters"], observation: Float[Array, " inputs"], outputs: int
     ) -> Float[Array, " outputs"]:
         """Map one observation to outputs in (-1, 1)."""
-        ways = partial(scanned, self.hidden, outputs), partial(unrolled, self.hidden, outputs)
-        answer: Array = by_platform(*ways)(parameters, observation)
+        forward = by_platform(partial(scanned, self.hidden, outputs), partial(unrolled, self.hidden, outputs))
+        answer: Array = forward(parameters, observation)
         return answer
 
 

@@ -21,8 +21,9 @@ Weights = Callable[[Genome, Array, Array], Array]
 STEP: Final = 4
 """Connections that a GPU's thread compares at a time."""
 NOWHERE: Final = -1
+"""Is looked for in place of a connection that the other genome cannot have."""
 VACANT: Final = -2
-"""What no connection is, and what there is none at a place: numbers that differ from connections' and each other."""
+"""Stands where a list has no connection; no connection is numbered so, nor is `NOWHERE`."""
 
 
 @pytree
@@ -98,9 +99,9 @@ def _searched(weights: Weights, *leaves: Array) -> list[Array]:
     return [slot, *(leaf[slot] for leaf in leaves[1:4]), weight]
 
 
-def _place(key: Int[Array, ""], keys: Int[Array, " nodes"]) -> Int[Array, ""]:
-    """Return where a key is among others; -1 if it is not."""
-    return jnp.max(jnp.where(keys == key, jnp.arange(keys.shape[0], dtype=jnp.int32), -1))
+def _place(number: Int[Array, ""], numbers: Int[Array, " places"]) -> Int[Array, ""]:
+    """Return where a number is among others, the last place if there are several; -1 if it is not."""
+    return jnp.max(jnp.where(numbers == number, jnp.arange(numbers.shape[0], dtype=jnp.int32), -1))
 
 
 _slot = one_kernel(_place, "The search for homologous nodes")
@@ -136,7 +137,7 @@ def _by_comparison(
 def _look_up(connections: int) -> GroupKernel:
     """Return the kernel that finds a number among a genome's, up to a count, and returns the weight there, or NaN.
 
-    What is from the count on differs from all that is looked for; `NOWHERE` is not looked for.
+    Places from the count on must hold `VACANT`; for `NOWHERE` the result is NaN.
     """
     one, full = (jax.ShapeDtypeStruct(shape, jnp.int32) for shape in ((), (connections + -connections % STEP,)))
     weights, weight = (jax.ShapeDtypeStruct(shape, jnp.float32) for shape in ((connections,), ()))

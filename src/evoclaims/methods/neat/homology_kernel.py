@@ -137,7 +137,7 @@ def write_search(
 def write_look_up(
     step: int, none: int, rows: Rows, other: Sequence[str], wanted: Sequence[str], results: Sequence[str]
 ) -> None:
-    """Write the search for numbers in a list: `step` of them are compared at a time, and none if one is `none`.
+    """Write the search for numbers in a list, compared `step` at a time; what equals `none` is not searched for.
 
     Args:
         step: a divisor of the list's length.

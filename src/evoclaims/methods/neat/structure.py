@@ -102,8 +102,8 @@ def without_node(
 ) -> tuple[Int[Array, ""], Connections, Int[Array, ""]]:
     """Return the slot of hidden node number `chosen`, all connections but that node's in their order, and how many.
 
-    The slot is -1 if there is no such node. Keys from `visible` on are those of hidden nodes. Sources and targets are
-    slots without the node. If it does not happen, there are no connections.
+    Keys from `visible` on are those of hidden nodes. Sources and targets are slots without the node. If there is
+    no such node, or it does not happen, the slot is -1 and there are no connections.
     """
     genes = genome.connections
     kernel = _removal(genome.nodes.key.shape[0], genes.weight.shape[0], visible)

@@ -27,9 +27,13 @@ PASSED_OVER: Final = -1
 NAME: Final = "The breeding of genomes"
 
 
-def _arrays(*sizes: int) -> tuple[jax.ShapeDtypeStruct, ...]:
-    """Return shapes of arrays of int32; 0 is a number."""
-    return tuple(jax.ShapeDtypeStruct((size,) if size else (), jnp.int32) for size in sizes)
+ONE: Final = jax.ShapeDtypeStruct((), jnp.int32)
+"""The shape of a whole number."""
+
+
+def _whole_numbers(size: int) -> jax.ShapeDtypeStruct:
+    """Return the shape of that many whole numbers."""
+    return jax.ShapeDtypeStruct((size,), jnp.int32)
 
 
 def ordering_kernel(nodes: int, connections: int, function: Function) -> GroupKernel:
@@ -40,8 +44,8 @@ def ordering_kernel(nodes: int, connections: int, function: Function) -> GroupKe
     to the source, and the slot that each of these places has its node from. `function` is the same in jax.
     """
     write = partial(_write_ordering, nodes, connections)
-    given, made = _arrays(connections, connections, 0, 0, 0), _arrays(0, nodes, nodes)
-    return GroupKernel(NAME, function, given, (), made, write)
+    slots, places = _whole_numbers(nodes), _whole_numbers(connections)
+    return GroupKernel(NAME, function, (places, places, ONE, ONE, ONE), (), (ONE, slots, slots), write)
 
 
 def removal_kernel(nodes: int, connections: int, visible: int, function: Function) -> GroupKernel:
@@ -51,10 +55,10 @@ def removal_kernel(nodes: int, connections: int, visible: int, function: Functio
     how many hidden nodes are before the one to remove. Its results are that node's slot, or -1, the number of
     connections that are left, and these in the first places, in their order. `function` is the same in jax.
     """
-    weights = jax.ShapeDtypeStruct((connections,), jnp.float32)
-    ends = _arrays(connections, connections)
-    given, made = (*_arrays(nodes), *ends, weights, *_arrays(0, 0)), (*_arrays(0, 0), *ends, weights)
-    return GroupKernel(NAME, function, given, (), made, partial(_write_removal, nodes, visible))
+    write = partial(_write_removal, nodes, visible)
+    slots, places = _whole_numbers(nodes), _whole_numbers(connections)
+    genes = places, places, jax.ShapeDtypeStruct((connections,), jnp.float32)
+    return GroupKernel(NAME, function, (slots, *genes, ONE, ONE), (), (ONE, ONE, *genes), write)
 
 
 def _write_ordering(
@@ -137,7 +141,7 @@ def _write_removal(
 
     def move(place: str, front: str) -> list[str]:
         *ends, weight = (load(page, gene, place) for gene in genes)
-        for end, result in zip(ends, moved, strict=False):
+        for end, result in zip(ends, moved[:2], strict=True):
             behind = page.put(f"zext i1 {_is(page, end, 'sgt', slot)} to i32")
             store(page, page.put(f"sub i32 {end}, {behind}"), result, front)
         store(page, weight, moved[-1], front)
