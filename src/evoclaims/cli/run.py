@@ -77,9 +77,10 @@ def _print_matrix(project: Project, tier: str, variant: str) -> None:
     print(f"\n{variant}: {project.reproduction.variants[variant].says}")
     for row in rows:
         for name, outcome in row.outcomes.items():
-            changed = f"{row.plain} -> {outcome}" if name in row.hangs_on else f"{outcome} either way"
-            alone = f"{outcome}; not run under the protocol itself"
-            print(f"  {row.claim}: {alone if row.plain is Outcome.NOT_RUN else changed}")
+            said = f"{row.plain} -> {outcome}" if name in row.hangs_on else f"{outcome} either way"
+            if row.plain is Outcome.NOT_RUN:
+                said = f"{outcome}; not run under the protocol itself"
+            print(f"  {row.claim}: {said}")
     if not rows:
         print("  No claim can be judged yet: each needs all trials of its tier.")
 
