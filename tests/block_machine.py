@@ -6,6 +6,7 @@ import ctypes
 import re
 import threading
 from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,7 @@ from evoclaims.kernels.gpu_kernel import BLOCK, ENTRY, GpuProgram
 
 NOT_A_NUMBER = 0x7FC00000
 CALLED = ctypes.CFUNCTYPE(None)
+ASKED = ctypes.CFUNCTYPE(ctypes.c_int32, ctypes.c_int32)
 
 
 def run(
@@ -32,20 +34,21 @@ def run(
         results: shapes of what it computes.
     """
     code = machine_code.address(_for_this_processor(text), ENTRY)
-    given = [np.ascontiguousarray(a) for a in arrays]
+    read = [np.ascontiguousarray(a) for a in arrays]
     made = [np.full(r.shape, 77, r.dtype) for r in results]
-    addresses = [ctypes.c_void_p(a.ctypes.data) for a in (*given, *made)]
-    kernel = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * (len(addresses) + 1), *[ctypes.c_int32] * 4, CALLED)(code)
+    addresses = [ctypes.c_void_p(a.ctypes.data) for a in (*read, *made)]
+    types = [*[ctypes.c_void_p] * (len(addresses) + 1), *[ctypes.c_int32] * 4, CALLED, ASKED]
+    kernel = ctypes.CFUNCTYPE(None, *types)(code)
     for first in range(0, rows, BLOCK * shape.teams):
         for lane in range(BLOCK):
             memory = np.full(shape.shared_bytes // 4, NOT_A_NUMBER, np.int32)
             barrier = threading.Barrier(shape.warps * shape.teams)
             wait = CALLED(lambda barrier=barrier: barrier.wait(60) and None)
+            anyone = ASKED(partial(_anyone, barrier, {}))
             block = first // (BLOCK * shape.teams)
             places = [(block, lane, warp, team) for warp in range(shape.warps) for team in range(shape.teams)]
-            threads = [
-                threading.Thread(target=kernel, args=(*addresses, memory.ctypes.data, *place, wait)) for place in places
-            ]
+            given = [(*addresses, memory.ctypes.data, *place, wait, anyone) for place in places]
+            threads = [threading.Thread(target=kernel, args=arguments) for arguments in given]
             for thread in threads:
                 thread.start()
             for thread in threads:
@@ -53,6 +56,15 @@ def run(
             of_others = np.delete(memory.reshape(-1, BLOCK), lane, axis=1)
             assert (of_others == NOT_A_NUMBER).all(), "a lane wrote into another's words"
     return made
+
+
+def _anyone(barrier: threading.Barrier, votes: dict[int, int], vote: int) -> int:
+    """Wait for all warps; return whether the vote of any is not 0."""
+    votes[threading.get_ident()] = vote
+    barrier.wait(60)
+    result = any(votes.values())
+    barrier.wait(60)
+    return int(result)
 
 
 def _for_this_processor(text: str) -> str:
@@ -66,6 +78,6 @@ def _for_this_processor(text: str) -> str:
         text = text.replace(f"call i32 @llvm.nvvm.read.ptx.sreg.{register}()", f"add i32 %{name}, 0")
     text = re.sub(r"call i32 @llvm.nvvm.shfl.sync.idx.i32\(i32 -1, (i32 %\w+),.*", r"add \1, 0", text)
     text = text.replace("call void @llvm.nvvm.barrier0()", "call void %wait()")
-    return re.sub(
-        r"(define void @\w+\(.*?)\)", r"\1, ptr %numbers, i32 %block, i32 %lane, i32 %warp, i32 %team, ptr %wait)", text
-    )
+    text = text.replace("call i32 @llvm.nvvm.barrier0.or(", "call i32 %anyone(")
+    given = "ptr %numbers, i32 %block, i32 %lane, i32 %warp, i32 %team, ptr %wait, ptr %anyone"
+    return re.sub(r"(define void @\w+\(.*?)\)", rf"\1, {given})", text)

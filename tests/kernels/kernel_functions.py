@@ -9,6 +9,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from evoclaims.kernels.seldom import seldom
+
 X = np.random.default_rng(0).normal(size=(37, 4)).astype(np.float32)  # the second block is not full
 Y = np.random.default_rng(1).normal(size=(37, 4)).astype(np.float32)
 I = np.random.default_rng(2).integers(-9, 9, (37, 4)).astype(np.int32)
@@ -51,9 +53,26 @@ def _solve(x: Any, y: Any) -> Any:
     return jax.scipy.linalg.cho_solve(jax.scipy.linalg.cho_factor(matrix), y), jnp.linalg.cholesky(matrix)
 
 
+def _with_a_shortcut(x: Any, y: Any) -> Any:
+    """Collide, so to say: of four gaps, seldom the last two are negative, and then they push, and something is dear."""
+
+    def following(carry: Any, _: None) -> Any:
+        place, speed = carry
+        gaps = jnp.sort(place * y)
+        far = jnp.where(seldom(gaps[2:] < -0.5), gaps[2:], 1.0)
+        gaps = gaps.at[2:].set(far)
+        pushes = jnp.where(gaps < 0.0, gaps, 0.0)
+        dear = jnp.outer(pushes, jnp.sin(speed)) @ (x * speed)
+        faster = speed * 0.9 + x * 0.1 - pushes * speed[::-1] + dear
+        return (place * 0.8 + faster * 0.1, faster), None
+
+    return jax.lax.scan(following, (x, y), None, length=5)[0]
+
+
 FUNCTIONS: dict[str, tuple[Callable[..., Any], tuple[Any, ...]]] = {
     "arithmetic": (lambda x, y: ((x + y) * x - y / (x + 9.0), -x, jnp.abs(y), x * 0.0 + 1.0, x / 4.0), (X, Y)),
     "roots and powers": (lambda x: (jnp.sqrt(x * x), jax.lax.rsqrt(x * x + 1.0), x**3, x**-2, jnp.square(x)), (X,)),
+    "a loop with a shortcut": (_with_a_shortcut, (X, Y)),
     "a power by a float": (lambda x: jnp.power(x, 2.0), (X,)),
     "sine and cosine": (lambda x: (jnp.sin(x * 50.0), jnp.cos(x * 50.0)), (X,)),
     "exponentials": (lambda x: (jnp.exp(x), jnp.exp2(x), jnp.expm1(x), jnp.tanh(x), jax.nn.sigmoid(x)), (X,)),

@@ -35,7 +35,7 @@ F = np.float32
 @cache
 def _compiled(write: Callable[[GpuInstructions, str, str], str], units: int) -> Any:
     """Return a function of addresses a, b, made, and a count, which computes what is written for each a and b."""
-    page = GpuInstructions([])
+    page = GpuInstructions()
     page.label("entry")
     page.write("br label %again")
     page.label("again")
@@ -231,7 +231,7 @@ def test_roots_of_any_numbers_have_ieees_bits(units: int) -> None:
 
 
 def test_quotients_by_the_same_number_share_its_reciprocal_within_a_basic_block() -> None:
-    page = GpuInstructions([])
+    page = GpuInstructions()
     page.label("entry")
     for dividend in ("%x", "%y", "%z"):
         page.divided(dividend, "%n")
@@ -273,7 +273,7 @@ def _of_groups(kernel: Kernel) -> str:
         rows.page.compute(in_order([result]), registers, load)
         rows.store(results[0], 1, 0, registers[id(result)])
 
-    return group_kernel.gpu_text(write, [result], Sizes((), (1, 1), (1,)), 2, 3, [True, True])
+    return group_kernel.gpu_text(write, Sizes((), (1, 1), (1,)), 2, 3, [True, True])
 
 
 @pytest.mark.parametrize("text_of", [_of_one_warp, _of_two_warps, _of_groups])

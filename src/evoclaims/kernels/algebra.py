@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, Final
 
 import numpy as np
 
-from evoclaims.kernels.expressions import COMPARISONS, KNOWN, Expression, Number, ScalarOperation, is_known
+from evoclaims.kernels.expressions import COMPARISONS, FUSED, KNOWN, Expression, Number, ScalarOperation, is_known
 from evoclaims.kernels.unsupported import Unsupported
 
 Rule = Callable[..., Number | None]
@@ -35,6 +35,27 @@ class Algebra:
         if simpler is not None:
             return simpler
         return self._shared(name, operands, np.dtype(bool) if name in COMPARISONS else operands[-1].dtype)
+
+    def again(self, operation: ScalarOperation, operands: Sequence[Number]) -> Number:
+        """Return an operation that has been made, on other operands."""
+        if operation.name == "cast":
+            return self.cast(operands[0], operation.dtype)
+        if operation.name == "bits":
+            return self.bits(operands[0], operation.dtype)
+        if operation.name in FUSED:
+            return self._fused(operation.name, *operands)
+        return self.apply(operation.name, *operands)
+
+    def _fused(self, name: str, c: Number, a: Number, b: Number) -> Number:
+        """Return c + a · b, or what else `FUSED` has, rounded once."""
+        product = _mul(self, a, b)  # None unless it is exact
+        if product is None and _is(c, 0):
+            product = self.apply("mul", a, b)
+        if product is None:
+            return self._shared(name, (c, a, b), a.dtype)
+        if name == "fma":
+            return self.apply("add", c, product)
+        return self.apply("sub", c, product) if name == "fnma" else self.apply("sub", product, c)
 
     def cast(self, number: Number, dtype: Any) -> Number:
         """Return the number as another dtype; floats become integers by truncation."""

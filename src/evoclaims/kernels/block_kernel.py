@@ -5,13 +5,23 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from evoclaims.kernels.block_shape import BlockShape
-from evoclaims.kernels.expressions import Carried, Input, Loop, LoopResult, Number, ScalarOperation, is_known
+from evoclaims.kernels.expressions import (
+    Carried,
+    Choice,
+    Input,
+    Loop,
+    LoopResult,
+    Number,
+    ScalarOperation,
+    is_known,
+    operands_of,
+)
 from evoclaims.kernels.gpu_instructions import GpuInstructions
 from evoclaims.kernels.gpu_kernel import BLOCK, Element, finished, parameters
 from evoclaims.kernels.interpreter import Numbers
 from evoclaims.kernels.llvm_ir import TYPES, ArrayRow, Instructions, either
 from evoclaims.kernels.shared_slots import Slots
-from evoclaims.kernels.warp_schedule import Phase, Schedule
+from evoclaims.kernels.warp_schedule import Phase, Schedule, Segment
 
 SHARED = "@numbers = external addrspace(3) global [0 x i32], align 16\n"
 """The block's shared memory; its size is said at the launch. A slot is a word of each lane."""
@@ -32,7 +42,7 @@ def text(
         rows: elements of the batch.
     """
     plan, places, teams = shape.plan, shape.slots, shape.teams
-    page = GpuInstructions([number for result in results for number in result.flat])
+    page = GpuInstructions()
     page.label("entry")
     sources = ("ctaid.x", "tid.x", "tid.y", "tid.z")
     block, lane, own, in_block = (page.call(f"llvm.nvvm.read.ptx.sreg.{name}", "i32", []) for name in sources)
@@ -74,7 +84,7 @@ class _Warp:
         segments = self._plan.segments
         for at, segment in enumerate(segments):
             if segment.loop:
-                self._repeat(segment.loop, segment.phases)
+                self._repeat(segment)
                 continue
             self._compute(segment.phases)
             if at + 1 < len(segments):
@@ -90,28 +100,52 @@ class _Warp:
             if at:
                 self._barrier()
             for operation in phase[self._number]:
-                registers = {id(n): self._register(n) for n in self._plan.needed(operation)}
+                registers = {id(n): self._register(n) for n in operands_of(operation)}
                 self._page.compute([operation], registers, self._element.load)
                 self._own[id(operation)] = registers[id(operation)]
                 if id(operation) in self._slots.of:
                     self._put(operation, registers[id(operation)])
 
-    def _repeat(self, around: Loop, phases: Sequence[Phase]) -> None:
+    def _repeat(self, segment: Segment) -> None:
         """Write a loop; its carry stays in slots."""
-        page = self._page
+        page, around = self._page, segment.loop
+        assert around
         before, again, after = page.block, f"{page.block}.again", f"{page.block}.after"
         page.write(f"br label %{again}")
         page.label(again)
         head, rounds = len(page.lines), page.register()
-        self._compute(phases)
-        following = self._values(around.results)
-        self._barrier()
-        self._leave(around, following)
+        self._compute(segment.phases)
+        if around.choice:
+            self._choose(around, around.choice, segment.ways)
+        else:
+            self._pass_on(around, around.results)
         self._barrier()
         more = page.put(f"add i32 {rounds}, 1")
         page.lines.insert(head, either(rounds, "i32", ("0", before), (more, page.block)))
         page.write(f"br i1 {page.put(f'icmp ult i32 {more}, {around.rounds}')}, label %{again}, label %{after}")
         page.label(after)
+
+    def _choose(self, around: Loop, choice: Choice, ways: Sequence[Sequence[Phase]]) -> None:
+        """Write both ways to the carry of a loop; all warps of a block take the same one."""
+        page = self._page
+        is_mine = self._plan.responsible(choice.condition, 0) == self._number
+        own = page.put(f"zext i1 {self._register(choice.condition)} to i32") if is_mine else "0"
+        anywhere = page.call("llvm.nvvm.barrier0.or", "i32", [("i32", own)])
+        whole, short, end = (f"{page.block}.{name}" for name in ("whole", "short", "end"))
+        page.write(f"br i1 {page.put(f'icmp ne i32 {anywhere}, 0')}, label %{whole}, label %{short}")
+        for name, phases, results in zip((whole, short), ways, (choice.whole, choice.short), strict=True):
+            page.label(name)
+            self._forget()
+            self._compute(phases)
+            self._pass_on(around, results)
+            page.write(f"br label %{end}")
+        page.label(end)
+
+    def _pass_on(self, around: Loop, results: Sequence[Number]) -> None:
+        """Leave the results of a round as the loop's carry."""
+        following = self._values(results)
+        self._barrier()
+        self._leave(around, following)
 
     def _leave(self, around: Loop, values: Sequence[str]) -> None:
         """Leave a loop's carry in its slots, as far as this warp is responsible for it."""
@@ -173,5 +207,9 @@ class _Warp:
     def _barrier(self) -> None:
         """Wait for the other warps."""
         self._page.call("llvm.nvvm.barrier0", "void", [])
+        self._forget()
+
+    def _forget(self) -> None:
+        """Forget what is read: it may have changed, or not be at hand."""
         self._at_hand.clear()
         self._element.forget()

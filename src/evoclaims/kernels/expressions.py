@@ -5,7 +5,6 @@ A number is known (a NumPy scalar) or an expression of inputs. Equal operations 
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
@@ -37,7 +36,7 @@ class Input(Expression):
 
 @dataclass(frozen=True, eq=False, slots=True)
 class ScalarOperation(Expression):
-    """A simple operation on numbers: one of `KNOWN`, "cast", or "bits" (see `Algebra`)."""
+    """A simple operation on numbers: one of `KNOWN`, of `FUSED`, "cast", or "bits" (see `Algebra`)."""
 
     name: str
     operands: tuple[Number, ...]
@@ -67,12 +66,43 @@ class Loop:
     results: tuple[Number, ...]
     taken: tuple[Expression, ...]
 
+    @property
+    def choice(self) -> Choice | None:
+        """The choice that all results are of (`with_shortcut`), if there is one."""
+        first = self.results[0]
+        return first.choice if isinstance(first, Chosen) else None
+
 
 @dataclass(frozen=True, eq=False, slots=True)
 class LoopResult(Expression):
     """A result of a loop: the value at position `place` of the carry after the last round."""
 
     loop: Loop
+    place: int
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Choice:
+    """Two ways to compute the same numbers.
+
+    Attributes:
+        condition: where it is False for all elements that are computed together, the short way will do.
+        whole: the results, computed the long way.
+        short: the results, computed the short way.
+        taken: outside expressions that the ways use; computed before.
+    """
+
+    condition: Expression
+    whole: tuple[Number, ...]
+    short: tuple[Number, ...]
+    taken: tuple[Expression, ...]
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Chosen(Expression):
+    """A result of a choice: the one at position `place`."""
+
+    choice: Choice
     place: int
 
 
@@ -85,22 +115,49 @@ def loop(rounds: int, carried: Sequence[Carried], start: Sequence[Number], resul
     """Return a loop."""
     inside: set[int] = {id(c) for c in carried}
     taken: dict[int, Expression] = {}
-    for expression in in_order(results):
-        if any(id(p) in inside for p in operands_of(expression)):
+    for expression in in_order(results, with_ways):
+        if any(id(p) in inside for p in with_ways(expression)):
             inside.add(id(expression))
-            taken.update((id(p), p) for p in operands_of(expression) if id(p) not in inside)
+            taken.update((id(p), p) for p in with_ways(expression) if id(p) not in inside)
     taken.update((id(r), r) for r in results if not is_known(r) and id(r) not in inside)
     return Loop(rounds, tuple(carried), tuple(start), tuple(results), tuple(taken.values()))
 
 
-def in_order(numbers: Iterable[Number]) -> list[Expression]:
-    """Return these and all expressions they use, operands first; without the bodies of loops."""
+def operands_of(expression: Expression) -> list[Expression]:
+    """Return the expressions that it reads."""
+    match expression:
+        case ScalarOperation(operands=operands):
+            return [o for o in operands if not is_known(o)]
+        case LoopResult(loop=around):
+            return [*(s for s in around.start if not is_known(s)), *around.taken]
+        case Chosen(choice=choice):
+            return [choice.condition, *choice.taken]
+    return []
+
+
+def with_ways(expression: Expression) -> list[Expression]:
+    """Return the expressions that it reads, and the results of both ways of a choice."""
+    read = operands_of(expression)
+    if isinstance(expression, Chosen):
+        read += [n for n in (*expression.choice.whole, *expression.choice.short) if not is_known(n)]
+    return read
+
+
+def in_order(
+    numbers: Iterable[Number], operands: Callable[[Expression], list[Expression]] = operands_of
+) -> list[Expression]:
+    """Return these and all expressions they use, operands first; without the bodies of loops and the ways of choices.
+
+    Args:
+        numbers: where to begin.
+        operands: what an expression uses.
+    """
     made: set[int] = set()
     order: list[Expression] = []
     waiting = [n for n in numbers if not is_known(n)][::-1]
     while waiting:
         expression = waiting[-1]
-        missing = [p for p in operands_of(expression) if id(p) not in made] if id(expression) not in made else []
+        missing = [p for p in operands(expression) if id(p) not in made] if id(expression) not in made else []
         if missing:
             waiting.extend(reversed(missing))
             continue
@@ -113,40 +170,9 @@ def in_order(numbers: Iterable[Number]) -> list[Expression]:
 
 def everything(numbers: Iterable[Number]) -> list[Expression]:
     """Return these and all expressions they use, operands first, with the bodies of loops at the end."""
-    order = in_order(numbers)
+    order = in_order(numbers, with_ways)
     loops = {id(e.loop): e.loop for e in order if isinstance(e, LoopResult)}
     return order + [inner for loop in loops.values() for inner in everything(loop.results)]
-
-
-def products_to_fuse(results: Sequence[Number]) -> frozenset[int]:
-    """Return the ids of the products of floats that are used once, in a sum or difference."""
-    expressions = everything(results)
-    uses: Counter[int] = Counter(id(r) for r in results)
-    for expression in expressions:
-        match expression:
-            case ScalarOperation(operands=operands):
-                uses.update(map(id, operands))
-            case LoopResult(loop=around):
-                uses.update(map(id, (*around.start, *around.results, *around.taken)))
-    chosen = set()
-    for expression in expressions:
-        if isinstance(expression, ScalarOperation) and expression.name in ("add", "sub"):
-            for operand in reversed(expression.operands):
-                product = isinstance(operand, ScalarOperation) and operand.name == "mul" and operand.dtype.kind == "f"
-                if product and uses[id(operand)] == 1:
-                    chosen.add(id(operand))
-                    break
-    return frozenset(chosen)
-
-
-def operands_of(expression: Expression) -> list[Expression]:
-    """Return the expressions that it reads."""
-    match expression:
-        case ScalarOperation(operands=operands):
-            return [o for o in operands if not is_known(o)]
-        case LoopResult(loop=around):
-            return [*(s for s in around.start if not is_known(s)), *around.taken]
-    return []
 
 
 def _quotient(a: Any, b: Any) -> Any:
@@ -182,6 +208,7 @@ KNOWN: Final[dict[str, Callable[..., Any]]] = {
     "or": np.bitwise_or,
     "rem": _remainder,
     "rint": np.rint,
+    "seldom": np.asarray,
     "select": np.where,
     "shift_left": np.left_shift,
     "shift_right_arithmetic": np.right_shift,
@@ -191,6 +218,8 @@ KNOWN: Final[dict[str, Callable[..., Any]]] = {
     "xor": np.bitwise_xor,
 }
 """The simple operations, on known numbers. "select" returns its second operand where the first is true; "rint" rounds
-halves to even; the others are jax's of the same name."""
+halves to even; "seldom" returns its operand (`seldom`); the others are jax's of the same name."""
 COMPARISONS: Final = frozenset({"eq", "ge", "gt", "le", "lt", "ne"})
 """Operations that return a bool."""
+FUSED: Final = ("fma", "fms", "fnma")
+"""Of floats c, a and b, rounded once: c + a · b, a · b - c, and c - a · b."""

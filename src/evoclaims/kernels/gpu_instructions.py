@@ -19,7 +19,6 @@ signs, infinities and NaN, except that
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -58,9 +57,9 @@ class _Divisor:
 class GpuInstructions(Instructions):
     """Instructions of a thread. Quotients by one number share its reciprocal, as far as a basic block goes."""
 
-    def __init__(self, results: Sequence[Number]) -> None:
-        """Start empty; `results` are all numbers that will be computed."""
-        super().__init__(1, results)
+    def __init__(self) -> None:
+        """Start empty."""
+        super().__init__(1)
         self._divisors: dict[str, _Divisor] = {}
 
     def label(self, name: str) -> None:

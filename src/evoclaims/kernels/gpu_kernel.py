@@ -35,7 +35,7 @@ def text(results: Sequence[Numbers], arrays: Mapping[int, ArrayRow], shared: Map
     numbers = [number for result in results for number in result.flat]
     # Without the branches of divisions, longer code would be one block, which NVIDIA's assembler orders for minutes
     # and spills more of.
-    page = GpuInstructions(numbers) if len(everything(numbers)) <= SMALL else Instructions(1, numbers)
+    page = GpuInstructions() if len(everything(numbers)) <= SMALL else Instructions(1)
     element = Element(page, begin(page, rows), arrays, shared)
     registers: dict[int, str] = {}
     page.compute(in_order(numbers), registers, element.load)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Final
 
 from evoclaims.kernels import gpu_kernel
 from evoclaims.kernels.gpu_instructions import GpuInstructions
@@ -92,7 +92,7 @@ def lanes_for(rows: int, widest: int) -> int:
     return min(1 << (rows - 1).bit_length(), LANES * widest)
 
 
-def host_text(write: Writer, numbers: Sequence[Any], sizes: Sizes, lanes: int, together: int) -> str:
+def host_text(write: Writer, sizes: Sizes, lanes: int, together: int) -> str:
     """Return the text of a kernel for processors.
 
     Its arguments are an array of int32, [groups, rows of each, and of each array of rows whether (1) or not (0) groups
@@ -100,12 +100,11 @@ def host_text(write: Writer, numbers: Sequence[Any], sizes: Sizes, lanes: int, t
 
     Args:
         write: what is computed.
-        numbers: the expressions that `write` computes.
         sizes: of the arrays.
         lanes: in a vector.
         together: rows that `write` is given at a time: as many as lanes, unless it goes through them itself.
     """
-    page = Instructions(lanes, numbers)
+    page = Instructions(lanes)
     page.label("entry")
     groups, rows, results = _named(sizes)
     write(Rows(page, "%count"), groups, rows, results)
@@ -117,12 +116,12 @@ def host_text(write: Writer, numbers: Sequence[Any], sizes: Sizes, lanes: int, t
     return "\n".join(page.declared) + "\n" + block + _loops(sizes, together) + called
 
 
-def gpu_text(write: Writer, numbers: Sequence[Any], sizes: Sizes, groups: int, rows: int, own: Sequence[bool]) -> str:
+def gpu_text(write: Writer, sizes: Sizes, groups: int, rows: int, own: Sequence[bool]) -> str:
     """Return the text of a kernel for NVIDIA's GPUs, a thread per row of a group; see `host_text`.
 
     Its parameters are the addresses of the arrays of groups, those of rows, and the results.
     """
-    page = GpuInstructions(numbers)
+    page = GpuInstructions()
     of_groups, of_rows, of_results = _named(sizes)
     thread = gpu_kernel.begin(page, groups * rows)
     group, row = page.put(f"udiv i32 {thread}, {rows}"), page.put(f"urem i32 {thread}, {rows}")

@@ -30,7 +30,6 @@ class GroupKernel:
         groups, rows: shapes of the group's arguments, and the row's.
         outputs: shapes of the results, none of them empty.
         write: writes it in LLVM's instructions.
-        numbers: the expressions that it computes.
         one_lane: whether `write` goes through all rows of a group itself, one after the other, rather than computing a
             vector of them.
         for_gpus: whether it is faster than `function` on GPUs too.
@@ -42,7 +41,6 @@ class GroupKernel:
     rows: Shapes
     outputs: Shapes
     write: Writer
-    numbers: Sequence[Any] = ()
     one_lane: bool = False
     for_gpus: bool = True
 
@@ -98,7 +96,7 @@ class GroupKernel:
         def call(groups: int, rows: int, own: list[bool], operands: list[Array], shapes: Shapes) -> Any:
             lanes = 1 if self.one_lane else group_kernel.lanes_for(rows, machine_code.lanes())
             together = group_kernel.ALL if self.one_lane else lanes
-            text = group_kernel.host_text(self.write, self.numbers, self.sizes, lanes, together)
+            text = group_kernel.host_text(self.write, self.sizes, lanes, together)
             return calls.on_host(text, [groups, rows, *own], operands, shapes)
 
         return self._call(leaves, call)
@@ -109,7 +107,7 @@ class GroupKernel:
             return self.as_it_is(*leaves)
 
         def call(groups: int, rows: int, own: list[bool], operands: list[Array], shapes: Shapes) -> Any:
-            text = group_kernel.gpu_text(self.write, self.numbers, self.sizes, groups, rows, own)
+            text = group_kernel.gpu_text(self.write, self.sizes, groups, rows, own)
             return calls.on_gpu(gpu_kernel.program(text, self.name), operands, shapes, groups * rows)
 
         return self._call(leaves, call)

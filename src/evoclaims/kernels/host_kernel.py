@@ -29,7 +29,7 @@ def text(results: Sequence[Numbers], arrays: Mapping[int, ArrayRow], lanes: int)
         arrays: the rows of the arrays read, in order.
         lanes: elements computed at a time.
     """
-    page = Instructions(lanes, [number for result in results for number in result.flat])
+    page = Instructions(lanes)
     _block(page, results, arrays)
     given = [f"i64 %shared{a}" for a in arrays]
     given += [f"ptr %a{a}" for a in arrays] + [f"ptr %z{z}" for z in range(len(results))]

@@ -14,6 +14,9 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from evoclaims.kernels.expressions import (
+    FUSED,
+    Choice,
+    Chosen,
     Expression,
     Input,
     Loop,
@@ -23,7 +26,6 @@ from evoclaims.kernels.expressions import (
     everything,
     in_order,
     is_known,
-    products_to_fuse,
 )
 from evoclaims.kernels.unsupported import Unsupported
 
@@ -53,6 +55,8 @@ BINARY: Final = {
     },
     "b": {"and": "and", "or": "or", "xor": "xor"},
 }
+WEIGHTS: Final = '!0 = !{!"branch_weights", i32 1, i32 1000}'
+"""How often the whole way is taken, and the short one, so that registers are kept for the latter."""
 _ORDERS: Final = ("ge", "gt", "le", "lt")
 COMPARED: Final = {
     "f": {"eq": "fcmp oeq", "ne": "fcmp une"} | {name: f"fcmp o{name}" for name in _ORDERS},
@@ -75,9 +79,9 @@ INTRINSICS: Final = {
 }
 CASTS: Final = {"bf": "uitofp", "bi": "zext", "if": "sitofp"}
 OTHERS: Final = {
-    "f": ("bits", "cast", "neg", "select"),
+    "f": ("bits", "cast", *FUSED, "neg", "select"),
     "i": ("abs", "bits", "cast", "neg", "not", "select"),
-    "b": ("cast", "not"),
+    "b": ("cast", "not", "seldom"),
 }
 
 
@@ -136,15 +140,15 @@ class Instructions:
         block: the basic block that is being written.
     """
 
-    def __init__(self, lanes: int, results: Sequence[Number]) -> None:
-        """Start empty; `results` are all numbers that will be computed."""
+    def __init__(self, lanes: int) -> None:
+        """Start empty."""
         self.lanes = lanes
         self.lines: list[str] = []
         self.declared: dict[str, None] = {}
-        self._fused = products_to_fuse(results)
         self.block = ""
         self._registers = 0
         self._loops = 0
+        self._branches = 0
 
     def register(self) -> str:
         """Return a new register."""
@@ -210,7 +214,7 @@ class Instructions:
     def compute(self, expressions: Iterable[Expression], registers: dict[int, Any], load: Loader) -> None:
         """Compute expressions in order; `registers` has each one's register by its id."""
         for expression in expressions:
-            if id(expression) in registers or id(expression) in self._fused:
+            if id(expression) in registers:
                 continue
             match expression:
                 case Input():
@@ -219,6 +223,10 @@ class Instructions:
                     if id(around) not in registers:
                         registers[id(around)] = self._repeat(around, registers, load)
                     place = registers[id(around)][expression.place]
+                case Chosen(choice=choice):
+                    if id(choice) not in registers:
+                        registers[id(choice)] = self._choose(choice, registers, load)
+                    place = registers[id(choice)][expression.place]
                 case ScalarOperation():
                     place = self._operate(expression, registers)
                 case _:
@@ -230,9 +238,11 @@ class Instructions:
         dtype, name = operation.operands[-1].dtype, operation.name
         kind = dtype.kind
         type_ = self.vector(TYPES[kind])
-        if name in ("add", "sub") and any(id(o) in self._fused for o in operation.operands):
-            return self._sum_with_product(operation, registers)
         operands = [self.operand(o, registers) for o in operation.operands]
+        if name == "seldom":
+            return operands[0]
+        if name in FUSED:
+            return self._fused(name, *operands)
         if (kind, name) == ("f", "div"):
             return self.divided(operands[0], operands[1])
         if (kind, name) == ("f", "sqrt"):
@@ -270,17 +280,13 @@ class Instructions:
         type_ = self.vector("float")
         return self.call(self.mangled(INTRINSICS["f"]["sqrt"], "f32"), type_, [(type_, number)])
 
-    def _sum_with_product(self, operation: ScalarOperation, registers: dict[int, Any]) -> str:
+    def _fused(self, name: str, c: str, a: str, b: str) -> str:
         """Write a sum or difference of a number and a product, rounded once."""
         type_ = self.vector("float")
-        left, right = operation.operands
-        second = id(right) in self._fused
-        product, term = (right, left) if second else (left, right)
-        a, b = (self.operand(o, registers) for o in product.operands)
-        c = self.operand(term, registers)
-        if operation.name == "sub":
-            negative = self.put(f"fneg {type_} {a if second else c}")
-            a, c = (negative, c) if second else (a, negative)
+        if name == "fms":
+            c = self.put(f"fneg {type_} {c}")
+        elif name == "fnma":
+            a = self.put(f"fneg {type_} {a}")
         return self.call(self.mangled("fma", "f32"), type_, [(type_, a), (type_, b), (type_, c)])
 
     def _repeat(self, loop: Loop, registers: dict[int, Any], load: Loader) -> list[str]:
@@ -305,6 +311,35 @@ class Instructions:
         self.write(f"br i1 {more}, label %{again}, label %{after}")
         self.label(after)
         return results
+
+    def _choose(self, choice: Choice, registers: dict[int, Any], load: Loader) -> list[str]:
+        """Write both ways of a choice; return the results' registers."""
+        self._branches += 1
+        whole, short, end = (f"{name}{self._branches}" for name in ("whole", "short", "end"))
+        condition = self.in_any_lane(self.operand(choice.condition, registers))
+        self.declared[WEIGHTS] = None
+        self.write(f"br i1 {condition}, label %{whole}, label %{short}, !prof !0")
+        ways = []
+        for name, numbers in ((whole, choice.whole), (short, choice.short)):
+            self.label(name)
+            inside = dict(registers)
+            self.compute(in_order(numbers), inside, load)
+            ways.append(([self.operand(n, inside) for n in numbers], self.block))
+            self.write(f"br label %{end}")
+        self.label(end)
+        (all_values, all_from), (few_values, few_from) = ways
+        results = [self.register() for _ in choice.whole]
+        self.lines += [
+            either(register, self.vector(TYPES[n.dtype.kind]), (a, all_from), (b, few_from))
+            for register, n, a, b in zip(results, choice.whole, all_values, few_values, strict=True)
+        ]
+        return results
+
+    def in_any_lane(self, condition: str) -> str:
+        """Return whether a condition is true in any lane."""
+        if self.lanes == 1:
+            return condition
+        return self.call(f"llvm.vector.reduce.or.v{self.lanes}i1", "i1", [(self.vector("i1"), condition)])
 
 
 def either(register: str, type_: str, *sources: tuple[str, str]) -> str:

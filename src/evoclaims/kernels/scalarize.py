@@ -14,6 +14,7 @@ from evoclaims.kernels import (
     indexing,  # noqa: F401  (they register what primitives do)
 )
 from evoclaims.kernels.expressions import Input
+from evoclaims.kernels.fusing import fused
 from evoclaims.kernels.interpreter import Numbers, Scalars, check, listed
 
 
@@ -32,4 +33,10 @@ def scalarize(traced: ClosedJaxpr) -> list[Numbers]:
         listed([Input(check(aval.dtype), array, place) for place in range(math.prod(aval.shape))], aval.shape)
         for array, aval in enumerate(traced.in_avals)
     ]
-    return Scalars().run(traced, inputs)
+    return _fused(Scalars().run(traced, inputs))
+
+
+def _fused(results: list[Numbers]) -> list[Numbers]:
+    """Return results with fused products."""
+    numbers = iter(fused([number for result in results for number in result.flat]))
+    return [listed([next(numbers) for _ in result.flat], result.shape) for result in results]

@@ -6,8 +6,8 @@ import heapq
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from evoclaims.kernels.expressions import Carried, Input, LoopResult, Number, is_known
-from evoclaims.kernels.warp_schedule import Schedule
+from evoclaims.kernels.expressions import Carried, Input, LoopResult, Number, is_known, operands_of
+from evoclaims.kernels.warp_schedule import Phase, Schedule
 
 
 @dataclass(frozen=True)
@@ -55,30 +55,42 @@ class _Uses:
         self._begin = self._last = 0  # of the segment
         now = 0
         for at, segment in enumerate(schedule.segments):
-            self._begin, self._last = now, now + len(segment.phases) - 1
-            for phase in segment.phases:
-                for warp, operations in enumerate(phase):
-                    for operation in operations:
-                        self._made[id(operation)] = now
-                        for number in schedule.needed(operation):
-                            self._note(number, warp, now)
-                now += 1
+            self._begin, self._last = now, now + sum(map(len, (segment.phases, *segment.ways))) - 1
+            now = self._compute(segment.phases, now)
             if segment.loop:
-                self._store(segment.loop.results)
+                choice = segment.loop.choice
+                if choice:
+                    self._store([choice.condition], now - 1)
+                    for phases, numbers in zip(segment.ways, (choice.whole, choice.short), strict=True):
+                        now = self._compute(phases, now)
+                        self._store(numbers, now - 1)
+                else:
+                    self._store(segment.loop.results, now - 1)
                 self.read |= {id(c): now for c in segment.loop.carried}  # the next carry, after a barrier of its own
                 now += 1
             elif at + 1 < len(schedule.segments):
                 following = schedule.segments[at + 1].loop
                 assert following
-                self._store(following.start)
+                self._store(following.start, self._last)
                 self.written |= {id(c): self._last for c in following.carried}
             else:
-                self._store(results)
+                self._store(results, self._last)
 
-    def _store(self, numbers: Sequence[Number]) -> None:
-        """Note that numbers are read at the end of the segment, each by the warp that stores it."""
+    def _compute(self, phases: Sequence[Phase], now: int) -> int:
+        """Go through phases, of which the first is `now`; return what comes after them."""
+        for phase in phases:
+            for warp, operations in enumerate(phase):
+                for operation in operations:
+                    self._made[id(operation)] = now
+                    for number in operands_of(operation):
+                        self._note(number, warp, now)
+            now += 1
+        return now
+
+    def _store(self, numbers: Sequence[Number], now: int) -> None:
+        """Note that numbers are read at the end of a phase, each by the warp that stores it."""
         for place, number in enumerate(numbers):
-            self._note(number, self._schedule.responsible(number, place), self._last)
+            self._note(number, self._schedule.responsible(number, place), now)
 
     def _note(self, number: Number, warp: int, now: int) -> None:
         """Note that a warp reads a number."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter, defaultdict
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Final
 
 STRETCHES: Final = 8
@@ -24,10 +24,12 @@ class Group:
     Attributes:
         instructions: how many.
         reads: the groups that make the numbers read, by the number's id; these come earlier in the list of groups.
+        outside: the warps that have made other numbers read, before, by the number's id.
     """
 
     instructions: int
     reads: Mapping[int, int]
+    outside: Mapping[int, int] = field(default_factory=dict)
 
 
 def assign(groups: Sequence[Group], warps: int) -> list[int]:
@@ -43,7 +45,7 @@ def assign(groups: Sequence[Group], warps: int) -> list[int]:
     load = [[0] * warps for _ in range(STRETCHES)]
     warp_of: list[int] = []
     for at, group in enumerate(groups):
-        near, busy = Counter(warp_of[maker] for maker in group.reads.values()), load[stretch[at]]
+        near, busy = Counter(home for _, home in _sources(group, warp_of)), load[stretch[at]]
         chosen = max(range(warps), key=lambda w: 2 * near[w] - 3 * busy[w] / share)
         warp_of.append(chosen)
         busy[chosen] += group.instructions
@@ -52,16 +54,16 @@ def assign(groups: Sequence[Group], warps: int) -> list[int]:
     for at, group in enumerate(groups):
         for number, maker in group.reads.items():
             if number not in readers:
-                readers[number] = [0] * warps
                 made[maker].append(number)
-            readers[number][warp_of[at]] += 1
+        for number, _ in _sources(group, warp_of):
+            readers.setdefault(number, [0] * warps)[warp_of[at]] += 1
 
     def readings(at: int, warp: int) -> float:
         """Return what a group costs if it is the warp's."""
         here = warp_of[at]
         cost = 0.0
-        for number, maker in groups[at].reads.items():
-            cost += warp_of[maker] != warp and readers[number][warp] == (warp == here)
+        for number, home in _sources(groups[at], warp_of):
+            cost += home != warp and readers[number][warp] == (warp == here)
         for number in made[at]:
             others = sum(count > 0 for w, count in enumerate(readers[number]) if w != warp)
             cost += others + PUBLISHING * (others > 0)
@@ -78,13 +80,18 @@ def assign(groups: Sequence[Group], warps: int) -> list[int]:
             warp_of[at] = best
             busy[here] -= size
             busy[best] += size
-            for number in groups[at].reads:
+            for number, _ in _sources(groups[at], warp_of):
                 readers[number][here] -= 1
                 readers[number][best] += 1
             moved += 1
         if not moved:
             break
     return warp_of
+
+
+def _sources(group: Group, warp_of: Sequence[int]) -> list[tuple[int, int]]:
+    """Return the numbers that a group reads from others, each with the warp that makes it."""
+    return [*((number, warp_of[maker]) for number, maker in group.reads.items()), *group.outside.items()]
 
 
 def _stretches(groups: Sequence[Group]) -> list[int]:

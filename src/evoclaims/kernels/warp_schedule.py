@@ -16,6 +16,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from evoclaims.kernels.expressions import (
+    Chosen,
     Expression,
     Loop,
     LoopResult,
@@ -24,7 +25,6 @@ from evoclaims.kernels.expressions import (
     in_order,
     is_known,
     operands_of,
-    products_to_fuse,
 )
 from evoclaims.kernels.warp_assignment import Group, assign
 
@@ -45,10 +45,12 @@ class Segment:
     Attributes:
         loop: whose round it is.
         phases: at least one.
+        ways: those of the whole and of the short way in which the round goes on, if it has a choice.
     """
 
     loop: Loop | None
     phases: tuple[Phase, ...]
+    ways: tuple[tuple[Phase, ...], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -59,40 +61,28 @@ class Schedule:
         warps: how many.
         segments: in order.
         owner: the warp that computes each operation, by the operation's id.
-        fused: ids of products that are computed where they are used (`products_to_fuse`).
     """
 
     warps: int
     segments: tuple[Segment, ...]
     owner: Mapping[int, int]
-    fused: frozenset[int]
-
-    def needed(self, operation: ScalarOperation) -> list[Expression]:
-        """Return the expressions that an operation reads, with those of a product that is fused with it."""
-        return _needed(operation, self.fused)
 
     def responsible(self, number: Number, place: int) -> int:
         """Return the warp that stores a number as the result, or the carry, at a place."""
         return self.owner.get(id(number), place % self.warps)
 
 
-def _needed(operation: ScalarOperation, fused: frozenset[int]) -> list[Expression]:
-    """Return the expressions that an operation reads."""
-    direct = [o for o in operation.operands if not is_known(o)]
-    inner = (p for o in direct for p in ([o] if id(o) not in fused else o.operands))
-    return list({id(p): p for p in inner if not is_known(p)}.values())
-
-
 def schedule(results: Sequence[Number], warps: int) -> Schedule | None:
     """Share a kernel among warps.
 
     Returns:
-        The schedule; None for a kernel with a loop inside another, which only one warp can compute.
+        The schedule; None for a kernel with a loop or a choice where only one warp can compute it: a loop inside
+        another, a choice outside of loops.
     """
-    fused = products_to_fuse(results)
     order = in_order(results)
     loops = list({id(e.loop): e.loop for e in order if isinstance(e, LoopResult)}.values())
-    if any(isinstance(e, LoopResult) for around in loops for e in _body(around)):
+    inner = [e for around in loops for part in _round(around) for e in part]
+    if any(isinstance(e, LoopResult) for e in inner) or any(isinstance(e, Chosen) for e in order):
         return None
     place = {id(around): at for at, around in enumerate(loops)}
     after: dict[int, int] = {}  # how many loops must have ended before each expression
@@ -108,30 +98,39 @@ def schedule(results: Sequence[Number], warps: int) -> Schedule | None:
     owner: dict[int, int] = {}
     segments = []
     for at, stretch in enumerate(stretches):
-        segments.append(Segment(None, _phases(stretch, warps, owner, fused)))
+        segments.append(Segment(None, _phases(stretch, warps, owner)))
         if at < len(loops):
-            body = [e for e in _body(loops[at]) if isinstance(e, ScalarOperation)]
-            segments.append(Segment(loops[at], _phases(body, warps, owner, fused)))
-    return Schedule(warps, tuple(segments), owner, fused)
+            parts = [[e for e in part if isinstance(e, ScalarOperation)] for part in _round(loops[at])]
+            first, *ways = [_phases(part, warps, owner) for part in parts]
+            segments.append(Segment(loops[at], first, tuple(ways)))
+    return Schedule(warps, tuple(segments), owner)
 
 
-def _body(around: Loop) -> list[Expression]:
-    """Return what a loop computes in a round, operands first."""
+def _round(around: Loop) -> list[list[Expression]]:
+    """Return what a loop computes in a round, operands first; with a choice in parts: before it, and on either way."""
     inside = set(map(id, around.carried))
-    body = []
-    for expression in in_order(around.results):
+    choice = around.choice
+    if choice is None:
+        return [_added(around.results, inside)]
+    before = _added([choice.condition, *choice.taken], inside)
+    return [before, *(_added(way, set(inside)) for way in (choice.whole, choice.short))]
+
+
+def _added(numbers: Sequence[Number], inside: set[int]) -> list[Expression]:
+    """Return what these need beyond what is `inside` a round, but in the round; add its ids."""
+    added = []
+    for expression in in_order(numbers):
         if id(expression) not in inside and any(id(p) in inside for p in operands_of(expression)):
             inside.add(id(expression))
-            body.append(expression)
-    return body
+            added.append(expression)
+    return added
 
 
 def _groups(
-    operations: Sequence[ScalarOperation], fused: frozenset[int]
+    operations: Sequence[ScalarOperation], owner: Mapping[int, int]
 ) -> tuple[list[Group], list[list[ScalarOperation]]]:
     """Put each operation that has one use with that use, as long as groups stay small; operands' groups come first."""
-    operations = [o for o in operations if id(o) not in fused]
-    read = {id(o): [id(r) for r in _needed(o, fused)] for o in operations}
+    read = {id(o): list(dict.fromkeys(map(id, operands_of(o)))) for o in operations}
     users: dict[int, list[int]] = defaultdict(list)
     for operation in operations:
         for number in read[id(operation)]:
@@ -150,17 +149,16 @@ def _groups(
     number_of = {id(o): number for number, o in enumerate(last)}
     groups = []
     for operation in last:
-        reads = (r for member in members[id(operation)] for r in read[id(member)] if r in root)
-        makers = {r: number_of[root[r]] for r in reads if root[r] != id(operation)}
-        groups.append(Group(size[id(operation)], makers))
+        reads = [r for member in members[id(operation)] for r in read[id(member)]]
+        makers = {r: number_of[root[r]] for r in reads if r in root and root[r] != id(operation)}
+        outside = {r: owner[r] for r in reads if r not in root and r in owner}
+        groups.append(Group(size[id(operation)], makers, outside))
     return groups, [members[id(o)] for o in last]
 
 
-def _phases(
-    operations: Sequence[ScalarOperation], warps: int, owner: dict[int, int], fused: frozenset[int]
-) -> tuple[Phase, ...]:
+def _phases(operations: Sequence[ScalarOperation], warps: int, owner: dict[int, int]) -> tuple[Phase, ...]:
     """Share operations among warps, the longest chains first; `owner` gets them."""
-    groups, members = _groups(operations, fused)
+    groups, members = _groups(operations, owner)
     warp_of = assign(groups, warps)
     for at, together in enumerate(members):
         owner.update((id(operation), warp_of[at]) for operation in together)

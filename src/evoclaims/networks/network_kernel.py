@@ -70,7 +70,6 @@ def network_kernel(
         rows=(numbers(inputs),),
         outputs=(numbers(outputs),),
         write=write,
-        numbers=(*functions.nodes, functions.output),
     )
 
 

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from typing import Any
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -50,3 +53,24 @@ def test_a_step_in_one_kernel_is_the_step(name: str) -> None:
     for marks in ("terminated", "truncated"):
         assert np.mean(np.asarray(getattr(made, marks)) != np.asarray(getattr(expected, marks))) < 0.01
     np.testing.assert_array_equal(made.inner.time, expected.inner.time)
+
+
+@pytest.mark.parametrize("name", ["obstacles", "ant"])
+def test_few_contacts_make_a_step_shorter_and_change_no_bit(name: str) -> None:
+    def path(touching: int) -> list[np.ndarray[Any, Any]]:
+        task = replace(TASKS[name], robot=replace(TASKS[name].robot, touching=touching))
+        state = jax.vmap(task.reset, (0, None))(jax.random.split(jax.random.key(0), 40), jnp.int32(0))
+
+        def step(state: Any, held: Any) -> Any:
+            def follow(state: Any, _: None) -> Any:
+                return jax.vmap(task.step)(state, held), None
+
+            state, _ = jax.lax.scan(follow, state, None, length=10)
+            return state, (state.inner.body, state.observation, state.reward)
+
+        held = jax.random.uniform(jax.random.key(1), (20, 40, task.action_size), minval=-1.0, maxval=1.0)
+        return [np.asarray(leaf) for leaf in jax.tree.leaves(jax.jit(lambda s: jax.lax.scan(step, s, held))(state)[1])]
+
+    always_whole, often_short = path(TASKS[name].robot.contacts), path(2)  # two are touched by some, not by all
+    for a, b in zip(always_whole, often_short, strict=True):
+        np.testing.assert_array_equal(a, b)

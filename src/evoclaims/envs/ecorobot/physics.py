@@ -14,7 +14,10 @@ from evoclaims.core.pytree import pytree
 from evoclaims.envs.ecorobot.constraints import constrained_acceleration
 from evoclaims.envs.ecorobot.pose import torso
 from evoclaims.envs.ecorobot.scene import GEOMS, Places, Scene, box_geoms, mjx, on_device
+from evoclaims.kernels.seldom import seldom
 
+APART: Final = 1.0
+"""Distance of contacts that do not touch, m."""
 LARGEST: Final = 1e10
 """MuJoCo's limit for valid numbers (mjMAXVAL)."""
 
@@ -73,7 +76,7 @@ def _frame(scene: Scene, body: Body, control: Float[Array, " nu"], places: Place
         data = mjx.kinematics(model, data)
         data = mjx.com_pos(model, data)
         data = mjx.crb(model, data)
-        data = mjx.collision(model, data)
+        data = _seldom_crowded(mjx.collision(model, data), scene.robot.touching)
         data = mjx.make_constraint(model, data)
         data = mjx.transmission(model, data)
         data = mjx.fwd_velocity(model, data)
@@ -85,6 +88,17 @@ def _frame(scene: Scene, body: Body, control: Float[Array, " nu"], places: Place
         )
         data = mjx.euler(model, data.replace(qacc=acceleration))
     return Body(position=data.qpos, velocity=data.qvel, acceleration=acceleration)
+
+
+def _seldom_crowded(data: Any, usual: int) -> Any:
+    """Tell kernels that seldom more than `usual` contacts touch: MJX keeps the deepest, in order.
+
+    Contacts that do not touch have no force, however far apart they are.
+    """
+    contact = data._impl.contact
+    gap = contact.dist - contact.includemargin
+    later = jnp.where(seldom(gap[usual:] < 0.0), contact.dist[usual:], contact.includemargin[usual:] + APART)
+    return data.tree_replace({"_impl.contact.dist": contact.dist.at[usual:].set(later)})
 
 
 def _nearest(scene: Scene, model: Any, body: Body, places: Places) -> Int[Array, " near"]:

@@ -1,0 +1,141 @@
+"""A kernel's short way: the same bits as the whole one, taken where no seldom condition is true."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from kernel_functions import FUNCTIONS, X
+
+from evoclaims.kernels import seldom as seldom_conditions
+from evoclaims.kernels.algebra import Algebra
+from evoclaims.kernels.expressions import FUSED, Expression, Input, LoopResult, ScalarOperation, in_order, is_known
+from evoclaims.kernels.kernel import Kernel
+from evoclaims.kernels.machine_code import lanes
+from evoclaims.kernels.one_kernel import one_kernel
+from evoclaims.kernels.seldom import seldom
+
+NUMBER = np.dtype(np.float32)
+SMALL_NUMBERS = st.integers(-64, 64).map(lambda n: np.float32(n / 4))
+
+
+def _kernel(function: Any, *arguments: Any) -> Kernel:
+    """Return a function as a kernel; arguments have a batch dimension in front."""
+    leaves, structure = jax.tree.flatten(arguments)
+    return Kernel(function, "This", structure, tuple(jax.ShapeDtypeStruct(a.shape[1:], a.dtype) for a in leaves))
+
+
+def _loop(kernel: Kernel) -> Any:
+    """Return the one loop of a kernel."""
+    numbers = [n for result in kernel.results for n in result.flat]
+    (around,) = {id(n.loop): n.loop for n in numbers if isinstance(n, LoopResult)}.values()
+    return around
+
+
+@given(seed=st.integers(0, 2**32 - 1), size=st.sampled_from([0.1, 1.0, 3.0]))
+def test_both_ways_make_the_same_bits(seed: int, size: float) -> None:
+    function, _ = FUNCTIONS["a loop with a shortcut"]
+    random = np.random.default_rng(seed)
+    x, y = (jnp.asarray(random.normal(size=(40, 4)) * size, jnp.float32) for _ in range(2))
+    made = jax.vmap(one_kernel(function, "This"))(x, y)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("kernel_functions.seldom", lambda condition: condition)
+        whole = jax.vmap(one_kernel(function, "This"))(x, y)
+    for a, b in zip(made, whole, strict=True):
+        np.testing.assert_array_equal(a, b)
+
+
+def test_the_short_way_has_no_operation_that_only_a_seldom_condition_needs() -> None:
+    function, arguments = FUNCTIONS["a loop with a shortcut"]
+    choice = _loop(_kernel(function, *arguments)).choice
+    before = in_order([choice.condition, *choice.taken])
+
+    def left(way: Any) -> int:
+        return len(set(map(id, in_order(way))) - set(map(id, before)))
+
+    assert left(choice.short) < left(choice.whole) / 2
+    assert not any(isinstance(e, ScalarOperation) and e.name == "seldom" for e in in_order(choice.short))
+
+
+def _where_two_ways_differ(x: Any) -> Any:
+    """Multiply infinity by 0 on the whole way only: the result tells which one was taken."""
+
+    def following(carry: Any, _: None) -> Any:
+        return carry + jnp.where(seldom(x[1] > 0.0), 1.0, 0.0) * x[0], None
+
+    return jax.lax.scan(following, jnp.float32(0), None, length=2)[0]
+
+
+def test_the_short_way_is_taken_where_the_condition_is_false_in_all_lanes() -> None:
+    width = lanes()
+    x = np.zeros((3 * width, 2), np.float32)
+    x[:, 0] = np.inf
+    x[width + 1, 1] = 1.0  # in the second vector
+    (made,) = jax.tree.leaves(jax.vmap(one_kernel(_where_two_ways_differ, "This"))(x))
+    second = np.arange(3 * width) // width == 1
+    np.testing.assert_array_equal(np.isnan(made), second & (x[:, 1] == 0))
+    np.testing.assert_array_equal(made[~second], 0.0)
+
+
+def test_a_loop_that_depends_on_a_seldom_condition_has_no_shortcut() -> None:
+    def function(x: Any) -> Any:
+        def outer(carry: Any, _: None) -> Any:
+            start = jnp.where(seldom(carry > 1.0), carry, 0.0)
+            return jax.lax.scan(lambda a, _: (a * 0.5 + x, None), start, None, length=2)[0], None
+
+        return jax.lax.scan(outer, x, None, length=3)[0]
+
+    kernel = _kernel(function, X)
+    assert _loop(kernel).choice is None
+    np.testing.assert_allclose(kernel.on_host(jnp.asarray(X))[0], jax.vmap(function)(X), rtol=1e-6)
+
+
+def test_a_seldom_condition_is_the_condition_elsewhere() -> None:
+    condition = jnp.array([[True, False], [False, False]])
+    np.testing.assert_array_equal(seldom(condition), condition)
+    np.testing.assert_array_equal(jax.jit(jax.vmap(jax.vmap(seldom)))(condition), condition)
+    slope = jax.grad(lambda x: jnp.sum(jnp.where(seldom(x > 0), x * x, 0.0)))(jnp.array([-1.0, 3.0]))
+    np.testing.assert_array_equal(slope, [0.0, 6.0])
+    assert seldom_conditions.SELDOM.name == "seldom"  # as `expressions.KNOWN` has it
+    outside = one_kernel(lambda x: jnp.where(seldom(x > 0), x, -x), "This")  # of a loop
+    np.testing.assert_array_equal(jax.vmap(outside)(X), np.abs(X))
+
+
+def _value(number: Any, values: dict[int, np.float32]) -> np.float32:
+    """Return what an expression of floats is, with sums and products rounded once."""
+    if is_known(number):
+        return number
+    if isinstance(number, Input):
+        return values[number.place]
+    assert isinstance(number, ScalarOperation)
+    exact = [Fraction(float(_value(o, values))) for o in number.operands]
+    c, a, b = exact if number.name in FUSED else (exact + [Fraction(0)] * 2)[:3]
+    result = {
+        "fma": c + a * b, "fms": a * b - c, "fnma": c - a * b,
+        "add": c + a, "sub": c - a, "mul": c * a, "neg": -c,
+    }[number.name]  # fmt: skip
+    return np.float32(float(result))
+
+
+@given(
+    name=st.sampled_from(FUSED),
+    known=st.lists(st.none() | st.sampled_from([0.0, 1.0, -1.0, 0.5]), min_size=3, max_size=3),
+    values=st.lists(SMALL_NUMBERS, min_size=3, max_size=3),
+)
+def test_fused_products_on_known_numbers_are_simpler_and_the_same(
+    name: str, known: list[float | None], values: list[np.float32]
+) -> None:
+    inputs: list[Expression] = [Input(NUMBER, 0, place) for place in range(3)]
+    given = [i if k is None else np.float32(k) for i, k in zip(inputs, known, strict=True)]
+    all_values = [v if k is None else np.float32(k) for v, k in zip(values, known, strict=True)]
+    operation = ScalarOperation(NUMBER, name, tuple(inputs))
+    made = Algebra().again(operation, given)
+    assert _value(made, dict(enumerate(values))) == _value(operation, dict(enumerate(all_values)))
+    if any(k in (0.0, 1.0, -1.0) for k in known[1:]):
+        assert is_known(made) or isinstance(made, Input) or made.name not in FUSED
