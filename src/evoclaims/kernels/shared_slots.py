@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import heapq
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from evoclaims.kernels.expressions import Carried, Input, LoopResult, Number, is_known, operands_of
@@ -27,20 +27,38 @@ def slots(schedule: Schedule, results: Sequence[Number]) -> Slots:
     """Return the slots of a kernel that computes `results`.
 
     Two numbers share a slot if the first is read for the last time in an earlier phase than that in which the second is
-    written; barriers are between phases.
+    written; barriers are between phases. Numbers of one way of a choice share slots with those of the other.
     """
     uses = _Uses(schedule, results)
     slot_of: dict[int, int] = {}
-    taken: list[tuple[int, int]] = []  # by when they are read for the last time: slots
-    count = 0
-    for number, written in sorted(uses.written.items(), key=lambda use: use[1]):
-        if taken and taken[0][0] < written:
-            slot = heapq.heappop(taken)[1]
-        else:
-            slot, count = count, count + 1
+    short = {number for _, numbers in uses.short for number in numbers}
+    count = _place([n for n in uses.written if n not in short], uses, [], slot_of)
+    for begin, numbers in uses.short:
+        last = dict.fromkeys(range(count), -1)  # when each slot is read for the last time, but for the whole way
+        for number, slot in slot_of.items():
+            if uses.written[number] < begin:
+                last[slot] = max(last[slot], uses.read[number])
+        taken = [(time, slot) for slot, time in last.items()]
+        heapq.heapify(taken)
+        count = _place([n for n in numbers if n in uses.written], uses, taken, slot_of)
+    return Slots(count, slot_of)
+
+
+def _place(numbers: Iterable[int], uses: _Uses, taken: list[tuple[int, int]], slot_of: dict[int, int]) -> int:
+    """Give numbers slots; return how many slots there are.
+
+    Args:
+        numbers: their ids.
+        uses: when they are used.
+        taken: a heap of the slots so far, by when they are read for the last time.
+        slot_of: gets each number's slot.
+    """
+    for number in sorted(numbers, key=uses.written.__getitem__):
+        free = taken and taken[0][0] < uses.written[number]
+        slot = heapq.heappop(taken)[1] if free else len(taken)
         slot_of[number] = slot
         heapq.heappush(taken, (uses.read[number], slot))
-    return Slots(count, slot_of)
+    return len(taken)
 
 
 class _Uses:
@@ -50,20 +68,24 @@ class _Uses:
         """Go through a schedule."""
         self.written: dict[int, int] = {}
         self.read: dict[int, int] = {}
+        self.short: list[tuple[int, list[int]]] = []  # when each choice's ways begin, and what its short way makes
         self._schedule = schedule
         self._made: dict[int, int] = {}
         self._begin = self._last = 0  # of the segment
         now = 0
         for at, segment in enumerate(schedule.segments):
-            self._begin, self._last = now, now + sum(map(len, (segment.phases, *segment.ways))) - 1
+            ways = max(map(len, segment.ways), default=0)
+            self._begin, self._last = now, now + len(segment.phases) + ways - 1
             now = self._compute(segment.phases, now)
             if segment.loop:
                 choice = segment.loop.choice
                 if choice:
                     self._store([choice.condition], now - 1)
                     for phases, numbers in zip(segment.ways, (choice.whole, choice.short), strict=True):
-                        now = self._compute(phases, now)
-                        self._store(numbers, now - 1)
+                        self._store(numbers, self._compute(phases, now) - 1)
+                    short = [id(o) for phase in segment.ways[1] for own in phase for o in own]
+                    self.short.append((now, short))
+                    now += ways
                 else:
                     self._store(segment.loop.results, now - 1)
                 self.read |= {id(c): now for c in segment.loop.carried}  # the next carry, after a barrier of its own

@@ -7,11 +7,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Final
 
-STRETCHES: Final = 8
+STRETCHES: Final = 4
 """Stretches of a kernel, from its inputs to its results, in each of which every warp gets about as much to do."""
-SLACK: Final = 1.1
+SLACK: Final = 1.3
 """How much more than its share of a stretch a warp may get."""
-PUBLISHING: Final = 0.5
+PUBLISHING: Final = 2.0
 """What writing a number for other warps costs, in readings."""
 SWEEPS: Final = 8
 """Most passes through the groups in which they are moved; about three suffice."""
