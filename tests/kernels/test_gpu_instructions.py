@@ -22,7 +22,7 @@ from evoclaims.kernels.expressions import Input, in_order
 from evoclaims.kernels.gpu_instructions import GpuInstructions
 from evoclaims.kernels.group_kernel import Rows, Sizes
 from evoclaims.kernels.kernel import Kernel
-from evoclaims.kernels.llvm_ir import literal
+from evoclaims.kernels.llvm_names import literal
 from evoclaims.kernels.shared_slots import slots
 from evoclaims.kernels.warp_schedule import schedule
 

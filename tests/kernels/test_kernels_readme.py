@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from evoclaims.kernels import llvm_ir
+from evoclaims.kernels import llvm_names
 
-FOLDER = Path(llvm_ir.__file__).parent
+FOLDER = Path(llvm_names.__file__).parent
 README = (FOLDER / "README.md").read_text(encoding="utf-8")
 
 
@@ -29,4 +29,4 @@ def test_the_example_prints_a_kernel(tmp_path: Path, capsys: pytest.CaptureFixtu
 
 
 def test_the_limit_of_operations_is_the_one_that_is_checked() -> None:
-    assert f"{llvm_ir.LARGEST:,} operations" in README.replace("\n", " ")
+    assert f"{llvm_names.LARGEST:,} operations" in README.replace("\n", " ")

@@ -19,7 +19,8 @@ from evoclaims.kernels.expressions import (
 from evoclaims.kernels.gpu_instructions import GpuInstructions
 from evoclaims.kernels.gpu_kernel import BLOCK, Element, finished, parameters
 from evoclaims.kernels.interpreter import Numbers
-from evoclaims.kernels.llvm_ir import TYPES, ArrayRow, Instructions, either
+from evoclaims.kernels.llvm_ir import Instructions, either
+from evoclaims.kernels.llvm_names import TYPES, ArrayRow
 from evoclaims.kernels.shared_slots import Slots
 from evoclaims.kernels.warp_schedule import Phase, Schedule, Segment
 

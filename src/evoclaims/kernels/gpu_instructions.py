@@ -25,7 +25,8 @@ from typing import Final
 import numpy as np
 
 from evoclaims.kernels.expressions import Number
-from evoclaims.kernels.llvm_ir import Instructions, literal, of_literal
+from evoclaims.kernels.llvm_ir import Instructions
+from evoclaims.kernels.llvm_names import literal, of_literal
 
 SCALE: Final = np.float32(4)
 """Divisors up to 1 are multiplied by this, others divided: so neither they nor their reciprocals are denormal."""

@@ -11,7 +11,8 @@ from typing import Any, Final
 from evoclaims.kernels.expressions import Input, everything, in_order
 from evoclaims.kernels.gpu_instructions import GpuInstructions
 from evoclaims.kernels.interpreter import Numbers
-from evoclaims.kernels.llvm_ir import BYTES, STORED, ArrayRow, Instructions
+from evoclaims.kernels.llvm_ir import Instructions
+from evoclaims.kernels.llvm_names import BYTES, STORED, ArrayRow
 from evoclaims.kernels.machine_code import llvm
 
 ENTRY: Final = "kernel"

@@ -11,7 +11,8 @@ from typing import Final
 
 from evoclaims.kernels.expressions import Input, in_order
 from evoclaims.kernels.interpreter import Numbers
-from evoclaims.kernels.llvm_ir import BYTES, STORED, SUFFIXES, ArrayRow, Instructions
+from evoclaims.kernels.llvm_ir import Instructions
+from evoclaims.kernels.llvm_names import BYTES, STORED, SUFFIXES, ArrayRow
 from evoclaims.kernels.xla_handler import handler
 
 WIDE: Final = 'nounwind "prefer-vector-width"="512" "min-legal-vector-width"="512"'

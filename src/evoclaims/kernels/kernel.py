@@ -13,9 +13,10 @@ import jax.numpy as jnp
 from jax.extend.core import jaxpr_as_fun
 from jaxtyping import Array
 
-from evoclaims.kernels import block_kernel, block_shape, calls, gpu_kernel, host_kernel, llvm_ir, machine_code
+from evoclaims.kernels import block_kernel, block_shape, calls, gpu_kernel, host_kernel, llvm_names, machine_code
 from evoclaims.kernels.expressions import Input, everything
 from evoclaims.kernels.interpreter import Numbers
+from evoclaims.kernels.llvm_names import ArrayRow
 from evoclaims.kernels.scalarize import scalarize
 from evoclaims.kernels.unsupported import Unsupported
 
@@ -46,7 +47,7 @@ class Kernel:
         """Whether it can be a kernel; a warning says once why not."""
         try:
             machine_code.lanes()
-            llvm_ir.check([number for result in self.results for number in result.flat])
+            llvm_names.check([number for result in self.results for number in result.flat])
         except Unsupported as reason:
             warnings.warn(f"{self.name} is not one kernel, and slower, because of {reason}.", stacklevel=5)
             return False
@@ -63,10 +64,10 @@ class Kernel:
         return [place for place, result in enumerate(self.results) if result.size]
 
     @cached_property
-    def read(self) -> dict[int, llvm_ir.ArrayRow]:
+    def read(self) -> dict[int, ArrayRow]:
         """The rows of the arguments that the results depend on."""
         used = {e.array for e in everything(n for r in self.results for n in r.flat) if isinstance(e, Input)}
-        return {i: llvm_ir.ArrayRow(math.prod(self.shapes[i].shape), self.shapes[i].dtype.kind) for i in sorted(used)}
+        return {i: ArrayRow(math.prod(self.shapes[i].shape), self.shapes[i].dtype.kind) for i in sorted(used)}
 
     @cached_property
     def _host_text(self) -> str:
