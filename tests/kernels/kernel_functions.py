@@ -54,16 +54,16 @@ def _solve(x: Any, y: Any) -> Any:
 
 
 def _with_a_shortcut(x: Any, y: Any) -> Any:
-    """Collide, so to say: of four gaps, seldom the last two are negative, and then they push, and something is dear."""
+    """Collide, so to say: of four gaps, the last two are seldom negative, and then they push, and that is dear."""
 
     def following(carry: Any, _: None) -> Any:
         place, speed = carry
-        gaps = jnp.sort(place * y)
+        gaps = place * y
         far = jnp.where(seldom(gaps[2:] < -0.5), gaps[2:], 1.0)
         gaps = gaps.at[2:].set(far)
         pushes = jnp.where(gaps < 0.0, gaps, 0.0)
-        dear = jnp.outer(pushes, jnp.sin(speed)) @ (x * speed)
-        faster = speed * 0.9 + x * 0.1 - pushes * speed[::-1] + dear
+        dear = jnp.outer(pushes, jnp.sin(speed)) @ jnp.sin(x * speed)
+        faster = speed * 0.9 + x * 0.1 - pushes * jnp.cos(speed[::-1]) + dear
         return (place * 0.8 + faster * 0.1, faster), None
 
     return jax.lax.scan(following, (x, y), None, length=5)[0]

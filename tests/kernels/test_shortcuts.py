@@ -38,7 +38,7 @@ def _loop(kernel: Kernel) -> Any:
     return around
 
 
-@given(seed=st.integers(0, 2**32 - 1), size=st.sampled_from([0.1, 1.0, 3.0]))
+@given(seed=st.integers(0, 2**32 - 1), size=st.sampled_from([0.1, 0.4, 0.6, 1.0, 3.0]))
 def test_both_ways_make_the_same_bits(seed: int, size: float) -> None:
     function, _ = FUNCTIONS["a loop with a shortcut"]
     random = np.random.default_rng(seed)
@@ -46,7 +46,7 @@ def test_both_ways_make_the_same_bits(seed: int, size: float) -> None:
     made = jax.vmap(one_kernel(function, "This"))(x, y)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("kernel_functions.seldom", lambda condition: condition)
-        whole = jax.vmap(one_kernel(function, "This"))(x, y)
+        whole = jax.vmap(one_kernel(lambda *given: function(*given), "This"))(x, y)  # jax would not trace it again
     for a, b in zip(made, whole, strict=True):
         np.testing.assert_array_equal(a, b)
 
