@@ -158,7 +158,7 @@ def test_bits_depend_neither_on_the_batch_nor_on_the_lanes(widest: int, monkeypa
 def _on_a_gpu(kernel: Any, groups: int, rows: int, arrays: list[Any]) -> list[Any]:
     """Return the results of a kernel's text for GPUs, on this processor; groups share their rows."""
     shared_rows = [False] * len(kernel.rows)
-    text = group_kernel.gpu_text(kernel.write, kernel.numbers, kernel.sizes, groups, rows, shared_rows)
+    text = group_kernel.gpu_text(kernel.write, kernel.sizes, groups, rows, shared_rows)
     results = [jax.ShapeDtypeStruct((groups * rows, *out.shape), out.dtype) for out in kernel.outputs]
     return run(text, GpuProgram("", kernel.name), groups * rows, arrays, results)
 

@@ -97,6 +97,7 @@ def test_a_first_verdict_is_accepted_and_the_same_one_not_again(store: Store, ju
             {"outcome": Outcome.INCONCLUSIVE},
             "supported -> inconclusive (by jax 0.10.2 -> 0.11.2, nvidia-cublas none -> 13.0, device cpu -> TPU)",
         ),
+        ({}, {"reason": "p = 0.03"}, "still supported, by other trials"),
         (
             {},
             {"verdict": verdict(fingerprint="e" * 64)},

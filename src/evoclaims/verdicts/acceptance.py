@@ -36,7 +36,7 @@ class Acceptance:
 
 
 def accept(history: History, reports: Sequence[ClaimReport], archive: Archive, today: str) -> Acceptance:
-    """Append an entry for every claim whose outcome, fingerprint, versions or device has changed since the last one.
+    """Append an entry for every claim whose outcome, fingerprint, reason, versions or device is not the last one's.
 
     A claim without a test at its tier has no verdicts there: those accepted earlier were about another sentence.
 
@@ -107,6 +107,8 @@ def difference(old: AcceptedVerdict | None, new: AcceptedVerdict) -> str:
         return f"{new.outcome}; a new history begins, since what is judged has changed (it was {old.outcome}){by}"
     if old.outcome != new.outcome:
         return f"{old.outcome} -> {new.outcome}{by}"
+    if old.reason != new.reason and old.trials != new.trials:
+        return f"still {new.outcome}, by other trials{by}"
     return f"still {new.outcome}{by}" if moved else ""
 
 

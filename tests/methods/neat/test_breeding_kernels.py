@@ -96,7 +96,7 @@ def test_a_gpus_threads_change_what_the_processor_does_and_nothing_of_genomes_th
 def _on_gpu(kernel: Any, *leaves: Any) -> Any:
     """Return the results of a GPU's text, run on this processor, a thread for each genome."""
     count = len(leaves[0])
-    text = group_kernel.gpu_text(kernel.write, kernel.numbers, kernel.sizes, count, 1, [])
+    text = group_kernel.gpu_text(kernel.write, kernel.sizes, count, 1, [])
     results = [jax.ShapeDtypeStruct((count, *out.shape), out.dtype) for out in kernel.outputs]
     return run(text, GpuProgram("", kernel.name), count, leaves, results)
 

@@ -177,7 +177,7 @@ def test_a_gpus_threads_find_the_weight_of_a_number_and_nan_for_what_is_not_ther
     absent = np.broadcast_to(np.int32([-1, 3, 10**6]), (len(counts), 3))
     wanted = np.concatenate([np.where(links == -2, -1, links), absent], axis=1)
     groups, rows = wanted.shape
-    text = group_kernel.gpu_text(kernel.write, kernel.numbers, kernel.sizes, groups, rows, [True])
+    text = group_kernel.gpu_text(kernel.write, kernel.sizes, groups, rows, [True])
     result = [jax.ShapeDtypeStruct((groups, rows), jnp.float32)]
     program = GpuProgram("", kernel.name)
     (made_,) = run(text, program, groups * rows, [links, weights, counts, wanted.reshape(-1)], result)
