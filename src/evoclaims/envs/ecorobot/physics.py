@@ -91,9 +91,10 @@ def _frame(scene: Scene, body: Body, control: Float[Array, " nu"], places: Place
 
 
 def _seldom_crowded(data: Any, usual: int) -> Any:
-    """Tell kernels that seldom more than `usual` contacts touch: MJX keeps the deepest, in order.
+    """Tell kernels that seldom more than `usual` contacts touch.
 
-    Contacts that do not touch have no force, however far apart they are.
+    Where there are more than it keeps, MJX keeps the deepest, in order. Those that do not touch have no force, however
+    far apart they are.
     """
     contact = data._impl.contact
     gap = contact.dist - contact.includemargin
