@@ -169,7 +169,7 @@ def in_order(
 
 
 def everything(numbers: Iterable[Number]) -> list[Expression]:
-    """Return these and all they use, operands first, also in the ways of choices; the bodies of loops are at the end."""
+    """Return these and all they use, operands first, also in the ways of choices; the bodies of loops at the end."""
     order = in_order(numbers, with_ways)
     loops = {id(e.loop): e.loop for e in order if isinstance(e, LoopResult)}
     return order + [inner for loop in loops.values() for inner in everything(loop.results)]
