@@ -113,7 +113,7 @@ class Hansen:
 class Params:
     """What `ordinal_weights` reads of evosax's parameters."""
 
-    weights = jnp.linspace(1.0, -1.0, POPULATION)
+    weights = np.linspace(1.0, -1.0, POPULATION, dtype=np.float32)
 
 
 @settings(max_examples=40, deadline=None)
