@@ -10,8 +10,10 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from assembler import kernels_for_gpus
+from hypothesis import given
+from hypothesis import strategies as st
 
-from evoclaims.kernels import machine_code, random_bits
+from evoclaims.kernels import machine_code
 from evoclaims.kernels.random_bits import fast
 
 DRAWS: Final[dict[str, Callable[..., Any]]] = {
@@ -28,17 +30,22 @@ def _keys() -> Any:
     return jax.random.split(jax.random.key(11), 5)
 
 
+def _numbers(keys: Any) -> Any:
+    """Return what keys are made of."""
+    return np.asarray(jax.random.key_data(keys))
+
+
 @pytest.fixture(params=[1, 4, 16])
 def _widths(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """Machines with vectors of several widths."""
     monkeypatch.setattr(machine_code, "lanes", lambda: request.param)
-    random_bits._kernel.cache_clear()
+    jax.clear_caches()  # of programs with vectors of another width
     yield
-    random_bits._kernel.cache_clear()
+    jax.clear_caches()
 
 
 @pytest.mark.usefixtures("_widths")
-@pytest.mark.parametrize("shape", [(), (1,), (65,), (100, 3), (4, 0)])
+@pytest.mark.parametrize("shape", [(), (1,), (3,), (64,), (65,), (100, 3), (4, 0)])
 def test_every_draw_is_jaxs(shape: tuple[int, ...]) -> None:
     for draw in DRAWS.values():
         made, wanted = draw(fast(_keys()[1]), shape), draw(_keys()[1], shape)
@@ -47,10 +54,50 @@ def test_every_draw_is_jaxs(shape: tuple[int, ...]) -> None:
         np.testing.assert_array_equal(many, jax.vmap(lambda key, draw=draw: draw(key, shape))(_keys()))
 
 
-def test_keys_derived_from_one_are_jaxs() -> None:
-    for derive in (jax.random.split, lambda key: jax.random.fold_in(key, 7)):
-        made, wanted = derive(fast(_keys()[0])), derive(_keys()[0])
-        np.testing.assert_array_equal(jax.random.key_data(made), jax.random.key_data(wanted))
+@given(st.integers(0, 2**32 - 1), st.integers(0, 2**32 - 1), st.integers(0, 2**32 - 1))
+def test_a_key_folded_in_a_number_is_jaxs(first: int, second: int, number: int) -> None:
+    plain = jax.random.wrap_key_data(jnp.array([first, second], jnp.uint32))
+    assert (_numbers(_fold(fast(plain), jnp.uint32(number))) == _numbers(_fold(plain, jnp.uint32(number)))).all()
+
+
+_fold = jax.jit(jax.random.fold_in)
+
+
+@pytest.mark.parametrize("shape", [(), (1,), (7,), (3, 5), (0,), (2, 0)])
+def test_keys_split_from_one_are_jaxs_and_such_keys_too(shape: tuple[int, ...]) -> None:
+    made, wanted = jax.random.split(fast(_keys()[0]), shape), jax.random.split(_keys()[0], shape)
+    np.testing.assert_array_equal(_numbers(made), _numbers(wanted))
+    assert made.dtype == fast(_keys()).dtype != wanted.dtype
+
+
+def test_many_keys_and_many_numbers_are_folded_as_by_jax() -> None:
+    numbers = jnp.arange(15, dtype=jnp.uint32).reshape(3, 5)
+    for many in (
+        jax.vmap(jax.vmap(jax.random.fold_in, (0, None)), (None, 0)),  # [3] numbers with [5] keys
+        jax.vmap(jax.vmap(jax.random.fold_in, (None, 0)), (0, None)),  # [5] keys with [3] numbers
+    ):
+        np.testing.assert_array_equal(
+            _numbers(jax.jit(many)(fast(_keys()), numbers[:, 0])), _numbers(many(_keys(), numbers[:, 0]))
+        )
+    each = jax.vmap(jax.vmap(jax.random.fold_in), (None, 0))
+    np.testing.assert_array_equal(_numbers(jax.jit(each)(fast(_keys()), numbers)), _numbers(each(_keys(), numbers)))
+
+
+def test_one_program_draws_any_amount() -> None:
+    """A kernel per size would be compiled for every shape that is drawn."""
+    before = set(machine_code._libraries)
+    for size in (5, 6, 700):
+        jax.jit(lambda key, size=size: jax.random.bits(key, (size,)))(fast(_keys()[0]))
+    assert len(set(machine_code._libraries) - before) <= 1
+
+
+def test_nothing_of_xlas_loops_is_left_in_a_program_for_processors() -> None:
+    def function(key: Any) -> Any:
+        one, two = jax.random.split(jax.random.fold_in(key, 3))
+        return jax.random.normal(one, (9,)), jax.random.randint(two, (), 0, 7)
+
+    assert "while" in jax.jit(function).lower(_keys()[0]).as_text()
+    assert "while" not in jax.jit(function).lower(fast(_keys()[0])).as_text()
 
 
 def test_keys_of_other_generators_are_left_alone() -> None:

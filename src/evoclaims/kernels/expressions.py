@@ -125,13 +125,12 @@ def loop(rounds: int, carried: Sequence[Carried], start: Sequence[Number], resul
 
 def operands_of(expression: Expression) -> list[Expression]:
     """Return the expressions that it reads."""
-    match expression:
-        case ScalarOperation(operands=operands):
-            return [o for o in operands if not is_known(o)]
-        case LoopResult(loop=around):
-            return [*(s for s in around.start if not is_known(s)), *around.taken]
-        case Chosen(choice=choice):
-            return [choice.condition, *choice.taken]
+    if isinstance(expression, ScalarOperation):  # nearly all are, and a robot's step has a hundred thousand
+        return [o for o in expression.operands if isinstance(o, Expression)]
+    if isinstance(expression, LoopResult):
+        return [*(s for s in expression.loop.start if not is_known(s)), *expression.loop.taken]
+    if isinstance(expression, Chosen):
+        return [expression.choice.condition, *expression.choice.taken]
     return []
 
 
@@ -152,19 +151,23 @@ def in_order(
         numbers: where to begin.
         operands: what an expression uses.
     """
-    made: set[int] = set()
+    begun: set[int] = set()
     order: list[Expression] = []
-    waiting = [n for n in numbers if not is_known(n)][::-1]
-    while waiting:
-        expression = waiting[-1]
-        missing = [p for p in operands(expression) if id(p) not in made] if id(expression) not in made else []
-        if missing:
-            waiting.extend(reversed(missing))
+    for number in numbers:
+        if is_known(number) or id(number) in begun:
             continue
-        waiting.pop()
-        if id(expression) not in made:
-            made.add(id(expression))
-            order.append(expression)
+        begun.add(id(number))
+        path = [(number, iter(operands(number)))]
+        while path:
+            expression, rest = path[-1]
+            for operand in rest:
+                if id(operand) not in begun:
+                    begun.add(id(operand))
+                    path.append((operand, iter(operands(operand))))
+                    break
+            else:
+                order.append(expression)
+                path.pop()
     return order
 
 

@@ -18,6 +18,7 @@ from evoclaims.core.errors import UserError
 from evoclaims.core.keys import TRAINING, trial_key
 from evoclaims.core.pytree import strong
 from evoclaims.envs.base import Episode, MisfitError, Task, TaskState, fitting
+from evoclaims.kernels.random_bits import fast
 from evoclaims.methods.base import Method, Policy, Progress
 
 _NUMBER = jax.ShapeDtypeStruct((), jnp.int32)
@@ -106,7 +107,7 @@ def check_scores(task: Task, final: Episode) -> None:
 
 def _key(seed: Int[Array, ""]) -> Array:
     """Return a key for tracing."""
-    return trial_key(seed, TRAINING)
+    return fast(trial_key(seed, TRAINING))
 
 
 def _check_task_state(task: Task, function: str, state: TaskState) -> None:

@@ -9,14 +9,13 @@ import jax.numpy as jnp
 from jaxtyping import PRNGKeyArray
 
 from evoclaims.core.keys import streams
-from evoclaims.kernels.random_bits import fast
 from evoclaims.methods.neat.homology import counterparts_in_pairs
 from evoclaims.networks.genome import Genome, Nodes
 
 
 def crossover(key: PRNGKeyArray, fitter: Genome, other: Genome) -> Genome:
     """Return a child with the fitter parent's structure; each attribute of a homologous gene is either parent's."""
-    node_key, connection_key = streams(fast(key), "node", "connection")
+    node_key, connection_key = streams(key, "node", "connection")
     found = counterparts_in_pairs(fitter, other)
     nodes, genes = fitter.nodes, fitter.connections
     coins = jax.random.bernoulli(node_key, shape=(nodes.key.shape[0], 3)) & found.has_node[:, None]

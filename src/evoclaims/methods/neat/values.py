@@ -9,7 +9,6 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float, PRNGKeyArray
 
 from evoclaims.core.keys import streams
-from evoclaims.kernels.random_bits import fast
 from evoclaims.methods.neat.settings import Attribute, Mutation
 from evoclaims.networks.genome import Genome, Nodes
 
@@ -41,7 +40,7 @@ def mutate_values(key: PRNGKeyArray, settings: Mutation, activations: int, genom
     """
     nodes, genes = genome.nodes, genome.connections
     node_choice, node_noise, choice, noise, function = streams(
-        fast(key), "node_choice", "node_noise", "connection_choice", "connection_noise", "function"
+        key, "node_choice", "node_noise", "connection_choice", "connection_noise", "function"
     )
     attributes = (nodes.bias.shape[0], 2)
     u, z = jax.random.uniform(node_choice, attributes), jax.random.normal(node_noise, attributes)
