@@ -8,21 +8,26 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import jax
 import pytest
 from hand_made_paper import CONDITIONS
 from made_trials import trial_of
 
 from evoclaims.core.errors import UserError
+from evoclaims.envs.gates.parity import NParity
 from evoclaims.judging.design import Design
 from evoclaims.judging.judge import judge
 from evoclaims.judging.sample import UnreadableTrialError
 from evoclaims.judging.verdict import Outcome
 from evoclaims.judging.window import Window
+from evoclaims.methods.hand_built import HandBuilt
 from evoclaims.paper.trial_group import TrialGroup
 from evoclaims.trials.budget import Budget
 from evoclaims.trials.imported import Imported
 from evoclaims.trials.result import TrialResult
+from evoclaims.trials.runner import run
 from evoclaims.trials.spec import Condition
+from evoclaims.trials.store import Store
 
 PLAIN = CONDITIONS["better", "small"]
 COST = PLAIN.method.cost(PLAIN.task)
@@ -83,6 +88,22 @@ def test_only_reports_on_the_level_count(group: Any) -> None:
     assert trials.steps_to("level", LAST).of(trial) == 3 * COST
     with pytest.raises(UserError, match=f"better on small has levels 0 to {LAST}, not {LAST + 1}"):
         trials.steps_to("success", 0.9, level=LAST + 1)
+
+
+@pytest.mark.parametrize("reports", [4, 2], ids=["a report a step", "a report every two steps"])
+def test_of_real_trials_it_is_when_they_solved_the_level(reports: int, tmp_path: Path) -> None:
+    """A report has the level that its last step climbed to, with the success on the one that it climbed from."""
+    budget = Budget(generations=4, reports=reports)
+    condition = Condition(HandBuilt(), NParity(bits=5), "curriculum", budget)
+    (trial,) = run(condition, [0], Store(tmp_path), jax.devices("cpu")[:1])
+    assert max(trial.curves["level"]) == 3.0
+    solved_at = trial.levels["solved_at"]
+    assert solved_at == tuple(condition.cost * step for step in (1.0, 2.0, 3.0, 4.0))
+    group = TrialGroup("hand_built", "n_parity", condition, lambda *_: [trial])
+    measures = [group.steps_to("success", 1.0, level) for level in range(4)]
+    assert [measure.of(trial) for measure in measures] == [
+        measure.window.seen(solved_at[i]) for i, measure in enumerate(measures)
+    ]
 
 
 def test_between_reports_nothing_is_known() -> None:

@@ -18,7 +18,8 @@ def steps_to(source: Source, condition: Condition, curve: str, value: float, lev
     """Return the environment steps at the first report in which a curve is at least `value` on a level.
 
     A trial that spends its budget without it is censored there: its number is only known to be larger. Where several
-    steps of the method lie between two reports, numbers are known to multiples of these.
+    steps of the method lie between two reports, numbers are known to multiples of these. A level that is solved between
+    two reports has reached success 1.
 
     Args:
         source: the trials.
@@ -44,13 +45,11 @@ def steps_to(source: Source, condition: Condition, curve: str, value: float, lev
 
     def read(trial: TrialResult) -> float:
         steps = trial.curves[_AXIS]
-        on_level = [at == wanted for at in trial.curves["level"]] if levels > 1 else [True] * len(steps)
-        reached = (
-            at
-            for at, found, there in zip(steps, trial.curves[curve], on_level, strict=True)
-            if there and found >= value
-        )
-        first = next(reached, math.inf)
+        reports = zip(steps, trial.curves[curve], _trained_levels(trial, levels), strict=True)
+        first = next((at for at, found, on in reports if on == wanted and found >= value), math.inf)
+        solved = trial.levels.get("solved_at")
+        if curve == "success" and value <= 1.0 and solved and solved[wanted] >= 0.0:
+            first = min(first, solved[wanted])
         if math.isinf(first) and max(steps, default=0.0) < budget:
             raise UnreadableTrialError(
                 f"The trial of seed {trial.seed_in_words} of {source.label} ended after "
@@ -63,3 +62,18 @@ def steps_to(source: Source, condition: Condition, curve: str, value: float, lev
     # Reports of imported trials are perhaps unevenly far apart, at steps that are no multiples of the longest distance.
     window = Window(budget, float(chunk * cost) if chunk > 1 else 0.0, as_reported=imported)
     return Measure(source, name, read, "lower", window)
+
+
+def _trained_levels(trial: TrialResult, levels: int) -> list[float]:
+    """Return the level that each report of a trial is about.
+
+    A report has the level after its last step; if this step solved a level, its success and fitness are of that one.
+    """
+    steps, solved = trial.curves[_AXIS], trial.levels.get("solved_at")
+    if levels == 1:
+        return [0.0] * len(steps)
+    reported = trial.curves["level"]
+    if not solved:  # of a trial that has not ended as it should, or that was made elsewhere
+        return list(reported)
+    pairs = zip(reported, steps, strict=True)
+    return [level - 1.0 if level > 0.0 and solved[int(level) - 1] == at else level for level, at in pairs]
