@@ -84,6 +84,7 @@ def test_ppo_is_bumpy(trials, verdict):
 def test_medium_obstacles_hold_back_neat_alone(trials, verdict):
     neat, neat_medium = trials("neat", on="obstacles"), trials("neat", on="obstacles_medium")
     ppo, ppo_medium = trials("ppo", on="obstacles"), trials("ppo", on="obstacles_medium")
+    # 500 is a seventh of what the published PPO collects, but most of what ours does (docs/protocol.md).
     verdict((neat.reward > neat_medium.reward) & ppo.reward.equivalent_to(ppo_medium.reward, margin=500))
 
 

@@ -7,8 +7,7 @@ from typing import Any
 
 from evoclaims import Condition, Variant, changed
 from evoclaims.envs import CumulativeParity, NParity, Obstacles, RobotTask, SimpleAlu
-from evoclaims.methods import CmaEs, HyperNeat, LevelTest, Neat, Ppo, SeldomDecomposedCmaEs
-from evoclaims.methods.neat import Mutation
+from evoclaims.methods import CmaEs, HandBuilt, HyperNeat, LevelTest, Neat, Ppo, SeldomDecomposedCmaEs
 from evoclaims.networks import AllSkips, Mlp
 from reproductions.nisioti2025 import ecorobot, stepping_gates
 from reproductions.nisioti2025.published_course import PublishedObstacles
@@ -17,7 +16,7 @@ from reproductions.nisioti2025.published_course import PublishedObstacles
 def _rows_so_far(method: str, task: str, condition: Condition) -> Condition | None:
     """N-parity, with the rows of all levels so far."""
     asked = condition.task
-    if not isinstance(asked, NParity) or condition.progression == "direct" or method.startswith("hand_built"):
+    if not isinstance(asked, NParity) or condition.progression == "direct" or isinstance(condition.method, HandBuilt):
         return None
     return replace(condition, task=CumulativeParity(asked.bits, asked.sampling))
 
@@ -25,7 +24,7 @@ def _rows_so_far(method: str, task: str, condition: Condition) -> Condition | No
 def _published_alu(method: str, task: str, condition: Condition) -> Condition | None:
     """Simple ALU, as in the published code."""
     asked = condition.task
-    if not isinstance(asked, SimpleAlu) or method.startswith("hand_built"):
+    if not isinstance(asked, SimpleAlu) or isinstance(condition.method, HandBuilt):
         return None
     return replace(condition, task=replace(asked, operations="published_code", multiplexer="published_code"))
 
@@ -51,7 +50,7 @@ def _published_neat(method: str, task: str, condition: Condition) -> Condition |
     ours = evolved.settings
     size = min(ours.population, 1_024)
     species = replace(ours.species, most=min(ours.species.most, 20), on_level_up="keep")
-    settings = replace(ours, population=size, mutation=Mutation(node_add=0.1), species=species)
+    settings = replace(ours, population=size, mutation=replace(ours.mutation, node_add=0.1), species=species)
     return replace(condition, method=replace(evolved, settings=settings))
 
 

@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.stats import chisquare
 
-from evoclaims.envs.base import Episode, share
+from evoclaims.envs.base import Episode, averaged, share
 from evoclaims.envs.gates.circuit import Circuit, Sampling
 from evoclaims.envs.gates.parity import NParity
 from evoclaims.envs.gates.truth_table import TruthTable
@@ -206,3 +206,15 @@ def test_a_share_is_that_of_whole_numbers() -> None:
     shares = np.asarray(jax.jit(share)(pairs[:, 0], pairs[:, 1]))
     np.testing.assert_allclose(shares, pairs[:, 0] / pairs[:, 1], rtol=1e-6)
     np.testing.assert_array_equal(shares == 1.0, pairs[:, 0] == pairs[:, 1])
+
+
+@pytest.mark.parametrize("count", [1, 10, 41, 47, 94, 97])
+def test_episodes_that_all_succeed_average_to_exactly_1(count: int) -> None:
+    """The mean of 41 ones, which XLA computes with the rounded reciprocal, is 0.99999994."""
+    all_ = Episode(fitness=jnp.arange(count, dtype=jnp.float32), success=jnp.ones(count))
+    made = jax.jit(averaged)(all_)
+    assert float(made.success) == 1.0
+    assert float(made.fitness) == pytest.approx((count - 1) / 2)
+    if count > 1:
+        one_fails = jax.jit(averaged)(Episode(fitness=all_.fitness, success=all_.success.at[0].set(0.0)))
+        assert float(one_fails.success) == pytest.approx((count - 1) / count)

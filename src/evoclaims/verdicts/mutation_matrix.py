@@ -160,10 +160,10 @@ def fate(sound: Outcome, faulty: Outcome, *, equivalent: bool, drifted: bool) ->
     Args:
         sound: the claim's outcome without the fault.
         faulty: its outcome with it.
-        equivalent: whether all faulty trials equal the sound ones.
+        equivalent: whether all faulty trials equal the sound ones in levels and metrics; a claim may read curves.
         drifted: whether the drift check finds that a condition of the claim has drifted.
     """
-    if equivalent:
+    if equivalent and faulty is sound:
         return Fate.EQUIVALENT
     if faulty in (Outcome.ERROR, Outcome.NOT_RUN):
         return Fate.BROKEN

@@ -11,6 +11,7 @@ import mujoco
 import numpy as np
 import pytest
 
+from evoclaims.core.canonical import as_plain
 from evoclaims.envs.ecorobot import deceptive, stones
 from evoclaims.envs.ecorobot.boxes import Box
 from evoclaims.envs.ecorobot.pose import Pose
@@ -123,3 +124,8 @@ def test_pie_slices_see_no_further_than_their_reach() -> None:
     ahead = Scene(SIMPLE_ROB, (Box((3.0, 0.0), (0.5, 0.5)),))  # 2.3 m from the robot's surface
     np.testing.assert_array_equal(PieSlices(4, reach=2.29).read(ahead, _pose()), np.zeros(4))
     np.testing.assert_array_equal(PieSlices(4, reach=2.31).read(ahead, _pose()), [1.0, 0.0, 0.0, 0.0])
+
+
+def test_conditions_with_different_sensors_have_different_ids() -> None:
+    """An id has the settings of a part, not its class."""
+    assert as_plain(PieSlices(5)) != as_plain(Rangefinders(5))

@@ -16,7 +16,7 @@ from jaxtyping import Array, Bool, Float, Int, PRNGKeyArray
 from evoclaims.core.errors import require_at_least
 from evoclaims.core.keys import streams
 from evoclaims.core.pytree import select, strong
-from evoclaims.envs.base import Episode, PolicyFn, TaskState, fitting, played
+from evoclaims.envs.base import Episode, PolicyFn, TaskState, averaged, fitting, played
 from evoclaims.envs.ecorobot import physics
 from evoclaims.envs.ecorobot.boxes import Box
 from evoclaims.envs.ecorobot.outing import Outing, Ruling
@@ -204,7 +204,7 @@ class RobotTask(ABC):
         """Run `examined_episodes` from different starts and average; success is the share that reached the goal."""
         keys = jax.random.split(key, self.examined_episodes)
         episodes: Episode = jax.vmap(lambda k: self._play(policy, k, level, follow=True))(keys)
-        return jax.tree.map(jnp.mean, episodes)
+        return averaged(episodes)
 
     def trajectory(self, policy: PolicyFn, key: PRNGKeyArray) -> tuple[Outing, Bool[Array, " steps"]]:
         """Return all states of one episode, leaves [steps, …], and which belong to it, for pictures."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Final, Protocol
 
 import jax.numpy as jnp
@@ -64,9 +64,11 @@ class PieSlices(_Rays):
     Attributes:
         count: sectors, the first one centred on the front, the others counterclockwise.
         reach: how far it sees, m.
+        name: part of a condition's id, since the other sensor has the same settings.
     """
 
     count: int = 4
+    name: str = field(default="pie_slices", init=False)
 
     def read(self, scene: Scene, pose: Pose) -> Float[Array, " size"]:
         """Return 1 for each sector in which one of five rays (at -45°, -22.5°, 0, 22.5°, 45°) hits, else 0."""

@@ -18,7 +18,7 @@ from evoclaims.core.errors import UserError, require_at_least
 from evoclaims.core.foreign import implicit_promotions
 from evoclaims.core.keys import EVALUATION, streams, trial_key
 from evoclaims.core.pytree import pytree, strong
-from evoclaims.envs.base import Episode, PolicyFn, TaskState, fitting, played
+from evoclaims.envs.base import Episode, PolicyFn, TaskState, averaged, fitting, played
 from evoclaims.envs.foreign.actions import Choice, Range
 from evoclaims.envs.foreign.scoring import ForeignTask, Scored
 
@@ -164,7 +164,7 @@ class JaxTask(ForeignTask):
         """Run `examined_episodes` from different starts and average; success is the share that is solved."""
         keys = jax.random.split(key, self.examined_episodes)
         episodes: Episode = jax.vmap(lambda k: self.episode(policy, k, level))(keys)
-        return jax.tree.map(jnp.mean, episodes)
+        return averaged(episodes)
 
     @property
     def area(self) -> tuple[tuple[float, float], tuple[float, float]]:
