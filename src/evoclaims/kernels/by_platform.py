@@ -51,13 +51,11 @@ BY_PLATFORM: Final = Primitive("by_platform")
 BY_PLATFORM.multiple_results = True
 
 
-@BY_PLATFORM.def_impl
 def _alone(*leaves: Array, function: Leaves, on_gpu: Leaves, outputs: Shapes) -> Sequence[Array]:
     """Run outside of compiled programs."""
     return function(*leaves)
 
 
-@BY_PLATFORM.def_abstract_eval
 def _shapes(*leaves: ShapedArray, function: Leaves, on_gpu: Leaves, outputs: Shapes) -> list[ShapedArray]:
     """Return the results' shapes."""
     return [ShapedArray(out.shape, out.dtype) for out in outputs]
@@ -91,6 +89,8 @@ def _lowered(name: str) -> Any:
     return rule
 
 
+BY_PLATFORM.def_impl(_alone)
+BY_PLATFORM.def_abstract_eval(_shapes)
 batching.primitive_batchers[BY_PLATFORM] = _batched
 ad.primitive_jvps[BY_PLATFORM] = _derivative
 mlir.register_lowering(BY_PLATFORM, _lowered("function"))

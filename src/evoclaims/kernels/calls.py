@@ -90,14 +90,12 @@ CALL: Final = Primitive("kernel")
 CALL.multiple_results = True
 
 
-@CALL.def_impl
 def _alone(*leaves: Array, kernel: Callee) -> list[Array]:
     """Run outside of compiled programs."""
     made: list[Array] = jax.jit(partial(CALL.bind, kernel=kernel))(*leaves)
     return made
 
 
-@CALL.def_abstract_eval
 def _shapes(*leaves: ShapedArray, kernel: Callee) -> list[ShapedArray]:
     """Return the results' shapes."""
     return [ShapedArray((*kernel.batch(leaves), *out.shape), out.dtype) for out in kernel.outputs]
@@ -130,6 +128,8 @@ def _for_gpu(kernel: Callee) -> Callable[..., list[Array]]:
     return kernel.on_gpu if is_new_enough else kernel.as_it_is
 
 
+CALL.def_impl(_alone)
+CALL.def_abstract_eval(_shapes)
 batching.primitive_batchers[CALL] = _batched
 ad.primitive_jvps[CALL] = _derivative
 mlir.register_lowering(CALL, _lowered(lambda kernel: kernel.as_it_is))

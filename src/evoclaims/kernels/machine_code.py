@@ -17,9 +17,10 @@ from evoclaims.core.files import read_file, write_atomically
 from evoclaims.kernels.unsupported import Unsupported
 
 try:
-    import llvmlite.binding as llvm
+    import llvmlite.binding as binding
 except ImportError:  # not every machine has a wheel of it; `lanes` says so
-    llvm = None
+    binding = None
+llvm: Any = binding
 
 OPTIMIZATION: Final = 2
 """Of choosing instructions and registers; the text itself is compiled as it is."""
@@ -85,7 +86,8 @@ def _linker() -> Any:
 
 def _machine_code(key: str, text: str) -> bytes:
     """Return a text's machine code from the cache on disk, where jax's configuration names one, or compile it."""
-    folder = jax.config.jax_compilation_cache_dir  # type: ignore[attr-defined]  (jax defines it at run time)
+    config: Any = jax.config  # defines its attributes at run time
+    folder = config.jax_compilation_cache_dir
     if folder is None:
         return compiled(text)
     path = Path(folder) / "kernels" / f"{key}.o"

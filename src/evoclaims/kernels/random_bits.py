@@ -51,12 +51,12 @@ def _random_bits(key: UInt32[Array, " 2"], bit_width: int, shape: tuple[int, ...
     if bit_width > 32 or not 0 < size < 2**31:
         drawn: Array = threefry_prng_impl.random_bits(key, bit_width, shape)
         return drawn
-    (bits,) = calls.CALL.bind(key, kernel=_Drawing(size))
+    bits: Array = calls.CALL.bind(key, kernel=_Drawing(size))[0]
     return bits.reshape(shape).astype(f"uint{bit_width}")
 
 
-def _fold_in(key: UInt32[Array, " 2"], data: UInt32[Array, ""]) -> UInt32[Array, " 2"]:
-    """Return the key that a key and a number make."""
+def _fold_in(key: UInt32[Array, " 2"], data: Any) -> UInt32[Array, " 2"]:
+    """Return the key that a key and a number, uint32, make."""
     (made,) = _FOLDING(*(jax.lax.bitcast_convert_type(words, jnp.int32) for words in (key, data.reshape(1))))
     return jax.lax.bitcast_convert_type(made, jnp.uint32)
 

@@ -6,7 +6,6 @@ from typing import Any, Final
 
 import jax
 import numpy as np
-from jax.core import ShapedArray
 from jax.extend.core import Primitive
 from jax.interpreters import ad, batching, mlir
 from jaxtyping import Array, Bool
@@ -26,21 +25,13 @@ def seldom(condition: Bool[Array, "*shape"]) -> Bool[Array, "*shape"]:
 SELDOM: Final = Primitive("seldom")
 
 
-@SELDOM.def_impl
-def _alone(condition: Array) -> Array:
-    return condition
-
-
-@SELDOM.def_abstract_eval
-def _shape(condition: ShapedArray) -> ShapedArray:
-    return condition
-
-
 def _derivative(values: Any, tangents: Any) -> Any:
     """A condition has no derivative."""
     return SELDOM.bind(*values), np.zeros(np.shape(values[0]), jax.dtypes.float0)
 
 
+SELDOM.def_impl(lambda condition: condition)
+SELDOM.def_abstract_eval(lambda condition: condition)
 ad.primitive_jvps[SELDOM] = _derivative
 batching.defvectorized(SELDOM)
 mlir.register_lowering(SELDOM, lambda context, condition: [condition])
