@@ -11,9 +11,9 @@ from typing import Final, get_args
 from evoclaims.cli.project import open_project
 from evoclaims.cli.stored import FIGURES, Stored, describe, load, write
 from evoclaims.cli.terminal import styled
+from evoclaims.core.drawing import Format
 from evoclaims.core.errors import UnknownNameError, UserError
 from evoclaims.networks import export
-from evoclaims.networks.picture import Format
 from evoclaims.report.champion import network
 from evoclaims.report.console import PlainSpokenConsole, plain_table
 from evoclaims.trials import champions, devices

@@ -133,7 +133,7 @@ def _watched(command: list[str], folder: Path, log: Path) -> tuple[int, str]:
     ) as process:
         try:
             with open(log, "w", encoding="utf-8", errors="backslashreplace") as file:
-                for line in process.stdout:
+                for line in process.stdout or ():
                     lines.append(line)
                     file.write(line)
                     file.flush()

@@ -14,13 +14,13 @@ import numpy as np
 from evoclaims.cli.episodes import Outings, run_again
 from evoclaims.cli.project import Project, open_project
 from evoclaims.cli.stored import FIGURES, Stored, describe, load, write
+from evoclaims.core.drawing import Format
 from evoclaims.core.errors import UnknownNameError, UserError
 from evoclaims.envs.ecorobot.robot_task import RobotTask
 from evoclaims.envs.ecorobot.views import film, page, pictures
 from evoclaims.envs.ecorobot.views.marks import marks
 from evoclaims.envs.ecorobot.views.motion import Motion, motion
 from evoclaims.methods.map_elites import MapElites
-from evoclaims.networks.picture import Format
 from evoclaims.paper.reproduction import Tier
 from evoclaims.trials import devices
 

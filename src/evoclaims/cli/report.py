@@ -62,7 +62,7 @@ def main(options: argparse.Namespace) -> int:
         gathered,
         figures=drawn,
         missing=missing,
-        robustness=robustness,
+        robustness=tuple(robustness),
         numbers=replications(archive, reproduction, tiers[0], ("", *reproduction.variants)),
         across=across_shown.last({project.store.root.absolute(), project.config.root / APART["across"]}),
         generated=f"Written on {datetime.now(UTC):%Y-%m-%d %H:%M} UTC by evoclaims {metadata.version('evoclaims')}.",

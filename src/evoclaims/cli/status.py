@@ -16,7 +16,7 @@ from evoclaims.judging.verdict import Outcome
 from evoclaims.paper.reproduction import Reproduction
 from evoclaims.report import table_cells, terminal_table
 from evoclaims.report.run_summary import run_summary
-from evoclaims.verdicts import export
+from evoclaims.verdicts import export, history
 from evoclaims.verdicts.claim_report import ClaimReport
 from evoclaims.verdicts.robustness import matrix
 
@@ -35,7 +35,7 @@ def main(options: argparse.Namespace) -> int:
     project = open_project(options.storage)
     project.reproduction.tier(options.tier, options.variant)
     names = [options.variant, ""] if options.variant else [""]
-    reports, *plain = map(table_cells.ordered, project.judge_variants([(options.tier, name) for name in names]))
+    reports, *plain = map(history.ordered, project.judge_variants([(options.tier, name) for name in names]))
     if options.only is not None:
         wanted = selected(options.only, {name for report in reports for name in (report.claim, report.name)})
         reports = [report for report in reports if wanted & {report.claim, report.name}]

@@ -9,6 +9,7 @@ import subprocess
 import sys
 import threading
 from collections.abc import Callable, Mapping
+from typing import IO, Any
 
 import msgspec
 
@@ -28,6 +29,9 @@ class Process:
             stderr=subprocess.PIPE,
             env={**os.environ, **environment},
         )
+        process: Any = self._process
+        pipes: tuple[IO[bytes], ...] = process.stdin, process.stdout, process.stderr
+        self._input, self._output, self._error_output = pipes
         self._errors = threading.Thread(target=self._pass_errors_on, daemon=True)
         self._errors.start()
         self._ask(order)
@@ -53,11 +57,11 @@ class Process:
     def close(self) -> None:
         """Give it nothing more to do, and wait for its end."""
         with contextlib.suppress(OSError):  # it is dead already
-            self._process.stdin.close()
+            self._input.close()
         self._process.wait()
         self._errors.join()
-        self._process.stdout.close()
-        self._process.stderr.close()
+        self._output.close()
+        self._error_output.close()
 
     def stop(self) -> None:
         """End it, whatever it does; it is still to be closed."""
@@ -66,12 +70,12 @@ class Process:
     def _ask(self, what: WorkOrder | Job) -> None:
         """Write a line to its standard input; a dead process is found when it does not reply."""
         with contextlib.suppress(OSError):
-            self._process.stdin.write(msgspec.json.encode(what) + b"\n")
-            self._process.stdin.flush()
+            self._input.write(msgspec.json.encode(what) + b"\n")
+            self._input.flush()
 
     def _reply(self) -> Reply | None:
         """Wait for its next reply; None where it has died."""
-        line = self._process.stdout.readline()
+        line = self._output.readline()
         try:
             return msgspec.json.decode(line, type=Reply) if line else None
         except msgspec.DecodeError:  # it died in the middle of a line
@@ -79,5 +83,5 @@ class Process:
 
     def _pass_errors_on(self) -> None:
         """Print what it writes to standard error."""
-        for line in self._process.stderr:
+        for line in self._error_output:
             print(line.decode(errors="replace"), end="", file=sys.stderr, flush=True)

@@ -37,7 +37,8 @@ def ordinal_weights(
     evosax's default averages the ranks of ties. With a thresholded fitness most of a population ties, the averaged
     weights cancel, and the step size collapses. Individuals are drawn independently, so the order by index is random.
     """
-    return params.weights[jnp.argsort(jnp.argsort(fitness, stable=True), stable=True)]
+    weights: Array = params.weights[jnp.argsort(jnp.argsort(fitness, stable=True), stable=True)]
+    return weights
 
 
 @dataclass(frozen=True)
@@ -118,4 +119,5 @@ class CmaEs:
     @property
     def _algorithm(self) -> Callable[..., CMA_ES]:
         """Return what makes the search."""
-        return CMA_ES
+        algorithm: Callable[..., CMA_ES] = CMA_ES
+        return algorithm

@@ -81,7 +81,8 @@ class ThresholdCircuit:
 
         def function(parameters: Any, observation: Float[Array, " inputs"]) -> Float[Array, " outputs"]:
             weights, thresholds, readout = parameters
-            return (weights @ observation > thresholds).astype(jnp.float32) @ readout
+            answers: Array = (weights @ observation > thresholds).astype(jnp.float32) @ readout
+            return answers
 
         parts = self.weights, self.thresholds, sign * self.readout
         return Policy(parameters=jax.tree.map(jnp.asarray, parts), function=function)

@@ -176,7 +176,7 @@ class Ppo:
 
         def function(parameters: Any, observation: Float[Array, " observation"]) -> Float[Array, " action"]:
             with implicit_promotions():
-                action, _ = make(parameters, deterministic=True)(observation, jax.random.key(0))
+                action: Array = make(parameters, deterministic=True)(observation, jax.random.key(0))[0]
             return action
 
         return Policy(parameters=(state.statistics, state.networks.policy), function=function)

@@ -33,7 +33,8 @@ class Minimizes(Fault):
 
     def step(self, key: PRNGKeyArray, task: Task, level: Int[Array, ""], state: Any) -> tuple[Any, Progress]:
         """Train on the reversed reward."""
-        return self.sound.step(key, plant(ReversesReward, task), level, state)
+        stepped: tuple[Any, Progress] = self.sound.step(key, plant(ReversesReward, task), level, state)
+        return stepped
 
 
 class SelectsAtRandom(Fault):
@@ -43,7 +44,8 @@ class SelectsAtRandom(Fault):
 
     def step(self, key: PRNGKeyArray, task: Task, level: Int[Array, ""], state: Any) -> tuple[Any, Progress]:
         """Train on random rewards."""
-        return self.sound.step(key, plant(PaysAtRandom, task), level, state)
+        stepped: tuple[Any, Progress] = self.sound.step(key, plant(PaysAtRandom, task), level, state)
+        return stepped
 
 
 class ForgetsChampion(Fault):
@@ -53,7 +55,8 @@ class ForgetsChampion(Fault):
 
     def best(self, task: Task, state: Any) -> Policy:
         """Return the policy of an untrained state."""
-        return self.sound.best(task, self.sound.init(jax.random.key(0), task))
+        policy: Policy = self.sound.best(task, self.sound.init(jax.random.key(0), task))
+        return policy
 
 
 class HasOneSeed(Fault):
@@ -75,7 +78,8 @@ class HasOneSeed(Fault):
 
     def best(self, task: Task, state: tuple[Int[Array, ""], Any]) -> Policy:
         """Return the policy of the sound method's state."""
-        return self.sound.best(task, state[1])
+        policy: Policy = self.sound.best(task, state[1])
+        return policy
 
 
 class KeepsItsStepSize(Fault):

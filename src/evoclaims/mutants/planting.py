@@ -23,7 +23,7 @@ class Fault:
     @property
     def sound(self) -> Any:
         """The component without the fault."""
-        made = object.__new__(self._sound_class)
+        made: Any = object.__new__(self._sound_class)
         made.__dict__.update(self.__dict__)
         return made
 
@@ -47,6 +47,7 @@ def plant(fault: type[F], component: Any) -> F:
     """
     if isinstance(component, Fault):
         raise UserError(f"{component.name!r} has a fault already; plant each in a component without one.")
-    made: F = object.__new__(_faulty(fault, type(component)))
+    kinds: Any = fault, type(component)
+    made: F = object.__new__(_faulty(*kinds))
     made.__dict__.update(component.__dict__)
     return made

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import partial
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -92,8 +93,9 @@ def resized(genomes: Genome, nodes: int, connections: int) -> Genome:
             return leaf[..., :size]
         return jnp.concatenate([leaf, jnp.full((*leaf.shape[:-1], missing), empty, leaf.dtype)], axis=-1)
 
+    fillers: Any = (EMPTY, 0, 0, 0)
     return replace(
         genomes,
-        nodes=jax.tree.map(partial(resize, nodes), genomes.nodes, Nodes(EMPTY, 0, 0, 0)),
+        nodes=jax.tree.map(partial(resize, nodes), genomes.nodes, Nodes(*fillers)),
         connections=jax.tree.map(partial(resize, connections), genomes.connections),
     )

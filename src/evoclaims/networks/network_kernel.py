@@ -81,7 +81,8 @@ def _array(dtype: Any, *shape: int) -> jax.ShapeDtypeStruct:
 def _expression(name: str) -> Expression:
     """Return an activation function as an expression."""
     (result,) = scalarize(jax.make_jaxpr(ACTIVATIONS[name])(NUMBER))
-    number: Expression = result[()]
+    number: Any = result[()]
+    assert isinstance(number, Expression)
     return number
 
 

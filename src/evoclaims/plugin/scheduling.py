@@ -14,7 +14,7 @@ LOAD: pytest.StashKey[Workload] = pytest.StashKey()
 """Where xdist's controller keeps what its workers have to do."""
 
 
-class ClaimScheduling(LoadScheduling):
+class ClaimScheduling(LoadScheduling):  # type: ignore[misc]  # xdist is not typed
     """xdist's own distribution (`--dist load`), but for claims, which change places among themselves.
 
     A worker needs to know its next test before it runs one, so that it has two claims at a time and no more.
@@ -40,7 +40,8 @@ class ClaimScheduling(LoadScheduling):
         """Give the tests of a worker that has died, or ended, to others."""
         if self._order is not None:
             self._order.lost(node)
-        return super().remove_node(node)
+        crashed: str | None = super().remove_node(node)
+        return crashed
 
     def _send_tests(self, node: Any, num: int) -> None:
         """Give a worker up to `num` tests: others as they come, and where a claim comes, the one that is due."""

@@ -83,9 +83,9 @@ class Summary:
         """
         refused = bool(self._troubles)
         if self.reports:  # they come in the order in which they were judged
-            from evoclaims.report import table_cells
+            from evoclaims.verdicts import history
 
-            self.reports = table_cells.ordered(self.reports)
+            self.reports = history.ordered(self.reports)
             with self._telling():
                 self._drift = make_session(self._config).drift(self.reports)
             with self._telling():
@@ -177,7 +177,8 @@ class Summary:
         """Say how claims are selected, where none was."""
         from evoclaims.verdicts.history import in_order
 
-        names = sorted(self._config.stash[KNOWN], key=lambda name: in_order(("", name)))
+        known: set[str] = self._config.stash[KNOWN]
+        names = sorted(known, key=lambda name: in_order(("", name)))
         return (
             f"No claim was selected: --claims-only={names[0]} selects claims by their ids, -m smoke and -m full their "
             f"tier. Claims here: {', '.join(names)}."

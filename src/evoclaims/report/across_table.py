@@ -75,7 +75,7 @@ def headline(found: Across) -> str:
 
 def rows(found: Across) -> list[Row]:
     """Return one row per claim and environment."""
-    return [
+    judged: list[Row] = [
         {
             "environment": one.label,
             "claim": claim,
@@ -96,7 +96,8 @@ def rows(found: Across) -> list[Row]:
         for one in found.environments
         for claim in found.claims
         if (cell := found.cells.get((claim, one.label))) is not None
-    ] + [{"environment": one.label, "trouble": one.trouble} for one in found.environments if one.trouble]
+    ]
+    return judged + [{"environment": one.label, "trouble": one.trouble} for one in found.environments if one.trouble]
 
 
 def said(cell: Cell | None) -> tuple[str, ...]:

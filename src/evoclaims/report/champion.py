@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Sequence
 from typing import Any, Final
 
+from evoclaims.core.drawing import Format
 from evoclaims.core.errors import UserError
 from evoclaims.networks import export, picture
 from evoclaims.report.model import ShownChampion
@@ -24,7 +25,7 @@ Draw = Callable[[Condition, TrialResult, Any, str], bytes | None]
 
 
 def network(
-    condition: Condition, result: TrialResult, parameters: Any, title: str, file_format: picture.Format = "svg"
+    condition: Condition, result: TrialResult, parameters: Any, title: str, file_format: Format = "svg"
 ) -> bytes | None:
     """Draw the network of a champion that is a graph, beside it the one that it generates on a substrate.
 

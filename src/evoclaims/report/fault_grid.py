@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from evoclaims.report import table_cells
+from evoclaims.verdicts import history
 from evoclaims.verdicts.claim_report import ClaimReport
 from evoclaims.verdicts.history import key_of
 from evoclaims.verdicts.mutation_matrix import Attempt, Fate, Matrix, current
@@ -52,7 +52,7 @@ class FaultGrid:
 
 def fault_grid(matrix: Matrix, tier: str, reports: Iterable[ClaimReport]) -> FaultGrid:
     """Return the grid of a tier; rows of the matrix that are about other verdicts than those of now are left out."""
-    ordered = table_cells.ordered(reports)
+    ordered = history.ordered(reports)
     found = {report.name: (report, row) for report in ordered if (row := current(matrix, report)) is not None}
     rows = tuple(
         GridRow(report, _cells(row.attempts), "" if row.untried else ", ".join(row.unnoticed))

@@ -25,13 +25,14 @@ from evoclaims.report.spark import spark_svg
 from evoclaims.report.verdict_chart import VerdictChart
 from evoclaims.verdicts.history import key_of
 
+_FIGURES: Final = ("figures", "Figures", "Figures of the paper, redrawn")
 _CHAPTERS: Final = (
     ("robustness", "Robustness", "Which conclusions hang on a detail?"),
     ("numbers", "Numbers", "Do the numbers replicate?"),
     ("faults", "Planted faults", "Which planted faults do the claims notice?"),
     ("across", "Releases", "Do other releases change a verdict?"),
     ("history", "History", "Accepted verdicts by date and versions"),
-    ("figures", "Figures", "Figures of the paper, redrawn"),
+    _FIGURES,
 )
 """The parts below the claims, as a `Page` and a template call them; what leads there; and their titles."""
 
@@ -45,7 +46,7 @@ def html(page: Page) -> str:
         .render(
             page=page,
             lines=opening_lines(page),
-            chapters=[one for one in _CHAPTERS if getattr(page, one[0]) or (one[0] == "figures" and page.missing)],
+            chapters=[one for one in _CHAPTERS if getattr(page, one[0]) or (one == _FIGURES and page.missing)],
             pieces=packed(dict(_pieces(page))),
             outcomes=list(Outcome),
             legend=LEGEND,

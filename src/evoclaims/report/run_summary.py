@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from evoclaims.judging.verdict import Outcome
 from evoclaims.report import table_cells
 from evoclaims.report.markdown_text import literal, table
-from evoclaims.verdicts import mixed_versions
+from evoclaims.verdicts import history, mixed_versions
 from evoclaims.verdicts.claim_report import ClaimReport
 
 COLUMNS = ("claim", "what is claimed", "verdict", "n", "p", "why")
@@ -15,7 +15,7 @@ COLUMNS = ("claim", "what is claimed", "verdict", "n", "p", "why")
 
 def run_summary(reports: Sequence[ClaimReport], notes: Sequence[str] = ()) -> str:
     """Return a table of verdicts, their totals, and plain `notes`, such as changes against the accepted verdicts."""
-    rows = (map(literal, _cells(report)) for report in table_cells.ordered(reports))
+    rows = (map(literal, _cells(report)) for report in history.ordered(reports))
     lines = ["## Claims", "", f"**{literal(table_cells.totals(reports))}**", ""]
     lines += [table(COLUMNS, rows, numbers=("n", "p"))]
     further = filter(None, (table_cells.faults(reports), *mixed_versions.lines(reports), *notes))

@@ -17,7 +17,7 @@ from evoclaims.judging.baseline import DriftReport
 from evoclaims.judging.verdict import Outcome
 from evoclaims.report import table_cells
 from evoclaims.report.console import PlainSpokenConsole
-from evoclaims.verdicts import mixed_versions
+from evoclaims.verdicts import history, mixed_versions
 from evoclaims.verdicts.claim_report import ClaimReport
 from evoclaims.verdicts.sensitivity import Tried
 
@@ -42,7 +42,7 @@ def verdict_table(reports: Sequence[ClaimReport], width: int, colour: bool) -> s
     The sentence is shortened to the terminal's width, never the id. Where that leaves it little room, columns are left
     out, the evidence first.
     """
-    ordered = table_cells.ordered(reports)
+    ordered = history.ordered(reports)
     names = _column("claim", [printable(report.name) for report in ordered], most=width // 2)
     verdicts = _column("verdict", [table_cells.verdict_of_versions(report) for report in ordered])
     columns = next((found for found in _choices(ordered) if _room(width, names, verdicts, *found) >= SENTENCE), ())

@@ -88,4 +88,5 @@ class Box:
         """Return the distance of ground points, shape [..., 2], from it, seen from above, m; 0 inside."""
         local = (points - np.array(self.centre)) @ self.rotation[:2, :2]
         outside = np.maximum(np.abs(local) - np.array(self.half_size), 0.0)
-        return np.hypot(outside[..., 0], outside[..., 1])
+        distance: NDArray[np.float64] = np.hypot(outside[..., 0], outside[..., 1])
+        return distance

@@ -60,7 +60,7 @@ class DeceptiveMaze(Maze):
         difficulty: "easy" (a bar across the way) or "difficult" (the walls of the stepping stones' maze).
     """
 
-    name: ClassVar[str] = "deceptive_maze"  # type: ignore[misc]
+    name: ClassVar[str] = "deceptive_maze"
     revision: ClassVar[int] = 1
     packages: ClassVar[tuple[str, ...]] = ROBOT_PACKAGES
 
@@ -102,4 +102,5 @@ class DeceptiveMaze(Maze):
 
     def _distance(self, pose: Pose) -> Float[Array, ""]:
         """Return the distance to where the target counts as reached, m."""
-        return jnp.linalg.norm(pose.place[:2] - jnp.asarray(self.target, jnp.float32)) - self.plan.within
+        distance: Array = jnp.linalg.norm(pose.place[:2] - jnp.asarray(self.target, jnp.float32))
+        return distance - self.plan.within

@@ -34,7 +34,7 @@ def forward(
 class Locomotion(RobotTask):
     """Run forward, along x; the policy does not see where it is."""
 
-    name: ClassVar[str] = "locomotion"  # type: ignore[misc]
+    name: ClassVar[str] = "locomotion"
     revision: ClassVar[int] = 1
     packages: ClassVar[tuple[str, ...]] = ROBOT_PACKAGES
     shows_place: ClassVar[bool] = False

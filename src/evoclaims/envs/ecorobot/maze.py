@@ -96,7 +96,7 @@ def _reachable(
         for (low, high), count in zip(area, cells, strict=True)
     ]
     points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
-    free = np.ones(points.shape[:2], bool)
+    free = np.ones((cells[0] * FINE, cells[1] * FINE), bool)
     for box in boxes:
         free &= box.distance(points) >= radius
     first = tuple(int(np.argmin(np.abs(axis - at))) for axis, at in zip(axes, start, strict=True))
@@ -109,6 +109,6 @@ def _reachable(
             if 0 <= i < free.shape[0] and 0 <= j < free.shape[1] and free[i, j] and not flooded[i, j]:
                 flooded[i, j] = True
                 edge.append((i, j))
-    ground = flooded.reshape(cells[0], FINE, cells[1], FINE).any(axis=(1, 3))
+    ground = np.asarray(flooded.reshape(cells[0], FINE, cells[1], FINE).any(axis=(1, 3)))
     ground.setflags(write=False)
     return ground

@@ -45,7 +45,7 @@ class Obstacles(RobotTask):
     The corridor's walls at y = ±3 are left out: the half-cheetah moves in the plane y = 0.
     """
 
-    name: ClassVar[str] = "obstacles"  # type: ignore[misc]
+    name: ClassVar[str] = "obstacles"
     revision: ClassVar[int] = 1
     packages: ClassVar[tuple[str, ...]] = ROBOT_PACKAGES
 

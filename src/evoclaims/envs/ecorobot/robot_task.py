@@ -66,6 +66,11 @@ class RobotTask(ABC):
 
     @property
     @abstractmethod
+    def revision(self) -> int:
+        """Increased whenever the task's results change."""
+
+    @property
+    @abstractmethod
     def boxes(self) -> tuple[Box, ...]:
         """The boxes in the world."""
 

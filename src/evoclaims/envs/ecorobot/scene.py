@@ -23,7 +23,7 @@ from evoclaims.envs.ecorobot.robots import Robot
 
 # MJX prints two lines when NVIDIA's warp is not installed; nothing here uses warp.
 with contextlib.redirect_stdout(io.StringIO()):
-    from mujoco import mjx
+    from mujoco import mjx as mjx
 
 WORLD_GROUP: Final = 1
 """The geom group of the scene's own geoms; sensors see it."""

@@ -53,7 +53,7 @@ class SteppingStones(Maze):
         shows_goal: whether the policy sees the next stone's place: goal-conditioned learning.
     """
 
-    name: ClassVar[str] = "stepping_stones"  # type: ignore[misc]
+    name: ClassVar[str] = "stepping_stones"
     revision: ClassVar[int] = 1
     packages: ClassVar[tuple[str, ...]] = ROBOT_PACKAGES
 
@@ -93,7 +93,8 @@ class SteppingStones(Maze):
 
     def reached(self, outing: Outing) -> Bool[Array, ""]:
         """Whether all stones are crossed."""
-        return outing.memory.crossed == len(self.stones)
+        memory: StonesCrossed = outing.memory
+        return memory.crossed == len(self.stones)
 
     def measures(self, outing: Outing) -> dict[str, Array]:
         """Return the number of stones crossed."""
@@ -101,8 +102,10 @@ class SteppingStones(Maze):
 
     def _next(self, memory: StonesCrossed) -> Float[Array, 2]:
         """Return the next stone's place; after the last, the last one's."""
-        return jnp.asarray(self.stones, jnp.float32)[jnp.minimum(memory.crossed, len(self.stones) - 1)]
+        stones: Array = jnp.asarray(self.stones, jnp.float32)
+        return stones[jnp.minimum(memory.crossed, len(self.stones) - 1)]
 
     def _distance(self, memory: StonesCrossed, pose: Pose) -> Float[Array, ""]:
         """Return the distance to the next stone, m."""
-        return jnp.linalg.norm(pose.place[:2] - self._next(memory))
+        distance: Array = jnp.linalg.norm(pose.place[:2] - self._next(memory))
+        return distance

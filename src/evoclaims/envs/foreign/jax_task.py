@@ -87,6 +87,11 @@ class JaxTask(ForeignTask):
         super().__post_init__()
         require_at_least(1, f"{self.name}'s", episode_steps=self.episode_steps)
 
+    @property
+    @abstractmethod
+    def revision(self) -> int:
+        """Increased whenever the task's results change."""
+
     @abstractmethod
     def make(self) -> Any:
         """Return the library's environment."""

@@ -42,6 +42,16 @@ class Circuit(ABC):
 
     @property
     @abstractmethod
+    def name(self) -> str:
+        """The registered name."""
+
+    @property
+    @abstractmethod
+    def revision(self) -> int:
+        """Increased whenever the task's results change."""
+
+    @property
+    @abstractmethod
     def table(self) -> TruthTable:
         """The whole truth table."""
 

@@ -134,11 +134,12 @@ def _crossed(key: PRNGKeyArray, genomes: Genome, parents: Parents) -> Genome:
     keys = jax.random.split(key, parents.fitter.shape[0])
     fitter = jax.tree.map(lambda leaf: leaf[parents.fitter], genomes)
     # With the paper's survival threshold most species have a single parent: no crossover is needed.
-    return jax.lax.cond(
+    children: Genome = jax.lax.cond(
         jnp.any(parents.fitter != parents.other),
         lambda: jax.vmap(crossover)(keys, fitter, jax.tree.map(lambda leaf: leaf[parents.other], genomes)),
         lambda: fitter,
     )
+    return children
 
 
 def _first_genome(key: PRNGKeyArray, settings: Settings, inputs: int, outputs: int) -> Genome:
