@@ -27,6 +27,7 @@ import jax.numpy as jnp
 from neat_against_tensorneat import TASK, random_genomes, sized, with_ours
 
 from evoclaims.kernels.grouped import GroupKernel
+from evoclaims.kernels.random_bits import fast
 from evoclaims.methods.neat.crossover import crossover
 from evoclaims.methods.neat.neat import Neat
 from evoclaims.methods.neat.population import first_population
@@ -38,7 +39,7 @@ from evoclaims.networks.graph import GraphNetwork
 
 NETWORK = GraphNetwork(TASK.observation_size, TASK.action_size)
 ROWS = jnp.asarray(TASK.table.inputs)
-BREEDING = "The breeding of genomes", "The drawing of random numbers"
+BREEDING = "The breeding of genomes", "The making of random keys"
 
 
 def by_kernel(genome: Genome, rows: Any) -> Any:
@@ -86,14 +87,14 @@ def parts_of_breeding(genomes: Genome) -> dict[str, tuple[Any, ...]]:
     state = replace(first, population=replace(first.population, species=grouped))
 
     def structure(key: Any, genome: Genome, new_key: Any) -> Genome:
-        return mutate_structure(key, settings.mutation, genome, new_key, NETWORK.inputs, NETWORK.outputs)
+        return mutate_structure(fast(key), settings.mutation, genome, new_key, NETWORK.inputs, NETWORK.outputs)
 
     return {
-        "crossover": (jax.vmap(crossover), keys, genomes, others),
+        "crossover": (jax.vmap(lambda key, *parents: crossover(fast(key), *parents)), keys, genomes, others),
         "species": (partial(speciate, settings.species), grouped, genomes, 1),
         "structure": (jax.vmap(structure), keys, genomes, new_keys),
-        "values": (jax.vmap(lambda key, genome: mutate_values(key, settings.mutation, 1, genome)), keys, genomes),
-        "generation": (lambda key, state: method.step(key, TASK, level, state), keys[0], state),
+        "values": (jax.vmap(lambda key, genome: mutate_values(fast(key), settings.mutation, 1, genome)), keys, genomes),
+        "generation": (lambda key, state: method.step(fast(key), TASK, level, state), keys[0], state),
     }
 
 

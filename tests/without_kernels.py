@@ -9,8 +9,8 @@ from unittest.mock import patch
 
 from evoclaims.kernels.grouped import GroupKernel
 
-BREEDING = "The breeding of genomes", "The drawing of random numbers"
-"""Names of the kernels of NEAT that are not its networks'."""
+BREEDING = ("The breeding of genomes",)
+"""The name of the kernels of NEAT that are not its networks'."""
 
 
 @contextmanager
