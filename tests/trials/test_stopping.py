@@ -1,16 +1,20 @@
-"""SIGTERM, as schedulers and containers send it before they kill: a running batch writes a checkpoint, then ends."""
+"""Ctrl-C; and SIGTERM, as schedulers send it before they kill: a running batch writes a checkpoint, then ends."""
 
 from __future__ import annotations
 
+import importlib
 import os
 import signal
+import sys
+import time
 from collections import Counter
+from pathlib import Path
 from typing import Any
 
 import pytest
 from climbers import CLIMBING, SEEDS, Log, digests
 
-from evoclaims.trials import checkpoint
+from evoclaims.trials import checkpoint, stopping
 from evoclaims.trials.progress import RunProgress
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.runner import run
@@ -60,3 +64,44 @@ def test_an_ignored_signal_stays_ignored() -> None:
             os.kill(os.getpid(), signal.SIGTERM)
     finally:
         signal.signal(signal.SIGTERM, before)
+
+
+def test_an_interrupt_comes_after_what_would_lose_it() -> None:
+    """What is raised while jax collects garbage is ignored, and what is raised in an import may crash the process."""
+    reached = []
+
+    def _xla_gc_callback() -> None:
+        os.kill(os.getpid(), signal.SIGINT)
+        time.sleep(0.005)
+        reached.append("the end of the callback")
+
+    def work() -> None:
+        _xla_gc_callback()
+        reached.append("the code after it")
+        time.sleep(10.0)
+        reached.append("the end")
+
+    with pytest.raises(KeyboardInterrupt), interrupted_by(signal.SIGINT):
+        work()
+    assert reached == ["the end of the callback", "the code after it"]
+
+
+def test_an_interrupt_comes_after_an_import_but_not_after_one_that_lasts(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.syspath_prepend(tmp_path)
+    send = "import os, signal, time\nos.kill(os.getpid(), signal.SIGINT)\n"
+    (tmp_path / "soon_imported.py").write_text(send + "time.sleep(0.005)\n")
+    (tmp_path / "long_imported.py").write_text(send + "time.sleep(60)\n")
+
+    def work(module: str) -> None:
+        importlib.import_module(module)
+        time.sleep(10.0)
+
+    with pytest.raises(KeyboardInterrupt), interrupted_by(signal.SIGINT):
+        work("soon_imported")
+    assert "soon_imported" in sys.modules
+    monkeypatch.setattr(stopping, "DEAF_SECONDS", 0.1)
+    with pytest.raises(KeyboardInterrupt), interrupted_by(signal.SIGINT):
+        work("long_imported")
+    assert "long_imported" not in sys.modules

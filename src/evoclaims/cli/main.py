@@ -64,24 +64,30 @@ def _ended(arguments: Sequence[str] | None) -> int:
     if unknown:
         options.refuse(f"unrecognized arguments: {' '.join(unknown)}")
     try:
-        _check_folder()
-        from evoclaims.cli.storage import storage_of
-
-        options.storage = storage_of(options.storage, options.command)
-        if "numprocesses" in options:
-            from evoclaims.cli.host import host_of
-
-            options.host = host_of(options.numprocesses, options.device)
-        command = importlib.import_module(f"evoclaims.cli.{options.command}")  # only now: --help waits for no jax
-        with interrupted_by(signal.SIGTERM):
-            status: int = command.main(options)
-        sys.stdout.flush()
+        with interrupted_by(signal.SIGINT), interrupted_by(signal.SIGTERM):
+            return _done(options)
     except UserError as error:
         print(f"evoclaims: {error}", file=sys.stderr)
         return USER_ERROR
     except KeyboardInterrupt:
-        print("\nevoclaims: interrupted; the same command goes on from the last checkpoint.", file=sys.stderr)
+        goes_on = "; the same command goes on from the last checkpoint" if options.command in _IN_PROCESSES else ""
+        print(f"\nevoclaims: interrupted{goes_on}.", file=sys.stderr)
         return INTERRUPTED
+
+
+def _done(options: argparse.Namespace) -> int:
+    """Run one command to its end; return its exit status."""
+    _check_folder()
+    from evoclaims.cli.storage import storage_of
+
+    options.storage = storage_of(options.storage, options.command)
+    if "numprocesses" in options:
+        from evoclaims.cli.host import host_of
+
+        options.host = host_of(options.numprocesses, options.device)
+    command = importlib.import_module(f"evoclaims.cli.{options.command}")  # only now: --help waits for no jax
+    status: int = command.main(options)
+    sys.stdout.flush()
     return status
 
 

@@ -5,6 +5,7 @@ Nothing heavy is imported here at the top: pytest loads this file in every run o
 
 from __future__ import annotations
 
+import signal
 from collections.abc import Callable, Generator
 from typing import TYPE_CHECKING, Any
 
@@ -22,6 +23,7 @@ from evoclaims.plugin.progress import QUIET, ProgressLine, progress_of
 from evoclaims.plugin.run_session import make_session
 from evoclaims.plugin.summary import ATTRIBUTE, KNOWN, TROUBLE, Summary
 from evoclaims.trials.allowance import end_without
+from evoclaims.trials.stopping import interrupted_by
 
 if TYPE_CHECKING:
     from evoclaims.claims.collected import ClaimTest
@@ -117,6 +119,15 @@ def pytest_collection_finish(session: pytest.Session) -> None:
         prepare(session, make_session(config), claim_tests(session.items))
     except UserError as error:
         _refuse(config, session.items, error)
+
+
+@pytest.hookimpl(wrapper=True, tryfirst=True)
+def pytest_runtestloop(session: pytest.Session) -> Generator[None, object, object]:
+    """While claims run, let Ctrl-C interrupt them wherever they are (see `interrupted_by`)."""
+    if not any(item.get_closest_marker("claim") for item in session.items):
+        return (yield)
+    with interrupted_by(signal.SIGINT):
+        return (yield)
 
 
 @pytest.hookimpl(trylast=True)
