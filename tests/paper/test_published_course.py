@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from evoclaims.envs import Box, Obstacles, RobotTask, Surface
+from evoclaims.envs.base import Episode
 from evoclaims.envs.ecorobot.pose import Pose
 from evoclaims.envs.ecorobot.robots import HALF_CHEETAH
 from evoclaims.envs.ecorobot.scene import Scene, box_geoms
@@ -71,12 +72,12 @@ def test_a_published_step_pays_the_distance_alone(task: Obstacles, cost: float) 
 def test_published_policies_are_examined_for_twice_the_steps(
     task: Obstacles, steps: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def length(self: RobotTask, *_: Any, **__: Any) -> Any:
-        return jnp.float32(self.horizon)
+    def length(self: RobotTask, *_: Any, **__: Any) -> Episode:
+        return Episode(fitness=jnp.float32(self.horizon), success=jnp.float32(0.0))
 
     monkeypatch.setattr(RobotTask, "_play", length)
-    examined: Any = task.examine(lambda observation: observation, jax.random.key(0), jnp.int32(0))
-    assert int(examined) == steps
+    examined = task.examine(lambda observation: observation, jax.random.key(0), jnp.int32(0))
+    assert int(examined.fitness) == steps
 
 
 @pytest.mark.parametrize("tier", ["smoke", "full"])

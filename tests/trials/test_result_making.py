@@ -6,13 +6,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import jax.numpy as jnp
 import numpy as np
 import pytest
 from trial_toys import Walker, walk
 
+from evoclaims.core.errors import UserError
 from evoclaims.envs.gates.parity import NParity
 from evoclaims.methods.base import Policy
 from evoclaims.methods.hand_built import HandBuilt
@@ -176,3 +177,42 @@ def test_a_trial_has_diverged_when_its_final_policy_or_its_score_is_not_finite(
     (result,) = run(condition, [0], Store(tmp_path), cpus[:1])
     assert result.status == status
     assert result.metrics["steps"] == 2
+
+
+@dataclass(frozen=True)
+class InPercent(Walker):
+    """Reports its success in percent."""
+
+    name: ClassVar[str] = "in_percent"
+
+    def step(self, *arguments: Any) -> Any:
+        state, progress = super().step(*arguments)
+        return state, replace(progress, success=100.0 * progress.success)
+
+
+@dataclass(frozen=True)
+class Generous(NParity):
+    """Gives twice the success."""
+
+    name: ClassVar[str] = "generous"
+
+    def examine(self, *arguments: Any) -> Any:
+        episode = super().examine(*arguments)
+        return replace(episode, success=2.0 * episode.success)
+
+
+@pytest.mark.parametrize(
+    ("changes", "what"),
+    [
+        ({"method": InPercent(chance=1.0)}, "in_percent on n_parity reports a success of 100"),
+        ({"task": Generous(4)}, "The examination of walker on generous reports a success of"),
+    ],
+)
+def test_a_success_that_is_no_share_is_a_sentence_and_no_trial(
+    changes: dict[str, Any], what: str, tmp_path: Path, cpus: list[Any]
+) -> None:
+    """No level would be solved at 100, or any would at 2, and claims would be about nothing."""
+    condition = replace(walk(steps=2), **changes)
+    with pytest.raises(UserError, match=what + ".*A success is a share from 0 to 1"):
+        run(condition, [0], Store(tmp_path), cpus)
+    assert not list(Store(tmp_path).results([condition.id]))

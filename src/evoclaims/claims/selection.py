@@ -23,8 +23,13 @@ def selected(option: str, known: Collection[str]) -> set[str]:
         begun = {one for one in known if name.isalpha() and re.match(rf"{name}\d", one)}
         found = {name} & set(known) or begun
         if not found:
+            if not known:
+                raise UserError(
+                    f"There is no claim named {name!r} here: pytest has collected no claims at all. Run it in the "
+                    "project's root, or name the folder of the claims (pytest ../claims)."
+                )
             alike = {one for one in known if ("[" in one) == ("[" in name)}
-            raise UnknownNameError("claim", name, alike or known or {"(none collected)"})
+            raise UnknownNameError("claim", name, alike or known)
         chosen |= found
     if not chosen:
         raise UserError(f"{option!r} names no claim: name some, such as G1 or G1,S2, or leave the option out.")

@@ -23,7 +23,7 @@ METRICS = ("mean_success", "last_fitness", "environment_steps")
 OF_TABLE = {"file", "sha256", "by"}
 """What a specification of imported trials says of their table, and not of how it is read."""
 
-_MEND = "Restore the file from version control, or write it anew with `evoclaims reference`."
+_MEND = "Restore the file from version control, or delete it and write it anew with `evoclaims reference`."
 
 
 def path_of(folder: Path, tier: str, method: str, task: str) -> Path:

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from types import MappingProxyType
-from typing import Any
+from typing import Any, Final
 
 import jax
 import numpy as np
 from numpy.typing import NDArray
 
+from evoclaims.core.errors import UserError
 from evoclaims.core.packages import DEPENDS_ON
 from evoclaims.core.provenance import collect, device_of
 from evoclaims.methods.base import Method, PartlyUsed
@@ -20,6 +22,9 @@ from evoclaims.trials.devices import MATMUL_PRECISION
 from evoclaims.trials.program import Report, Score
 from evoclaims.trials.result import Status, TrialResult, digest
 from evoclaims.trials.spec import Condition, TrialSpec
+
+_ROUNDING: Final = 1e-6
+"""What a share may be above 1 by rounding."""
 
 
 def curve_point(spec_cost: int, report: Report, lane: int) -> dict[str, float]:
@@ -33,6 +38,20 @@ def curve_point(spec_cost: int, report: Report, lane: int) -> dict[str, float]:
         "success": float(report.success[lane]),
         **{name: float(values[lane]) for name, values in report.metrics.items()},
     }
+
+
+def check_success(what: str, *successes: float) -> None:
+    """Check that successes are shares; those that are not finite are divergence, which is judged elsewhere.
+
+    Raises:
+        UserError: when one is not.
+    """
+    wrong = [success for success in successes if math.isfinite(success) and not 0.0 <= success <= 1.0 + _ROUNDING]
+    if wrong:
+        raise UserError(
+            f"{what} reports a success of {wrong[0]:g}. A success is a share from 0 to 1, and a level is solved at "
+            "exactly 1: make the task's or the method's success such a share."
+        )
 
 
 def make_result(
@@ -57,6 +76,7 @@ def make_result(
     """
     cost = spec.condition.cost
     success, fitness = np.asarray(score.final.success)[lane], np.asarray(score.final.fitness)[lane]
+    check_success(f"The examination of {spec.condition.label}", *map(float, success))
     solved_at = np.asarray(score.solved_at)[lane]
     solved = np.flatnonzero(solved_at != NEVER)
     steps = int(report.steps[lane])

@@ -27,7 +27,7 @@ from evoclaims.trials.pacing import Rhythm, Strides
 from evoclaims.trials.program import Report
 from evoclaims.trials.progress import RunProgress, Watcher, ignore
 from evoclaims.trials.result import TrialResult
-from evoclaims.trials.result_making import curve_point, make_result, make_unfinished
+from evoclaims.trials.result_making import check_success, curve_point, make_result, make_unfinished
 from evoclaims.trials.running import shared
 from evoclaims.trials.spec import Condition, TrialSpec
 from evoclaims.trials.stopping import postponed
@@ -190,6 +190,7 @@ def _advance(run: Run, batch: Batch, allowance: Allowance, strides: Strides) -> 
         for lane in batch.running:
             seed = str(header.lanes[lane])
             point = curve_point(cost, report, lane)
+            check_success(run.condition.label, point["success"])
             curves[seed] = {name: [*curves[seed].get(name, []), value] for name, value in point.items()}
         header = replace(header, chunks=header.chunks + 1, curves=curves)
     return replace(batch, header=header, state=state, steps=until), report, whole
