@@ -30,6 +30,7 @@ def interrupted_by(number: signal.Signals) -> Iterator[None]:
     process; it is raised after that. A signal that this process was started to ignore stays ignored, and no thread but
     the main one may listen to one.
     """
+    global _deaf_since
     before = signal.getsignal(number)
     if before in (signal.SIG_IGN, None) or threading.current_thread() is not threading.main_thread():
         yield
@@ -40,6 +41,7 @@ def interrupted_by(number: signal.Signals) -> Iterator[None]:
     finally:
         signal.signal(number, before)
         _asked.clear()
+        _deaf_since = None
 
 
 @contextmanager
