@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
@@ -19,6 +20,7 @@ from evoclaims.core.foreign import implicit_promotions
 from evoclaims.core.pytree import strong
 from evoclaims.envs.base import Episode
 from evoclaims.envs.gates.parity import NParity
+from evoclaims.methods import cma_es
 from evoclaims.methods.cma_es import CmaEs, ordinal_weights
 from evoclaims.networks.all_skips import AllSkips
 
@@ -316,3 +318,26 @@ def test_an_ill_conditioned_ellipsoid_is_solved_in_as_many_generations_as_the_tu
 def test_a_population_too_small_to_recombine_is_one_sentence() -> None:
     with pytest.raises(UserError, match="population of at least 4, not 3"):
         CmaEs(3)
+
+
+@pytest.mark.parametrize(("large", "eigenvalues"), [(DIMENSIONS, "5"), (DIMENSIONS + 1, "4,5")], ids=["large", "small"])
+def test_a_batch_of_large_matrices_is_decomposed_one_after_the_other(
+    large: int, eigenvalues: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """And otherwise as a batch; the generations are the same."""
+    method: Any = CmaEs(POPULATION, Itself())  # type: ignore[arg-type]  # as much of a network as CMA-ES calls
+    task: Any = Ellipsoid()
+
+    def generation(key: Any, state: Any) -> Any:
+        return method.step(key, task, jnp.zeros((), jnp.int32), state)[0]
+
+    keys = jax.random.split(jax.random.key(3), 4)
+    start = method.init(keys[0], task)
+    states = jax.vmap(generation, (0, None))(keys, start)
+    expected = jax.jit(jax.vmap(generation))(keys, states).distribution
+    monkeypatch.setattr(cma_es, "LARGE", large)
+    program = str(jax.make_jaxpr(jax.vmap(generation))(keys, states))
+    assert re.findall(r"f32\[([\d,]+)\] = eigh", program) == [eigenvalues]
+    found = jax.jit(jax.vmap(generation))(keys, states).distribution
+    for name in ("mean", "std", "C"):
+        np.testing.assert_allclose(getattr(found, name), getattr(expected, name), atol=1e-5)
