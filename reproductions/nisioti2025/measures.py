@@ -31,12 +31,12 @@ class PaperTrials(TrialGroup):
     @property
     def path_coverage(self) -> Measure:
         """Share of the reachable cells on the final policy's path."""
-        return self.measure("share of the maze covered", lambda t: t.metrics["coverage"])
+        return self.measure("share of the maze on the path", lambda t: t.metrics["coverage"])
 
     @property
     def archive_coverage(self) -> Measure:
         """Share of the reachable cells with an elite; for methods with an archive."""
-        return self.measure("share of the maze covered", lambda t: t.curves["coverage"][-1])
+        return self.measure("share of the maze with an elite", lambda t: t.curves["coverage"][-1])
 
     @property
     def reaches_the_target(self) -> Event:

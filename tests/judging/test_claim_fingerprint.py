@@ -12,7 +12,7 @@ from evoclaims.judging.judge import judge
 from evoclaims.judging.kinds.omnibus import any_differ
 from evoclaims.judging.window import Window
 
-FROM_BEFORE = "98f6447e90c39098dd9ad0ee969147e07239d1f729256d7c75b8cd4331aae07b"
+FROM_BEFORE = "c3a335c335a9080bc0dd65636a262ed43122812345414ea605ab3b69636d6de5"
 """Of a claim under the first rules: a change of it would start new histories everywhere."""
 
 

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
-from itertools import combinations, combinations_with_replacement
+from itertools import combinations, combinations_with_replacement, product
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 from scipy.stats import binom, norm
 
+from evoclaims.judging.assertion import AllOf, AnyOf, Compound
 from evoclaims.judging.exact import binomial_test, rank_test, sign_test
 from evoclaims.judging.kendall import trend_test
 from evoclaims.judging.kinds.greater import GreaterTests
-from evoclaims.judging.verdict import Outcome
+from evoclaims.judging.verdict import Outcome, PValues
 
 DRAWS = 10_000
 Draw = Callable[[np.random.Generator, tuple[int, ...]], NDArray[np.float64]]
@@ -75,6 +77,24 @@ def test_solves_errs_no_more_often_than_alpha_either_way(n: int, alpha: float) -
 def test_a_sign_test_errs_no_more_often_than_alpha(n: int) -> None:
     mass = binom.pmf(range(n + 1), n, 0.5)
     assert sum(mass[k] for k in range(n + 1) if sign_test(k, n).p <= 0.05) <= 0.05
+
+
+@pytest.mark.parametrize("compound", [AllOf, AnyOf])
+@pytest.mark.parametrize("p0", [0.5, 0.7])
+def test_three_parts_together_err_no_more_often_than_alpha_either_way(compound: type[Compound], p0: float) -> None:
+    """Every outcome of three events whose probability is p0, the edge of both hypotheses."""
+    n = 10
+    parts = [
+        (mass, PValues(binomial_test(k, n, p0, "greater").p, binomial_test(k, n, p0, "less").p))
+        for k, mass in enumerate(binom.pmf(range(n + 1), n, p0).tolist())
+    ]
+    together = [
+        (math.prod(mass for mass, _ in three), compound.combine([p for _, p in three]))
+        for three in product(parts, repeat=3)
+    ]
+    for alpha in (0.05, 0.04, 0.01):
+        assert sum(mass for mass, p in together if p.supported <= alpha) <= alpha
+        assert sum(mass for mass, p in together if p.refuted <= alpha) <= alpha
 
 
 def test_the_rank_test_is_exactly_valid_for_every_tie_pattern_of_four_against_four() -> None:

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from evoclaims.judging.multiplicity import holm
+from evoclaims.judging.multiplicity import holm, smallest
 
 
 @pytest.fixture(scope="module")
@@ -30,3 +30,10 @@ def test_holm_steps_down_from_the_smallest_p(ps: list[float]) -> None:
         running = max(running, min(1.0, (len(ps) - step) * ps[index]))
         expected[index] = running
     assert holm(ps) == pytest.approx(tuple(expected))
+
+
+@pytest.mark.usefixtures("_little_garbage")
+@given(st.lists(st.floats(0, 1), min_size=1, max_size=6))
+@settings(deadline=None, max_examples=30)
+def test_the_smallest_is_that_of_all(ps: list[float]) -> None:
+    assert smallest(ps) == min(holm(ps))

@@ -6,9 +6,10 @@ import math
 from itertools import product
 
 import pytest
+from scipy.stats import binom
 
 from evoclaims.judging.design import FIXED_10, Design
-from evoclaims.judging.judge import judge
+from evoclaims.judging.judge import attainability, judge
 from evoclaims.judging.verdict import Outcome
 
 SUPPORTED, REFUTED, INCONCLUSIVE = Outcome.SUPPORTED, Outcome.REFUTED, Outcome.INCONCLUSIVE
@@ -207,10 +208,17 @@ def test_and_needs_every_part_and_or_needs_one(source, left, right) -> None:
     assert [entry.outcome for entry in judge(a & b, FIXED_10).evidence] == [left, right]
 
 
-def test_or_pays_holms_correction_and_and_does_not(source) -> None:
+def test_or_pays_holms_correction_where_it_is_supported_and_and_where_it_is_refuted(source) -> None:
     # 10 of 10 against 0.7 has p = 0.028: enough alone and for "and", not as the better of two.
     a, b = source("a", [1.0] * 10).solved().stays(), source("b", [1.0] * 10).solved().stays()
     assert judge(a & b, FIXED_10).outcome is SUPPORTED
     verdict = judge(a | b, FIXED_10)
     assert verdict.outcome is INCONCLUSIVE
     assert verdict.p == pytest.approx(2 * 0.7**10)
+    # 4 of 10 against 0.7 has p = 0.047: enough to refute one event, or one of two, not both together.
+    a, b = (source(name, [1.0] * 4 + [0.0] * 6).solved().stays() for name in "ab")
+    assert judge(a, FIXED_10).outcome is judge(a | b, FIXED_10).outcome is REFUTED
+    verdict = judge(a & b, FIXED_10)
+    assert verdict.outcome is INCONCLUSIVE
+    assert verdict.p_refuted == pytest.approx(2 * binom.cdf(4, 10, 0.7))
+    assert attainability(a & b, FIXED_10)[-1][1].refuted == pytest.approx(2 * 0.3**10)

@@ -13,7 +13,7 @@ from evoclaims.core.errors import UserError
 from evoclaims.judging.design import Design, Look
 from evoclaims.judging.effect import a12, a12_interval, cliffs_delta
 from evoclaims.judging.entry import Entry
-from evoclaims.judging.multiplicity import holm
+from evoclaims.judging.multiplicity import smallest
 from evoclaims.judging.reading import TrialReading
 from evoclaims.judging.sample import Sample, Source, Trials
 from evoclaims.judging.verdict import Bound, Direction, Evidence, Interval, PValues
@@ -247,7 +247,7 @@ class Compound(Assertion):
 
 @dataclass(frozen=True)
 class AllOf(Compound):
-    """Supported when every part is (intersection-union: no correction), refuted when any part is."""
+    """Supported when every part is (intersection-union: no correction), refuted when some part is after Holm's."""
 
     kind: ClassVar[str] = "all of"
     entry: ClassVar[Entry] = Entry(
@@ -257,16 +257,16 @@ class AllOf(Compound):
             "Each part is, at the same α: the intersection–union test needs no correction. A test of several "
             "conditions before pairs of them (any_differ) is one more part."
         ),
-        refuted="One of the parts is.",
-        source="Berger 1982 (intersection–union test)",
+        refuted="One of the parts is after Holm's correction: each more part is one more chance to err.",
+        source="Berger 1982 (intersection–union test), Holm 1979",
     )
     joint: ClassVar[str] = "and"
     weakest: ClassVar[Direction] = Direction.FOR
 
     @staticmethod
     def combine(parts: Sequence[PValues]) -> PValues:
-        """Take the weakest support and the strongest refutation."""
-        return PValues(max(part.supported for part in parts), min(part.refuted for part in parts))
+        """Take the weakest support and the strongest refutation, corrected."""
+        return PValues(max(part.supported for part in parts), smallest([part.refuted for part in parts]))
 
 
 @dataclass(frozen=True)
@@ -287,4 +287,4 @@ class AnyOf(Compound):
     @staticmethod
     def combine(parts: Sequence[PValues]) -> PValues:
         """Take the strongest support, corrected, and the weakest refutation."""
-        return PValues(min(holm([part.supported for part in parts])), max(part.refuted for part in parts))
+        return PValues(smallest([part.supported for part in parts]), max(part.refuted for part in parts))

@@ -6,7 +6,7 @@ from evoclaims.core.canonical import content_hash
 from evoclaims.judging.assertion import Assertion
 from evoclaims.judging.design import Design
 
-JUDGING_REVISION = 1
+JUDGING_REVISION = 2
 """Raised when a kind's tests change, so that old verdicts do not count as new ones."""
 
 

@@ -11,6 +11,11 @@ def holm(ps: Sequence[float]) -> tuple[float, ...]:
     return _holm(tuple(ps)) if len(ps) else ()
 
 
+def smallest(ps: Sequence[float]) -> float:
+    """Return the smallest Holm-adjusted p, which is at most alpha if any is: the smallest times their number."""
+    return min(1.0, len(ps) * min(ps))
+
+
 @lru_cache(maxsize=1024)
 def _holm(ps: tuple[float, ...]) -> tuple[float, ...]:
     """Return the adjusted p; cached, since statsmodels runs the garbage collector in every call (tens of ms)."""
