@@ -55,9 +55,9 @@ def test_a_method_is_not_better_than_itself(trials, verdict, method):
 
 @claim(
     "C3",
-    says="PPO learns plain locomotion: far more reward than a random policy's",
+    says="PPO learns plain locomotion: far more reward than a random policy's, or a robot's that stands still",
     where="control",
-    smoke="In 10,000 steps PPO learns to collect more reward with the half-cheetah than a random policy does",
+    smoke="In 10,000 steps with the half-cheetah PPO's reward rises, to more than a random policy's",
 )
 @pytest.mark.parametrize(
     "task",
@@ -72,11 +72,13 @@ def test_a_method_is_not_better_than_itself(trials, verdict, method):
         ),
     ],
 )
-def test_ppo_learns_to_run(trials, verdict, task):
+def test_ppo_learns_to_run(trials, verdict, claim_tier, task):
     """Only "more" is asserted; how much more stands in docs/protocol.md, "Limbs and obstacles"."""
     ppo = trials("ppo", on=task)
     random_policy = trials("random_policy", on=task)
-    verdict(ppo.reward > random_policy.reward)
+    standing_still = {"locomotion_half_cheetah": 0, "locomotion_ant": 1_000}[task]  # Brax pays an ant 1 a step to be up
+    learns = {"full": ppo.reward > standing_still, "smoke": ppo.reward_gained > 0}[claim_tier]
+    verdict((ppo.reward > random_policy.reward) & learns)
 
 
 @claim(

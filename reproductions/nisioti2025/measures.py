@@ -62,6 +62,11 @@ class PaperTrials(TrialGroup):
         return self.event(f"passes at most {obstacles:g} obstacles", lambda t: t.metrics["obstacles"] <= obstacles)
 
     @property
+    def reward_gained(self) -> Measure:
+        """Reward per episode at the last report of training, less that at the first; for tasks of one level."""
+        return self.measure("reward gained", lambda t: t.curves["fitness"][-1] - t.curves["fitness"][0])
+
+    @property
     def overturned(self) -> Measure:
         """Share of the final policy's steps in which the robot is upside-down."""
         return self.measure("share of steps upside-down", lambda t: t.metrics["upside_down"], better="lower")

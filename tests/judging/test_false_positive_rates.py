@@ -13,8 +13,9 @@ from scipy.stats import binom, norm
 
 from evoclaims.judging.assertion import AllOf, AnyOf, Compound
 from evoclaims.judging.exact import binomial_test, rank_test, sign_test
-from evoclaims.judging.kendall import trend_test
 from evoclaims.judging.kinds.greater import GreaterTests
+from evoclaims.judging.kinds.threshold import sign_tests
+from evoclaims.judging.kinds.trend import kendall_s
 from evoclaims.judging.verdict import Outcome, PValues
 
 DRAWS = 10_000
@@ -58,11 +59,18 @@ def test_an_effect_as_declared_is_refuted_no_more_often_than_alpha(n: int) -> No
     assert_rate_at_most(0.05, outcomes.count(Outcome.REFUTED))
 
 
-@pytest.mark.parametrize("null", NULLS)
+@pytest.mark.parametrize("null", [*NULLS, "half rise and half fall"])
 @pytest.mark.parametrize("n", [3, 5, 10])
 def test_a_trend_is_supported_no_more_often_than_alpha(n: int, null: str) -> None:
-    data = NULLS[null](np.random.default_rng(n), (DRAWS, n, 4)).tolist()
-    assert_rate_at_most(0.05, sum(trend_test(rows, "falls").p <= 0.05 for rows in data))
+    rng = np.random.default_rng(n)
+    if null == "half rise and half fall":
+        data = np.arange(9.0) * rng.choice([-1.0, 1.0], (DRAWS, n, 1))
+    else:
+        data = NULLS[null](rng, (DRAWS, n, 4))
+    slopes = [[kendall_s(row) for row in rows] for rows in data.tolist()]
+    p = [sign_tests(sum(s < 0 for s in rows), sum(s > 0 for s in rows), n) for rows in slopes]
+    assert_rate_at_most(0.05, sum(one.supported <= 0.05 for one in p))
+    assert_rate_at_most(0.05, sum(one.refuted <= 0.05 for one in p))
 
 
 @pytest.mark.parametrize("n", [3, 5, 10])
@@ -89,7 +97,7 @@ def test_three_parts_together_err_no_more_often_than_alpha_either_way(compound: 
         for k, mass in enumerate(binom.pmf(range(n + 1), n, p0).tolist())
     ]
     together = [
-        (math.prod(mass for mass, _ in three), compound.combine([p for _, p in three]))
+        (math.prod(mass for mass, _ in three), compound(()).combine([p for _, p in three]))
         for three in product(parts, repeat=3)
     ]
     for alpha in (0.05, 0.04, 0.01):

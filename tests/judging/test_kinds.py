@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 import math
+from functools import reduce
 from itertools import product
+from operator import and_, or_
 
 import pytest
-from scipy.stats import binom
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.stats import binom, kendalltau
 
 from evoclaims.judging.design import FIXED_10, Design
 from evoclaims.judging.judge import attainability, judge
+from evoclaims.judging.kinds.trend import kendall_s
 from evoclaims.judging.verdict import Outcome
 
 SUPPORTED, REFUTED, INCONCLUSIVE = Outcome.SUPPORTED, Outcome.REFUTED, Outcome.INCONCLUSIVE
@@ -112,6 +117,10 @@ def test_a_band_is_refuted_at_half_of_alpha(source, n, outcome) -> None:
         ([(0.5, 0.6, 0.8, 1.0)] * 10, REFUTED),
         ([(1.0, 0.5, 0.5, 1.0)] * 10, INCONCLUSIVE),
         (["diverged"] * 10, INCONCLUSIVE),
+        ([(1.0, 0.8, 0.6, 0.5)] + ["diverged"] * 9, INCONCLUSIVE),  # one trial is one draw, of however many levels
+        ([(1.0, 0.8, 0.6, 0.5)] * 5 + [(0.5, 0.6, 0.8, 1.0)] * 5, INCONCLUSIVE),
+        ([(1.0, 0.8, 0.9, 0.5)] * 9 + ["diverged"], SUPPORTED),
+        ([(1.0, 0.8, 0.9, 0.5)] * 8 + [(1.0, 0.5, 0.5, 1.0)] * 2, INCONCLUSIVE),  # p = 0.055: a tie counts as not
     ],
 )
 def test_trend(source, rows, outcome) -> None:
@@ -121,8 +130,20 @@ def test_trend(source, rows, outcome) -> None:
     assert judge(profile.rises(), FIXED_10).outcome is mirrored[outcome]
 
 
+@given(st.lists(st.sampled_from([-math.inf, 0.0, 0.5, 1.0]), max_size=6))
+def test_kendalls_s_is_that_of_scipy(row: list[float]) -> None:
+    """SciPy's tau-c is S times a number that depends on the sizes alone."""
+    s = kendall_s(row)
+    assert kendall_s([-value for value in row]) == kendall_s(row[::-1]) == -s
+    distinct = len(set(row))
+    if distinct > 1:
+        tau = kendalltau(range(len(row)), [max(value, -1.0) for value in row], variant="c").statistic
+        assert s == pytest.approx(tau * len(row) ** 2 * (distinct - 1) / distinct / 2)
+
+
 def test_a_trend_reports_every_level(source) -> None:
-    verdict = judge(source("a", [(1.0, 0.5)] * 10).success(2).falls(), FIXED_10)
+    verdict = judge(source("a", [(1.0, 0.5)] * 9 + [(0.5, 0.5)]).success(2).falls(), FIXED_10)
+    assert verdict.evidence[0].detail == "falls in 9 of 10 trials, rises in 0, and neither in 1"
     assert [sample.median for sample in verdict.evidence[0].samples] == [1.0, 0.5]
 
 
@@ -206,6 +227,22 @@ def test_and_needs_every_part_and_or_needs_one(source, left, right) -> None:
     assert judge(a & b, FIXED_10).outcome is expected_and
     assert judge(a | b, FIXED_10).outcome is expected_or
     assert [entry.outcome for entry in judge(a & b, FIXED_10).evidence] == [left, right]
+
+
+def test_a_part_that_contradicts_itself_decides_neither_and_nor_or(source) -> None:
+    a = source("a", [10.0, 20, 30, 40, 50, 60, 70, 80, 90, 100]).score()
+    b = source("b", [11.0, 21, 31, 41, 51, 61, 0, 0, 0, 0]).score()
+    wide = Design(looks=FIXED_10.looks, a12_margin=0.75)
+    part = a > b
+    both = judge(part, wide)
+    # Each p is significant alone, and not after the correction for four parts.
+    assert max(both.p, both.p_refuted) <= 0.05 < 4 * min(both.p, both.p_refuted)
+    holds = [source(f"holds {i}", [1.0] * 10).solved().in_most_trials() for i in range(3)]
+    fails = [source(f"fails {i}", [0.0] * 10).solved().in_most_trials() for i in range(3)]
+    assert judge(reduce(and_, holds, part), wide).outcome is INCONCLUSIVE
+    assert judge(reduce(or_, fails, part), wide).outcome is INCONCLUSIVE
+    assert judge(part & fails[0], wide).outcome is REFUTED
+    assert judge(part | holds[0].event.in_every_trial(), wide).outcome is SUPPORTED
 
 
 def test_or_pays_holms_correction_where_it_is_supported_and_and_where_it_is_refuted(source) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import pytest
 
@@ -53,6 +54,17 @@ def test_nan_in_a_finished_trial_is_an_error_for_every_kind_of_reading(source) -
     computed = Profile(row, "computed", lambda trial: (0.0, math.nan), 2)
     with pytest.raises(UnreadableTrialError, match="NaN"):
         computed.rows(fetched(row, 1))
+
+
+def test_nan_in_a_curve_that_is_read_is_an_error(source) -> None:
+    """An event that compares it would not hold, and the claim be refuted."""
+    broken = source("neat", [1.0])
+    broken.trials[0] = replace(broken.trials[0], curves={"nodes": (7.0, math.nan), "success": (0.0, 1.0)})
+    grown = Event(broken, "grown", lambda trial: trial.curves["nodes"][-1] > 5)
+    with pytest.raises(UnreadableTrialError, match="'nodes' is NaN in the finished trial of seed 0"):
+        grown.sample(fetched(broken, 1))
+    learnt = Event(broken, "learnt", lambda trial: trial.curves["success"][-1] == 1)
+    assert learnt.sample(fetched(broken, 1)).values == (1.0,)
 
 
 def test_a_misspelled_number_of_a_trial_is_an_error_that_lists_the_known_ones(source) -> None:

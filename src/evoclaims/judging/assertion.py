@@ -64,6 +64,10 @@ class Assertion(ABC):
         """Return the conditions it needs, without duplicates."""
         return tuple({reading.source.fingerprint: reading.source for reading in self.readings()}.values())
 
+    def drawn(self) -> tuple[Source, ...]:
+        """Return the conditions whose trials it takes for independent draws: all, unless it is no test."""
+        return self.sources()
+
     def readings(self) -> tuple[TrialReading, ...]:
         """Return what it reads from trials."""
         values = [getattr(self, field.name) for field in fields(self)]
@@ -197,10 +201,17 @@ class Compound(Assertion):
     joint: ClassVar[str]
     weakest: ClassVar[Direction]
 
-    @staticmethod
-    @abstractmethod
-    def combine(parts: Sequence[PValues]) -> PValues:
-        """Combine the parts' p; the result must never fall when a part's p rises."""
+    def combine(self, parts: Sequence[PValues], *, corrected: bool = True) -> PValues:
+        """Combine the parts' p; the result never falls when a part's p rises.
+
+        The largest p is that of all parts together: an intersection-union test, which needs no correction. The smallest
+        is that of some part, with Holm's correction: each more part is one more chance to err.
+        """
+        some = smallest if corrected else min
+        supported, refuted = [part.supported for part in parts], [part.refuted for part in parts]
+        if self.weakest is Direction.FOR:
+            return PValues(max(supported), some(refuted))
+        return PValues(some(supported), max(refuted))
 
     def describe(self) -> str:
         """Join the parts' sentences."""
@@ -214,6 +225,10 @@ class Compound(Assertion):
         """Return the kind and the parts."""
         return {"kind": self.kind, "parts": [part.plain() for part in self.parts]}
 
+    def drawn(self) -> tuple[Source, ...]:
+        """Return those of the parts."""
+        return tuple({source.fingerprint: source for part in self.parts for source in part.drawn()}.values())
+
     def looks(self, design: Design) -> tuple[Look, ...]:
         """Return the looks that every part takes."""
         return min((part.looks(design) for part in self.parts), key=len)
@@ -223,15 +238,16 @@ class Compound(Assertion):
         return self.combine([part.attainable(n, design) for part in self.parts])
 
     def bounds(self, trials: Trials, n: int, design: Design) -> tuple[PValues, PValues]:
-        """Combine the parts' bounds."""
-        bounds = [part.bounds(trials, n, design) for part in self.parts]
-        return self.combine([low for low, _ in bounds]), self.combine([high for _, high in bounds])
+        """Combine the parts' bounds; the lowest without correction, since a part may contradict itself without it."""
+        lows, highs = zip(*(part.bounds(trials, n, design) for part in self.parts), strict=True)
+        return self.combine(lows, corrected=False), self.combine(highs)
 
     def find(self, trials: Trials, design: Design, alpha: float) -> Finding:
-        """Judge every part."""
+        """Judge every part; one that contradicts itself, significant both ways, decides nothing."""
         findings = [part.find(trials, design, alpha) for part in self.parts]
+        undecided = PValues(1.0, 1.0)
         return Finding(
-            p=self.combine([finding.p for finding in findings]),
+            p=self.combine([undecided if finding.p.contradict(alpha) else finding.p for finding in findings]),
             attainable=self.combine([finding.attainable for finding in findings]),
             describe=lambda: tuple(entry for finding in findings for entry in finding.evidence),
             deciding=lambda direction: self._deciding(findings, direction),
@@ -263,11 +279,6 @@ class AllOf(Compound):
     joint: ClassVar[str] = "and"
     weakest: ClassVar[Direction] = Direction.FOR
 
-    @staticmethod
-    def combine(parts: Sequence[PValues]) -> PValues:
-        """Take the weakest support and the strongest refutation, corrected."""
-        return PValues(max(part.supported for part in parts), smallest([part.refuted for part in parts]))
-
 
 @dataclass(frozen=True)
 class AnyOf(Compound):
@@ -283,8 +294,3 @@ class AnyOf(Compound):
     )
     joint: ClassVar[str] = "or"
     weakest: ClassVar[Direction] = Direction.AGAINST
-
-    @staticmethod
-    def combine(parts: Sequence[PValues]) -> PValues:
-        """Take the strongest support, corrected, and the weakest refutation."""
-        return PValues(smallest([part.supported for part in parts]), max(part.refuted for part in parts))

@@ -102,6 +102,9 @@ def decide(
         crashed = _crashed(assertion, trials)
         if crashed:
             return Ending(Outcome.ERROR, look, trials, None, crashed)
+        copied = _copied(assertion, trials)
+        if copied:
+            return Ending(Outcome.INCONCLUSIVE, look, trials, None, copied)
         try:
             finding = assertion.find(trials, design, look.alpha)
         except UnreadableTrialError as error:
@@ -155,6 +158,23 @@ def _crashed(assertion: Assertion, trials: Trials) -> str:
     ]
     reason = next((f"; the first: {said}" for _, said in crashed if said), "")
     return f"trials crashed: {', '.join(name for name, _ in crashed)}{reason}" if crashed else ""
+
+
+def _copied(assertion: Assertion, trials: Trials) -> str:
+    """Return a sentence that names a condition whose trials are all one and the same, or nothing.
+
+    Ten copies of a trial say as much as one, and a test would take them for ten draws. What may be the same by chance
+    (a success, a network of few bits) is not enough: champions and whole training curves are.
+    """
+    for source in assertion.drawn():
+        first, *others = trials[source.fingerprint]
+        if first.champion and others and all((a.champion, a.curves) == (first.champion, first.curves) for a in others):
+            return (
+                f"all {1 + len(others)} trials of {source.label} are copies of one: the same champion and training "
+                "curves, whatever the seed. Tests take trials for independent: does the method draw from its key? "
+                "Facts about trials without chance are asserted by in_every_trial()"
+            )
+    return ""
 
 
 def _without_result(assertion: Assertion, trials: Trials) -> str:

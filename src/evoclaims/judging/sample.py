@@ -86,8 +86,11 @@ def is_failed(trial: TrialResult) -> bool:
     return trial.status != "done"
 
 
-class _Named(Mapping[str, Any]):
-    """What a trial has measured, by name; a missing name raises an error with that name."""
+class _Numbers(Mapping[str, Any]):
+    """What a trial has measured, by name; reading a NaN is an error, since any comparison with it is silently false.
+
+    So is a missing name, which the error tells.
+    """
 
     def __init__(self, numbers: Mapping[str, Any], where: str) -> None:
         self._numbers = numbers
@@ -97,6 +100,8 @@ class _Named(Mapping[str, Any]):
         value = self._numbers.get(name, ())
         if value == ():
             raise MissingNumberError(f"There is no {name!r} in {self._where}.{guess(name, self._numbers)}")
+        if any(math.isnan(number) for number in (value if isinstance(value, list | tuple) else (value,))):
+            raise UnreadableTrialError(f"{name!r} is NaN in {self._where}.")
         return value
 
     def __iter__(self) -> Iterator[str]:
@@ -106,18 +111,8 @@ class _Named(Mapping[str, Any]):
         return len(self._numbers)
 
 
-class _Numbers(_Named):
-    """A trial's numbers by name; reading a NaN is an error, since any comparison with it is silently false."""
-
-    def __getitem__(self, name: str) -> Any:
-        value = super().__getitem__(name)
-        if any(math.isnan(number) for number in (value if isinstance(value, list | tuple) else (value,))):
-            raise UnreadableTrialError(f"{name!r} is NaN in {self._where}.")
-        return value
-
-
 def checked(trial: TrialResult) -> TrialResult:
-    """Return the trial with metrics and levels that raise `UnreadableTrialError` for NaN or missing names."""
+    """Return the trial with numbers that raise `UnreadableTrialError` for NaN or missing names."""
     if isinstance(trial.metrics, _Numbers):  # it has been checked, as trials are that are judged again and again
         return trial
     where = f"the finished trial of seed {trial.seed_in_words} (id {trial.id[:12]})"
@@ -125,7 +120,7 @@ def checked(trial: TrialResult) -> TrialResult:
         trial,
         metrics=_Numbers(trial.metrics, where),
         levels=_Numbers(trial.levels, where),
-        curves=_Named(trial.curves, where),
+        curves=_Numbers(trial.curves, where),
     )
 
 

@@ -58,6 +58,10 @@ class PValues:
             return Outcome.INCONCLUSIVE
         return Outcome.SUPPORTED if supported else Outcome.REFUTED
 
+    def contradict(self, alpha: float) -> bool:
+        """Whether both directions are significant at `alpha`."""
+        return max(self.supported, self.refuted) <= alpha
+
     def toward(self, direction: Direction) -> float:
         """Return the p value of one direction."""
         return self.supported if direction is Direction.FOR else self.refuted

@@ -9,7 +9,7 @@ from evoclaims.judging.assertion import Assertion, Finding
 from evoclaims.judging.design import Design, Look
 from evoclaims.judging.entry import Entry
 from evoclaims.judging.reading import EventReading
-from evoclaims.judging.sample import Trials
+from evoclaims.judging.sample import Source, Trials
 from evoclaims.judging.verdict import PValues
 
 
@@ -30,6 +30,10 @@ class EveryTrial(Assertion):
     def describe(self) -> str:
         """Return "E in every trial"."""
         return f"{self.event.describe()} in every trial"
+
+    def drawn(self) -> tuple[Source, ...]:
+        """Return none: a fact about trials that are copies of each other is as true."""
+        return ()
 
     def looks(self, design: Design) -> tuple[Look, ...]:
         """Return only the last look: "every" needs every trial."""

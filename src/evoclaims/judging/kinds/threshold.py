@@ -54,14 +54,14 @@ class Threshold(Assertion):
 
     def attainable(self, n: int, design: Design) -> PValues:
         """Return the p of all trials on one side."""
-        return _p(n, n, n)
+        return sign_tests(n, n, n)
 
     def bounds(self, trials: Trials, n: int, design: Design) -> tuple[PValues, PValues]:
         """Bound p by new trials that are all on one side."""
         sample = self.measure.sample(trials)
         toward, away = self._counts(sample)
         new = n - len(sample.values)
-        return _p(toward + new, away + new, n), _p(toward, away, n)
+        return sign_tests(toward + new, away + new, n), sign_tests(toward, away, n)
 
     def find(self, trials: Trials, design: Design, alpha: float) -> Finding:
         """Run both sign tests."""
@@ -71,8 +71,8 @@ class Threshold(Assertion):
         decided = toward + away
         undecided = f", {n - decided} at it or without a result, which count for neither" if n > decided else ""
         return self.found(
-            _p(toward, away, n),
-            _p(decided, decided, n),
+            sign_tests(toward, away, n),
+            sign_tests(decided, decided, n),
             alpha,
             (sample,),
             detail=f"{toward} of {n} {self.side} {self.number:.12g}, {away} {_OPPOSITE[self.side]}{undecided}",
@@ -90,6 +90,6 @@ class Threshold(Assertion):
         return toward, sum(distance < 0 for distance in distances)
 
 
-def _p(toward: int, away: int, n: int) -> PValues:
-    """Return the sign tests' p for and against."""
+def sign_tests(toward: int, away: int, n: int) -> PValues:
+    """Return the p of sign tests each way, of `n` trials of which `toward` count for a claim and `away` against it."""
     return PValues(sign_test(toward, n).p, sign_test(away, n).p)

@@ -2,26 +2,36 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import ClassVar
+from itertools import combinations
+from typing import ClassVar, Literal
 
 from evoclaims.core.errors import require_known
 from evoclaims.judging.assertion import Assertion, Finding
 from evoclaims.judging.design import Design
 from evoclaims.judging.entry import Entry
-from evoclaims.judging.kendall import Slope, trend_attainable, trend_test
+from evoclaims.judging.kinds.threshold import sign_tests
 from evoclaims.judging.reading import LevelsReading
 from evoclaims.judging.sample import Trials
 from evoclaims.judging.verdict import PValues
 
-_OPPOSITE: dict[Slope, Slope] = {"falls": "rises", "rises": "falls"}
+Slope = Literal["falls", "rises"]
+
+_SIGNS: dict[Slope, int] = {"falls": -1, "rises": 1}
+
+
+def kendall_s(profile: Sequence[float]) -> int:
+    """Return Kendall's S of values against their index: pairs of them that rise, less pairs that fall."""
+    return sum((later > earlier) - (later < earlier) for earlier, later in combinations(profile, 2))
 
 
 @dataclass(frozen=True)
 class Trend(Assertion):
-    """The profile falls, or rises, with the level: exact permutation test of the rank correlation within trials.
+    """The profile of most trials falls, or rises, with the level: an exact sign test each way of Kendall's S.
 
-    Refuted by the same test in the other direction.
+    A trial is one draw, whatever its number of levels. Were its pairs of levels the draws, as in a permutation test of
+    the sum of S, a method of which half of the trials rise and half fall would be found to fall in one of six samples.
     """
 
     profile: LevelsReading
@@ -32,42 +42,45 @@ class Trend(Assertion):
             "a.success.falls()",
             "a.success.rises()",
         ),
-        null="Within a trial, each order of its values over the levels is equally likely.",
-        supported="The permutation test of the sum over trials of Kendall's S rejects that, ties counted exactly.",
-        refuted="The same test does in the other direction.",
-        source="Kendall 1938; its distribution with ties: MacMahon 1913",
+        null="With a probability of 1/2 at most, more pairs of a trial's values fall than rise (Kendall's S).",
+        supported="The sign test rejects that; a trial with as many of both, or without a result, does not fall.",
+        refuted="The sign test rejects the same of rising; such a trial does not rise either.",
+        source="Kendall 1938; Dixon and Mood 1946 (sign test)",
     )
 
     def __post_init__(self) -> None:
         """Reject an unknown direction."""
-        require_known("direction", self.direction, _OPPOSITE)
+        require_known("direction", self.direction, _SIGNS)
 
     def describe(self) -> str:
         """Return "P falls with the level"."""
         return f"{self.profile.describe()} {self.direction} with the level"
 
     def attainable(self, n: int, design: Design) -> PValues:
-        """Return the p of a strict trend in every trial, for and against."""
-        strict = trend_attainable(n, self.profile.size)
-        return PValues(strict, strict)
+        """Return the p of a trend in every trial, for and against."""
+        return sign_tests(n, n, n)
 
     def bounds(self, trials: Trials, n: int, design: Design) -> tuple[PValues, PValues]:
-        """Bound p from below by new trials that follow the trend strictly.
-
-        A strict row adds the most inversions; ties in a new row would only remove possible inversions from the null.
-        So no other row lowers p further.
-        """
-        rows = self.profile.rows(trials)
-        falling = tuple(float(-level) for level in range(self.profile.size))
-        rising = tuple(reversed(falling))
-        new = n - len(rows)
-        fall = trend_test(rows + (falling,) * new, "falls").p
-        rise = trend_test(rows + (rising,) * new, "rises").p
-        return PValues(*((fall, rise) if self.direction == "falls" else (rise, fall))), PValues(1.0, 1.0)
+        """Bound p by new trials that all go one way."""
+        toward, away, known = self._counts(trials)
+        new = n - known
+        return sign_tests(toward + new, away + new, n), sign_tests(toward, away, n)
 
     def find(self, trials: Trials, design: Design, alpha: float) -> Finding:
-        """Run the trend test in both directions."""
-        rows = self.profile.rows(trials)
-        test, reverse = trend_test(rows, self.direction), trend_test(rows, _OPPOSITE[self.direction])
-        p, attainable = PValues(test.p, reverse.p), PValues(test.attainable_p, reverse.attainable_p)
-        return self.found(p, attainable, alpha, self.profile.samples(trials))
+        """Run both sign tests."""
+        toward, away, n = self._counts(trials)
+        decided = toward + away
+        opposite = "rises" if self.direction == "falls" else "falls"
+        neither = f", and neither in {n - decided}" if n > decided else ""
+        return self.found(
+            sign_tests(toward, away, n),
+            sign_tests(decided, decided, n),
+            alpha,
+            self.profile.samples(trials),
+            detail=f"{self.direction} in {toward} of {n} trials, {opposite} in {away}{neither}",
+        )
+
+    def _counts(self, trials: Trials) -> tuple[int, int, int]:
+        """Return how many trials go the claimed way, how many the other way, and how many there are."""
+        slopes = [_SIGNS[self.direction] * kendall_s(row) for row in self.profile.rows(trials)]
+        return sum(slope > 0 for slope in slopes), sum(slope < 0 for slope in slopes), len(slopes)
