@@ -24,7 +24,7 @@ from evoclaims.networks.base import Network
 LARGE: Final = 1_000
 """Covariance matrices of so many rows are decomposed one after the other, not as a batch of trials.
 
-NVIDIA's solver takes 142 ms for a batch of five matrices of 1,588 rows, as long as for ten, and 16.7 ms for one (an H200).
+An H200 takes 142 ms for a batch of five matrices of 1,588 rows, hardly less than for ten, and 16.7 ms for one.
 """
 
 
