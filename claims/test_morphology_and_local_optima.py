@@ -21,7 +21,7 @@ NO_ROOM_FAVOURS_HYPERNEAT = (
     "M1",
     says="The robot controlled by NEAT reaches only the first stepping stone in the maze",
     where="§5.2.2, Fig. 9",
-    smoke="The ant controlled by NEAT walks, and reaches no more than one of three stepping stones, the simplest robot two",
+    smoke="The ant controlled by NEAT walks, and reaches no more than one of three stones, the simplest robot two",
 )
 def test_the_ant_stays_at_the_first_stone(trials, verdict, claim_tier):
     ant, simple = trials("neat", on="stones_ant"), trials("neat", on="stones")
@@ -111,7 +111,7 @@ def test_hyperneat_fails_in_the_difficult_maze(trials, verdict, claim_tier):
     "X1",
     says="None of the considered methods manages to address both complex locomotion and transfer learning",
     where="§6",
-    smoke="No method leads the ant past the first of three stepping stones, though all but HyperNEAT's ants walk, NEAT, "
+    smoke="No method leads the ant past the first of three stones, though all but HyperNEAT's ants walk, and NEAT, "
     "HyperNEAT and CMA-ES lead the simplest robot further, and PPO collects more reward with it than a random policy",
 )
 @pytest.mark.parametrize("method", ["neat", "hyperneat", "cma_es", "ppo"])
