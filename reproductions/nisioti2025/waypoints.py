@@ -41,6 +41,7 @@ class Waypoints:
     name: ClassVar[str] = "waypoints"
     revision: ClassVar[int] = 1
     packages: ClassVar[tuple[str, ...]] = (*ROBOT_PACKAGES, "scipy")
+    deterministic: ClassVar[bool] = True
 
     speed: float = 1.0
     gain: float = 10.0

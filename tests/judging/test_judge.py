@@ -220,6 +220,8 @@ def test_trials_that_are_all_copies_of_one_are_no_evidence(source) -> None:
     assert verdict.reason.startswith("all 10 trials of a are copies of one: the same champion and training curves")
     assert judge(a.solved().in_every_trial(), FIXED_10).outcome is Outcome.SUPPORTED
     assert judge(a.solved().in_every_trial() & (a.score() > 0.5), FIXED_10).outcome is Outcome.INCONCLUSIVE
+    a.deterministic = True
+    assert judge(a.score() > 0.5, FIXED_10).outcome is Outcome.SUPPORTED
 
 
 @pytest.mark.parametrize(

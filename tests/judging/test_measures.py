@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from evoclaims.core.errors import UserError
@@ -67,6 +68,15 @@ def test_nan_in_a_curve_that_is_read_is_an_error(source) -> None:
     assert learnt.sample(fetched(broken, 1)).values == (1.0,)
 
 
+@pytest.mark.parametrize("given", [None, 1.0, "yes", (True,)])
+def test_an_event_that_is_neither_true_nor_false_is_an_error(source, given) -> None:
+    """A forgotten comparison would hold of every number but 0, and a forgotten return of none."""
+    ppo = source("ppo", [1.0])
+    with pytest.raises(UnreadableTrialError, match="'ppo: fast' is .* neither True nor False"):
+        Event(ppo, "fast", lambda trial: given).sample(fetched(ppo, 1))
+    assert Event(ppo, "fast", lambda trial: np.float32(1) > 0).sample(fetched(ppo, 1)).values == (1.0,)
+
+
 def test_a_misspelled_number_of_a_trial_is_an_error_that_lists_the_known_ones(source) -> None:
     ppo = source("ppo", [1.0])
     with pytest.raises(UnreadableTrialError, match="There is no 'scor' in the finished trial of seed 0") as error:
@@ -125,9 +135,11 @@ def test_no_assertion_is_true_or_false_without_a_judge(source) -> None:
     cma, ppo = source("cma_es", []), source("ppo", [])
     greater = cma.score() > ppo.score()
     for assertion in (greater, cma.solved().stays(), greater & greater, greater | greater, cma.success(2).falls()):
-        with pytest.raises(TypeError, match=r"Write verdict\(a > b\), and a\.between\(low, high\)"):
+        with pytest.raises(
+            TypeError, match=r"Write verdict\(a > b\) instead of assert a > b; .* a\.between\(low, high\)"
+        ):
             assert assertion
-    with pytest.raises(TypeError, match="bare assert"):
+    with pytest.raises(TypeError, match="neither true nor false until it is judged"):
         assert cma.score() > ppo.score() > cma.score()
 
 

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import pytest
+
+from evoclaims.core.errors import UserError
 from evoclaims.judging.assertion import Assertion
 from evoclaims.judging.design import FIXED_10, Design
 from evoclaims.judging.judge import judge
-from evoclaims.judging.verdict import Bound, Direction, Outcome
+from evoclaims.judging.verdict import Bound, Direction, Outcome, PValues
 
 RISING = [float(i) for i in range(10)]
 
@@ -71,3 +74,9 @@ def test_the_part_that_decided_is_named_whatever_the_compound(source) -> None:
     assert decided_by((yes | open_) & (yes & no)) == "no"
     assert decided_by((no & yes) | (open_ & yes)) == "open"
     assert judge(yes, Design.fixed(1)).deciding_part is None
+
+
+@pytest.mark.parametrize("p", [(2.0, 0.0), (0.0, -1.0), (float("nan"), 0.5)])
+def test_a_p_value_that_is_no_probability_is_refused(p: tuple[float, float]) -> None:
+    with pytest.raises(UserError, match="A p value lies between 0 and 1"):
+        PValues(*p)

@@ -10,6 +10,7 @@ import pytest
 
 from evoclaims.core.errors import UserError
 from evoclaims.paper.config import SuiteConfig, find_root, load_config, load_reproduction
+from evoclaims.paper.reproduction import Reproduction, Tier
 
 TABLE = '[tool.evoclaims]\nreproduction = "a_tiny_paper"\n'
 MODULE = """
@@ -178,3 +179,10 @@ def test_a_time_limit_that_is_no_time_is_a_sentence(project: Path) -> None:
     with pytest.raises(UserError, match="A time limit is a length of time") as caught:
         load_config(project).seconds(None)
     assert "'soon'" in _sentence(caught)
+
+
+def test_a_reproduction_with_text_for_a_folder_or_a_number_for_a_design_is_refused() -> None:
+    with pytest.raises(UserError, match=r"folder='\.': write Path\(__file__\)\.parent"):
+        Reproduction("tiny", "A Tiny Paper", ".", {})  # type: ignore[arg-type]
+    with pytest.raises(UserError, match=r"A tier has a design, unlike 10: Tier\(conditions, Design\.fixed\(10\)\)"):
+        Tier({}, 10)  # type: ignore[arg-type]

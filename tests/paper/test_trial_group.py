@@ -75,15 +75,29 @@ def test_each_measure_reads_its_own_number(group: Any, name: str, values: tuple[
         (lambda g: g.solves_the_last_level, (0, 0, 1)),
         (lambda g: g.does_not_solve_the_last_level, (1, 1, 0)),
         (lambda g: g.solves_level(0), (0, 0, 1)),
-        (lambda g: g.solves_level(-1), (1, 1, 1)),
+        (lambda g: g.solves_level(1), (0, 0, 1)),
+        (lambda g: g.solves_no_level_beyond(-1), (1, 1, 0)),
         (lambda g: g.solves_no_level_beyond(0), (1, 1, 0)),
-        (lambda g: g.solves_no_level_beyond(1), (1, 1, 1)),
         (lambda g: g.success_everywhere_is(0.5), (0, 1, 0)),
     ],
 )
 def test_each_event_holds_where_its_name_says(group: Any, event: Any, held: tuple[int, ...]) -> None:
     made = group(lambda seed: seed / 2)
     assert _read(event(made), made) == held
+
+
+@pytest.mark.parametrize(
+    ("event", "said"),
+    [
+        (lambda g: g.solves_level(-1), "2 levels, counted from 0: .* of -1 .* From 0 to 1"),
+        (lambda g: g.solves_level(2), "2 levels, counted from 0: .* of 2 .* From 0 to 1"),
+        (lambda g: g.solves_no_level_beyond(1), "2 levels, counted from 0: .* of 1 .* From -1 to 0"),
+        (lambda g: g.solves_no_level_beyond(-2), "of -2"),
+    ],
+)
+def test_what_would_always_hold_of_a_level_or_never_is_refused(group: Any, event: Any, said: str) -> None:
+    with pytest.raises(UserError, match=said):
+        event(group(lambda seed: 1.0))
 
 
 def test_the_success_of_a_level_can_be_compared_with_another(group: Any) -> None:
@@ -102,7 +116,7 @@ def test_measures_and_events_have_names_of_their_own_since_fingerprints_hash_the
         made.solves_level(0),
         made.solves_level(1),
         made.solves_no_level_beyond(0),
-        made.solves_no_level_beyond(1),
+        made.solves_no_level_beyond(-1),
         made.success_everywhere_is(0.0),
     ]
     names = [thing.name for thing in (*measures, *events, made.success)]

@@ -96,9 +96,7 @@ def test_a_bare_assert_cannot_bypass_the_judge(project: Any) -> None:
     project.write(a="assert trials('right', on='parity').mean_success > trials('wrong', on='parity').mean_success")
     result = project.run()
     assert (result.ret, _letters(result)) == (1, "E")
-    result.stdout.fnmatch_lines(
-        ["*TypeError: Write verdict(a > b), and *; a bare assert would skip the exact judging.*"]
-    )
+    result.stdout.fnmatch_lines(["*TypeError: *Write verdict(a > b) instead of assert a > b; *"])
 
 
 @pytest.mark.parametrize(

@@ -150,3 +150,13 @@ def test_a_plugin_that_does_not_import_is_one_line(project: Any, capsys: pytest.
     err = capsys.readouterr().err
     assert err.count("\n") == 1
     assert "a_plugin_that_is_not_there" in err
+
+
+def test_a_claim_file_imports_modules_of_the_project_as_it_does_for_the_commands(project: Any) -> None:
+    project.write(a="supported")
+    (project.path / "our_words.py").write_text("SAID = 1\n")
+    (project.path / "claims" / "test_imports.py").write_text(
+        "from our_words import SAID\n\n\ndef test_it():\n    assert SAID\n"
+    )
+    result = project.run("claims/test_imports.py", own_store=True)
+    result.assert_outcomes(passed=1)

@@ -288,3 +288,14 @@ def test_what_fits_is_told_as_it_is() -> None:
     assert jax.tree.map(lambda leaf: (leaf.shape, str(leaf.dtype)), progress) == Progress(
         fitness=((), "float32"), success=((), "float32"), healthy=((), "bool"), metrics={"first": ((), "float32")}
     )
+
+
+def test_an_error_inside_a_method_or_task_has_a_note_with_both_names() -> None:
+    @dataclass(frozen=True)
+    class Broken(Walker):
+        def init(self, key: Any, task: Any) -> Any:
+            return jnp.zeros(3).reshape(8, 3)
+
+    with pytest.raises(TypeError, match="cannot reshape") as caught:
+        traced_progress(Broken(), TASK)
+    assert "The method 'walker' was tried on the task 'n_parity'." in caught.value.__notes__

@@ -167,8 +167,9 @@ class Assertion(ABC):
             TypeError: always.
         """
         raise TypeError(
-            "Write verdict(a > b), and a.between(low, high) for low < a < high; "
-            "a bare assert would skip the exact judging."
+            "An assertion is neither true nor false until it is judged. Write verdict(a > b) instead of assert a > b; "
+            "(a > b) & (c > d) or (a > b) | (c > d), with parentheses, instead of the words and, or; a < b instead of "
+            "not a > b; a.between(low, high) instead of low < a < high."
         )
 
 

@@ -10,7 +10,7 @@ from evoclaims.judging.assertion import Assertion, Finding
 from evoclaims.judging.counting import MAX_TRIALS
 from evoclaims.judging.design import Design, Look
 from evoclaims.judging.fingerprint import fingerprint
-from evoclaims.judging.sample import Limited, Source, Trials, UnreadableTrialError
+from evoclaims.judging.sample import Declared, Limited, Source, Trials, UnreadableTrialError
 from evoclaims.judging.verdict import Outcome, PValues, Verdict
 from evoclaims.trials.crashes import why
 from evoclaims.trials.result import TrialResult
@@ -164,15 +164,18 @@ def _copied(assertion: Assertion, trials: Trials) -> str:
     """Return a sentence that names a condition whose trials are all one and the same, or nothing.
 
     Ten copies of a trial say as much as one, and a test would take them for ten draws. What may be the same by chance
-    (a success, a network of few bits) is not enough: champions and whole training curves are.
+    (a success, a network of few bits) is not enough: champions and whole training curves are. A method may say that it
+    draws nothing.
     """
     for source in assertion.drawn():
         first, *others = trials[source.fingerprint]
+        if isinstance(source, Declared) and source.deterministic:
+            continue
         if first.champion and others and all((a.champion, a.curves) == (first.champion, first.curves) for a in others):
             return (
                 f"all {1 + len(others)} trials of {source.label} are copies of one: the same champion and training "
-                "curves, whatever the seed. Tests take trials for independent: does the method draw from its key? "
-                "Facts about trials without chance are asserted by in_every_trial()"
+                "curves, whatever the seed. Tests take trials for independent: does the method draw from its key? One "
+                "without chance, such as a control, declares deterministic = True; in_every_trial() asserts facts"
             )
     return ""
 

@@ -9,6 +9,8 @@ from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import Any, Literal, Self, TypeVar, get_args
 
+import numpy as np
+
 from evoclaims.core.errors import UserError, require_known
 from evoclaims.judging.sample import (
     Limited,
@@ -181,8 +183,20 @@ class EventReading(ScalarReading):
     holds: Callable[[TrialResult], bool]
 
     def of(self, trial: TrialResult) -> float:
-        """Return 1.0 if the event holds in a trial, else 0.0."""
-        return float(not is_failed(trial) and bool(self.holds(checked(trial))))
+        """Return 1.0 if the event holds in a trial, else 0.0.
+
+        Raises:
+            UnreadableTrialError: when `holds` gives something else than True or False, such as a number or nothing.
+        """
+        if is_failed(trial):
+            return 0.0
+        held: object = self.holds(checked(trial))
+        if not isinstance(held, bool | np.bool_):
+            raise UnreadableTrialError(
+                f"{self.describe()!r} is {held!r} in the trial of seed {trial.seed}, neither True nor False: the "
+                "function of an event returns a comparison, such as lambda t: t.metrics['steps'] > 5."
+            )
+        return float(held)
 
 
 @dataclass(frozen=True, eq=False)

@@ -39,6 +39,15 @@ class Limited(Source, Protocol):
         """Whether another source, of another fingerprint, reads some of the same trials."""
 
 
+@runtime_checkable
+class Declared(Source, Protocol):
+    """A source that says whether its trials have no chance in them."""
+
+    @property
+    def deterministic(self) -> bool:
+        """Whether they may be copies of each other."""
+
+
 Trials = Mapping[str, tuple[TrialResult, ...]]
 """Fetched trials by the fingerprint of their source, in order of their seeds."""
 

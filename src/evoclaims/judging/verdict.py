@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import StrEnum
 
+from evoclaims.core.errors import UserError
 from evoclaims.judging.sample import Sample
 
 
@@ -50,6 +51,11 @@ class PValues:
 
     supported: float
     refuted: float
+
+    def __post_init__(self) -> None:
+        """Reject what is no probability, such as that of a kind of one's own."""
+        if not (0.0 <= self.supported <= 1.0 and 0.0 <= self.refuted <= 1.0):
+            raise UserError(f"A p value lies between 0 and 1, unlike {self.supported} or {self.refuted}.")
 
     def outcome(self, alpha: float) -> Outcome:
         """Return the outcome at `alpha`; if both directions are significant, neither is decided."""

@@ -52,7 +52,7 @@ class Method(Protocol[S]):
     """An algorithm with its frozen hyperparameters.
 
     The state is a pytree whose structure, shapes and dtypes never change. `step` gets a fresh key each time and must
-    derive all randomness from it.
+    derive all randomness from it. A method without randomness, such as a control, says so: `deterministic = True`.
     """
 
     @property

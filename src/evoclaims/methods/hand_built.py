@@ -33,6 +33,7 @@ class HandBuilt:
 
     revision: ClassVar[int] = 2
     packages: ClassVar[tuple[str, ...]] = ()
+    deterministic: ClassVar[bool] = True
 
     negated: bool = False
 

@@ -78,6 +78,12 @@ def load_config(root: Path) -> SuiteConfig:
     return SuiteConfig(root=root, **table, slurm=slurm)
 
 
+def make_importable(root: Path) -> None:
+    """Let modules of the project in `root` be imported, by claim files and by each other."""
+    if str(root) not in sys.path:
+        sys.path.insert(0, str(root))
+
+
 def load_reproduction(config: SuiteConfig) -> Reproduction:
     """Import the project's reproduction.
 
@@ -86,8 +92,7 @@ def load_reproduction(config: SuiteConfig) -> Reproduction:
     """
     from evoclaims.paper.reproduction import Reproduction  # which needs jax, as no other setting does
 
-    if str(config.root) not in sys.path:
-        sys.path.insert(0, str(config.root))
+    make_importable(config.root)
     module = import_module(config.reproduction, config.root, "[tool.evoclaims]")
     found = getattr(module, "REPRODUCTION", None)
     if not isinstance(found, Reproduction):

@@ -27,6 +27,13 @@ class Tier:
     conditions: Mapping[tuple[str, str], Condition]
     design: Design
 
+    def __post_init__(self) -> None:
+        """Reject a number of trials in the place of the design."""
+        if not isinstance(self.design, Design):
+            raise UserError(
+                f"A tier has a design, unlike {self.design!r}: Tier(conditions, Design.fixed(10)) looks at ten trials."
+            )
+
     def condition(self, method: str, task: str) -> Condition:
         """Return the condition of a method on a task; an `UnknownNameError` lists the known ones."""
         methods = {m for m, _ in self.conditions}
@@ -56,7 +63,7 @@ class Reproduction:
     Tables of imported trials are looked for in `folder`.
 
     Raises:
-        UserError: when `trials` is neither.
+        UserError: when `trials` is neither, or the folder no path.
     """
 
     name: str
@@ -69,7 +76,12 @@ class Reproduction:
     mutants: str = ""
 
     def __post_init__(self) -> None:
-        """Check the class of the trials, and say where imported ones are."""
+        """Check the folder and the class of the trials, and say where imported ones are."""
+        if not isinstance(self.folder, Path):
+            raise UserError(
+                f"The reproduction {self.name!r} says folder={self.folder!r}: write Path(__file__).parent, "
+                "a pathlib.Path."
+            )
         if not (isinstance(self.trials, type) and issubclass(self.trials, TrialGroup)):
             raise UserError(
                 f"The reproduction {self.name!r} says trials={self.trials!r}: name a subclass of TrialGroup whose "

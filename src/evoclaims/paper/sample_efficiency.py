@@ -29,12 +29,14 @@ def steps_to(source: Source, condition: Condition, curve: str, value: float, lev
         level: on which the trial must train at that report, counted from 0; None for the last.
 
     Raises:
-        UserError: when the value is not finite, or there is no such level.
+        UserError: when the value is not finite, or a success that none can be, or there is no such level.
     """
     levels = condition.task.levels
     wanted = levels - 1 if level is None else level
     if not math.isfinite(value):
         raise UserError(f"{source.label}: a curve is asked when it reaches a finite value, unlike {value}.")
+    if curve == "success" and not 0.0 <= value <= 1.0:
+        raise UserError(f"{source.label}: a success is a share of 0 to 1, and never reaches {value:g}.")
     if not 0 <= wanted < levels:
         raise UserError(f"{source.label} has levels 0 to {levels - 1}, not {wanted}.")
     cost, budget = condition.cost, float(condition.environment_steps)

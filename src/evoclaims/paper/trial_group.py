@@ -6,10 +6,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from evoclaims.core.errors import UnknownNameError, require_known
+from evoclaims.core.errors import UnknownNameError, UserError, require_known
 from evoclaims.judging.measure import Event, Measure, Profile
 from evoclaims.judging.reading import Better
-from evoclaims.judging.sample import Limited, Source
+from evoclaims.judging.sample import Declared, Limited, Source
 from evoclaims.paper.sample_efficiency import steps_to
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.spec import Condition
@@ -45,7 +45,7 @@ class TrialGroup:
             """Raise an error that lists the known measures."""
             if name.startswith("_") or hasattr(type(self), name):
                 return object.__getattribute__(self, name)  # raises what the property itself has raised
-            known = {known for known in dir(type(self)) if not known.startswith("_")} - set(dir(Limited))
+            known = {known for known in dir(type(self)) if not known.startswith("_")} - {*dir(Limited), *dir(Declared)}
             raise UnknownMeasureError("measure", name, known)
 
     @property
@@ -57,6 +57,11 @@ class TrialGroup:
     def fingerprint(self) -> str:
         """The condition's id."""
         return self.condition.id
+
+    @property
+    def deterministic(self) -> bool:
+        """Whether the method says that it draws nothing, so that its trials may be copies of each other."""
+        return bool(getattr(self.condition.method, "deterministic", False))
 
     def fetch(self, seeds: Sequence[int]) -> Sequence[TrialResult]:
         """Return one trial per seed."""
@@ -151,11 +156,23 @@ class TrialGroup:
 
     def solves_level(self, level: int) -> Event:
         """This level, counted from 0, was solved while training."""
+        self._require_level(level, 0, self.condition.task.levels - 1)
         return self.event(f"solves level {level}", lambda t: t.metrics["furthest_solved"] >= level)
 
     def solves_no_level_beyond(self, level: int) -> Event:
-        """No level above `level` (counted from 0) was solved while training."""
+        """No level above `level` (counted from 0; -1 for none at all) was solved while training."""
+        self._require_level(level, -1, self.condition.task.levels - 2)
         return self.event(f"solves no level beyond {level}", lambda t: t.metrics["furthest_solved"] <= level)
+
+    def _require_level(self, level: int, first: int, last: int) -> None:
+        """Reject a level about which an event would always hold, or never."""
+        if not first <= level <= last:
+            raise UserError(
+                f"{self.label} has {self.condition.task.levels} levels, counted from 0: what is said of {level} holds "
+                f"always, or never. From {first} to {last} it says something."
+                if first <= last
+                else f"{self.label} has a single level, which is 0, and so none beyond it."
+            )
 
     def success_everywhere_is(self, value: float) -> Event:
         """The final policy's success is exactly `value` on every level."""

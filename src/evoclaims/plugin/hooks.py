@@ -20,7 +20,7 @@ from evoclaims.plugin.options import pytest_addoption as pytest_addoption
 from evoclaims.plugin.own_gpu import pytest_load_initial_conftests as pytest_load_initial_conftests
 from evoclaims.plugin.own_gpu import pytest_xdist_auto_num_workers as pytest_xdist_auto_num_workers
 from evoclaims.plugin.progress import QUIET, ProgressLine, progress_of
-from evoclaims.plugin.run_session import make_session
+from evoclaims.plugin.run_session import import_from_root, make_session
 from evoclaims.plugin.summary import ATTRIBUTE, KNOWN, TROUBLE, Summary
 from evoclaims.trials.allowance import end_without
 from evoclaims.trials.stopping import interrupted_by
@@ -51,6 +51,7 @@ def pytest_configure(config: pytest.Config) -> None:
         if config.pluginmanager.has_plugin("terminal") and config.get_verbosity() > QUIET:
             config.pluginmanager.register(ProgressLine(config), "claims-progress")
     options.check(config)
+    import_from_root(config)
 
 
 @pytest.hookimpl(wrapper=True, tryfirst=True)

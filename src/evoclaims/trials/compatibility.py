@@ -35,7 +35,7 @@ METRICS: Final = (
 
 @contextmanager
 def both_named(method: Method[Any], task: Task) -> Iterator[None]:
-    """Name method and task in the error about a misfit.
+    """Name method and task in the error about a misfit, and in a note on any other.
 
     Raises:
         UserError: instead of a `MisfitError`.
@@ -44,6 +44,11 @@ def both_named(method: Method[Any], task: Task) -> Iterator[None]:
         yield
     except MisfitError as error:
         raise UserError(f"The method {method.name!r} does not fit the task {task.name!r}: {error.clause}.") from error
+    except UserError:  # says it all
+        raise
+    except Exception as error:
+        error.add_note(f"The method {method.name!r} was tried on the task {task.name!r}.")
+        raise
 
 
 def traced_progress(method: Method[Any], task: Task) -> Progress:
