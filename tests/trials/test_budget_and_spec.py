@@ -117,6 +117,14 @@ def test_a_method_that_can_be_changed_after_its_trials_have_an_id_is_a_sentence(
         _ = Condition(mine(), NParity(3), "direct", Budget(generations=1)).id
 
 
+@pytest.mark.parametrize("field", ["method", "task"])
+def test_a_class_in_the_place_of_an_object_is_a_sentence(field: str) -> None:
+    given: Any = type(getattr(CONDITION, field))
+    said = f"^{given.__name__} is a class, where an object of it is needed: write {given.__name__}\\(\\)\\.$"
+    with pytest.raises(UserError, match=said):
+        _ = replace(CONDITION, **{field: given}).id
+
+
 def test_the_id_changes_with_everything_that_makes_a_trial_another() -> None:
     ids = {name: condition.id for name, condition in {"same": CONDITION, **OTHERS}.items()}
     assert len(set(ids.values())) == len(ids)

@@ -23,6 +23,10 @@ ENGINE_REVISION = 1
 
 def _described(component: Any) -> dict[str, Any]:
     """Return name, revision and parameters of a method or task, as plain JSON; a `UserError` says what is missing."""
+    if isinstance(component, type):
+        raise UserError(
+            f"{component.__name__} is a class, where an object of it is needed: write {component.__name__}()."
+        )
     kind = type(component).__name__
     for name, of in (("name", str), ("revision", int)):
         given = getattr(component, name, None)
