@@ -160,3 +160,16 @@ def test_a_claim_file_imports_modules_of_the_project_as_it_does_for_the_commands
     )
     result = project.run("claims/test_imports.py", own_store=True)
     result.assert_outcomes(passed=1)
+
+
+@pytest.mark.parametrize("collected", [(), ("a",)])
+@pytest.mark.parametrize("options", [(), ("-n1",)])
+def test_a_claim_whose_file_does_not_import_is_not_called_unknown(
+    project: Any, collected: tuple[str, ...], options: tuple[str, ...]
+) -> None:
+    project.write(**dict.fromkeys(collected, "supported"))
+    Path("claims/test_others.py").write_text("import a_package_that_is_not_installed\n")
+    result = project.run("--claims-only=H4", *options)
+    shown = "\n".join([*result.outlines, *result.errlines])
+    assert "ERROR collecting claims/test_others.py" in shown
+    assert "no claim named 'H4' in the files that were collected, and not all were: the errors above say why." in shown

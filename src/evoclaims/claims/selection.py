@@ -8,12 +8,13 @@ from collections.abc import Collection
 from evoclaims.core.errors import UnknownNameError, UserError
 
 
-def selected(option: str, known: Collection[str]) -> set[str]:
+def selected(option: str, known: Collection[str], *, incomplete: bool = False) -> set[str]:
     """Return the known names that an option such as "G1,S" selects: G1 and all of S1, S2, ….
 
     Args:
         option: names, separated by commas.
         known: ids of claims, and perhaps whole names such as "G1[n_parity]".
+        incomplete: there are files whose claims are not known, since pytest has failed to collect them.
 
     Raises:
         UserError: for a name that selects nothing, and when there is no name.
@@ -23,6 +24,11 @@ def selected(option: str, known: Collection[str]) -> set[str]:
         begun = {one for one in known if name.isalpha() and re.match(rf"{name}\d", one)}
         found = {name} & set(known) or begun
         if not found:
+            if incomplete:
+                raise UserError(
+                    f"There is no claim named {name!r} in the files that were collected, and not all were: the errors "
+                    "above say why."
+                )
             if not known:
                 raise UserError(
                     f"There is no claim named {name!r} here: pytest has collected no claims at all. Run it in the "

@@ -75,7 +75,7 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> Generator[None, object, 
 
 
 @pytest.hookimpl(tryfirst=True)
-def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+def pytest_collection_modifyitems(session: pytest.Session, config: pytest.Config, items: list[pytest.Item]) -> None:
     """Leave out other tiers and claims; the full tier is only kept when it was asked for by name."""
     tests: dict[pytest.Item, ClaimTest] = {}
     try:
@@ -84,7 +84,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
             tests = claim_tests(items)
         config.stash[KNOWN] = {test.claim.id for test in tests.values()}
-        wanted = options.wanted_claims(config, tests.values())
+        wanted = options.wanted_claims(config, tests.values(), incomplete=session.testsfailed > 0)
     except UserError as error:
         _refuse(config, items, error)
         return

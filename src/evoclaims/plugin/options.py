@@ -91,14 +91,17 @@ def wanted_tiers(config: pytest.Config) -> set[str]:
     return set(TIERS) if re.search(r"\bfull\b", named) else {"smoke"}
 
 
-def wanted_claims(config: pytest.Config, tests: Iterable[ClaimTest]) -> set[str]:
-    """Return the ids, and the names with a case such as G1[n_parity], that --claims-only selects."""
+def wanted_claims(config: pytest.Config, tests: Iterable[ClaimTest], *, incomplete: bool) -> set[str]:
+    """Return the ids, and the names with a case such as G1[n_parity], that --claims-only selects.
+
+    `incomplete` says that pytest has failed to collect something.
+    """
     option, ids = config.getoption("claims_only"), {test.claim.id for test in tests}
     if option is None:
         return ids
     from evoclaims.claims.selection import selected
 
-    return selected(option, ids | {test.key[1] for test in tests})
+    return selected(option, ids | {test.key[1] for test in tests}, incomplete=incomplete)
 
 
 def _check_root(config: pytest.Config) -> None:
