@@ -18,6 +18,7 @@ from toy_loops import Nowhere
 
 from evoclaims.core.errors import UserError
 from evoclaims.envs.gates.parity import NParity
+from evoclaims.judging.sample import UnreadableTrialError, checked
 from evoclaims.methods.training_loop import TrainingLoop
 from evoclaims.trials import crashes
 from evoclaims.trials.budget import Budget
@@ -55,6 +56,16 @@ def test_each_trial_ends_as_its_process_does_and_the_others_go_on(all_ends: Any)
     assert good.provenance["trained_by"] == "toy_loops:in_every_way"
     assert told[-1].ended == told[-1].trials == 4
     assert told[-1].total_steps == 100
+
+
+def test_reading_a_number_that_the_loop_has_not_returned_says_so(all_ends: Any) -> None:
+    good = checked(all_ends[1][0])
+    assert good.metrics["last_fitness"] == 7.5
+    loop, trial = "The training loop toy_loops:in_every_way", "the finished trial of seed 0 "
+    with pytest.raises(UnreadableTrialError, match=f"^{loop} returned no 'last_success' for {trial}"):
+        _ = good.metrics["last_success"]
+    with pytest.raises(UnreadableTrialError, match=f"^{loop} returned no policy, .* shows 'success' for {trial}"):
+        _ = good.levels["success"]
 
 
 def test_what_is_reported_becomes_curves_of_as_many_points_as_the_budget_says(all_ends: Any) -> None:

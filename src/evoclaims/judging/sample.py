@@ -9,7 +9,7 @@ from typing import Any, Protocol, runtime_checkable
 
 from evoclaims.core.errors import guess
 from evoclaims.judging.effect import median
-from evoclaims.trials.result import TrialResult
+from evoclaims.trials.result import TRAINED_BY, TrialResult
 
 
 class Source(Protocol):
@@ -101,16 +101,19 @@ class _Numbers(Mapping[str, Any]):
     So is a missing name, which the error tells.
     """
 
-    def __init__(self, numbers: Mapping[str, Any], where: str) -> None:
+    def __init__(self, numbers: Mapping[str, Any], where: str, lacking: str = "") -> None:
+        """Remember where the numbers are from; `lacking` begins the sentence about a NaN that stands for no number."""
         self._numbers = numbers
         self._where = where
+        self._lacking = lacking
 
     def __getitem__(self, name: str) -> Any:
         value = self._numbers.get(name, ())
         if value == ():
             raise MissingNumberError(f"There is no {name!r} in {self._where}.{guess(name, self._numbers)}")
         if any(math.isnan(number) for number in (value if isinstance(value, list | tuple) else (value,))):
-            raise UnreadableTrialError(f"{name!r} is NaN in {self._where}.")
+            said = f"{self._lacking} {name!r} for" if self._lacking else f"{name!r} is NaN in"
+            raise UnreadableTrialError(f"{said} {self._where}.")
         return value
 
     def __iter__(self) -> Iterator[str]:
@@ -125,10 +128,14 @@ def checked(trial: TrialResult) -> TrialResult:
     if isinstance(trial.metrics, _Numbers):  # it has been checked, as trials are that are judged again and again
         return trial
     where = f"the finished trial of seed {trial.seed_in_words} (id {trial.id[:12]})"
+    loop, of_metrics, of_levels = trial.provenance.get(TRAINED_BY), "", ""
+    if loop:  # what its function or its policy's examination gives as NaN is no finished trial
+        of_metrics = f"The training loop {loop} returned no"
+        of_levels = f"{of_metrics} policy, which alone shows"
     return replace(
         trial,
-        metrics=_Numbers(trial.metrics, where),
-        levels=_Numbers(trial.levels, where),
+        metrics=_Numbers(trial.metrics, where, of_metrics),
+        levels=_Numbers(trial.levels, where, of_levels),
         curves=_Numbers(trial.curves, where),
     )
 

@@ -10,7 +10,7 @@ import jax
 
 from evoclaims.methods.training_loop import TrainingLoop
 from evoclaims.trials.loop_messages import Trained
-from evoclaims.trials.result import Status, TrialResult
+from evoclaims.trials.result import TRAINED_BY, Status, TrialResult
 from evoclaims.trials.result_making import make_record
 from evoclaims.trials.spec import TrialSpec
 
@@ -60,7 +60,7 @@ def trained_record(
         metrics |= returned | known | scores.metrics
     status: Status = "diverged" if broken else "done"
     origin = {
-        "trained_by": spec.condition.method.place,
+        TRAINED_BY: spec.condition.method.place,
         SCORED_BY: "training function" if scores is None else "examination",
     }
     return make_record(spec, status, metrics, levels, curves, b"", timing, devices, origin)

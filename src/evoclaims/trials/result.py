@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, Final, Literal
 
 from evoclaims.core.canonical import as_plain, content_hash
 
@@ -12,6 +12,8 @@ Status = Literal["done", "diverged", "timeout", "crashed"]
 COMPLETE: tuple[str, ...] = ("done", "diverged")
 """Statuses of trials that ran to their end and have all their metrics."""
 SCHEMA = 1
+TRAINED_BY: Final = "trained_by"
+"""Key of the provenance of a training loop's trial: the place of its function, "module:name"."""
 
 
 @dataclass(frozen=True)
