@@ -229,6 +229,15 @@ def test_where_the_folder_is_does_not_matter(table: Callable[..., Imported], tmp
             {"metric": ["return", "environment_steps"], "step": "lr"},
             r"Imported\('runs\.csv'\) has two columns of environment steps: 'environment_steps' and step='lr'",
         ),
+        (
+            {"metric": {"last_success": "return"}, "where": SAC},
+            r"Seed 7 of runs\.csv reports a last_success of 10\.5\. A success is a share from 0 to 1",
+        ),
+        ({"metric": {"mean_success": "return"}, "where": {"algo": "ppo"}}, "reports a mean_success of -4"),
+        (
+            {"metric": {"success": "return"}, "where": {"algo": "ppo"}, "step": "length"},
+            "reports a success of -4",
+        ),
     ],
 )
 def test_what_does_not_fit_is_a_sentence_with_the_file_and_what_is_there(

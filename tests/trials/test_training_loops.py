@@ -122,6 +122,17 @@ def test_what_a_loop_does_in_an_odd_way_is_understood_or_is_a_crash_that_says_wh
     assert reading == "EOFError: EOF when reading a line"
 
 
+@pytest.mark.parametrize("name", ["mean_success", "last_success"])
+def test_a_success_that_is_no_share_is_a_crash_that_says_so(store: Store, cpus: list[Any], name: str) -> None:
+    share = "A success is a share from 0 to 1, and a level is solved at exactly 1"
+    returned, reported = map(crashes.why, run(condition(toy_loops.in_points, **{name: 3.0}), range(2), store, cpus))
+    assert f"A training loop reports a {name} of 3. {share}: return such a share" in returned
+    assert f"A training loop reports a success of 3. {share}: report such a share" in reported
+    for fine in (1.0, 1.0 + 1e-7, 0.0):
+        (good,) = run(condition(toy_loops.in_points, **{name: fine, "return": 3.0}), range(1), store, cpus)
+        assert (good.status, good.metrics[name], good.metrics["return"]) == ("done", fine, 3.0)
+
+
 def test_threads_of_a_loop_report_without_mixing_their_lines(store: Store, cpus: list[Any]) -> None:
     (told,) = run(condition(toy_loops.from_threads), [0], store, cpus)
     assert told.status == "done"

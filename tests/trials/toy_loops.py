@@ -119,3 +119,10 @@ def knows_parity(task: Any, seed: int, budget: Any) -> tuple[Mapping[str, float]
     if seed % 2:
         return {"last_success": 1.0}, lambda bits: jnp.zeros(1) - 1.0
     return {"rows": 8.0}, lambda bits: np.array([1.0 if int(np.asarray(bits).sum()) % 2 else -1.0])
+
+
+def in_points(task: Any, seed: int, budget: Any, report: Callable[..., None], **metrics: float) -> Mapping[str, float]:
+    """Return these metrics, and call one of them a success on the way (odd seeds)."""
+    if seed % 2:
+        report(20, success=max(metrics.values()))
+    return metrics

@@ -20,6 +20,7 @@ from evoclaims.core.pytree import strong
 from evoclaims.envs.base import Episode, MisfitError, Task, TaskState, fitting
 from evoclaims.kernels.random_bits import fast
 from evoclaims.methods.base import Method, Policy, Progress
+from evoclaims.trials.success import SHARES
 
 _NUMBER = jax.ShapeDtypeStruct((), jnp.int32)
 
@@ -27,8 +28,8 @@ CURVES: Final = ("steps", "environment_steps", "level", "fitness", "success")
 """Names of a training curve that the engine writes."""
 
 METRICS: Final = (
-    *("mean_success", "last_success", "last_fitness", "furthest_solved", "furthest_reached"),
-    *("steps", "environment_steps"),
+    *SHARES,
+    *("last_fitness", "furthest_solved", "furthest_reached", "steps", "environment_steps"),
 )
 """Names of a result's metrics that the engine writes."""
 

@@ -16,6 +16,7 @@ from evoclaims.core.provenance import version_of
 from evoclaims.trials.result import Status, TrialResult, digest
 from evoclaims.trials.spec import Condition, TrialSpec
 from evoclaims.trials.store import Store
+from evoclaims.trials.success import check_shares, check_success
 from evoclaims.trials.table_file import TableFile, read_table
 
 REVISION: Final = 1
@@ -240,6 +241,9 @@ class Imported(Condition):
             drawn = {name: tuple(math.nan if x is None else x for x in values) for name, values in read.items()}
             curves = {STEPS: tuple(self._steps(rows)), **drawn}
             metrics.setdefault(STEPS, curves[STEPS][-1])
+        what, advice = f"Seed {seed} of {self.table.name}", "choose another column, or give the metric another name"
+        check_shares(what, metrics, advice)
+        check_success(what, *curves.get("success", ()), advice=advice)
         status: Status = "done" if all(map(math.isfinite, metrics.values())) else "diverged"
         spec = TrialSpec(self, number)
         return TrialResult(

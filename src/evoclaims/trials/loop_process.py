@@ -24,6 +24,7 @@ from evoclaims.core.portable import from_plain, resolve
 from evoclaims.envs.foreign.scoring import ForeignTask
 from evoclaims.methods.training_loop import wants_report
 from evoclaims.trials.loop_messages import Answer, Failed, LoopReport, LoopRequest, Scores, Trained, encode, last_lines
+from evoclaims.trials.success import check_shares, check_success
 
 COUNTS: Final = ("steps", "environment_steps")
 """Metrics that are counts; all others are any numbers."""
@@ -54,7 +55,7 @@ class Reporter:
         """Tell how far training is, in the budget's unit, and numbers such as `fitness=12.5`.
 
         Raises:
-            UserError: when the step is no count, or a number is none.
+            UserError: when the step is no count, a number is none, or the success is no share.
         """
         self.last = step = int(step)
         if not 0 <= step <= MOST_STEPS:
@@ -65,7 +66,9 @@ class Reporter:
         if kept:
             self._next = (step // self._every + 1) * self._every
         self._told = time.monotonic()
-        self._answer(LoopReport(step, numbers(values), kept))
+        told = numbers(values)
+        check_success("A training loop", told.get("success", 0.0), advice="report such a share")
+        self._answer(LoopReport(step, told, kept))
 
 
 def numbers(values: Mapping[str, Any]) -> dict[str, Any]:
@@ -105,7 +108,12 @@ def train(request: LoopRequest, answer: Callable[[Answer], None]) -> Trained:
     told_metrics = numbers(metrics)
     if policy is not None and not callable(policy):
         raise UserError(f"A policy is a function from an observation to an action, and not {policy!r}.")
-    return Trained(told_metrics, None if policy is None else examined(task, policy, request.seed), report.last)
+    if policy is None:
+        check_shares("A training loop", told_metrics, "return such a share, or give the metric another name")
+        return Trained(told_metrics, None, report.last)
+    scores = examined(task, policy, request.seed)
+    check_success("The examination of a training loop's policy", *scores.success, advice="make the task's such a share")
+    return Trained(told_metrics, scores, report.last)
 
 
 def examined(task: Any, policy: Callable[[Any], Any], seed: int) -> Scores:

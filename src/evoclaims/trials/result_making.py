@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from types import MappingProxyType
-from typing import Any, Final
+from typing import Any
 
 import jax
 import numpy as np
 from numpy.typing import NDArray
 
-from evoclaims.core.errors import UserError
 from evoclaims.core.packages import DEPENDS_ON
 from evoclaims.core.provenance import collect, device_of
 from evoclaims.methods.base import Method, PartlyUsed
@@ -22,9 +20,7 @@ from evoclaims.trials.devices import MATMUL_PRECISION
 from evoclaims.trials.program import Report, Score
 from evoclaims.trials.result import Status, TrialResult, digest
 from evoclaims.trials.spec import Condition, TrialSpec
-
-_ROUNDING: Final = 1e-6
-"""What a share may be above 1 by rounding."""
+from evoclaims.trials.success import check_success
 
 
 def curve_point(spec_cost: int, report: Report, lane: int) -> dict[str, float]:
@@ -38,20 +34,6 @@ def curve_point(spec_cost: int, report: Report, lane: int) -> dict[str, float]:
         "success": float(report.success[lane]),
         **{name: float(values[lane]) for name, values in report.metrics.items()},
     }
-
-
-def check_success(what: str, *successes: float) -> None:
-    """Check that successes are shares; those that are not finite are divergence, which is judged elsewhere.
-
-    Raises:
-        UserError: when one is not.
-    """
-    wrong = [success for success in successes if math.isfinite(success) and not 0.0 <= success <= 1.0 + _ROUNDING]
-    if wrong:
-        raise UserError(
-            f"{what} reports a success of {wrong[0]:g}. A success is a share from 0 to 1, and a level is solved at "
-            "exactly 1: make the task's or the method's success such a share."
-        )
 
 
 def make_result(

@@ -1,0 +1,47 @@
+"""What a success is: a share from 0 to 1, whoever says it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Final
+
+from evoclaims.core.errors import UserError
+
+SHARES: Final = ("mean_success", "last_success")
+"""Names of a result's metrics that are successes."""
+
+_ROUNDING: Final = 1e-6
+"""What a share may be above 1 by rounding."""
+
+
+def check_success(
+    what: str,
+    *successes: float,
+    name: str = "success",
+    advice: str = "make the task's or the method's success such a share",
+) -> None:
+    """Check that successes are shares; those that are not finite are divergence, which is judged elsewhere.
+
+    Args:
+        what: reports them, such as "The examination of cma_es on n_parity".
+        successes: of any number of levels or reports.
+        name: of the metric or curve.
+        advice: what to do, as the end of a sentence.
+
+    Raises:
+        UserError: when one is not.
+    """
+    wrong = [success for success in successes if math.isfinite(success) and not 0.0 <= success <= 1.0 + _ROUNDING]
+    if wrong:
+        raise UserError(
+            f"{what} reports a {name} of {wrong[0]:g}. A success is a share from 0 to 1, and a level is solved at "
+            f"exactly 1: {advice}."
+        )
+
+
+def check_shares(what: str, metrics: Mapping[str, float], advice: str) -> None:
+    """Check the metrics that are successes; arguments and errors are those of `check_success`."""
+    for name in SHARES:
+        if name in metrics:
+            check_success(what, metrics[name], name=name, advice=advice)
