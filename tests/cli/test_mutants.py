@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import csv
+import errno
+import os
 import re
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 import unpacked
-from tiny_project import BODIES, Evoclaims, Project
+from tiny_project import BODIES, Evoclaims, Project, forget
 
+from evoclaims.core import files
 from evoclaims.trials.store import Store
 from evoclaims.verdicts.mutation_matrix import Fate, dump, load
 from evoclaims.verdicts.sensitivity import Tried
@@ -51,6 +55,30 @@ def test_one_fault_of_one_target_can_be_asked_for(evoclaims: Evoclaims, stored: 
     assert evoclaims("mutants", "--mutant=paralysed", "--of=parity")[0] == 0
     (attempt,) = load(Path("mutants.toml"))["smoke", "a"].attempts
     assert (attempt.mutant, attempt.target) == ("paralysed", "parity")
+
+
+def test_a_fault_whose_trials_cannot_be_stored_is_not_called_broken(
+    evoclaims: Evoclaims, stored: Store, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    sound = set(stored.ids())
+    assert evoclaims("mutants", "--mutant=paralysed")[0] == 0
+    before = load(Path("mutants.toml"))
+    forget(stored, [trial for trial in stored.results([]) if trial.id not in sound])
+
+    def read_only(path: Any, *arguments: Any, **more: Any) -> Any:
+        if not isinstance(path, int) and stored.root.absolute() in Path(path).absolute().parents:
+            raise OSError(errno.EROFS, os.strerror(errno.EROFS), str(path))
+        return open(path, *arguments, **more)
+
+    monkeypatch.setattr(files, "open", read_only, raising=False)
+    status, _, err = evoclaims("mutants", "--mutant=paralysed")
+    assert status == 1
+    assert "Read-only file system" in err
+    assert "2 of 4 conditions failed.\nevoclaims: 2 of them could not be tried, and mutants.toml keeps" in err
+    assert load(Path("mutants.toml")) == before
+    Path("mutants.toml").unlink()
+    assert evoclaims("mutants", "--mutant=paralysed")[0] == 1
+    assert not any(row.named(Fate.BROKEN) for row in load(Path("mutants.toml")).values())
 
 
 def test_a_users_mistake_is_one_sentence(evoclaims: Evoclaims, stored: Store) -> None:

@@ -11,7 +11,7 @@ from dataclasses import replace
 
 from evoclaims.cli.project import Project, open_project
 from evoclaims.cli.running import Execution
-from evoclaims.cli.worker import WorkOrder
+from evoclaims.cli.worker import Ended, WorkOrder
 from evoclaims.core.errors import UnknownNameError, UserError
 from evoclaims.core.files import write_atomically
 from evoclaims.mutants import catalogue
@@ -37,7 +37,7 @@ def main(options: argparse.Namespace) -> int:
         {names: one for names, one in tier.conditions.items() if names in used}, catalogue.load(project.reproduction)
     )
     planted = _chosen(every, options)
-    failed: frozenset[Job] = frozenset()
+    failed: tuple[Ended, ...] = ()
     if not options.stored:
         asked = {
             (source.method, source.task)
@@ -56,10 +56,11 @@ def main(options: argparse.Namespace) -> int:
     mutated = replace(project, reproduction=under_faults(project.reproduction, options.tier, planted))
     reports = mutated.judge_variants([(options.tier, one.name) for one in planted])
     comparison = Comparison(project.archive, project.reproduction, options.tier, frozenset(used))
+    broken = {(one.job.fault, one.job.names) for one in failed if not one.untried}
     path = project.reproduction.folder / mutation_matrix.FILE
     matrix = merged(
         mutation_matrix.load(path),
-        noticed(comparison, claims, planted, reports, {(one.fault, one.names) for one in failed}),
+        noticed(comparison, claims, planted, reports, broken),
         options.tier,
         {key_of(report): [one.name for one in every if one.touching(report)] for report in claims if report.has_test},
     )
@@ -91,15 +92,21 @@ def _chosen(every: Sequence[Planted], options: argparse.Namespace) -> list[Plant
     return [one for one in every if options.mutant in (None, one.mutant) and options.of in (None, one.target)]
 
 
-def _run(project: Project, wanted: Mapping[Job, Condition], options: argparse.Namespace) -> frozenset[Job]:
-    """Run conditions that lack trials, and return those that have failed."""
+def _run(project: Project, wanted: Mapping[Job, Condition], options: argparse.Namespace) -> tuple[Ended, ...]:
+    """Run conditions that lack trials, and return how those ended that have failed."""
     design = project.reproduction.tier(options.tier).design
     order = WorkOrder(options.storage, options.tier, options.device, design.first_seed, design.last.n)
     running = Execution(project, order, options.host)
     running.check()
-    failed = frozenset(ended.job for ended in running.run(wanted, lambda text: None) if ended.error)
+    failed = tuple(ended for ended in running.run(wanted, lambda text: None) if ended.error)
     if failed:
         print(f"evoclaims: {len(failed)} of {len(wanted)} conditions failed.", file=sys.stderr)
+    untried = sum(ended.untried for ended in failed)
+    if untried:
+        print(
+            f"evoclaims: {untried} of them could not be tried, and {mutation_matrix.FILE} keeps what it says of them.",
+            file=sys.stderr,
+        )
     return failed
 
 

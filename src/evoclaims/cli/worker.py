@@ -20,7 +20,7 @@ import msgspec
 
 from evoclaims.claims.fetching import RunMissing
 from evoclaims.cli.project import Project, open_project
-from evoclaims.core.errors import UserError
+from evoclaims.core.errors import StorageError, UserError
 from evoclaims.core.printable import printable
 from evoclaims.core.raised import in_one_line
 from evoclaims.mutants import catalogue
@@ -72,11 +72,13 @@ class Ended(msgspec.Struct, frozen=True, tag=True):
     Attributes:
         job: which.
         error: why it failed, as a clause; empty where it did not.
+        untried: its failure says nothing about it: nothing could be stored, or no process was there to run it.
         again: trials that were run again, since the stored ones were made with other versions.
     """
 
     job: Job
     error: str = ""
+    untried: bool = False
     again: int = 0
 
 
@@ -106,7 +108,7 @@ def run_jobs(project: Project, order: WorkOrder, asked: Iterable[Job], line: Liv
         except (KeyboardInterrupt, BrokenPipeError):  # the user, or the reader of the output, has stopped
             raise
         except BaseException as error:  # an error in a method or a task must not stop the other conditions
-            yield Ended(job, printable(in_one_line(error, project.config.root)))
+            yield Ended(job, printable(in_one_line(error, project.config.root)), isinstance(error, StorageError))
         else:
             yield Ended(job, again=len(fetch.again.get(condition.id, ())))
 

@@ -98,7 +98,7 @@ class Workers:
                 self._taken -= 1
                 lost = [] if self._taken else list(self._left)
             for job in (job for group in lost for job in group):
-                self._ended.put(Ended(job, "no worker process could start"))
+                self._ended.put(Ended(job, "no worker process could start", untried=True))
         except BaseException as error:
             self._ended.put(error)
 

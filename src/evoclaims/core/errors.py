@@ -16,6 +16,10 @@ class UserError(Exception):
         super().__init__(shown(message))
 
 
+class StorageError(UserError):
+    """A file that cannot be written, or a stored one that cannot be used: what ran is not to blame."""
+
+
 class UnknownNameError(UserError):
     """An unknown name; the message lists the known names."""
 

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Final
 
-from evoclaims.core.errors import UserError
+from evoclaims.core.errors import StorageError
 
 ADVICE: Final = "Free some space or name another folder."
 
@@ -40,7 +40,7 @@ def write_atomically(path: Path, data: bytes, advice: str = ADVICE) -> None:
     Missing parent folders are created. `advice` is a sentence for the user if writing fails.
 
     Raises:
-        UserError: when the folder cannot be written or the disk is full.
+        StorageError: when the folder cannot be written or the disk is full.
     """
     with _aside(path, data, advice) as aside:
         os.replace(aside, path)
@@ -70,7 +70,7 @@ def write_where_named(path: Path, data: bytes, advice: str = ADVICE) -> None:
     Any other path is written as by `write_atomically`, whose file would replace a link or device.
 
     Raises:
-        UserError: when it cannot be written; also for a pipe that nobody reads, on which a writer could wait forever.
+        StorageError: when it cannot be written; also for a pipe that nobody reads, where a writer could wait forever.
     """
     try:
         is_file = stat.S_ISREG(os.stat(path).st_mode)
@@ -86,7 +86,7 @@ def write_where_named(path: Path, data: bytes, advice: str = ADVICE) -> None:
                 os.set_blocking(file.fileno(), True)
             file.write(data)
     except OSError as error:
-        raise UserError(f"Cannot write {path}: {error.strerror or error}. {advice}") from error
+        raise StorageError(f"Cannot write {path}: {error.strerror or error}. {advice}") from error
 
 
 @contextlib.contextmanager
@@ -101,7 +101,7 @@ def _aside(path: Path, data: bytes, advice: str) -> Iterator[Path]:
             os.fsync(file.fileno())
         yield aside
     except OSError as error:
-        raise UserError(f"Cannot write {path}: {error.strerror or error}. {advice}") from error
+        raise StorageError(f"Cannot write {path}: {error.strerror or error}. {advice}") from error
     finally:
         with contextlib.suppress(OSError):  # fails too on a read-only disk
             aside.unlink()

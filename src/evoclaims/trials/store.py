@@ -20,7 +20,7 @@ from typing import Any, Literal
 
 from numpy.typing import NDArray
 
-from evoclaims.core.errors import UserError
+from evoclaims.core.errors import StorageError
 from evoclaims.core.files import read_file, write_atomically, write_once
 from evoclaims.core.packages import Versions, agree, depends_on, recorded
 from evoclaims.trials.arrays import pack, unpack
@@ -35,7 +35,7 @@ Put = Literal["stored", "present", "differs"]
 """Result of storing a trial: written; already there, bit-identical; already there with another digest."""
 
 
-class DamagedFileError(UserError):
+class DamagedFileError(StorageError):
     """A file of the store is torn, edited or foreign; `path` is the file and `reason` a clause that says why."""
 
     def __init__(self, path: Path, reason: str) -> None:
@@ -202,7 +202,7 @@ class Store(StoreFiles):
 
         Raises:
             DamagedFileError: when a record is torn, edited, foreign or unreadable.
-            UserError: when a record cannot be removed.
+            StorageError: when a record cannot be removed.
         """
         for path in (path for trial_id in trial_ids for path in self.record_files(trial_id)):
             present = self.read(path)
@@ -210,7 +210,7 @@ class Store(StoreFiles):
                 try:
                     path.unlink(missing_ok=True)
                 except OSError as error:
-                    raise UserError(f"Cannot remove {path}: {error.strerror or error}.") from error
+                    raise StorageError(f"Cannot remove {path}: {error.strerror or error}.") from error
 
     def _remove_champion_beside(self, first: TrialResult, sealed: TrialResult) -> None:
         """Remove our champion of a trial that another process stored first with a different champion."""
