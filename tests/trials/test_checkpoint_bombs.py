@@ -126,7 +126,7 @@ def test_a_bomb_takes_no_memory_and_is_named(
     path.write_bytes(whole.read_bytes())
     BOMBS[kind](path)
     memory()
-    with pytest.raises(DamagedFileError, match="it is not a readable checkpoint; run `evoclaims verify`"):
+    with pytest.raises(DamagedFileError, match=f"readable checkpoint; run `evoclaims verify --storage {store.root}`"):
         run(CONDITION, [1, 5], store, cpus)
     assert memory() < BOUND
     (problem,) = verify(store, repair=True, checkpoint_fault=checkpoint.fault)

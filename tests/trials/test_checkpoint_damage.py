@@ -77,7 +77,7 @@ def test_a_bad_checkpoint_is_named_and_moved_aside_by_verify(kind: str, interrup
     path = store.checkpoints / interrupted.name
     path.parent.mkdir(parents=True)
     path.write_bytes(DAMAGE[kind](interrupted.read_bytes()))
-    with pytest.raises(DamagedFileError, match="run `evoclaims verify`") as caught:
+    with pytest.raises(DamagedFileError, match=f"run `evoclaims verify --storage {store.root}`") as caught:
         checkpoint.find(store.checkpoints, CONDITION.id, "any")
     assert str(path) in str(caught.value)
     assert "\n" not in str(caught.value)

@@ -31,9 +31,29 @@ def complaint(store: Store, trial_id: str) -> str:
         store.get(trial_id)
     text = str(caught.value)
     assert str(store.record_path(trial_id)) in text
-    assert "evoclaims verify" in text
+    assert f"run `evoclaims verify --storage {store.root}`" in text
     assert "\n" not in text
     return text
+
+
+@pytest.mark.parametrize(
+    ("root", "command"),
+    [
+        (".evoclaims", "verify"),
+        ("../.evoclaims", "verify"),
+        ("../b/.evoclaims", "verify"),
+        ("../c/.evoclaims", "verify --storage ../c/.evoclaims"),
+        ("trials/my store", "verify --storage 'trials/my store'"),
+    ],
+)
+def test_the_way_out_names_the_store_that_a_damaged_file_is_in(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, root: str, command: str
+) -> None:
+    (tmp_path / "a" / "b").mkdir(parents=True)
+    monkeypatch.chdir(tmp_path / "a" / "b")
+    store, some = Store(Path(root)), "0" * 64
+    for path in (store.record_path(some), store.champion_path(some), store.checkpoints / "0.npz"):
+        assert f"run `evoclaims {command}`," in str(DamagedFileError(path, "it is torn"))
 
 
 @given(st.data())

@@ -13,6 +13,7 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 import os
+import shlex
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -27,7 +28,7 @@ from evoclaims.trials.arrays import pack, unpack
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.result_codec import dump, parse
 from evoclaims.trials.result_schema import RecordError
-from evoclaims.trials.store_files import StoreFiles, record_id
+from evoclaims.trials.store_files import DEFAULT_ROOT, StoreFiles, record_id
 from evoclaims.trials.store_mark import ADVICE, check_store, mark
 from evoclaims.trials.time_limit import time_allowed
 
@@ -41,8 +42,8 @@ class DamagedFileError(StorageError):
     def __init__(self, path: Path, reason: str) -> None:
         """Build the message, which names the file and what to do."""
         super().__init__(
-            f"Cannot use {path}: {reason}; run `evoclaims verify`, which moves the file aside so that "
-            "the trial is run again."
+            f"Cannot use {path}: {reason}; run `evoclaims verify{_storage_of(path)}`, which moves the file aside so "
+            "that the trial is run again."
         )
         self.path = path
         self.reason = reason
@@ -261,6 +262,14 @@ class Store(StoreFiles):
                     yield result
             except DamagedFileError as error:
                 errors.append(error)
+
+
+def _storage_of(path: Path) -> str:
+    """Return the option with which a command uses the store that a file is in; empty for the usual store from here."""
+    root = next((above.parent for above in path.parents if above.name in ("trials", "champions", "checkpoints")), None)
+    here = Path.cwd()
+    usual = [above / DEFAULT_ROOT for above in (here, *here.parents)]
+    return "" if root is None or Path(os.path.abspath(root)) in usual else f" --storage {shlex.quote(str(root))}"
 
 
 def _gives_way(present: TrialResult, result: TrialResult) -> bool:
