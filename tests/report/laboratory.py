@@ -94,11 +94,11 @@ class Laboratory:
         return made
 
     def put_genomes(self, values: Iterable[float]) -> None:
-        """Store a trial of NEAT for each value, all with a first genome as their champion."""
+        """Store a trial of NEAT for each value, each with a first genome of its own as its champion."""
         condition = CONDITIONS["neat", "small"]
-        policy = METHODS["neat"].best(condition.task, METHODS["neat"].init(trial_key(0, TRAINING), condition.task))
-        champion = named_leaves(jax.device_get(policy.parameters))
         for seed, value in enumerate(values):
+            state = METHODS["neat"].init(trial_key(seed, TRAINING), condition.task)
+            champion = named_leaves(jax.device_get(METHODS["neat"].best(condition.task, state).parameters))
             self.store.put(record(condition, seed, value), champion)
 
     def judge(self, assert_: Judge, tier: str = "full", case: str = "", **texts: str) -> ClaimReport:

@@ -50,7 +50,7 @@ CLAIMS: dict[str, tuple[Make, Outcome, Outcome]] = {
         SUPPORTED,
         INCONCLUSIVE,
     ),
-    "any of": (lambda a, b, c: (a.reward > 0.6) | (a.steps_to("success", 2.0) < 7), SUPPORTED, REFUTED),
+    "any of": (lambda a, b, c: (a.reward > 0.6) | (a.steps_to("success", 0.9) < 7), SUPPORTED, REFUTED),
 }
 HIGH, LOW = [1.0, 0.95, 0.9, 0.85, 0.8, 0.75], [0.1, 0.2, 0.3, 0.3, 0.2, 0.1]
 
