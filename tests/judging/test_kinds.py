@@ -239,7 +239,8 @@ def test_a_part_that_contradicts_itself_decides_neither_and_nor_or(source) -> No
     assert max(both.p, both.p_refuted) <= 0.05 < 4 * min(both.p, both.p_refuted)
     holds = [source(f"holds {i}", [1.0] * 10).solved().in_most_trials() for i in range(3)]
     fails = [source(f"fails {i}", [0.0] * 10).solved().in_most_trials() for i in range(3)]
-    assert judge(reduce(and_, holds, part), wide).outcome is INCONCLUSIVE
+    undecided = judge(reduce(and_, holds, part), wide)
+    assert (undecided.outcome, undecided.deciding) == (INCONCLUSIVE, 0)
     assert judge(reduce(or_, fails, part), wide).outcome is INCONCLUSIVE
     assert judge(part & fails[0], wide).outcome is REFUTED
     assert judge(part | holds[0].event.in_every_trial(), wide).outcome is SUPPORTED

@@ -247,17 +247,18 @@ class Compound(Assertion):
         """Judge every part; one that contradicts itself, significant both ways, decides nothing."""
         findings = [part.find(trials, design, alpha) for part in self.parts]
         undecided = PValues(1.0, 1.0)
+        ps = [undecided if finding.p.contradict(alpha) else finding.p for finding in findings]
         return Finding(
-            p=self.combine([undecided if finding.p.contradict(alpha) else finding.p for finding in findings]),
+            p=self.combine(ps),
             attainable=self.combine([finding.attainable for finding in findings]),
             describe=lambda: tuple(entry for finding in findings for entry in finding.evidence),
-            deciding=lambda direction: self._deciding(findings, direction),
+            deciding=lambda direction: self._deciding(findings, ps, direction),
         )
 
-    def _deciding(self, findings: Sequence[Finding], direction: Direction) -> int:
+    def _deciding(self, findings: Sequence[Finding], ps: Sequence[PValues], direction: Direction) -> int:
         """Return the index, among all parts' evidence, of the entry that gives the compound's p."""
         choose = max if direction is self.weakest else min
-        chosen = choose(range(len(findings)), key=lambda index: findings[index].p.toward(direction))
+        chosen = choose(range(len(findings)), key=lambda index: ps[index].toward(direction))
         before = sum(len(finding.evidence) for finding in findings[:chosen])
         return before + findings[chosen].deciding(direction)
 
