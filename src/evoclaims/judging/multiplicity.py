@@ -1,4 +1,4 @@
-"""Holm's correction, for claims joined by "or" and for checks of a whole suite."""
+"""Holm's correction: where one part of a compound is enough, and for checks of a whole suite."""
 
 from __future__ import annotations
 
