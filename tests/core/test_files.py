@@ -52,8 +52,8 @@ def test_a_failing_disk_leaves_the_old_file_and_no_leftovers(
     path = tmp_path / "file"
     write_atomically(path, b"old")
     monkeypatch.setattr(os, call, _raising(fault))
-    with pytest.raises(UserError, match=rf"^Cannot write .*file: {fault.strerror}\. Buy a larger one\.$"):
-        write_atomically(path, b"new", "Buy a larger one.")
+    with pytest.raises(UserError, match=rf"^Cannot write .*file: {fault.strerror}\. .*[Bb]uy a larger one\.$"):
+        write_atomically(path, b"new", "buy a larger one.")
     monkeypatch.undo()
     assert path.read_bytes() == b"old"
     assert list(tmp_path.iterdir()) == [path]
@@ -138,3 +138,15 @@ def test_a_device_that_a_user_has_named_is_not_replaced_by_a_file(tmp_path: Path
         write_where_named(device, b"data")
     assert device.is_symlink()
     assert Path("/dev/full").is_char_device()
+
+
+@pytest.mark.parametrize(("fault", "way"), [(errno.ENOSPC, "Free some space, or name"), (errno.EROFS, "Name")])
+def test_only_on_a_full_disk_space_is_asked_for(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, fault: int, way: str
+) -> None:
+    def refuse(descriptor: int) -> None:
+        raise OSError(fault, os.strerror(fault))
+
+    monkeypatch.setattr(os, "fsync", refuse)
+    with pytest.raises(UserError, match=rf"Cannot write .*: {os.strerror(fault)}\. {way} another folder\.$"):
+        write_atomically(tmp_path / "file", b"data")

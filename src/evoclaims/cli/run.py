@@ -17,6 +17,7 @@ from evoclaims.judging.verdict import Outcome
 from evoclaims.mutants.conditions import Job
 from evoclaims.paper.reproduction import Reproduction, Tier
 from evoclaims.paper.variant import Names
+from evoclaims.trials.crashes import last_said
 from evoclaims.trials.imported import where_from
 from evoclaims.trials.spec import Condition, TrialSpec
 from evoclaims.trials.store import Store
@@ -67,7 +68,11 @@ def _print_trials(store: Store, name: str, condition: Condition, seeds: Sequence
     results = [store.get(TrialSpec(condition, seed).id, condition.versions) for seed in seeds]
     for result in filter(None, results):
         print(f"  {describe(result)}")
-    return any(result.status == "crashed" for result in filter(None, results))
+    crashed = [result for result in filter(None, results) if result.status == "crashed"]
+    said = last_said(crashed[0]).splitlines() if crashed else []
+    if len(said) > 1:
+        print(f"  what seed {crashed[0].seed} said last:", *said, sep="\n    ")
+    return bool(crashed)
 
 
 def _print_matrix(project: Project, tier: str, variant: str) -> None:

@@ -13,7 +13,11 @@ from typing import Final
 
 from evoclaims.core.errors import StorageError
 
-ADVICE: Final = "Free some space or name another folder."
+ELSEWHERE: Final = "name another folder."
+"""What a user can do about a file that cannot be written, if nothing else is known."""
+
+_FULL: Final = (errno.ENOSPC, getattr(errno, "EDQUOT", errno.ENOSPC))
+"""Errors of a disk or a quota that is full, where there is another way out."""
 
 
 def read_file(path: Path) -> bytes:
@@ -34,19 +38,19 @@ def read_file(path: Path) -> bytes:
         return file.read()
 
 
-def write_atomically(path: Path, data: bytes, advice: str = ADVICE) -> None:
+def write_atomically(path: Path, data: bytes, elsewhere: str = ELSEWHERE) -> None:
     """Write `data` to `path`; a reader always sees the whole old file or the whole new one, even after a kill.
 
-    Missing parent folders are created. `advice` is a sentence for the user if writing fails.
+    Missing parent folders are created. `elsewhere` is the end of the sentence that says how to write to another place.
 
     Raises:
         StorageError: when the folder cannot be written or the disk is full.
     """
-    with _aside(path, data, advice) as aside:
+    with _aside(path, data, elsewhere) as aside:
         os.replace(aside, path)
 
 
-def write_once(path: Path, data: bytes, advice: str = ADVICE) -> bool:
+def write_once(path: Path, data: bytes, elsewhere: str = ELSEWHERE) -> bool:
     """Write `data` to `path` as `write_atomically` does, unless the path exists; return whether this call wrote it.
 
     If several processes write at once, exactly one succeeds. Without hard links in the file system, a race between
@@ -54,7 +58,7 @@ def write_once(path: Path, data: bytes, advice: str = ADVICE) -> bool:
     """
     if os.path.lexists(path):
         return False
-    with _aside(path, data, advice) as aside:
+    with _aside(path, data, elsewhere) as aside:
         try:
             os.link(aside, path)
         except OSError:
@@ -64,7 +68,7 @@ def write_once(path: Path, data: bytes, advice: str = ADVICE) -> bool:
     return True
 
 
-def write_where_named(path: Path, data: bytes, advice: str = ADVICE) -> None:
+def write_where_named(path: Path, data: bytes, elsewhere: str = ELSEWHERE) -> None:
     """Write `data` to what a user has named: through a link, or straight into a device or pipe such as /dev/stdout.
 
     Any other path is written as by `write_atomically`, whose file would replace a link or device.
@@ -77,7 +81,7 @@ def write_where_named(path: Path, data: bytes, advice: str = ADVICE) -> None:
     except OSError:  # not there yet
         is_file = True
     if is_file:
-        write_atomically(Path(os.path.realpath(path)) if os.path.islink(path) else path, data, advice)
+        write_atomically(Path(os.path.realpath(path)) if os.path.islink(path) else path, data, elsewhere)
         return
     at_once = getattr(os, "O_NONBLOCK", 0)
     try:
@@ -86,11 +90,11 @@ def write_where_named(path: Path, data: bytes, advice: str = ADVICE) -> None:
                 os.set_blocking(file.fileno(), True)
             file.write(data)
     except OSError as error:
-        raise StorageError(f"Cannot write {path}: {error.strerror or error}. {advice}") from error
+        raise _unwritten(path, error, elsewhere) from error
 
 
 @contextlib.contextmanager
-def _aside(path: Path, data: bytes, advice: str) -> Iterator[Path]:
+def _aside(path: Path, data: bytes, elsewhere: str) -> Iterator[Path]:
     """Yield a temporary file beside `path` with `data` on disk; it is deleted after the block unless renamed."""
     aside = path.with_name(f".{path.name}.{os.getpid()}.{secrets.token_hex(4)}.tmp")
     try:
@@ -101,7 +105,13 @@ def _aside(path: Path, data: bytes, advice: str) -> Iterator[Path]:
             os.fsync(file.fileno())
         yield aside
     except OSError as error:
-        raise StorageError(f"Cannot write {path}: {error.strerror or error}. {advice}") from error
+        raise _unwritten(path, error, elsewhere) from error
     finally:
         with contextlib.suppress(OSError):  # fails too on a read-only disk
             aside.unlink()
+
+
+def _unwritten(path: Path, error: OSError, elsewhere: str) -> StorageError:
+    """Return the error that says why a file was not written, and what to do."""
+    way = f"Free some space, or {elsewhere}" if error.errno in _FULL else f"{elsewhere[0].upper()}{elsewhere[1:]}"
+    return StorageError(f"Cannot write {path}: {error.strerror or error}. {way}")

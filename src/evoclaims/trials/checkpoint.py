@@ -20,7 +20,7 @@ from evoclaims.trials.arrays import Packed, pack
 from evoclaims.trials.program import TrialState
 from evoclaims.trials.result_codec import is_hash
 from evoclaims.trials.store import DamagedFileError
-from evoclaims.trials.store_mark import ADVICE
+from evoclaims.trials.store_mark import ELSEWHERE
 
 SCHEMA: Final = 1
 _HEADER: Final = "header"
@@ -74,7 +74,7 @@ def save(folder: Path, header: Header, state: TrialState) -> None:
     """Write header and state (on the host, leaves [lanes, …]) in one atomic step."""
     arrays = {f"{i:04d}": np.asarray(leaf) for i, leaf in enumerate(jax.tree.leaves(state))}
     arrays[_HEADER] = np.frombuffer(_text(header).encode(), dtype=np.uint8)
-    write_atomically(path_of(folder, header), pack(arrays), ADVICE)
+    write_atomically(path_of(folder, header), pack(arrays), ELSEWHERE)
 
 
 def _text(header: Header) -> str:

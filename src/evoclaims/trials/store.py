@@ -29,7 +29,7 @@ from evoclaims.trials.result import TrialResult
 from evoclaims.trials.result_codec import dump, parse
 from evoclaims.trials.result_schema import RecordError
 from evoclaims.trials.store_files import DEFAULT_ROOT, StoreFiles, record_id
-from evoclaims.trials.store_mark import ADVICE, check_store, mark
+from evoclaims.trials.store_mark import ELSEWHERE, check_store, mark
 from evoclaims.trials.time_limit import time_allowed
 
 Put = Literal["stored", "present", "differs"]
@@ -80,7 +80,7 @@ class Store(StoreFiles):
         self.check()
         mark(self.root)
         probe = self.root / f".writable.{os.getpid()}.tmp"
-        write_atomically(probe, bytes(4096), ADVICE)
+        write_atomically(probe, bytes(4096), ELSEWHERE)
         probe.unlink(missing_ok=True)
 
     def made_with(self, trial_id: str, versions: Versions) -> TrialResult | None:
@@ -184,16 +184,16 @@ class Store(StoreFiles):
             return "present" if present.digest == result.digest else "differs"
         mark(self.root)
         usual = self.champion_path(sealed.id)
-        if packed and not write_once(usual, packed, ADVICE) and _sha256(usual) != sealed.champion:
-            write_atomically(self.spare_champion_path(sealed.id, sealed.champion), packed, ADVICE)
+        if packed and not write_once(usual, packed, ELSEWHERE) and _sha256(usual) != sealed.champion:
+            write_atomically(self.spare_champion_path(sealed.id, sealed.champion), packed, ELSEWHERE)
         path = self.home(result)
-        if present is None and write_once(path, record, ADVICE):
+        if present is None and write_once(path, record, ELSEWHERE):
             return "stored"
         first = self.present(result)
         if present is None and first is not None:  # another process was faster
             self._remove_champion_beside(first, sealed)
             return self.put_packed(result, packed)
-        write_atomically(path, record, ADVICE)
+        write_atomically(path, record, ELSEWHERE)
         return "stored"
 
     def forget_timeouts(self, trial_ids: Iterable[str], versions: Versions) -> None:

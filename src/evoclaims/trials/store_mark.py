@@ -27,7 +27,6 @@ _FOLDERS: Final = {
 
 ELSEWHERE: Final = "name another folder with --claims-storage (pytest) or --storage (evoclaims)."
 """End of the error message when a store cannot be used."""
-ADVICE: Final = f"Free some space or {ELSEWHERE}"
 
 _OTHER: Final = "Name the folder of a store with --storage (evoclaims) or --claims-storage (pytest)"
 
@@ -74,9 +73,9 @@ def mark(root: Path) -> None:
         return
     begins = not any((root / name).exists() for name in _FOLDERS)
     text = json.dumps({"program": PROGRAM, "schema": SCHEMA, "content": "trials of claims; see `evoclaims --help`"})
-    write_once(root / MARK, f"{text}\n".encode(), ADVICE)
+    write_once(root / MARK, f"{text}\n".encode(), ELSEWHERE)
     if begins:
-        write_once(root / ".gitignore", b"*\n", ADVICE)
+        write_once(root / ".gitignore", b"*\n", ELSEWHERE)
 
 
 def _check_mark(path: Path) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import importlib.util
 import io
+import math
 from pathlib import Path
 from typing import Any
 
@@ -161,3 +162,21 @@ def test_wrong_names_and_what_map_elites_needs_are_sentences() -> None:
         BraxTask("fast", episode_steps=0)
     with pytest.raises(UserError, match="examined_episodes must be at least 1, not 0"):
         BraxTask("fast", examined_episodes=0)
+
+
+@pytest.mark.parametrize("places", [(0,), (0, 1, 2), (-1, 0), (0.5, 1)])
+def test_a_descriptors_places_are_two_positions(places: Any) -> None:
+    with pytest.raises(UserError, match=r"places are two positions in the observation from 0, not \("):
+        Descriptor(places=places, area=((0, 1), (0, 1)))
+
+
+@pytest.mark.parametrize("area", [((1, 0), (0, 1)), ((0, 1), (1, 1)), ((0, math.inf), (0, 1)), ((0, math.nan), (0, 1))])
+def test_a_descriptors_area_has_room(area: Any) -> None:
+    with pytest.raises(UserError, match=r"lowest first, and not \("):
+        Descriptor(places=(0, 1), area=area)
+
+
+def test_a_place_beyond_the_observation_is_not_read_as_its_last_number() -> None:
+    beyond = Descriptor(places=(0, 2), area=((-5, 5), (-5, 5)))  # an observation of fast has two numbers
+    with pytest.raises(UserError, match=r"reads the places \(0, 2\) of its observation, which has 2 numbers"):
+        traced_progress(METHODS["map_elites"], BraxTask("fast", episode_steps=12, descriptor=beyond))

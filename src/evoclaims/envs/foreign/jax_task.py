@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from abc import abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -66,6 +67,17 @@ class Descriptor:
 
     places: tuple[int, int]
     area: tuple[tuple[float, float], tuple[float, float]]
+
+    def __post_init__(self) -> None:
+        """Reject places that are none, and an area without room."""
+        if len(self.places) != 2 or not all(isinstance(place, int) and place >= 0 for place in self.places):
+            raise UserError(f"A descriptor's places are two positions in the observation from 0, not {self.places!r}.")
+        for lowest, highest in self.area:
+            if not (math.isfinite(lowest) and math.isfinite(highest) and lowest < highest):
+                raise UserError(
+                    f"A descriptor's area is the lowest and the highest value of each number, lowest first, and not "
+                    f"({lowest}, {highest})."
+                )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -162,6 +174,11 @@ class JaxTask(ForeignTask):
         state, total, _ = played(self, policy, self.reset(key, level))
         metrics = {"episode_steps": state.inner.time.astype(jnp.float32)}
         if self.descriptor is not None:
+            if max(self.descriptor.places) >= state.observation.size:  # jax would take the last number instead
+                raise UserError(
+                    f"{self.name}'s descriptor reads the places {self.descriptor.places} of its observation, which has "
+                    f"{state.observation.size} numbers, counted from 0."
+                )
             metrics |= {name: state.observation[at] for name, at in zip("xy", self.descriptor.places, strict=True)}
         return Episode(fitness=total, success=(total >= self.threshold).astype(jnp.float32), metrics=metrics)
 
