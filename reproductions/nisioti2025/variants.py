@@ -44,13 +44,28 @@ def _perceptron(method: str, task: str, condition: Condition) -> Condition | Non
 
 def _published_neat(method: str, task: str, condition: Condition) -> Condition | None:
     """NEAT with the published code's rates and handling of new levels; at full size also its population."""
-    evolved: Any = condition.method
-    if not isinstance(evolved, Neat):
+    if not isinstance(condition.method, Neat):
         return None
+    ours = condition.method.settings
+    most = ours.species.most * 50 // 20 if isinstance(condition.task, RobotTask) else min(ours.species.most, 20)
+    return _published_evolution(condition, min(ours.population, 1_024), most)
+
+
+def _published_hyperneat(method: str, task: str, condition: Condition) -> Condition | None:
+    """HyperNEAT with the published code's rates and handling of new levels; at full size also its population."""
+    if not isinstance(condition.method, HyperNeat):
+        return None
+    ours = condition.method.settings
+    size = ours.population // 2 if isinstance(condition.task, RobotTask) else min(ours.population, 1_024)
+    return _published_evolution(condition, size, min(ours.species.most, 20))
+
+
+def _published_evolution(condition: Condition, population: int, most: int) -> Condition:
+    """Evolve so many genomes in at most so many species, which keep their records on a new level."""
+    evolved: Any = condition.method
     ours = evolved.settings
-    size = min(ours.population, 1_024)
-    species = replace(ours.species, most=min(ours.species.most, 20), on_level_up="keep")
-    settings = replace(ours, population=size, mutation=replace(ours.mutation, node_add=0.1), species=species)
+    species = replace(ours.species, most=most, on_level_up="keep")
+    settings = replace(ours, population=population, mutation=replace(ours.mutation, node_add=0.1), species=species)
     return replace(condition, method=replace(evolved, settings=settings))
 
 
@@ -98,13 +113,14 @@ def _few_environments(method: str, task: str, condition: Condition) -> Condition
 
 
 def _published(method: str, task: str, condition: Condition) -> Condition | None:
-    """Every detail of the published code at once."""
+    """All variants at once."""
     now = condition
     for change in (
         _rows_so_far,
         _published_alu,
         _perceptron,
         _published_neat,
+        _published_hyperneat,
         _sigmoid,
         _lucky_level_up,
         _published_ppo,
@@ -137,8 +153,13 @@ VARIANTS = {
     ),
     "published_neat": _variant(
         "NEAT adds nodes with probability 0.1, keeps old records on a new level, and has at most 1,024 genomes in 20 "
-        "species, as in the published code",
+        "species, with robots in 50 (at smoke 10), as in the published code",
         _published_neat,
+    ),
+    "published_hyperneat": _variant(
+        "HyperNEAT adds nodes to its CPPNs with probability 0.1, keeps old records on a new level, and has at most "
+        "1,024 genomes in 20 species, with robots 512 (smoke: half), as in the published code",
+        _published_hyperneat,
     ),
     "sigmoid": _variant("HyperNEAT's CPPNs have sigmoids only, as in the published code", _sigmoid),
     "lucky_level_up": _variant(
@@ -159,5 +180,8 @@ VARIANTS = {
         "(at smoke 200)",
         _published_course,
     ),
-    "published": _variant("Every detail of the published code at once: all the variants above", _published),
+    "published": _variant(
+        "All the variants above at once: the published code's settings (not its maze, where stones pay nothing)",
+        _published,
+    ),
 }

@@ -21,7 +21,7 @@ class Claim:
     Attributes:
         id: a short name, such as "G1".
         says: the paper's own words.
-        where: section and figure.
+        where: section and figure; "control" for a check of the benchmark itself, which is counted apart.
         smoke: the scaled-down statement that the smoke tier judges instead; None if it judges none.
     """
 
@@ -58,7 +58,7 @@ def claim(
     Args:
         claim_id: a short name, such as "G1".
         says: the paper's own words.
-        where: section and figure.
+        where: section and figure; "control" for a check of the benchmark itself, which is counted apart.
         smoke: the scaled-down statement of the smoke tier; None if no small instance can show the sentence, which is
             then not judged there (see `without_smoke` for one parameter of a claim).
         expect: an accepted outcome, for every tier and parameter; a narrower one (see `expected`) overrides it.

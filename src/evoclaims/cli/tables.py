@@ -3,6 +3,7 @@
 A table is between two comments, the first of which says what it shows:
 
     <!-- evoclaims: verdicts full full:published smoke -->    verdicts by tier, or by tier and variant of the protocol
+    <!-- evoclaims: tally full -->                            how many verdicts of a tier ended how, in a sentence
     <!-- evoclaims: numbers full all -->                      published numbers and ours, under all variants
     <!-- evoclaims: details full -->                          verdicts that variants of the protocol may change
     <!-- evoclaims: measures -->                              what claims can read from trials
@@ -26,6 +27,7 @@ from evoclaims.figures.replication import replications
 from evoclaims.report import replication_cells, vocabulary
 from evoclaims.report.markdown import numbers, robustness
 from evoclaims.report.markdown_text import literal
+from evoclaims.report.tally import tally
 from evoclaims.report.trial_summary import Reader
 from evoclaims.report.verdict_overview import overview
 from evoclaims.verdicts.robustness import matrix
@@ -89,6 +91,13 @@ def _verdicts(project: Project, words: list[str]) -> str:
     return overview(columns, sentences, Reader(project.archive))
 
 
+def _tally(project: Project, words: list[str]) -> str:
+    """Return how many verdicts of a tier ended how."""
+    (tier,) = words or list(project.reproduction.tiers)[-1:]
+    (reports,) = project.judge_variants([(tier, "")])
+    return tally(reports)
+
+
 def _details(project: Project, words: list[str]) -> str:
     """Return the verdicts of a tier under the protocol and under each variant, of the claims that a variant touches."""
     (tier,) = words or list(project.reproduction.tiers)[-1:]
@@ -112,6 +121,7 @@ def _numbers(project: Project, words: list[str]) -> str:
 
 _KINDS: Final[Mapping[str, Callable[[Project, list[str]], str]]] = {
     "verdicts": _verdicts,
+    "tally": _tally,
     "details": _details,
     "numbers": _numbers,
     "measures": lambda project, _: vocabulary.measures(project.reproduction.trials),

@@ -21,8 +21,10 @@ _SHOWN: Final = ("python", "jax", "jaxlib")
 """Packages whose versions are shown for every trial; others only where a trial depends on them."""
 
 HOW: Final = (
-    "In parentheses: in how many of the judged trials the event holds that decided, or the effect (A12) or the finding "
-    "of the part that decided; then a letter for the device and the versions that the trials were made with."
+    "In parentheses, what decided: in how many of the judged trials an event holds, or the effect (A12: how often a "
+    "trial of one side beats one of the other), or how many trials lie in a range; where a claim has several parts, "
+    "the part that decided it, or that left it open. Then a letter for the device and the versions that the trials "
+    "were made with."
 )
 """How to read the table."""
 
@@ -92,7 +94,8 @@ class Environments:
 def _shown(versions: Iterable[tuple[str, str]], needed: Iterable[str]) -> Versions:
     """Return the versions of Python and of what a trial depends on."""
     names = {*_SHOWN, *needed}
-    return {name: version for name, version in versions if name in names}
+    known = dict(versions)
+    return {name: known.get(name) or "none" for name in names}
 
 
 def _cell(reports: Sequence[ClaimReport], made: Environments) -> str:
@@ -117,10 +120,14 @@ def _evidence(report: ClaimReport) -> str:
     """Return what the part that decided has found."""
     part = report.verdict.deciding_part if report.verdict else None
     trials = plural(report.n, "trial")
-    if part is None:
+    if report.verdict is None or part is None:
         return trials
+    several = len(report.verdict.evidence) > 1
+    what = f"{part.samples[0].label.partition(': ')[2]}: " if several and part.samples else ""
     if part.events:
-        return f"{sum(part.samples[0].values):g} of {trials}"
+        return f"{what}{sum(part.samples[0].values):g} of {trials}"
     if part.a12 is not None:
-        return f"A12 {part.a12:.2f}, {trials} a side"
-    return f"{part.detail}; {trials}" if part.detail else trials
+        return f"{what}A12 {part.a12:.2f}, {trials} a side"
+    ends = [f"{bound.value:g}" for bound in part.bounds]
+    within = f" [{', '.join(ends)}]" if len(ends) == 2 else ""
+    return f"{what}{part.detail}{within}; {trials}" if part.detail else trials

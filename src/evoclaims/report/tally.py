@@ -1,0 +1,33 @@
+"""How many verdicts ended how, in a sentence: the paper's own claims apart from the controls of the benchmark."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from typing import Final
+
+from evoclaims.judging.verdict import Outcome
+from evoclaims.report.formatting import plural
+from evoclaims.verdicts.claim_report import ClaimReport
+
+CONTROL: Final = "control"
+"""What a claim says in `where` that is not the paper's, but a check of the benchmark itself."""
+
+
+def tally(reports: Sequence[ClaimReport]) -> str:
+    """Return the sentences, such as "Of 54 cases of the paper's sentences 17 are supported, …"."""
+    controls = [report for report in reports if report.where == CONTROL]
+    papers = [report for report in reports if report.where != CONTROL]
+    said = f"Of {plural(len(papers), 'case')} of the paper's sentences, {_counted(papers)}."
+    if controls:
+        said += (
+            f" Of {plural(len(controls), 'case')} of controls, which test the benchmark itself, {_counted(controls)}."
+        )
+    return said
+
+
+def _counted(reports: Sequence[ClaimReport]) -> str:
+    """Return how many ended how, such as "17 are **supported** and 3 **not run**"."""
+    ended = Counter(report.outcome for report in reports)
+    told = [f"{ended[outcome]} **{outcome}**" for outcome in Outcome if ended[outcome]]
+    return " and ".join(filter(None, (", ".join(told[:-1]), told[-1]))) if told else "none"

@@ -1,0 +1,95 @@
+"""Tables in docs/protocol.md that no command writes are what the committed trials and the conditions give."""
+
+from __future__ import annotations
+
+import statistics
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import pytest
+
+from evoclaims.judging.effect import a12
+from evoclaims.judging.exact import rank_test
+from evoclaims.paper.references import committed
+from evoclaims.trials.result import TrialResult
+from reproductions.nisioti2025 import REPRODUCTION
+
+PROTOCOL = (Path(__file__).parents[2] / "docs" / "protocol.md").read_text(encoding="utf-8")
+NAMES = {"neat": "NEAT", "map_elites": "MAP-Elites", "cma_es": "CMA-ES", "hyperneat": "HyperNEAT", "ppo": "PPO"}
+Reward = Callable[[TrialResult], float]
+
+
+def _of_training(trial: TrialResult) -> float:
+    return float(trial.curves["fitness"][-1])
+
+
+def _examined(trial: TrialResult) -> float:
+    return float(trial.metrics["last_fitness"])
+
+
+def _without_cost(trial: TrialResult) -> float:
+    return _examined(trial) + float(trial.metrics["control_cost"])
+
+
+def _rewards(method: str, task: str, reward: Reward) -> list[float]:
+    trials = committed(REPRODUCTION.references, "full", method, task)
+    assert len(trials) == 10
+    return [reward(trial) for trial in trials]
+
+
+def _line(cells: Sequence[str]) -> str:
+    """Return a line of a table; an empty cell is one space."""
+    return "\n|" + "".join(f" {cell} |" if cell else " |" for cell in cells) + "\n"
+
+
+def _higher(a: Sequence[float], b: Sequence[float]) -> str:
+    """Return how often A is above B, and the p of its being no higher."""
+    return f"{a12(a, b):.2f}, p = {rank_test(a, b).p:.2g}"
+
+
+@pytest.mark.parametrize("method", ["neat", "map_elites", "cma_es", "hyperneat"])
+def test_rewards_among_stones_in_training_and_after_it_are_those_of_the_trials(method: str) -> None:
+    cells = [NAMES[method]]
+    for reward in (_of_training, _examined):
+        values = _rewards(method, "stones", reward)
+        cells.append(f"{statistics.mean(values):,.0f} ± {statistics.stdev(values):.0f}")
+        cells.append("" if method == "neat" else _higher(_rewards("neat", "stones", reward), values))
+    assert _line(cells) in PROTOCOL
+
+
+@pytest.mark.parametrize(
+    ("part", "one", "other", "task"),
+    [
+        (r"O1\[hyperneat\]: NEAT above HyperNEAT", "neat", "hyperneat", "obstacles"),
+        (r"O1\[cma\_es\]: NEAT above CMA-ES", "neat", "cma_es", "obstacles"),
+        (r"O1\[ppo\]: NEAT above PPO", "neat", "ppo", "obstacles"),
+        (r"O2\[hyperneat\]: PPO above HyperNEAT", "ppo", "hyperneat", "obstacles"),
+        (r"O2\[cma\_es\]: PPO above CMA-ES", "ppo", "cma_es", "obstacles"),
+        ("O5: NEAT above PPO, high obstacles", "neat", "ppo", "obstacles_high"),
+    ],
+)
+def test_comparisons_with_the_control_cost_given_back_are_those_of_the_trials(
+    part: str, one: str, other: str, task: str
+) -> None:
+    found = (
+        _higher(_rewards(one, task, reward), _rewards(other, task, reward)) for reward in (_examined, _without_cost)
+    )
+    assert f"| {part} | {' | '.join(f'A12 {text}' for text in found)} |" in PROTOCOL
+
+
+@pytest.mark.parametrize("method", NAMES)
+def test_training_lengths_are_those_of_the_conditions(method: str) -> None:
+    cells = [NAMES[method]]
+    conditions = REPRODUCTION.tiers["full"].conditions
+    for tasks in (
+        ("n_parity", "n_parity_direct"),
+        ("simple_alu",),
+        ("stones", "stones_ant"),
+        ("obstacles", "obstacles_medium", "obstacles_high"),
+        ("deceptive_maze_easy", "deceptive_maze_easy_ant", "deceptive_maze_difficult"),
+    ):
+        found = {conditions[method, task] for task in tasks if (method, task) in conditions}
+        lengths = {(one.environment_steps, "" if method == "ppo" else f" ({one.steps:,})") for one in found}
+        assert len(lengths) <= 1
+        cells += [f"{steps / 1e6:,.0f}{generations}" for steps, generations in lengths] or [""]
+    assert _line(cells) in PROTOCOL
