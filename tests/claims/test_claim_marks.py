@@ -174,3 +174,8 @@ def test_the_evidence_lies_below_the_store_under_a_plain_name(case: str, tmp_pat
     path = Path(saved.evidence)
     assert path.parent == tmp_path / "verdicts" / "smoke"
     assert ClaimReport.from_json(json.loads(path.read_text())) == saved
+
+
+def test_an_outcome_is_expected_at_a_tier_that_there_is() -> None:
+    with pytest.raises(UserError, match="There is no tier named 'smok'. Did you mean 'smoke'"):
+        expected("refuted", because="seen", tier="smok")

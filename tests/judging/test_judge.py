@@ -232,3 +232,24 @@ def test_trials_that_are_all_copies_of_one_are_no_evidence(source) -> None:
 def test_trials_that_agree_by_chance_or_keep_no_champion_are_evidence(source, champions, curves) -> None:
     a = _with_champions(source, "a", champions, curves)
     assert judge(a.solved().in_most_trials(), FIXED_10).outcome is Outcome.SUPPORTED
+
+
+@pytest.mark.parametrize(
+    ("numbers", "outcome"),
+    [([0.857], Outcome.INCONCLUSIVE), ([0.857, 0.9], Outcome.SUPPORTED), ([1.0], Outcome.SUPPORTED)],
+    ids=["one number", "two numbers", "one whole number"],
+)
+def test_a_training_loop_that_tells_the_same_whatever_its_seed_is_no_evidence(source, numbers, outcome) -> None:
+    a = source("a", [1.0] * 10)
+    for seed, trial in a.trials.items():
+        number = numbers[seed % len(numbers)]
+        a.trials[seed] = replace(
+            trial,
+            champion="",
+            curves={"fitness": (number,)},
+            digest=str(number),
+            provenance={"trained_by": "loops:one"},
+        )
+    verdict = judge(a.solved().in_most_trials(), FIXED_10)
+    assert verdict.outcome is outcome
+    assert verdict.reason.startswith("all 10 trials of a are copies of one") == (outcome is Outcome.INCONCLUSIVE)

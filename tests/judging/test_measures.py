@@ -203,3 +203,11 @@ def test_a_profile_above_another_is_above_at_every_level_beyond(source) -> None:
 def test_profiles_are_compared_at_levels_that_both_have(source, size, beyond) -> None:
     with pytest.raises(UserError, match="cannot be compared"):
         source("cma_es", []).success(4).above(source("ppo", []).success(size), beyond=beyond)
+
+
+@pytest.mark.parametrize("answer", [None, [1.0, 2.0], "much"])
+def test_a_measure_that_reads_no_number_is_a_sentence_with_its_name(source, answer) -> None:
+    a = source("a", [1.0])
+    odd = Measure(a, "odd", lambda trial: answer)
+    with pytest.raises(UnreadableTrialError, match="odd is .*, and no number, in the finished trial of seed 0"):
+        odd.sample(fetched(a, 1))

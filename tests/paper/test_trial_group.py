@@ -4,15 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import pytest
 
 from evoclaims.claims.session import Session
 from evoclaims.core.errors import UserError
+from evoclaims.judging.design import FIXED_10
 from evoclaims.judging.measure import Event, Measure
-from evoclaims.paper.reproduction import Reproduction
+from evoclaims.paper.reproduction import Reproduction, Tier
 from evoclaims.paper.trial_group import TrialGroup
+from evoclaims.paper.variant import Variant
 from evoclaims.trials.store import Store
 
 Served = Callable[..., Any]
@@ -177,3 +180,18 @@ def test_what_breaks_in_a_measure_is_not_taken_for_a_misspelled_one(reproduction
 def test_trials_that_are_none_are_refused(reproduction: Reproduction) -> None:
     with pytest.raises(UserError, match="The reproduction 'tiny' says trials=.*: name a subclass of TrialGroup"):
         replace(reproduction, trials={"stones": len})  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("conditions", "sentence"),
+    [
+        ({"smok": {}}, "There is no tier for the variant 'other' named 'smok'. Did you mean 'smoke'"),
+        (
+            {"smoke": {("a", "b"): None}},
+            "There is no condition of the smoke tier for the variant 'other' named 'a on b'",
+        ),
+    ],
+)
+def test_a_variant_changes_what_there_is(conditions: Any, sentence: str, tmp_path: Path) -> None:
+    with pytest.raises(UserError, match=sentence):
+        Reproduction("tiny", "", tmp_path, {"smoke": Tier({}, FIXED_10)}, variants={"other": Variant("", conditions)})

@@ -178,3 +178,11 @@ def test_tests_without_claims_are_left_alone(project: Any) -> None:
     result.assert_outcomes(passed=1)
     result.stdout.no_fnmatch_line("*claims:*")
     assert not (project.path / ".evoclaims").exists()
+
+
+def test_a_case_whose_parameters_have_a_comma_is_selected_by_its_name(project: Any) -> None:
+    project.write(
+        "@says('a')\n@pytest.mark.parametrize('case', ['x,y', 'z'])\ndef test_a(case, trials, verdict):\n    pass\n"
+    )
+    chosen = project.run("--collect-only", "-q", "--claims-only=a[x,y]")
+    assert [line for line in chosen.outlines if "::" in line] == ["claims/test_claims.py::test_a[x,y-a-smoke]"]

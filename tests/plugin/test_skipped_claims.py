@@ -100,6 +100,17 @@ def test_a_claim_that_was_judged_is_not_listed_again_when_its_fixture_skips_at_t
     assert [report["outcome"] for report in _reports(project)] == ["supported"]
 
 
+def test_a_claim_that_was_judged_is_not_judged_again_when_its_fixture_fails_at_the_end(project: Any) -> None:
+    project.write(
+        "@pytest.fixture\ndef late():\n    yield\n    raise OSError('too late')\n\n"
+        f"@says('a')\ndef test_a(late, trials, verdict):\n    {BODY}\n"
+    )
+    result = project.run("--claims-json=out.json")
+    assert result.ret == pytest.ExitCode.TESTS_FAILED
+    result.stdout.fnmatch_lines(["*OSError: too late*"])
+    assert [report["outcome"] for report in _reports(project)] == ["supported"]
+
+
 def test_a_skipped_claim_keeps_the_verdict_that_an_earlier_run_has_stored(project: Any) -> None:
     project.write(a="supported")
     project.run(own_store=True)

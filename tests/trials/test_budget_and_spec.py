@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-from dataclasses import make_dataclass, replace
+from dataclasses import dataclass, make_dataclass, replace
 from typing import Any
 
 import pytest
@@ -176,3 +176,47 @@ def test_the_canonical_form_of_a_specification_is_what_has_been_stored_so_far() 
 @pytest.mark.parametrize(("progression", "label"), [("curriculum", ""), ("direct", " (direct)")])
 def test_a_condition_has_a_short_name(progression: Any, label: str) -> None:
     assert replace(CONDITION, progression=progression).label == f"random_search on n_parity{label}"
+
+
+@pytest.mark.parametrize("lengths", [{"generations": 3.0}, {"environment_steps": 1e3}, {"generations": True}])
+def test_a_budget_is_a_whole_number_so_that_one_length_has_one_id(lengths: dict[str, Any]) -> None:
+    with pytest.raises(UserError, match="a whole number of at least 1"):
+        Budget(**lengths)
+    with pytest.raises(UserError, match="a whole number of at least 1"):
+        Budget(generations=3, reports=2.5)  # type: ignore[arg-type]
+
+
+@dataclass(frozen=True)
+class _Wide:
+    width: int = 3
+
+
+@dataclass(frozen=True)
+class _Negated:
+    width: int = 3
+
+
+class _Otherwise(RandomSearch):
+    """Computes something else under the inherited name."""
+
+
+class _OtherGate(SimpleAlu):
+    """Asks something else under the inherited name."""
+
+
+class _Named(RandomSearch):
+    name = "random_search"  # type: ignore[misc]
+
+
+def test_parts_and_subclasses_of_a_users_own_are_told_apart_by_their_classes() -> None:
+    wide, negated = (Condition(RandomSearch(8, network=part), TASK, "direct", BUDGET) for part in (_Wide(), _Negated()))
+    assert wide.id != negated.id
+    plain, other = (Condition(kind(8), TASK, "direct", BUDGET) for kind in (RandomSearch, _Otherwise))
+    assert plain.id != other.id
+    assert Condition(METHOD, SimpleAlu(), "direct", BUDGET).id != Condition(METHOD, _OtherGate(), "direct", BUDGET).id
+    assert Condition(_Named(8), TASK, "direct", BUDGET).id == plain.id  # it says that it is the same
+
+
+def test_a_field_that_cannot_be_written_is_a_sentence_that_names_the_class() -> None:
+    with pytest.raises(UserError, match="A field of RandomSearch tells its trials apart and is no number, word"):
+        _ = Condition(RandomSearch(8, network=Mlp), TASK, "direct", BUDGET).id  # type: ignore[arg-type]

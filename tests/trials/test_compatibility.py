@@ -299,3 +299,56 @@ def test_an_error_inside_a_method_or_task_has_a_note_with_both_names() -> None:
     with pytest.raises(TypeError, match="cannot reshape") as caught:
         traced_progress(Broken(), TASK)
     assert "The method 'walker' was tried on the task 'n_parity'." in caught.value.__notes__
+
+
+@dataclass(frozen=True)
+class Deaf(NParity):
+    """Asks the same at every level."""
+
+    name: ClassVar[str] = "deaf"
+
+    def reset(self, key: Any, level: Any) -> Any:
+        return super().reset(key, jnp.int32(0))
+
+
+def test_a_task_whose_reset_does_not_read_the_level_is_refused_if_it_has_several() -> None:
+    with pytest.raises(UserError, match="'deaf' has 2 levels, and its reset does the same on all of them"):
+        traced_progress(Walker(), Deaf(3))
+
+
+@pytest.mark.parametrize(
+    ("parts", "sentence"),
+    [
+        ((BITS * 2, YES, YES, (2, 4)), "table's inputs are bits, 0 or 1"),
+        ((BITS, YES, np.array([[True], [False], [True], [True]]), (2, 4)), "a row or an output that nothing asks"),
+        ((BITS, YES, YES, (2, 3)), "not for ever more of its 4, at last for all"),
+    ],
+)
+def test_a_table_of_no_bits_or_with_rows_that_are_never_asked_is_refused(parts: Any, sentence: str) -> None:
+    with pytest.raises(UserError, match=sentence):
+        TruthTable(*parts)
+
+
+@dataclass(frozen=True)
+class Misspelled(Walker):
+    """Declares a package that there is none of."""
+
+    packages: ClassVar[tuple[str, ...]] = ("optacs",)
+
+
+def test_a_package_that_is_not_installed_is_named_before_anything_runs(tmp_path: Any, cpus: list[Any]) -> None:
+    with pytest.raises(UserError, match="The packages of 'walker' name optacs, not installed here: is it misspelled"):
+        run(Condition(Misspelled(), TASK, "direct", Budget(generations=1)), [0], Store(tmp_path), cpus)
+
+
+@dataclass(frozen=True)
+class Rounded(NParity):
+    """Its examination's success is a mean of ones, rounded."""
+
+    def examine(self, policy: Any, key: Any, level: Any) -> Any:
+        return replace(super().examine(policy, key, level), success=jnp.float32(0.99999994))
+
+
+def test_a_success_that_is_1_but_for_rounding_is_a_sentence(tmp_path: Any, cpus: list[Any]) -> None:
+    with pytest.raises(UserError, match=r"of 0\.9999999\d+, which is 1 but for rounding.*evoclaims\.envs\.averaged"):
+        run(Condition(Walker(), Rounded(3), "direct", Budget(generations=1)), [0], Store(tmp_path), cpus)

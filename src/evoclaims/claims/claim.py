@@ -8,7 +8,8 @@ from typing import Any, TypeVar
 
 import pytest
 
-from evoclaims.core.errors import UserError
+from evoclaims.core.errors import UserError, require_known
+from evoclaims.core.tiers import TIERS
 from evoclaims.judging.verdict import Outcome
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -93,12 +94,14 @@ def expected(outcome: Outcome | str, *, because: str, tier: str | None = None) -
     """Return a mark that accepts an outcome, for a whole claim or for one `pytest.param(..., marks=...)` of it.
 
     Raises:
-        UserError: for an unknown outcome, or without a reason.
+        UserError: for an unknown outcome or tier, or without a reason.
     """
     if outcome not in set(Outcome):
         raise UserError(f"There is no outcome {outcome!r}; known: {', '.join(Outcome)}.")
     if not because.strip():
         raise UserError(f"An accepted {outcome} verdict says because=...: what is known about why.")
+    if tier is not None:
+        require_known("tier", tier, TIERS)
     return pytest.mark.claim_expect(Expectation(Outcome(outcome), because, tier))
 
 

@@ -4,8 +4,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Collection
+from typing import Final
 
 from evoclaims.core.errors import UnknownNameError, UserError
+
+_COMMA: Final = re.compile(r",(?![^\[]*\])")
+"""A comma between names, and not in the parameters of one, such as "G6[cma_es,ppo]"."""
 
 
 def selected(option: str, known: Collection[str], *, incomplete: bool = False) -> set[str]:
@@ -20,7 +24,7 @@ def selected(option: str, known: Collection[str], *, incomplete: bool = False) -
         UserError: for a name that selects nothing, and when there is no name.
     """
     chosen: set[str] = set()
-    for name in filter(None, map(str.strip, option.split(","))):
+    for name in filter(None, map(str.strip, _COMMA.split(option))):
         begun = {one for one in known if name.isalpha() and re.match(rf"{name}\d", one)}
         found = {name} & set(known) or begun
         if not found:

@@ -22,8 +22,8 @@ from evoclaims.cli.terminal import styled
 from evoclaims.core.environments import Recipe, checked, checked_name, installed_here
 from evoclaims.core.errors import UnknownNameError, UserError
 from evoclaims.core.releases import released
+from evoclaims.core.tiers import TIERS
 from evoclaims.paper.config import find_root, load_config
-from evoclaims.plugin.options import TIERS
 from evoclaims.report import across_shown, across_table
 from evoclaims.report.charts_of_verdicts import across_chart
 from evoclaims.report.console import PlainSpokenConsole

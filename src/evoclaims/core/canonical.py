@@ -12,18 +12,16 @@ from typing import Any
 def as_plain(value: Any) -> Any:
     """Turn frozen dataclasses, tuples and scalars into plain JSON values.
 
-    A dataclass becomes its fields; fields whose metadata holds `canonical=False` are left out. NaN and the
+    A dataclass becomes its fields, and the name of its class if that is none of this package's, where no two with the
+    same fields mean different things. Fields whose metadata holds `canonical=False` are left out. NaN and the
     infinities become the strings "nan", "inf", "-inf", since JSON cannot express them.
 
     Raises:
         TypeError: for a value without a canonical form (an array, a function, a set, a key that is not a string).
     """
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
-        return {
-            field.name: as_plain(getattr(value, field.name))
-            for field in dataclasses.fields(value)
-            if field.metadata.get("canonical", True)
-        }
+        kind = {} if is_own(type(value)) else {"class": type(value).__qualname__}
+        return {**kind, **fields_of(value)}
     if isinstance(value, dict):
         for key in value:
             if not isinstance(key, str):  # JSON would write 1 and "1" alike
@@ -36,6 +34,20 @@ def as_plain(value: Any) -> Any:
     if value is None or isinstance(value, bool | int | float | str):
         return value
     raise TypeError(f"{type(value).__name__} has no canonical JSON form: {value!r}")
+
+
+def fields_of(value: Any) -> dict[str, Any]:
+    """Return the fields of a dataclass as plain JSON values."""
+    return {
+        field.name: as_plain(getattr(value, field.name))
+        for field in dataclasses.fields(value)
+        if field.metadata.get("canonical", True)
+    }
+
+
+def is_own(kind: type) -> bool:
+    """Whether a class is of this package."""
+    return kind.__module__.partition(".")[0] == __name__.partition(".")[0]
 
 
 def canonical_json(value: Any) -> str:

@@ -44,6 +44,14 @@ def packages_of(component: Any) -> tuple[str, ...]:
     return tuple(sorted({*declared, *(name for part in _parts(component) for name in packages_of(part))}))
 
 
+def absent(component: Any) -> tuple[str, ...]:
+    """Return the packages that a component and its parts declare, and that are not installed, or are misspelled.
+
+    Those that this project knows are not looked at: some are optional, and imports miss the others.
+    """
+    return tuple(name for name in packages_of(component) if name not in PACKAGES and version_of(name) is None)
+
+
 def _parts(component: Any) -> Iterator[Any]:
     """Yield the parts in a component's fields that have their own packages: wrapped components, declaring parts."""
     held: list[Any] = [component]

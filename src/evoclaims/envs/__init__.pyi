@@ -2,7 +2,9 @@ from evoclaims.envs.base import Episode as Episode
 from evoclaims.envs.base import Numbered as Numbered
 from evoclaims.envs.base import Task as Task
 from evoclaims.envs.base import TaskState as TaskState
+from evoclaims.envs.base import averaged as averaged
 from evoclaims.envs.base import fitting as fitting
+from evoclaims.envs.base import share as share
 from evoclaims.envs.ecorobot.boxes import Box as Box
 from evoclaims.envs.ecorobot.boxes import Surface as Surface
 from evoclaims.envs.ecorobot.brax_env import BraxEnv as BraxEnv

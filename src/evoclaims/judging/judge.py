@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+import math
 from bisect import bisect_left
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -13,7 +15,7 @@ from evoclaims.judging.fingerprint import fingerprint
 from evoclaims.judging.sample import Declared, Limited, Source, Trials, UnreadableTrialError
 from evoclaims.judging.verdict import Outcome, PValues, Verdict
 from evoclaims.trials.crashes import why
-from evoclaims.trials.result import TrialResult
+from evoclaims.trials.result import TRAINED_BY, TrialResult
 
 
 @dataclass(frozen=True)
@@ -164,20 +166,32 @@ def _copied(assertion: Assertion, trials: Trials) -> str:
     """Return a sentence that names a condition whose trials are all one and the same, or nothing.
 
     Ten copies of a trial say as much as one, and a test would take them for ten draws. What may be the same by chance
-    (a success, a network of few bits) is not enough: champions and whole training curves are. A method may say that it
-    draws nothing.
+    (a success, a network of few bits) is not enough: champions and whole training curves are, and of a training loop,
+    which keeps no champion, all that it has told, if that is more than whole numbers. A method may say that it draws
+    nothing.
     """
     for source in assertion.drawn():
         first, *others = trials[source.fingerprint]
-        if isinstance(source, Declared) and source.deterministic:
+        if not others or (isinstance(source, Declared) and source.deterministic):
             continue
-        if first.champion and others and all((a.champion, a.curves) == (first.champion, first.curves) for a in others):
+        if first.champion:
+            alike, same = all((a.champion, a.curves) == (first.champion, first.curves) for a in others), "champion"
+        else:
+            alike, same = _is_telling(first) and all(a.digest == first.digest for a in others), "metrics"
+        if alike:
             return (
-                f"all {1 + len(others)} trials of {source.label} are copies of one: the same champion and training "
-                "curves, whatever the seed. Tests take trials for independent: does the method draw from its key? One "
-                "without chance, such as a control, declares deterministic = True; in_every_trial() asserts facts"
+                f"all {1 + len(others)} trials of {source.label} are copies of one: the same {same} and training "
+                "curves, whatever the seed. Tests take trials for independent: does the method draw from its key or "
+                "seed? One without chance, such as a control, declares deterministic = True; in_every_trial() asserts "
+                "facts"
             )
     return ""
+
+
+def _is_telling(trial: TrialResult) -> bool:
+    """Whether a training loop has told a number that two of its trials hardly share by chance."""
+    told = (*trial.metrics.values(), *itertools.chain.from_iterable(trial.curves.values()))
+    return TRAINED_BY in trial.provenance and not all(number.is_integer() for number in told if math.isfinite(number))
 
 
 def _without_result(assertion: Assertion, trials: Trials) -> str:

@@ -144,9 +144,19 @@ def read_number(trial: TrialResult, what: str, read: Callable[[TrialResult], flo
     """Return what `read` finds in a finished trial, or `worst` for a failed one.
 
     Raises:
-        UnreadableTrialError: when a NaN is read from a finished trial.
+        UnreadableTrialError: when NaN or no number is read from a finished trial.
     """
-    return worst if is_failed(trial) else ranked(float(read(checked(trial))), trial, what)
+    if is_failed(trial):
+        return worst
+    value = read(checked(trial))
+    try:
+        number = float(value)
+    except (TypeError, ValueError):
+        raise UnreadableTrialError(
+            f"{what} is {value!r}, and no number, in the finished trial of seed {trial.seed_in_words}: what reads it "
+            "returns one number for a trial."
+        ) from None
+    return ranked(number, trial, what)
 
 
 def ranked(value: float, trial: TrialResult, what: str) -> float:

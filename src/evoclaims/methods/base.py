@@ -73,7 +73,11 @@ class Method(Protocol[S]):
         """Return the policy to judge: the champion, or the current deterministic policy."""
 
     def cost(self, task: Task) -> int:
-        """Return the environment steps that one step spends, counting the longest episode."""
+        """Return the environment steps that one step spends, counting the longest episode.
+
+        Of the methods here, those that evaluate a champion again beside their population leave that episode out, as
+        published budgets do.
+        """
 
 
 @runtime_checkable

@@ -105,7 +105,7 @@ class CmaEs:
         return champion_policy(self.network, task, state.champion)
 
     def cost(self, task: Task) -> int:
-        """Return the environment steps of one generation, at the longest episode."""
+        """Return the environment steps of one generation, at the longest episode, but for the champion's own."""
         return self.population * task.horizon
 
     def _search(self, task: Task) -> tuple[CMA_ES, Any]:

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from functools import partial
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any, ClassVar, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Any, ClassVar, Final, Protocol, runtime_checkable
 
 import jax
 import jax.numpy as jnp
@@ -58,6 +58,9 @@ class MapElitesState:
     reached: Float[Array, ""]
 
 
+_LOWEST: Final = float(np.finfo(np.float32).min)
+
+
 @dataclass(frozen=True)
 class MapElites:
     """QDax's MAP-Elites with iso+line variation of uniformly drawn elites (Vassiliades and Mouret 2018, GECCO).
@@ -88,6 +91,8 @@ class MapElites:
 
     def __post_init__(self) -> None:
         """Check the sizes and standard deviations."""
+        if not isinstance(self.network, Mlp):
+            raise UserError(f"MAP-Elites evolves perceptrons: network is an Mlp, and not {self.network!r}.")
         require_at_least(1, "MAP-Elites's", batch=self.batch, initial=self.initial)
         if len(self.cells) != 2 or min(self.cells) < 1:
             raise UserError(f"The grid of MAP-Elites is two numbers of cells, each at least 1, not {self.cells}.")
@@ -125,7 +130,8 @@ class MapElites:
         """Draw or vary one batch, evaluate it and put it into the archive.
 
         Metrics: "coverage" (share of the reachable cells that hold an elite), "elites" (how many there are) and
-        "reached" (see `MapElitesState`). Fitness and success are the best elite's; -inf and 0 where there is none.
+        "reached" (see `MapElitesState`). Fitness and success are the best elite's; where there is none, the lowest
+        number and 0.
 
         Raises:
             UserError: when the task's episodes do not report where they end.
@@ -224,7 +230,7 @@ class MapElites:
         filled = fitnesses > -jnp.inf
         ground = _mapped(task).reachable(self.cells)
         return Progress(
-            fitness=archive.fitnesses[elite, 0],
+            fitness=jnp.maximum(archive.fitnesses[elite, 0], _LOWEST),  # -inf would be divergence
             success=archive.extra_scores["success"][elite],
             healthy=healthy,
             metrics={

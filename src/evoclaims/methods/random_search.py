@@ -62,5 +62,5 @@ class RandomSearch:
         return champion_policy(self.network, task, state)
 
     def cost(self, task: Task) -> int:
-        """Return the environment steps of one population, at the longest episode."""
+        """Return the environment steps of one population, at the longest episode, but for the champion's own."""
         return self.population * task.horizon

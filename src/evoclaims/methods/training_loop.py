@@ -34,6 +34,7 @@ class TrainingLoop:
             trials again.
         name: of the method; the function's if empty.
         revision: raise it when the function computes something else.
+        deterministic: whether its trials have no chance in them, so that they may be copies of each other.
     """
 
     function: Callable[..., Any] | str
@@ -41,6 +42,7 @@ class TrainingLoop:
     packages: tuple[str, ...] = field(kw_only=True, metadata=_NOT_HASHED)
     name: str = field(default="", kw_only=True, metadata=_NOT_HASHED)
     revision: int = field(default=1, kw_only=True, metadata=_NOT_HASHED)
+    deterministic: bool = field(default=False, kw_only=True, metadata=_NOT_HASHED)
 
     def __post_init__(self) -> None:
         """Replace the function by its place, after checking that it takes the settings."""

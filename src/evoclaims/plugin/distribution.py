@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import pytest
 
+from evoclaims.core.errors import UserError
 from evoclaims.plugin.progress import progress_of
 
 if TYPE_CHECKING:
@@ -44,8 +45,10 @@ def prepare(session: pytest.Session, judging: Session, tests: dict[pytest.Item, 
     if given is not None:
         import msgspec
 
-        with suppress(OSError):  # a worker on another machine
-            Path(given[FILE]).write_bytes(msgspec.json.encode(load))
+        from evoclaims.core.files import write_atomically
+
+        with suppress(UserError):  # a worker on another machine
+            write_atomically(Path(given[FILE]), msgspec.json.encode(load))  # the controller may read at any time
         return
     line = progress_of(config)
     if line is not None:

@@ -13,9 +13,9 @@ import pytest
 
 from evoclaims.core.errors import UserError
 from evoclaims.core.printable import shown
+from evoclaims.core.tiers import TIERS
 from evoclaims.plugin import options
 from evoclaims.plugin.distribution import Distribution, prepare
-from evoclaims.plugin.options import TIERS
 from evoclaims.plugin.options import pytest_addoption as pytest_addoption
 from evoclaims.plugin.own_gpu import pytest_load_initial_conftests as pytest_load_initial_conftests
 from evoclaims.plugin.own_gpu import pytest_xdist_auto_num_workers as pytest_xdist_auto_num_workers
@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from evoclaims.verdicts.claim_report import ClaimReport
 
 _verdicts: pytest.StashKey[Verdicts] = pytest.StashKey()
+_reported: pytest.StashKey[bool] = pytest.StashKey()
 _ended: pytest.StashKey[pytest.Session] = pytest.StashKey()
 
 
@@ -209,10 +210,11 @@ def pytest_runtest_makereport(
         return report
     if call.excinfo and call.excinfo.errisinstance(KeyboardInterrupt):
         return report
-    if report.skipped and report.when == "teardown":  # the claim has been reported
+    if report.when == "teardown" and (report.skipped or _reported in item.stash):  # one verdict a claim
         return report
     claimed = _claim_report(item, call, report)
     setattr(report, ATTRIBUTE, claimed.to_json())
+    item.stash[_reported] = True
     if report.skipped:
         return report
     undecided = claimed.outcome == "inconclusive" and item.config.getoption("claims_undecided") == "fail"

@@ -9,11 +9,10 @@ from typing import TYPE_CHECKING, Final
 import pytest
 
 from evoclaims.core.errors import UnknownNameError, UserError
+from evoclaims.core.tiers import TIERS
 
 if TYPE_CHECKING:
     from evoclaims.claims.collected import ClaimTest
-
-TIERS: Final = ("smoke", "full")
 
 _PATHS: Final = ("--claims-storage", "--claims-json")
 """Options whose values are paths."""

@@ -13,7 +13,7 @@ import pytest
 
 from evoclaims.core.errors import UserError
 from evoclaims.core.printable import shown, spelled
-from evoclaims.plugin.options import TIERS
+from evoclaims.core.tiers import TIERS
 from evoclaims.plugin.run_session import make_session
 
 if TYPE_CHECKING:

@@ -25,10 +25,11 @@ class Budget:
     def __post_init__(self) -> None:
         """Reject budgets with no length, two lengths, or one below 1."""
         lengths = [x for x in (self.generations, self.environment_steps) if x is not None]
-        if len(lengths) != 1 or lengths[0] < 1 or self.reports < 1:
+        whole = all(type(number) is int and number >= 1 for number in (*lengths, self.reports))
+        if len(lengths) != 1 or not whole:  # 1e3 would be another trial than 1000
             raise UserError(
-                "A budget names exactly one of generations and environment_steps, at least 1, and at least one "
-                f"report; this one has generations={self.generations}, "
+                "A budget names exactly one of generations and environment_steps, a whole number of at least 1, and at "
+                f"least one report; this one has generations={self.generations}, "
                 f"environment_steps={self.environment_steps}, reports={self.reports}."
             )
 

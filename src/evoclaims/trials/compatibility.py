@@ -64,8 +64,17 @@ def traced_progress(method: Method[Any], task: Task) -> Progress:
         for name in ("action_size", "horizon", "levels"):
             if getattr(task, name) < 1:
                 raise MisfitError(f"{task.name!r} has {name} = {getattr(task, name)}, and it takes at least 1")
-        shown: TaskState = jax.eval_shape(lambda seed, level: task.reset(_key(seed), level), _NUMBER, _NUMBER)
+        begun, shown = jax.make_jaxpr(lambda seed, level: task.reset(_key(seed), level), return_shape=True)(
+            _NUMBER, _NUMBER
+        )
         _check_task_state(task, "reset", shown)
+        program = begun.jaxpr
+        read = [*program.outvars, *(given for equation in program.eqns for given in equation.invars)]
+        if task.levels > 1 and not any(program.invars[1] is one for one in read):
+            raise MisfitError(
+                f"{task.name!r} has {task.levels} levels, and its reset does the same on all of them: it does not read "
+                "`level`"
+            )
         before = jax.eval_shape(lambda seed: strong(method.init(_key(seed), task)), _NUMBER)
         jax.eval_shape(lambda state, seen: fitting(task, _policy(method, task, state)(seen)), before, shown.observation)
         action = jax.ShapeDtypeStruct((task.action_size,), jnp.float32)

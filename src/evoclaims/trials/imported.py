@@ -243,7 +243,7 @@ class Imported(Condition):
             metrics.setdefault(STEPS, curves[STEPS][-1])
         what, advice = f"Seed {seed} of {self.table.name}", "choose another column, or give the metric another name"
         check_shares(what, metrics, advice)
-        check_success(what, *curves.get("success", ()), advice=advice)
+        check_success(what, *curves.get("success", ()), solves=False, advice=advice)
         status: Status = "done" if all(map(math.isfinite, metrics.values())) else "diverged"
         spec = TrialSpec(self, number)
         return TrialResult(

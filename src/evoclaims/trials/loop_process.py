@@ -67,7 +67,7 @@ class Reporter:
             self._next = (step // self._every + 1) * self._every
         self._told = time.monotonic()
         told = numbers(values)
-        check_success("A training loop", told.get("success", 0.0), advice="report such a share")
+        check_success("A training loop", told.get("success", 0.0), solves=False, advice="report such a share")
         self._answer(LoopReport(step, told, kept))
 
 

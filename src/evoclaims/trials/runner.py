@@ -12,6 +12,8 @@ from typing import Any, Final
 import jax
 import numpy as np
 
+from evoclaims.core.errors import UserError
+from evoclaims.core.packages import absent
 from evoclaims.methods.training_loop import TrainingLoop
 from evoclaims.trials import checkpoint
 from evoclaims.trials.allowance import Allowance, OutOfTimeError
@@ -94,6 +96,12 @@ def _maker(stored: StoredTrials, devices: Sequence[jax.Device], checkpoint_secon
     """Return what makes a condition's trials: a process for each, or compiled programs, at first of `most` trials."""
     if isinstance(stored.condition.method, TrainingLoop):
         return LoopTrials(stored, devices).make
+    for component in (stored.condition.method, stored.condition.task):
+        if missing := absent(component):
+            raise UserError(
+                f"The packages of {component.name!r} name {', '.join(missing)}, not installed here: is it misspelled? "
+                "Another version of a package runs trials again, and one that is not there has none."
+            )
 
     def make(owed: Sequence[int], tell: Watcher) -> None:
         """Run batches until all trials are stored, or one turns out too large for the device's memory."""

@@ -7,7 +7,7 @@ from functools import cached_property
 from numbers import Real
 from typing import Any, Literal, get_args
 
-from evoclaims.core.canonical import as_plain, content_hash
+from evoclaims.core.canonical import as_plain, content_hash, fields_of, is_own
 from evoclaims.core.errors import UserError, require_known
 from evoclaims.core.packages import ALWAYS, installed, packages_of
 from evoclaims.envs.base import Task
@@ -42,7 +42,21 @@ def _described(component: Any) -> dict[str, Any]:
             f"{kind} is no {'dataclass' if frozen is None else 'frozen dataclass'}: write @dataclass(frozen=True) "
             "above the class, since the fields of a method or task tell its trials apart."
         )
-    return {"name": component.name, "revision": component.revision, "parameters": as_plain(component)}
+    inherited = not is_own(type(component)) and not _has_own_name(component)
+    told = {"class": kind} if inherited else {}  # it computes something else than the class whose name it has
+    try:
+        parameters = fields_of(component)
+    except TypeError as error:
+        raise UserError(
+            f"A field of {kind} tells its trials apart and is no number, word, tuple or frozen dataclass: {error}."
+        ) from error
+    return {"name": component.name, "revision": component.revision, "parameters": parameters, **told}
+
+
+def _has_own_name(component: Any) -> bool:
+    """Whether a class that is not of this package says the name, in itself, a base or a field."""
+    of_others = (base for base in type(component).__mro__ if not is_own(base))
+    return any("name" in (*vars(base), *getattr(base, "__annotations__", ())) for base in of_others)
 
 
 @dataclass(frozen=True)

@@ -12,13 +12,14 @@ SHARES: Final = ("mean_success", "last_success")
 """Names of a result's metrics that are successes."""
 
 _ROUNDING: Final = 1e-6
-"""What a share may be above 1 by rounding."""
+"""What is so close to 1 and not 1 is a mean of ones, rounded."""
 
 
 def check_success(
     what: str,
     *successes: float,
     name: str = "success",
+    solves: bool = True,
     advice: str = "make the task's or the method's success such a share",
 ) -> None:
     """Check that successes are shares; those that are not finite are divergence, which is judged elsewhere.
@@ -27,11 +28,18 @@ def check_success(
         what: reports them, such as "The examination of cma_es on n_parity".
         successes: of any number of levels or reports.
         name: of the metric or curve.
+        solves: whether a level is solved by one that is exactly 1.
         advice: what to do, as the end of a sentence.
 
     Raises:
         UserError: when one is not.
     """
+    rounded = [success for success in successes if 0.0 < abs(success - 1.0) <= _ROUNDING]
+    if rounded and solves:
+        raise UserError(
+            f"{what} reports a {name} of {rounded[0]!r}, which is 1 but for rounding, and a level is solved at exactly "
+            "1: average episodes by evoclaims.envs.averaged, or shares by evoclaims.envs.share."
+        )
     wrong = [success for success in successes if math.isfinite(success) and not 0.0 <= success <= 1.0 + _ROUNDING]
     if wrong:
         raise UserError(
@@ -44,4 +52,4 @@ def check_shares(what: str, metrics: Mapping[str, float], advice: str) -> None:
     """Check the metrics that are successes; arguments and errors are those of `check_success`."""
     for name in SHARES:
         if name in metrics:
-            check_success(what, metrics[name], name=name, advice=advice)
+            check_success(what, metrics[name], name=name, solves=False, advice=advice)

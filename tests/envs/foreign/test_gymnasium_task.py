@@ -108,3 +108,9 @@ def test_a_task_of_ours_is_an_environment_that_gymnasium_accepts() -> None:
         rewards.append(reward)
     assert (rewards, terminated, truncated) == ([0.0] * 8, True, False)
     assert isinstance(environment.action_space, gymnasium.spaces.Box)
+
+
+@pytest.mark.parametrize("level", [-1, 2])
+def test_a_task_as_an_environment_of_gymnasium_has_the_levels_that_it_has(level: int) -> None:
+    with pytest.raises(UserError, match=f"n_parity has levels 0 to 1, not {level}"):
+        GymnasiumEnv(NParity(3), level=level)

@@ -10,6 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 from numpy.typing import NDArray
 
+from evoclaims.core.errors import UserError
 from evoclaims.envs.base import Task
 
 
@@ -20,7 +21,13 @@ class GymnasiumEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
     """
 
     def __init__(self, task: Task, level: int | None = None) -> None:
-        """Wrap a task, at its last level unless another is named."""
+        """Wrap a task, at its last level unless another is named.
+
+        Raises:
+            UserError: when the task has no such level.
+        """
+        if level is not None and not 0 <= level < task.levels:
+            raise UserError(f"{task.name} has levels 0 to {task.levels - 1}, not {level}.")
         self.task = task
         self.level = task.levels - 1 if level is None else level
         self.observation_space = gymnasium.spaces.Box(-np.inf, np.inf, (task.observation_size,), np.float32)

@@ -72,6 +72,8 @@ class Descriptor:
         """Reject places that are none, and an area without room."""
         if len(self.places) != 2 or not all(isinstance(place, int) and place >= 0 for place in self.places):
             raise UserError(f"A descriptor's places are two positions in the observation from 0, not {self.places!r}.")
+        if len(self.area) != 2:
+            raise UserError(f"A descriptor's area is a range for each of its two numbers, not {self.area!r}.")
         for lowest, highest in self.area:
             if not (math.isfinite(lowest) and math.isfinite(highest) and lowest < highest):
                 raise UserError(
