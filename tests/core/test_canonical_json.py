@@ -15,6 +15,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from evoclaims.core.canonical import as_plain, canonical_json, content_hash
+from evoclaims.trials.budget import Budget
 
 scalars = st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False, allow_infinity=False) | st.text()
 values = st.recursive(
@@ -73,8 +74,10 @@ def test_a_float64_of_numpy_is_written_as_the_float_it_is() -> None:
     assert canonical_json(np.float64(0.1)) == canonical_json(0.1) == "0.1"
 
 
-def test_a_dataclass_is_its_fields_without_those_marked_as_not_canonical() -> None:
-    assert canonical_json(Outer()) == '{"name":"a","parts":[{"rate":0.5},{"rate":1.0}]}'
+def test_a_dataclass_is_its_fields_and_its_class_without_what_is_marked_as_not_canonical() -> None:
+    parts = '[{"class":"Inner","rate":0.5},{"class":"Inner","rate":1.0}]'
+    assert canonical_json(Outer()) == f'{{"class":"Outer","name":"a","parts":{parts}}}'
+    assert canonical_json(Budget(generations=3)) == '{"environment_steps":null,"generations":3,"reports":50}'  # ours
     assert content_hash(Outer()) == content_hash(dataclasses.replace(Outer(), note="another"))
     assert content_hash(Outer()) != content_hash(dataclasses.replace(Outer(), name="b"))
 

@@ -90,20 +90,13 @@ class Reproduction:
         tiers = {name: replace(tier, conditions=self._found(tier.conditions)) for name, tier in self.tiers.items()}
         object.__setattr__(self, "tiers", tiers)
         for name, one in self.variants.items():
-            self._check_variant(name, one)
+            for tier in one.conditions:  # an unknown one would change nothing, in silence
+                require_known(f"tier for the variant {name!r}", tier, self.tiers)
         variants = {
             name: replace(one, conditions={tier: self._found(these) for tier, these in one.conditions.items()})
             for name, one in self.variants.items()
         }
         object.__setattr__(self, "variants", variants)
-
-    def _check_variant(self, name: str, variant: Variant) -> None:
-        """Reject a variant of tiers or conditions that there are not: it would change nothing, in silence."""
-        for tier, changes in variant.conditions.items():
-            require_known(f"tier for the variant {name!r}", tier, self.tiers)
-            for method, task in changes:
-                known = [" on ".join(names) for names in self.tiers[tier].conditions]
-                require_known(f"condition of the {tier} tier for the variant {name!r}", f"{method} on {task}", known)
 
     def _found(self, conditions: Conditions) -> dict[Names, Condition]:
         """Return conditions whose tables are looked for in the reproduction's folder."""
