@@ -8,7 +8,10 @@ from jaxtyping import Array, Float
 
 
 class Network(Protocol):
-    """A frozen, hashable description of a network whose parameters are one flat vector."""
+    """A frozen dataclass that describes a network whose parameters are one flat vector.
+
+    Its fields are part of the ids of its trials, and so is the name of its class, unless it is one of this package.
+    """
 
     def size(self, inputs: int, outputs: int) -> int:
         """Return the number of parameters."""

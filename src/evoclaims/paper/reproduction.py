@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from evoclaims.core.errors import UnknownNameError, UserError, require_known
+from evoclaims.core.tiers import TIERS
 from evoclaims.judging.design import Design
 from evoclaims.paper.reported import FILE, Published, load_published
 from evoclaims.paper.trial_group import TrialGroup
@@ -91,7 +92,7 @@ class Reproduction:
         object.__setattr__(self, "tiers", tiers)
         for name, one in self.variants.items():
             for tier in one.conditions:  # an unknown one would change nothing, in silence
-                require_known(f"tier for the variant {name!r}", tier, self.tiers)
+                require_known(f"tier for the variant {name!r}", tier, {*TIERS, *self.tiers})
         variants = {
             name: replace(one, conditions={tier: self._found(these) for tier, these in one.conditions.items()})
             for name, one in self.variants.items()
