@@ -41,7 +41,7 @@ def test_a_right_circuit_scores_one_and_a_wrong_one_zero(trials, verdict, task):
 
 @claim(
     "C5",
-    says="Trials of one method, split into halves at random, are found different no more often than chance allows",
+    says="Trials of one method, split into halves in every way, are found different no more often than chance allows",
     where="control",
     smoke=None,
     because="it is about the judge: no fault of a method or a task can change it. How often the judge is wrong about "

@@ -88,7 +88,8 @@ def test_the_ant_does_not_escape(trials, verdict):
 
 @claim(
     "D4",
-    says="MAP-Elites finds the target of the classical deceptive task, where HyperNEAT fails",
+    says="It [the ability of HyperNEAT] also disappears when we consider the larger deceptive maze with multiple traps "
+    "where methods that explicitly optimize for diversity excel",
     where="§5.2.1, §5.2.3, Figs. 6 and 10",
     smoke="MAP-Elites finds the target behind the wall, where HyperNEAT ends at the wall",
 )

@@ -160,8 +160,9 @@ def test_map_elites_explores_the_maze(trials, verdict, claim_tier):
 
 @claim(
     "S7",
-    says="The classical deceptive task (that only differs from our maze in the absence of stepping stones) is solved "
-    "by MAP-Elites, which explores it in the same way",
+    says="In this task [the classical deceptive one, that only differs from our maze in the absence of stepping "
+    "stones], the agent's extensive exploration leads to finding the optimal policy: reaching the target on the top "
+    "left",
     where="§5.2.1, Fig. 6",
     smoke="Without stones MAP-Elites finds the target behind the wall; its elites, too, stand on a tenth of the room",
 )
