@@ -236,8 +236,13 @@ def test_trials_that_agree_by_chance_or_keep_no_champion_are_evidence(source, ch
 
 @pytest.mark.parametrize(
     ("numbers", "outcome"),
-    [([0.857], Outcome.INCONCLUSIVE), ([0.857, 0.9], Outcome.SUPPORTED), ([1.0], Outcome.SUPPORTED)],
-    ids=["one number", "two numbers", "one whole number"],
+    [
+        ([0.857], Outcome.INCONCLUSIVE),
+        ([0.857, 0.9], Outcome.SUPPORTED),
+        ([1.0], Outcome.SUPPORTED),
+        ([1], Outcome.SUPPORTED),
+    ],
+    ids=["one number", "two numbers", "one whole number", "one that is read as an int"],
 )
 def test_a_training_loop_that_tells_the_same_whatever_its_seed_is_no_evidence(source, numbers, outcome) -> None:
     a = source("a", [1.0] * 10)

@@ -191,7 +191,7 @@ def _copied(assertion: Assertion, trials: Trials) -> str:
 def _is_telling(trial: TrialResult) -> bool:
     """Whether a training loop has told a number that two of its trials hardly share by chance."""
     told = (*trial.metrics.values(), *itertools.chain.from_iterable(trial.curves.values()))
-    return TRAINED_BY in trial.provenance and not all(number.is_integer() for number in told if math.isfinite(number))
+    return TRAINED_BY in trial.provenance and not all(float(x).is_integer() for x in told if math.isfinite(x))
 
 
 def _without_result(assertion: Assertion, trials: Trials) -> str:

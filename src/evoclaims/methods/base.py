@@ -75,8 +75,7 @@ class Method(Protocol[S]):
     def cost(self, task: Task) -> int:
         """Return the environment steps that one step spends, counting the longest episode.
 
-        Of the methods here, those that evaluate a champion again beside their population leave that episode out, as
-        published budgets do.
+        Of the methods here, those that evaluate a champion again beside their population leave that episode out.
         """
 
 

@@ -47,8 +47,10 @@ def prepare(session: pytest.Session, judging: Session, tests: dict[pytest.Item, 
 
         from evoclaims.core.files import write_atomically
 
-        with suppress(UserError):  # a worker on another machine
-            write_atomically(Path(given[FILE]), msgspec.json.encode(load))  # the controller may read at any time
+        file = Path(given[FILE])
+        if file.parent.is_dir():  # not so for a worker on another machine
+            with suppress(UserError):
+                write_atomically(file, msgspec.json.encode(load))  # the controller may read at any time
         return
     line = progress_of(config)
     if line is not None:

@@ -15,7 +15,7 @@ CONTROL: Final = "control"
 
 
 def tally(reports: Sequence[ClaimReport]) -> str:
-    """Return the sentences, such as "Of 54 cases of the paper's sentences 17 are supported, …"."""
+    """Return the sentences, such as "Of 3 cases of the paper's sentences, 2 **supported** and 1 **refuted**."."""
     controls = [report for report in reports if report.where == CONTROL]
     papers = [report for report in reports if report.where != CONTROL]
     said = f"Of {plural(len(papers), 'case')} of the paper's sentences, {_counted(papers)}."
@@ -27,7 +27,7 @@ def tally(reports: Sequence[ClaimReport]) -> str:
 
 
 def _counted(reports: Sequence[ClaimReport]) -> str:
-    """Return how many ended how, such as "17 are **supported** and 3 **not run**"."""
+    """Return how many ended how, such as "17 **supported** and 3 **not run**"."""
     ended = Counter(report.outcome for report in reports)
     told = [f"{ended[outcome]} **{outcome}**" for outcome in Outcome if ended[outcome]]
     return " and ".join(filter(None, (", ".join(told[:-1]), told[-1]))) if told else "none"

@@ -1,0 +1,32 @@
+"""The sentence that counts verdicts: every outcome once, controls apart."""
+
+from __future__ import annotations
+
+import pytest
+
+from evoclaims.judging.verdict import Outcome
+from evoclaims.report.tally import CONTROL, tally
+from evoclaims.verdicts.claim_report import ClaimReport
+
+
+def _reports(where: str, *outcomes: Outcome) -> list[ClaimReport]:
+    return [ClaimReport("G1", str(case), "full", "", where, outcome, "") for case, outcome in enumerate(outcomes)]
+
+
+@pytest.mark.parametrize(
+    ("papers", "controls", "said"),
+    [
+        ((Outcome.REFUTED,), (), "Of 1 case of the paper's sentences, 1 **refuted**."),
+        (
+            (Outcome.NOT_RUN, Outcome.REFUTED, Outcome.SUPPORTED, Outcome.SUPPORTED),
+            (Outcome.SUPPORTED, Outcome.ERROR),
+            "Of 4 cases of the paper's sentences, 2 **supported**, 1 **refuted** and 1 **not run**. Of 2 cases of "
+            "controls, which test the benchmark itself, 1 **supported** and 1 **error**.",
+        ),
+        ((), (), "Of 0 cases of the paper's sentences, none."),
+    ],
+)
+def test_every_outcome_is_counted_once_and_controls_apart(
+    papers: tuple[Outcome, ...], controls: tuple[Outcome, ...], said: str
+) -> None:
+    assert tally([*_reports("§5", *papers), *_reports(CONTROL, *controls)]) == said
