@@ -93,3 +93,23 @@ def test_training_lengths_are_those_of_the_conditions(method: str) -> None:
         assert len(lengths) <= 1
         cells += [f"{steps / 1e6:,.0f}{generations}" for steps, generations in lengths] or [""]
     assert _line(cells) in PROTOCOL
+
+
+@pytest.mark.parametrize(
+    ("variant", "method", "task"),
+    [
+        ("published", "neat", "n_parity"),
+        ("published", "hyperneat", "n_parity"),
+        ("published", "cma_es", "simple_alu"),
+        ("published", "ppo", "n_parity"),
+        ("", "cma_es", "n_parity"),
+        ("rows_so_far", "neat", "n_parity"),
+        ("sigmoid", "hyperneat", "n_parity"),
+    ],
+)
+def test_success_by_level_is_the_mean_of_the_trials(variant: str, method: str, task: str) -> None:
+    folder = REPRODUCTION.references / "variants" / variant if variant else REPRODUCTION.references
+    trials = committed(folder, "full", method, task)
+    levels = zip(*(trial.levels["success"] for trial in trials), strict=True)
+    assert len(trials) == 10
+    assert " ".join(f"{statistics.mean(level):.2f}" for level in levels) in " ".join(PROTOCOL.split())
