@@ -12,9 +12,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from evoclaims.core.canonical import require_whole_numbers
 from evoclaims.core.errors import UserError
 from evoclaims.envs.gates.alu import SimpleAlu
 from evoclaims.envs.gates.parity import NParity
+from evoclaims.methods.cma_es import CmaEs
 from evoclaims.methods.hand_built import HandBuilt
 from evoclaims.methods.random_search import RandomSearch
 from evoclaims.networks.all_skips import AllSkips
@@ -220,3 +222,26 @@ def test_parts_and_subclasses_of_a_users_own_are_told_apart_by_their_classes() -
 def test_a_field_that_cannot_be_written_is_a_sentence_that_names_the_class() -> None:
     with pytest.raises(UserError, match="A field of RandomSearch tells its trials apart and is no number, word"):
         _ = Condition(RandomSearch(8, network=Mlp), TASK, "direct", BUDGET).id  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("method", "said"),
+    [
+        (CmaEs(population=16.0), r"population of CmaEs takes whole numbers: int, not 16\.0\."),  # type: ignore[arg-type]
+        (CmaEs(network=AllSkips(24.0)), r"of AllSkips takes whole numbers: int, not 24\.0\."),  # type: ignore[arg-type]
+        (CmaEs(network=Mlp((8, 8.0))), r"of Mlp takes whole numbers: tuple\[int, \.\.\.\], not \(8, 8\.0\)\."),  # type: ignore[arg-type]
+    ],
+    ids=["method", "network", "widths"],
+)
+def test_a_float_where_a_whole_number_is_declared_is_refused_with_the_name_of_the_field(
+    method: CmaEs, said: str
+) -> None:
+    with pytest.raises(UserError, match=said):
+        _ = Condition(method, NParity(3), "curriculum", Budget(generations=1)).id
+
+
+def test_a_float_in_a_class_whose_annotations_are_types_is_refused_too() -> None:
+    mine = make_dataclass("Mine", [("sizes", tuple[int, int]), ("rate", float)], frozen=True)
+    require_whole_numbers(mine((1, 2), 3))
+    with pytest.raises(UserError, match=r"sizes of Mine takes whole numbers"):
+        require_whole_numbers(mine((1, 2.5), 0.5))

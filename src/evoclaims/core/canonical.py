@@ -6,7 +6,14 @@ import dataclasses
 import hashlib
 import json
 import math
-from typing import Any
+import re
+from inspect import formatannotation
+from typing import Any, Final
+
+from evoclaims.core.errors import UserError
+
+WHOLE: Final = re.compile(r"int|tuple\[int(, (int|\.\.\.))*\]")
+"""Annotations of fields that take no float: int, and tuples of ints."""
 
 
 def as_plain(value: Any) -> Any:
@@ -43,6 +50,24 @@ def fields_of(value: Any) -> dict[str, Any]:
         for field in dataclasses.fields(value)
         if field.metadata.get("canonical", True)
     }
+
+
+def require_whole_numbers(value: Any) -> None:
+    """Refuse a float where a dataclass, or one among its fields, declares an int: 16.0 would have another id than 16.
+
+    Raises:
+        UserError: naming the field.
+    """
+    if not dataclasses.is_dataclass(value) or isinstance(value, type):
+        return
+    for field in dataclasses.fields(value):
+        given = getattr(value, field.name)
+        items = given if isinstance(given, tuple) else (given,)
+        declared = field.type if isinstance(field.type, str) else formatannotation(field.type)
+        if WHOLE.fullmatch(declared) and any(isinstance(item, float) for item in items):
+            raise UserError(f"{field.name} of {type(value).__name__} takes whole numbers: {declared}, not {given!r}.")
+        for item in items:
+            require_whole_numbers(item)
 
 
 def is_own(kind: type) -> bool:

@@ -7,7 +7,7 @@ from functools import cached_property
 from numbers import Real
 from typing import Any, Literal, get_args
 
-from evoclaims.core.canonical import as_plain, content_hash, fields_of, is_own
+from evoclaims.core.canonical import as_plain, content_hash, fields_of, is_own, require_whole_numbers
 from evoclaims.core.errors import UserError, require_known
 from evoclaims.core.packages import ALWAYS, installed, packages_of
 from evoclaims.envs.base import Task
@@ -42,6 +42,7 @@ def _described(component: Any) -> dict[str, Any]:
             f"{kind} is no {'dataclass' if frozen is None else 'frozen dataclass'}: write @dataclass(frozen=True) "
             "above the class, since the fields of a method or task tell its trials apart."
         )
+    require_whole_numbers(component)
     inherited = not is_own(type(component)) and not _has_own_name(component)
     told = {"class": kind} if inherited else {}  # it computes something else than the class whose name it has
     try:
