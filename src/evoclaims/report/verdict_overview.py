@@ -1,4 +1,4 @@
-"""All verdicts as one Markdown table: a line per sentence of the paper, a column per tier or variant."""
+"""All verdicts as a Markdown table: a line per sentence of the paper, a column per tier or variant; controls below."""
 
 from __future__ import annotations
 
@@ -11,11 +11,14 @@ from evoclaims.judging.verdict import Outcome
 from evoclaims.report.formatting import plural
 from evoclaims.report.markdown_text import literal, table
 from evoclaims.report.table_cells import NONE, in_the_papers_order
+from evoclaims.report.tally import CONTROL
 from evoclaims.report.trial_summary import Reader
 from evoclaims.verdicts.claim_report import ClaimReport
 from evoclaims.verdicts.sensitivity import Tried
 
 Versions = dict[str, str]
+_Rows = dict[tuple[str, str], dict[str, list[ClaimReport]]]
+"""Reports of a claim and a sentence, by the heading of their column."""
 
 _SHOWN: Final = ("python", "jax", "jaxlib")
 """Packages whose versions are shown for every trial; others only where a trial depends on them."""
@@ -33,7 +36,7 @@ NOT_CHANGED: Final = f"{NONE}: the variant changes none of the claim's trials, o
 
 
 def overview(columns: Mapping[str, Sequence[ClaimReport]], sentences: Mapping[str, str], reader: Reader) -> str:
-    """Return the table, and a list of the devices and versions that its letters stand for.
+    """Return a table of the paper's claims, one of the controls, and what the letters for devices and versions mean.
 
     Args:
         columns: reports by heading.
@@ -41,19 +44,25 @@ def overview(columns: Mapping[str, Sequence[ClaimReport]], sentences: Mapping[st
         reader: reads the trials behind the reports.
     """
     made = Environments(reader)
-    rows: dict[tuple[str, str], dict[str, list[ClaimReport]]] = {}
+    papers: _Rows = {}
+    controls: _Rows = {}
     for heading, reports in columns.items():
         for report in in_the_papers_order(reports):
+            rows = controls if report.where == CONTROL else papers
             line = rows.setdefault((report.claim, sentences[report.name]), defaultdict(list))
             line[heading].append(report)
-    lines = [
-        (literal(claim), literal(sentence), *(_cell(found[heading], made) for heading in columns))
-        for (claim, sentence), found in rows.items()
+    tables = [
+        _table(*headings, columns, rows, made)
+        for headings, rows in (
+            (("claim", "the paper says"), papers),
+            (("control", "what the benchmark checks"), controls),
+        )
+        if rows
     ]
     every = [report for reports in columns.values() for report in reports]
     missing = any(report.outcome is Outcome.NOT_RUN and not report.variant for report in every)
     says = [HOW, *([NOT_RUN] if missing else []), *([NOT_CHANGED] if any(report.variant for report in every) else [])]
-    blocks = (table(("claim", "the paper says", *map(literal, columns)), lines), " ".join(says), made.legend())
+    blocks = (*tables, " ".join(says), made.legend())
     return "\n\n".join(filter(None, blocks))
 
 
@@ -96,6 +105,15 @@ def _shown(versions: Iterable[tuple[str, str]], needed: Iterable[str]) -> Versio
     names = {*_SHOWN, *needed}
     known = dict(versions)
     return {name: known.get(name) or "none" for name in names}
+
+
+def _table(name: str, says: str, columns: Iterable[str], rows: _Rows, made: Environments) -> str:
+    """Return a table with a line for each sentence."""
+    lines = [
+        (literal(claim), literal(sentence), *(_cell(found[heading], made) for heading in columns))
+        for (claim, sentence), found in rows.items()
+    ]
+    return table((name, says, *map(literal, columns)), lines)
 
 
 def _cell(reports: Sequence[ClaimReport], made: Environments) -> str:
