@@ -95,6 +95,18 @@ def test_training_lengths_are_those_of_the_conditions(method: str) -> None:
     assert _line(cells) in PROTOCOL
 
 
+def test_rewards_of_neat_with_the_published_settings_are_those_of_its_trials() -> None:
+    page = " ".join(PROTOCOL.split())
+    trials = committed(REPRODUCTION.references_of("published_neat"), "full", "neat", "stones")
+    rewards = {reward: [reward(trial) for trial in trials] for reward in (_of_training, _examined)}
+    earned = (f"{statistics.mean(values):,.0f} ± {statistics.stdev(values):,.0f}" for values in rewards.values())
+    assert len(trials) == 10
+    assert "{} in training and {} afterwards".format(*earned) in page
+    assert f"(A12 {a12(rewards[_examined], _rewards('cma_es', 'stones', _examined)):.2f};" in page
+    for method in ("cma_es", "map_elites", "hyperneat"):
+        assert f"({_higher(rewards[_of_training], _rewards(method, 'stones', _of_training))})" in page
+
+
 @pytest.mark.parametrize(
     ("variant", "method", "task"),
     [
@@ -108,8 +120,7 @@ def test_training_lengths_are_those_of_the_conditions(method: str) -> None:
     ],
 )
 def test_success_by_level_is_the_mean_of_the_trials(variant: str, method: str, task: str) -> None:
-    folder = REPRODUCTION.references / "variants" / variant if variant else REPRODUCTION.references
-    trials = committed(folder, "full", method, task)
+    trials = committed(REPRODUCTION.references_of(variant), "full", method, task)
     levels = zip(*(trial.levels["success"] for trial in trials), strict=True)
     assert len(trials) == 10
     assert " ".join(f"{statistics.mean(level):.2f}" for level in levels) in " ".join(PROTOCOL.split())
