@@ -124,3 +124,12 @@ def test_success_by_level_is_the_mean_of_the_trials(variant: str, method: str, t
     levels = zip(*(trial.levels["success"] for trial in trials), strict=True)
     assert len(trials) == 10
     assert " ".join(f"{statistics.mean(level):.2f}" for level in levels) in " ".join(PROTOCOL.split())
+
+
+def test_direct_encodings_on_average_over_levels_of_simple_alu_are_those_of_the_trials() -> None:
+    def means(method: str) -> list[float]:
+        trials = committed(REPRODUCTION.references, "full", method, "simple_alu")
+        return [statistics.mean(trial.levels["success"]) for trial in trials]
+
+    neat, cma_es = (a12(means(method), means("hyperneat")) for method in ("neat", "cma_es"))
+    assert f"on Simple ALU NEAT's A12 against HyperNEAT is {neat:.2f}, CMA-ES's {cma_es:.2f}" in PROTOCOL
