@@ -72,6 +72,7 @@ def test_run_can_be_held_to_a_task_and_a_tier(evoclaims: Evoclaims, monkeypatch:
         (("run", "--tier", "ful"), "There is no tier named 'ful'. Did you mean 'full'? Known: full, smoke."),
         (("plan", "--tier", "ful"), "There is no tier named 'ful'."),
         (("plan", "--device", "tpu"), "There is no device named 'tpu'."),
+        (("plan", "--variant", "trade"), "There is no variant named 'trade'. Did you mean 'traded'? Known: traded."),
         (("status", "--tier", "ful"), "There is no tier named 'ful'."),
         (("status", "--storage", "pyproject.toml"), "is a file, not a folder"),
         (("reference", "--tier", "ful"), "There is no tier named 'ful'."),
@@ -264,6 +265,24 @@ def test_plan_tells_times_as_of_a_device_that_trials_were_made_on(evoclaims: Evo
     status, _, err = evoclaims("plan", "--like", "abacus")
     assert status == 2
     assert "No trial of the smoke tier at hand was made on a device called 'abacus'" in err
+
+
+def test_plan_of_a_variant_has_what_it_changes_and_the_claims_that_read_it(
+    evoclaims: Evoclaims, project: Project, stored: Store
+) -> None:
+    """The variant's right network is the protocol's wrong one, whose trials are stored."""
+    assert evoclaims("reference")[0] == 0
+    status, out, _ = evoclaims("plan", "--variant", "traded")
+    assert status == 0
+    assert "Conditions of the smoke tier that traded changes, on " in out
+    assert re.search(r"^right on parity +10 +0 +0 +0 s$", out, re.MULTILINE)
+    assert "wrong on parity" not in out
+    assert re.search(r"^a +10 +0.05 ", out, re.MULTILINE)
+    assert not re.search(r"^b ", out, re.MULTILINE)
+    project.write(b="refuted")
+    status, _, err = evoclaims("plan", "--variant", "traded")
+    assert status == 2
+    assert err == "evoclaims: The variant traded changes no condition that claims of the smoke tier read.\n"
 
 
 def test_plan_tells_what_the_reference_trials_have_cost(evoclaims: Evoclaims, stored: Store) -> None:

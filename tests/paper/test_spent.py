@@ -12,6 +12,7 @@ from hand_made_paper import CONDITIONS
 from evoclaims.paper import references
 from evoclaims.paper.reproduction import Reproduction
 from evoclaims.paper.spent import spent
+from evoclaims.paper.variant import Variant
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.spec import Condition
 
@@ -52,6 +53,22 @@ def test_a_core_s_pace_is_the_tier_s_own_or_another_s(reproduction: Reproduction
     assert found.core_seconds(201) == pytest.approx(120.0)
     _commit(reproduction, "full", batch(range(1), CPU))
     assert spent(reproduction, "full", "better", "small").core_seconds(100) == pytest.approx(60.0)
+
+
+def test_a_variant_s_trials_are_its_own_and_its_pace_is_the_protocol_s_where_it_has_none(
+    reproduction: Reproduction, batch: Any
+) -> None:
+    worse = Variant("The better is worse.", {"full": {("better", "small"): CONDITIONS["worse", "small"]}})
+    reproduction = replace(reproduction, variants={"worse": worse})
+    _commit(reproduction, "full", [*batch(range(5), GPU), *batch(range(2), CPU, "later")])
+    found = spent(reproduction, "full", "better", "small", "worse")
+    assert (found.trials, found.seconds) == (0, {})
+    assert found.core_seconds(201) == pytest.approx(120.0)
+    path = references.path_of(reproduction.references_of("worse"), "full", "better", "small")
+    references.write(path, batch(range(5), GPU, condition=CONDITIONS["worse", "small"]))
+    found = spent(reproduction, "full", "better", "small", "worse")
+    assert (found.trials, found.seconds) == (5, {"NVIDIA H200": 63.0})
+    assert spent(reproduction, "full", "better", "small").trials == 7
 
 
 def test_trials_of_another_condition_or_without_an_end_count_for_nothing(

@@ -128,6 +128,7 @@ def _parser() -> argparse.ArgumentParser:
     new.add_argument("--from", dest="project", metavar="PAPER", default="skeleton", help="a paper, such as nisioti2025")
 
     plan = add("plan", "say what a tier would run, what it costs here, and what its verdicts can show")
+    plan.add_argument("--variant", metavar="NAME", default="", help="what this variant of the protocol changes")
     plan.add_argument("--like", metavar="KIND", help="times as of trials made on such a device, such as 'NVIDIA H200'")
     plan.add_argument("--measure", action="store_true", help="time a few steps of conditions never run here")
 

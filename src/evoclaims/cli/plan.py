@@ -16,6 +16,7 @@ from evoclaims.methods.training_loop import TrainingLoop
 from evoclaims.paper.cost import Pace, known_pace, measured_pace
 from evoclaims.paper.reproduction import Tier
 from evoclaims.paper.spent import Spent, spent
+from evoclaims.paper.variant import Names
 from evoclaims.report.console import PlainSpokenConsole, plain_table
 from evoclaims.report.live_line import duration
 from evoclaims.trials import devices
@@ -25,7 +26,7 @@ from evoclaims.trials.spec import Condition
 from evoclaims.trials.store import Store
 from evoclaims.verdicts.claim_report import ClaimReport
 
-Costs = Mapping[tuple[str, str], Spent]
+Costs = Mapping[Names, Spent]
 """What the reference trials have cost, by method and task."""
 
 HOUR: Final = 3600
@@ -38,26 +39,35 @@ AND_MORE: Final = "\nand more"
 def main(options: argparse.Namespace) -> int:
     """Print conditions with their cost, then claims with their attainable p."""
     project = open_project(options.storage)
-    reproduction, store = project.reproduction, project.store
-    tier = reproduction.tier(options.tier)
+    reproduction, store, variant = project.reproduction, project.store, options.variant
+    tier = reproduction.tier(options.tier, variant)
     chosen = devices.choose(options.device)
     kind = options.like or chosen[0].device_kind
-    reports = project.judge(options.tier)
-    read = sorted({(source.method, source.task) for report in reports for source in report.sources})
+    (reports,) = project.judge_variants([(options.tier, variant)])
+    if variant:
+        touched = reproduction.variants[variant].conditions.get(options.tier, {})
+        reports = [report for report in reports if not touched.keys().isdisjoint(_read([report]))]
+        read = [names for names in _read(reports) if names in touched]
+        if not read:
+            raise UserError(f"The variant {variant} changes no condition that claims of the {options.tier} tier read.")
+    else:
+        read = _read(reports)
     used = [names for names in read if tier.condition(*names).existing is None]
 
     def pace(condition: Condition, method: str, task: str) -> Pace | None:
-        known = known_pace(condition, store, reproduction.references, options.tier, method, task, kind)
+        folder = reproduction.references_of(variant)
+        known = known_pace(condition, store, folder, options.tier, method, task, kind)
         compiled = not isinstance(condition.method, TrainingLoop)  # a loop has no steps that could be timed
         return measured_pace(condition, chosen) if known is None and options.measure and compiled else known
 
     paces = {names: pace(tier.condition(*names), *names) for names in used}
-    costs = {names: spent(reproduction, options.tier, *names) for names in read}
+    costs = {names: spent(reproduction, options.tier, *names, variant) for names in read}
     if options.like and not any(paces.values()):
         raise UserError(f"No trial of the {options.tier} tier at hand was made on a device called {options.like!r}.")
     console = PlainSpokenConsole(file=styled())
     where = f"as they took on one {kind}" if options.like else f"on {len(chosen)} × {kind}"
-    console.print(f"Conditions of the {options.tier} tier, {where}")
+    under = f" that {variant} changes" if variant else ""
+    console.print(f"Conditions of the {options.tier} tier{under}, {where}")
     console.print_whole(_conditions(tier, store, used, paces, project.config.seconds(None)))
     own, timed = sum(_has_run(store, tier, names) for names in used), sum(pace is not None for pace in paces.values())
     if not options.like and own < timed:
@@ -78,6 +88,8 @@ def main(options: argparse.Namespace) -> int:
         f"\nClaims: the smallest p that the design allows (n trials a side, α {tier.design.alpha:g}), and how each "
         f"look can end them: {ends}, or neither (no)"
     )
+    if variant:
+        console.print(f"The time of a claim is that of the conditions that {variant} changes.")
     console.print_whole(_claims(reports, costs))
     for report in reports:
         if report.outcome is Outcome.ERROR and not report.attainable:
@@ -87,11 +99,16 @@ def main(options: argparse.Namespace) -> int:
     return 0
 
 
+def _read(reports: Sequence[ClaimReport]) -> list[Names]:
+    """Return the conditions that claims read."""
+    return sorted({(source.method, source.task) for report in reports for source in report.sources})
+
+
 def _conditions(
     tier: Tier,
     store: Store,
-    used: Sequence[tuple[str, str]],
-    paces: dict[tuple[str, str], Pace | None],
+    used: Sequence[Names],
+    paces: dict[Names, Pace | None],
     limit: float,
 ) -> Table:
     """Build the table of conditions; steps and times are upper bounds, since a trial that has solved all levels stops.
@@ -152,7 +169,7 @@ def _spent(tier: Tier, costs: Costs) -> Table:
     return table
 
 
-def _has_run(store: Store, tier: Tier, names: tuple[str, str]) -> bool:
+def _has_run(store: Store, tier: Tier, names: Names) -> bool:
     """Whether the store has a trial of a condition, made with the installed versions."""
     stored = StoredTrials(store, tier.condition(*names))
     return any(map(stored.get, tier.design.seeds(tier.design.last.n)))
@@ -163,7 +180,7 @@ def _kinds(costs: Costs) -> list[str]:
     return sorted({kind for cost in costs.values() for kind in cost.seconds})
 
 
-def _took(costs: Costs, names: Sequence[tuple[str, str]], kind: str) -> str:
+def _took(costs: Costs, names: Sequence[Names], kind: str) -> str:
     """Return the time that the reference trials of some conditions took on a kind of accelerator."""
     found = [costs[name] for name in names]
     seconds = sum(cost.seconds.get(kind, 0.0) for cost in found)
@@ -188,7 +205,7 @@ def _claims(reports: Sequence[ClaimReport], costs: Costs) -> Table:
     table = plain_table(("claim", "n", "α", "p for", "p\nagainst", "can\nend", *took), (), names=0)
     table.columns[0].justify = "left"
     for report in reports:
-        used = [(source.method, source.task) for source in report.sources]
+        used = [names for names in _read([report]) if names in costs]
         for look in report.attainable:
             smallest = {Outcome.SUPPORTED: look.supported, Outcome.REFUTED: look.refuted}
             reach = [outcome.symbol for outcome, p in smallest.items() if p <= look.alpha]

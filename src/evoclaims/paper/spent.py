@@ -32,21 +32,21 @@ class Spent:
         return None if self.core_pace is None else self.core_pace * steps
 
 
-def spent(reproduction: Reproduction, tier: str, method: str, task: str) -> Spent:
-    """Return what the committed trials of a condition have cost.
+def spent(reproduction: Reproduction, tier: str, method: str, task: str, variant: str = "") -> Spent:
+    """Return what the committed trials of a condition have cost, under the protocol or a variant of it.
 
     Raises:
         UserError: when a file of reference trials cannot be read.
     """
-    condition = reproduction.tier(tier).condition(method, task)
-    folder = reproduction.references
-    committed = references.committed(folder, tier, method, task)
+    condition = reproduction.tier(tier, variant).condition(method, task)
+    committed = references.committed(reproduction.references_of(variant), tier, method, task)
     trials = [trial for trial in committed if trial.condition == condition.id]
     seconds: dict[str, float] = defaultdict(float)
     for batch in _batches(trials):
         if batch.layout != "alone":
             seconds[str(batch.trials[0].device["kind"])] += batch.run + batch.compile
-    others = (references.committed(folder, name, method, task) for name in reproduction.tiers if name != tier)
+    tiers = [name for name in reproduction.tiers if variant or name != tier]
+    others = (references.committed(reproduction.references, name, method, task) for name in tiers)
     paces = (_core_pace(found) for found in (trials, *others))
     return Spent(len(trials), dict(seconds), next((pace for pace in paces if pace is not None), None))
 
