@@ -111,5 +111,10 @@ def test_a_difference_that_single_precision_cannot_hold_is_no_drift(case) -> Non
     assert row.median_new == row.median_ref
 
 
+def test_a_value_without_limit_is_not_taken_for_the_largest_finite_one(case) -> None:
+    (row,) = check_drift([case([math.inf] * 5, [1.0, 2.0] * 5)]).rows
+    assert (row.status, row.median_new, row.median_ref) == ("drift", math.inf, 1.5)
+
+
 def test_values_that_single_precision_tells_apart_are_told_apart(case) -> None:
     assert check_drift([case([0.9008] * 5, [0.9007] * 10)]).drifted

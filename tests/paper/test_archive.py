@@ -40,6 +40,17 @@ def test_a_committed_trial_comes_before_one_that_ran_out_of_time(
     assert [trial and trial.status for trial in found] == ["done", "timeout"]
 
 
+def test_a_stored_trial_of_other_versions_comes_before_one_that_ran_out_of_time_here(
+    store: Store, made: Any, reproduction: Reproduction
+) -> None:
+    condition = reproduction.tier("smoke").condition("better", "small")
+    here, packages = dict(condition.versions), list(condition.versions)
+    store.put(made(condition, 0, 0.0, "timeout", versions=here, depends_on=packages), {})
+    store.put(made(condition, 0, 1.0, versions={**here, "jax": "0.0.1"}, depends_on=packages), {})
+    assert len(store.records(made(condition, 0, 1.0).id)) == 2
+    assert [trial and trial.status for trial in Archive(store).trials(condition, [0])] == ["done"]
+
+
 def test_a_torn_file_of_reference_trials_is_said(
     tmp_path: Path, store: Store, made: Any, reproduction: Reproduction
 ) -> None:

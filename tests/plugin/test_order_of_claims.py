@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import json
 import re
+import sys
 from pathlib import Path
 from typing import Any
 
 import pytest
+
+from evoclaims.cli import main
 
 CLAIMS = """
 @says('coin')
@@ -93,3 +96,22 @@ def test_xdists_workers_get_claims_in_an_order_of_their_own_and_the_controller_t
     assert order(result) == ["wrong", "plain", "own", "right", "last", "coin"]
     (line,) = [line for line in result.outlines if " claims, " in line]
     assert re.match(r"  [0-3]/4 claims, 20/30 trials; coin on parity: ", line)
+
+
+def test_a_run_that_takes_processors_hours_is_told_of_beforehand(
+    project: Any, stored: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The right network solves every level at once, but its budget is long at the pace of the reference trials."""
+    project.write(right="supported")
+    assert main(["reference", "--storage", str(stored.root)]) == 0
+    monkeypatch.delitem(sys.modules, "tiny_paper")
+    paper = project.path / "tiny_paper.py"
+    paper.write_text(paper.read_text().replace("Tier(conditions(2)", "Tier(conditions(10**9)"))
+    told = "The missing trials take up to "
+    result = project.run("-m", "full", "--claims-device=cpu", own_store=True)
+    (line,) = [line for line in result.outlines if told in line]
+    hours = re.search(r"up to ([\d,]+) hours of a processor's core here\. `evoclaims plan` of this tier says", line)
+    assert hours
+    assert int(hours[1].replace(",", "")) > 1_000
+    again = project.run("-m", "full", "--claims-device=cpu", own_store=True)
+    assert told not in str(again.stdout)  # they are stored by now

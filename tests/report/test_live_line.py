@@ -9,7 +9,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from evoclaims.claims.overview import Overview
-from evoclaims.report.live_line import LOG_SECONDS, REWRITE_SECONDS, LiveLine, describe, describe_all, duration
+from evoclaims.claims.workload import LONG, Work, Workload
+from evoclaims.report.live_line import (
+    LOG_SECONDS,
+    REWRITE_SECONDS,
+    LiveLine,
+    beforehand,
+    describe,
+    describe_all,
+    duration,
+)
 from evoclaims.trials.progress import RunProgress
 from evoclaims.trials.running import Running
 
@@ -149,3 +158,19 @@ def test_the_line_of_claims_says_what_runs_how_much_is_done_and_when_it_will_end
 )
 def test_a_length_of_time_is_written_as_people_write_it(seconds: float, words: str) -> None:
     assert duration(seconds) == words
+
+
+def test_a_run_of_hours_is_told_of_with_what_is_unknown_of_it_and_a_short_one_is_not() -> None:
+    def told(**core_seconds: float | None) -> str:
+        works = {
+            name: Work(name, name, LONG, 0, ("file",), None, None, seconds) for name, seconds in core_seconds.items()
+        }
+        return beforehand(Workload("store", {}, works))
+
+    assert told() == told(a=3_599.0) == told(a=None) == ""
+    assert told(a=5_400.0, b=5_400.0).startswith(
+        "The missing trials take up to 3 hours of a processor's core here. `ev"
+    )
+    assert told(a=7_200.0, b=None).startswith(
+        "The missing trials take up to 2 hours of a processor's core here, and more of which no trial tells. `evoclaims"
+    )

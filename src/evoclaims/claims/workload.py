@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from statistics import median
-from typing import Any
+from typing import Any, Final
 
 import pytest
 
@@ -21,12 +21,16 @@ from evoclaims.core.provenance import machine_class
 from evoclaims.judging.assertion import Assertion
 from evoclaims.paper import references
 from evoclaims.paper.cost import took
+from evoclaims.paper.spent import spent
 from evoclaims.paper.trial_group import TrialGroup
 from evoclaims.trials import devices
 from evoclaims.trials.batches import StoredTrials
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.spec import Condition, TrialSpec
 from evoclaims.trials.store import DamagedFileError, Store
+
+LONG: Final = 10**9
+"""Environment steps that take a processor's core ten minutes or more."""
 
 
 @dataclass(frozen=True)
@@ -42,6 +46,8 @@ class Work:
         here: seconds that the missing trials will take, or all if none is missing, by stored trials of this machine;
             None where there are none.
         elsewhere: the same by the committed reference trials, whatever machine they were made on.
+        core_seconds: of a processor's core that the missing trials take at most, at the pace of reference trials of any
+            tier; None on an accelerator, for short work, and where no such trial was made on a processor.
     """
 
     label: str
@@ -51,6 +57,7 @@ class Work:
     missing: tuple[str, ...]
     here: float | None
     elsewhere: float | None
+    core_seconds: float | None = None
 
 
 @dataclass(frozen=True)
@@ -97,6 +104,12 @@ def weights(works: Iterable[Work]) -> dict[Work, float]:
     return dict.fromkeys(works, 0.0) | {
         work: work.environment_steps * pace if took is None else took for work, took in known.items()
     }
+
+
+def core_seconds(works: Iterable[Work]) -> tuple[float, bool]:
+    """Return the seconds of a processor's core that long work takes, and whether they are known of all of it."""
+    long = [work for work in works if work.environment_steps >= LONG]
+    return sum(work.core_seconds or 0.0 for work in long), all(work.core_seconds is not None for work in long)
 
 
 def scale_of(pairs: Iterable[tuple[float | None, float | None]]) -> float | None:
@@ -155,20 +168,25 @@ def _work(session: Session, fetch: RunMissing, tier: str, group: TrialGroup, pla
     stored = StoredTrials(session.store, condition, fetch.any_version, fetch.time_limit)
     missing = [seed for seed in seeds if condition.existing is None and _lacks(stored, seed)]
     timed = len(missing) or len(seeds)
-    here, elsewhere = took(_made_here(session.store, condition, seeds), platform), None
+    steps = condition.environment_steps * len(missing)
+    here, elsewhere, slow = took(_made_here(session.store, condition, seeds), platform), None, None
     with suppress(UserError):  # what is wrong with the reference trials is told at the end of the run
         folder = session.reproduction.references_of(session.variant)
         trials = references.committed(folder, tier, group.method, group.task)
         elsewhere = took((one for one in trials if one.condition == condition.id), platform)
+        if platform == "cpu" and steps >= LONG:
+            cost = spent(session.reproduction, tier, group.method, group.task, session.variant)
+            slow = cost.core_seconds(steps)
     files = (session.store.record_path(TrialSpec(condition, seed).id, versions) for seed in missing)
     return Work(
         label=group.label,
         programs=condition.programs,
-        environment_steps=condition.environment_steps * len(missing),
+        environment_steps=steps,
         stored=len(seeds) - len(missing),
         missing=tuple(str(path.relative_to(session.store.root)) for path in files),
         here=None if here is None else here.seconds(timed),
         elsewhere=None if elsewhere is None else elsewhere.seconds(timed),
+        core_seconds=slow,
     )
 
 

@@ -185,7 +185,8 @@ def _as_exact_as_float32(*sides: Sequence[float]) -> list[list[float]]:
     exact: dict[float, float] = {}
     last = -math.inf
     for value in sorted({value for side in sides for value in side}):
-        near = math.isfinite(last) and value - last <= RESOLUTION * max(abs(value), abs(last))
+        bounded = math.isfinite(last) and math.isfinite(value)
+        near = bounded and value - last <= RESOLUTION * max(abs(value), abs(last))
         exact[value] = exact[last] if near else value
         last = value
     return [[exact[value] for value in side] for side in sides]

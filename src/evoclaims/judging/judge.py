@@ -177,7 +177,8 @@ def _copied(assertion: Assertion, trials: Trials) -> str:
         if first.champion:
             alike, same = all((a.champion, a.curves) == (first.champion, first.curves) for a in others), "champion"
         else:
-            alike, same = _is_telling(first) and all(a.digest == first.digest for a in others), "metrics"
+            told = bool(first.digest) and _is_telling(first)  # a pilot keeps no digest
+            alike, same = told and all(a.digest == first.digest for a in others), "metrics"
         if alike:
             return (
                 f"all {1 + len(others)} trials of {source.label} are copies of one: the same {same} and training "

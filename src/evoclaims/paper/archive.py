@@ -45,6 +45,8 @@ class Archive:
     def get(self, trial: str, versions: Versions | None = None) -> TrialResult | None:
         """Return the record of the trial with this id, if possible made with `versions` of its packages, or None.
 
+        One that ran out of time, here or elsewhere, stands back behind every one that came to an end.
+
         Raises:
             UserError: when a record, or a file of reference trials, is damaged or edited.
         """
@@ -53,10 +55,10 @@ class Archive:
             return here
         committed = self._committed.get(trial, ())
         agreeing = next((one for one in committed if versions is not None and agree(one.provenance, versions)), None)
-        if here is not None or agreeing is not None:
-            return agreeing or newest(committed) or here
+        if agreeing is not None:
+            return agreeing
         records = self.store.records(trial)
-        return newest(filter(is_final, records)) or newest(committed) or newest(records)
+        return newest(filter(is_final, records)) or newest(committed) or here or newest(records)
 
     def trials(self, condition: Condition, seeds: Sequence[int]) -> tuple[TrialResult | None, ...]:
         """Return a condition's trial for each seed, or None; this environment's records come first."""

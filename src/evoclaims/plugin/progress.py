@@ -43,9 +43,15 @@ class ProgressLine:
         self._ticking: threading.Thread | None = None
 
     def begin(self, load: Workload, workers: int, tick: bool) -> None:
-        """Begin to show how far a run is; with `tick`, now and then by itself, else whenever a run tells something."""
-        from evoclaims.claims.overview import Watching
+        """Begin to show how far a run is; with `tick`, now and then by itself, else whenever a run tells something.
 
+        A run that takes a processor hours is told of beforehand.
+        """
+        from evoclaims.claims.overview import Watching
+        from evoclaims.report.live_line import beforehand
+
+        if told := beforehand(load):
+            self._write(f"\n{told}\n")
         self._watching = Watching(load, workers)
         if tick and self._ticking is None:
             self._ticking = threading.Thread(target=self._tick, daemon=True)

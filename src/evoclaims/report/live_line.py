@@ -10,11 +10,15 @@ from collections.abc import Callable
 from typing import Final
 
 from evoclaims.claims.overview import Overview
+from evoclaims.claims.workload import Workload, core_seconds
 from evoclaims.core.printable import printable
 from evoclaims.trials.progress import RunProgress
 
 LOG_SECONDS: Final = 60.0
 """Least time between two lines of a log."""
+
+HOUR: Final = 3600.0
+"""Seconds."""
 
 REWRITE_SECONDS: Final = 0.5
 """Least time between two states of the line on a terminal."""
@@ -98,6 +102,18 @@ def _briefly(progress: RunProgress) -> str:
         return printable(f"{progress.condition}: {progress.phase}")
     done = f"{progress.ended}/{progress.trials}, step {progress.steps:,}/{progress.total_steps:,}"
     return printable(f"{progress.condition}: {done}")
+
+
+def beforehand(load: Workload) -> str:
+    """Return what is to be known before a run of hours on processors; empty for a shorter one."""
+    seconds, whole = core_seconds(load.conditions.values())
+    if seconds < HOUR:
+        return ""
+    return (
+        f"The missing trials take up to {seconds / HOUR:,.0f} hours of a processor's core here"
+        f"{'' if whole else ', and more of which no trial tells'}. `evoclaims plan` of this tier says which, and what "
+        "they took elsewhere. A run that is stopped goes on where it was."
+    )
 
 
 def duration(seconds: float) -> str:
