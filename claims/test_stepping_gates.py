@@ -46,7 +46,7 @@ PAIRS = [
 @expected(
     Outcome.REFUTED,
     tier="full",
-    because="local optima: nearly all of the population ties one row short; full: 2 of 10 solve 6-parity, none of 10 "
+    because="local optima: nearly all of the population ties one row short; full: 2 of 10 solve 6-parity, one of 10 "
     "gets past XOR in the ALU. The published code trains a 4 x 32 perceptron instead of the network of appendix A.3: "
     "with that 10 of 10 solve 6-parity and 4 of 10 the ALU (docs/protocol.md)",
 )

@@ -22,8 +22,8 @@ EVOLVED = [
         marks=expected(
             Outcome.REFUTED,
             tier="full",
-            because="its champions cross 0.5 to 2.0 stones (mean 1.6) in ten episodes other than those that made them "
-            "champions, in no trial more than two",
+            because="its champions cross 1.0 to 2.6 stones (mean 1.6) in ten episodes other than those that made them "
+            "champions, in one trial more than two",
         ),
     ),
 ]
@@ -105,7 +105,7 @@ def test_ppo_stays_at_the_first_stone(trials, verdict, claim_tier, method):
     [
         "hyperneat",
         pytest.param(
-            "cma_es", marks=expected(Outcome.REFUTED, tier="full", because=f"{LUCKY}; CMA-ES, 1,100 to 2,700")
+            "cma_es", marks=expected(Outcome.REFUTED, tier="full", because=f"{LUCKY}; CMA-ES, 1,700 to 2,900")
         ),
         "map_elites",
         "ppo",
@@ -187,7 +187,7 @@ def test_map_elites_finds_the_target_without_stones(trials, verdict, claim_tier)
     where="§5.2.1, Fig. 5",
     smoke="CMA-ES collects less reward than NEAT in the room with three stones, but more than a random policy",
 )
-@expected(Outcome.REFUTED, tier="full", because=f"{LUCKY}; CMA-ES, 1,100 to 2,700")
+@expected(Outcome.REFUTED, tier="full", because=f"{LUCKY}; CMA-ES, 1,700 to 2,900")
 def test_cma_es_is_below_neat(trials, verdict, claim_tier):
     cma_es = trials("cma_es", on="stones")
     neat = trials("neat", on="stones")

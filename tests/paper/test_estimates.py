@@ -20,16 +20,23 @@ LONGER = replace(CONDITION, budget=Budget(generations=400))
 
 
 def _trials(
-    run: float, platform: str = "cpu", condition: Condition = CONDITION, count: int = 4, started: str = "monday"
+    run: float,
+    platform: str = "cpu",
+    condition: Condition = CONDITION,
+    count: int = 4,
+    started: str = "monday",
+    cores: int | None = 1,
 ) -> list[TrialResult]:
     """Return a batch of trials that spent half of the budget."""
+    timing = {"run": run, "compile": 2.0, "batch": count, "started": started}
+    timing |= {"cores": cores} if platform == "cpu" and cores else {}
     return [
         sound(
             TrialSpec(condition, seed).plain,
             metrics={"environment_steps": condition.environment_steps / 2},
             levels={},
             curves={},
-            timing={"run": run, "compile": 2.0, "batch": count, "started": started},
+            timing=timing,
             provenance={"device": {"platform": platform, "kind": platform, "count": 1}},
         )
         for seed in range(count)
@@ -54,6 +61,24 @@ def test_of_several_batches_the_largest_counts() -> None:
 def test_another_condition_of_the_same_names_counts_by_its_pace() -> None:
     assert _seconds("cpu", (LONGER, 4, _trials(20.0))) == [2.0 + 4 * 2 * 20.0]  # four budgets, and each to its end
     assert _seconds("gpu", (LONGER, 4, _trials(20.0, "gpu"))) == [2.0 + 4 * 2 * 20.0]
+
+
+def test_trials_that_ran_side_by_side_took_the_time_of_so_many_cores() -> None:
+    batch = _trials(20.0, cores=2)
+    assert _seconds("cpu", (CONDITION, 8, batch)) == [2.0 + 80.0]
+    assert _seconds("cpu", (CONDITION, 8, batch), cores=2) == [2.0 + 40.0]
+
+
+def test_where_a_record_tells_no_cores_it_had_as_many_as_are_here(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("evoclaims.paper.estimates.usable_cores", lambda: 2)
+    assert _seconds("cpu", (CONDITION, 8, _trials(20.0, cores=None)), cores=2) == [2.0 + 40.0]
+
+
+def test_a_trial_that_is_both_stored_and_committed_ran_once() -> None:
+    batch = _trials(20.0)
+    assert _seconds("cpu", (CONDITION, 8, [*batch, *batch])) == _seconds("cpu", (CONDITION, 8, batch))
+    longer = _seconds("cpu", (LONGER, 4, batch))
+    assert _seconds("cpu", (LONGER, 4, [*batch, *batch])) == longer
 
 
 def test_what_has_not_run_on_such_a_device_counts_by_its_budget_at_the_pace_of_the_others() -> None:

@@ -18,7 +18,7 @@ from evoclaims.trials.spec import Condition
 
 BETTER = CONDITIONS["better", "small"]
 GPU = {"platform": "gpu", "kind": "NVIDIA H200", "count": 1}
-CPU = {"platform": "cpu", "kind": "cpu", "count": 2}
+CPU = {"platform": "cpu", "kind": "cpu", "count": 1}
 
 
 @pytest.fixture
@@ -26,9 +26,14 @@ def batch(made: Callable[..., TrialResult]) -> Callable[..., list[TrialResult]]:
     """A function that makes trials of one batch, which ran for 60 seconds after compiling for 3."""
 
     def make(
-        seeds: Sequence[int], device: dict[str, Any], started: str = "now", condition: Condition = BETTER
+        seeds: Sequence[int],
+        device: dict[str, Any],
+        started: str = "now",
+        condition: Condition = BETTER,
+        cores: int | None = 2,
     ) -> list[TrialResult]:
         timing = {"run": 60.0, "compile": 3.0, "batch": len(seeds), "started": started}
+        timing |= {"cores": cores} if device is CPU and cores else {}
         return [replace(made(condition, seed, 1.0, device=device), timing=timing) for seed in seeds]
 
     return make
@@ -69,6 +74,17 @@ def test_a_variant_s_trials_are_its_own_and_its_pace_is_the_protocol_s_where_it_
     found = spent(reproduction, "full", "better", "small", "worse")
     assert (found.trials, found.seconds) == (5, {"NVIDIA H200": 63.0})
     assert spent(reproduction, "full", "better", "small").trials == 7
+
+
+def test_a_core_s_pace_is_not_known_where_no_record_tells_how_many_ran_side_by_side(
+    reproduction: Reproduction, batch: Any
+) -> None:
+    _commit(reproduction, "full", batch(range(2), CPU, cores=None))
+    assert spent(reproduction, "full", "better", "small").core_pace is None
+    _commit(reproduction, "smoke", batch(range(2), CPU))
+    assert spent(reproduction, "full", "better", "small").core_seconds(201) == pytest.approx(120.0)
+    _commit(reproduction, "full", batch(range(1), CPU, cores=None))  # a trial alone has one
+    assert spent(reproduction, "full", "better", "small").core_seconds(100) == pytest.approx(60.0)
 
 
 def test_trials_of_another_condition_or_without_an_end_count_for_nothing(

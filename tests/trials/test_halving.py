@@ -76,7 +76,9 @@ def test_trials_are_the_same_to_the_bit_whatever_fits_into_memory(
 def test_halves_go_on_from_the_last_checkpoint(store: Store, cpus: list[Any], small_memory: Small) -> None:
     small_memory("advance", 3, from_step=4)
     log = Log()
-    run_climbers(store, cpus, log)
+    results = run_climbers(store, cpus, log)
+    halves = Counter(result.timing["started"] for result in results)
+    assert sorted(halves.values()) == [2, 3]  # batches of their own, so that their times add up
     phases = [progress.phase for progress in log]
     split = next(place for place, phase in enumerate(phases) if "memory" in phase)
     assert "training" in phases[:split]

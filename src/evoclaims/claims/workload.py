@@ -20,7 +20,7 @@ from evoclaims.core.errors import UserError
 from evoclaims.core.provenance import machine_class
 from evoclaims.judging.assertion import Assertion
 from evoclaims.paper import references
-from evoclaims.paper.cost import took
+from evoclaims.paper.recorded_batches import took
 from evoclaims.paper.spent import spent
 from evoclaims.paper.trial_group import TrialGroup
 from evoclaims.trials import devices

@@ -13,7 +13,7 @@ from evoclaims.cli.terminal import styled
 from evoclaims.core.errors import UserError
 from evoclaims.judging.verdict import Outcome
 from evoclaims.methods.training_loop import TrainingLoop
-from evoclaims.paper.cost import Pace, known_pace, measured_pace
+from evoclaims.paper.pace import Pace, known_pace, measured_pace
 from evoclaims.paper.reproduction import Tier
 from evoclaims.paper.spent import Spent, spent
 from evoclaims.paper.variant import Names

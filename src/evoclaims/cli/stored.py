@@ -11,7 +11,7 @@ from evoclaims.cli.project import Project
 from evoclaims.core.errors import UserError
 from evoclaims.core.files import write_once, write_where_named
 from evoclaims.core.printable import printable
-from evoclaims.paper.cost import known_pace
+from evoclaims.paper.pace import known_pace
 from evoclaims.report.live_line import duration
 from evoclaims.trials import champions, devices
 from evoclaims.trials.crashes import why

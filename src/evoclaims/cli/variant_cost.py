@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from evoclaims.cli.running import Execution
 from evoclaims.paper import references
-from evoclaims.paper.cost import known_pace
+from evoclaims.paper.pace import known_pace
 from evoclaims.paper.variant import Names
 from evoclaims.report.formatting import plural
 from evoclaims.report.live_line import duration

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 from typing import Final, TypeVar
 
 from evoclaims.paper import references
-from evoclaims.paper.cost import by_batch
+from evoclaims.paper.recorded_batches import by_batch
 from evoclaims.paper.reproduction import Reproduction
-from evoclaims.trials.devices import layout_on
+from evoclaims.trials.devices import layout_on, usable_cores
 from evoclaims.trials.result import COMPLETE, TrialResult
 from evoclaims.trials.spec import Condition
 
@@ -100,7 +100,7 @@ def _known(one: Missing, platform: str, layout: str) -> Estimate | None:
     batch = max(same or batches[:1], key=lambda batch: len(batch.trials))
     steps = [max(float(trial.metrics.get("environment_steps", 0.0)), 1.0) for trial in batch.trials]
     if layout == "alone":
-        used = batch.core_seconds
+        used = batch.core_seconds or batch.run * min(usable_cores(), len(steps))  # untold: as if here
         work = used * one.trials / len(steps) if same else used / sum(steps) * _steps(one, layout)
     else:
         work = batch.run if same else batch.run / max(steps) * _steps(one, layout)

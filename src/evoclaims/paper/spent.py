@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from evoclaims.paper import references
-from evoclaims.paper.cost import RecordedBatch, by_batch
+from evoclaims.paper.recorded_batches import RecordedBatch, by_batch
 from evoclaims.paper.reproduction import Reproduction
 from evoclaims.trials.result import TrialResult
 
@@ -20,7 +20,7 @@ class Spent:
         trials: how many there are.
         seconds: of one accelerator, by its kind, with compiling; empty when no trial was made on one.
         core_pace: seconds of a CPU's core per environment step, by trials of the same method and task, if need be of
-            another tier; None where none was made on a CPU.
+            another tier; None where none was made on a CPU whose number of cores they tell.
     """
 
     trials: int
@@ -52,10 +52,10 @@ def spent(reproduction: Reproduction, tier: str, method: str, task: str, variant
 
 
 def _core_pace(trials: Iterable[TrialResult]) -> float | None:
-    """Return the seconds of a core per environment step."""
-    batches = [batch for batch in _batches(trials) if batch.layout == "alone"]
+    """Return the seconds of a core per environment step, by batches whose records tell how many cores they had."""
+    batches = [batch for batch in _batches(trials) if batch.layout == "alone" and batch.core_seconds is not None]
     steps = sum(trial.metrics.get("environment_steps", 0.0) for batch in batches for trial in batch.trials)
-    return sum(batch.core_seconds for batch in batches) / steps if steps else None
+    return sum(batch.core_seconds or 0.0 for batch in batches) / steps if steps else None
 
 
 def _batches(trials: Iterable[TrialResult]) -> list[RecordedBatch]:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import logging
 from dataclasses import replace
+from datetime import UTC, datetime
 
 import jax
 
@@ -54,8 +55,9 @@ def halved(run: Run, tried: Header) -> int:
     if header is not None:
         state = checkpoint.restore(run.store.checkpoints, header, run.lanes.shapes(len(header.lanes)))
         if state is not None:  # else another process goes on with it
-            for part in (left[:half], left[half:]):
-                _save(run, header, state, part)
+            _save(run, header, state, left[:half])
+            now = datetime.now(UTC).isoformat()  # the second half begins anew: what both have had counts once
+            _save(run, replace(header, started=now, run_seconds=0.0, compile_seconds=0.0), state, left[half:])
             checkpoint.remove(run.store.checkpoints, header)
     return half
 

@@ -51,7 +51,7 @@ class Record(Struct):
 
 
 class Metrics(Struct):
-    """The metrics of every trial that ran to its end (see `outcome.make_result`); tasks add their own."""
+    """The metrics of every trial that ran to its end (see `result_making.make_result`); tasks add their own."""
 
     mean_success: Number
     last_success: Number
@@ -77,6 +77,7 @@ class Timing(Struct):
     batch: Annotated[int, Meta(ge=1)]
     started: str
     ended: str = ""
+    cores: Annotated[int, Meta(ge=1)] | None = None
 
 
 class Device(Struct):

@@ -19,7 +19,7 @@ from evoclaims.trials import checkpoint
 from evoclaims.trials.allowance import Allowance, OutOfTimeError
 from evoclaims.trials.batches import Batch, Run, StoredTrials, batches, drop_finished_checkpoints
 from evoclaims.trials.checkpoint import Header
-from evoclaims.trials.devices import single_threaded_linear_algebra
+from evoclaims.trials.devices import single_threaded_linear_algebra, usable_cores
 from evoclaims.trials.halving import halved, is_exhausted
 from evoclaims.trials.imported import into_store
 from evoclaims.trials.lanes import Lanes, picked
@@ -238,12 +238,13 @@ def _give_up(run: Run, header: Header) -> None:
 
 def _timing(run: Run, header: Header) -> dict[str, Any]:
     """Return the timing for the records of a batch's trials."""
-    return {
+    timing = {
         "run": header.run_seconds,
         "compile": header.compile_seconds + run.lanes.seconds,
         "batch": len(header.batch),
         "started": header.started,
     }
+    return {**timing, "cores": usable_cores()} if run.lanes.layout == "alone" else timing
 
 
 def _rearranged(run: Run, batch: Batch) -> Batch:

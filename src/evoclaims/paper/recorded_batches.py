@@ -1,0 +1,64 @@
+"""Batches of trials as their records tell them: what ran together, and how long that took."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+from evoclaims.trials.devices import layout_on
+from evoclaims.trials.result import COMPLETE, TrialResult
+
+
+@dataclass(frozen=True)
+class RecordedBatch:
+    """Trials that ran together, as their records say.
+
+    Attributes:
+        trials: at least one, each once.
+        compile, run: seconds, until the last trial had ended.
+        layout: see `program.over_trials`.
+        cores: of a processor that ran trials side by side; None where the records do not tell.
+    """
+
+    trials: Sequence[TrialResult]
+    compile: float
+    run: float
+    layout: str
+    cores: int | None
+
+    @property
+    def core_seconds(self) -> float | None:
+        """Seconds of a processor's core, as if all cores had been busy to the end; None where that is not told."""
+        cores = 1 if len(self.trials) == 1 else self.cores
+        return None if cores is None else self.run * min(cores, len(self.trials))
+
+    def seconds(self, trials: int) -> float:
+        """Return about how long so many trials of the same condition take."""
+        return self.compile + self.run * (trials / len(self.trials) if self.layout == "alone" else 1)
+
+
+def took(trials: Iterable[TrialResult], platform: str) -> RecordedBatch | None:
+    """Return the largest batch among trials of one condition on a platform; None if there is none."""
+    return largest(trial for trial in trials if trial.device.get("platform") == platform)
+
+
+def largest(trials: Iterable[TrialResult]) -> RecordedBatch | None:
+    """Return the largest batch of trials that came to an end; None if there is none."""
+    ended = by_batch(trial for trial in trials if trial.status in COMPLETE)
+    return max(ended, key=lambda batch: len(batch.trials), default=None)
+
+
+def by_batch(trials: Iterable[TrialResult]) -> list[RecordedBatch]:
+    """Return trials by batch, in the order of the first of each; a trial that is given twice counts once."""
+    batches: dict[tuple[str, str], dict[str, TrialResult]] = defaultdict(dict)
+    for trial in trials:
+        batches[str(trial.timing["started"]), str(trial.device.get("kind"))][trial.id] = trial
+    found = []
+    for each in batches.values():
+        together = list(each.values())
+        compiling, running = (max(float(trial.timing[name]) for trial in together) for name in ("compile", "run"))
+        layout = layout_on(str(together[0].device["platform"]))
+        cores = max((int(trial.timing.get("cores", 0)) for trial in together), default=0)
+        found.append(RecordedBatch(together, compiling, running, layout, cores or None))
+    return found
