@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from evoclaims.cli.main import _parser
+from evoclaims.cli.arguments import parser
 from evoclaims.verdicts.transitions import parse_patterns
 
 ROOT = Path(__file__).parents[1]
@@ -25,11 +25,11 @@ COMMANDS = [shlex.split(line)[1:] for line in re.findall(r"\.tox/smoke/bin/(evoc
 
 @pytest.mark.parametrize("arguments", COMMANDS, ids=lambda arguments: arguments[0])
 def test_every_command_is_one_that_the_command_line_takes(arguments: list[str]) -> None:
-    assert _parser().parse_args(arguments).command == arguments[0]
+    assert parser().parse_args(arguments).command == arguments[0]
 
 
 def test_the_report_and_the_badge_are_written_where_they_are_uploaded_from() -> None:
-    written = {arguments[0]: _parser().parse_args(arguments) for arguments in COMMANDS}
+    written = {arguments[0]: parser().parse_args(arguments) for arguments in COMMANDS}
     assert {"report", "badge", "export", "compare"} <= written.keys()
     assert re.findall(r"\n          path: (\S+/)\n", TEXT) == ["report/", ".evoclaims/"]
     assert {Path(options.out).parts[0] for options in written.values() if getattr(options, "out", None)} == {"report"}
@@ -47,7 +47,7 @@ def test_the_claims_are_run_by_tox_on_two_cores_with_options_that_the_plugin_tak
 
 
 def test_every_week_the_newest_release_of_each_library_is_compared_with_the_pinned_one() -> None:
-    options = _parser().parse_args(shlex.split(ACROSS))
+    options = parser().parse_args(shlex.split(ACROSS))
     assert (options.command, options.package, options.form) == ("across", ["jax", "installed", "newest"], "markdown")
     assert re.search(r'\n  schedule:\n    - cron: "\d+ \d+ \* \* [0-6]"\n', WEEKLY)
     (packages,) = re.findall(r"package: \[(.*)\]", WEEKLY)
@@ -57,7 +57,7 @@ def test_every_week_the_newest_release_of_each_library_is_compared_with_the_pinn
 
 
 def test_the_text_of_an_issue_is_kept_where_something_changed_and_only_there() -> None:
-    options = _parser().parse_args(shlex.split(ACROSS))
+    options = parser().parse_args(shlex.split(ACROSS))
     kept = re.findall(r"if: (.*)\n +uses: actions/upload-artifact@v4\n +with:\n.*\n +path: (\S+)\n", WEEKLY)
     assert kept == [("${{ failure() && hashFiles('issue.md') != '' }}", options.out)]
 

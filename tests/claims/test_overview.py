@@ -16,7 +16,7 @@ from evoclaims.methods.hand_built import HandBuilt
 from evoclaims.trials.budget import Budget
 from evoclaims.trials.notice import announced
 from evoclaims.trials.progress import RunProgress
-from evoclaims.trials.running import Running, shared
+from evoclaims.trials.shared_progress import Running, shared
 from evoclaims.trials.spec import Condition
 from evoclaims.trials.store import Store
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import jax
 from tiny_project import Evoclaims
 
+from evoclaims.cli.chosen_conditions import named
 from evoclaims.cli.project import open_project
-from evoclaims.cli.run import named
 from evoclaims.trials.result_making import make_unfinished
 from evoclaims.trials.spec import TrialSpec
 from reproductions.nisioti2025 import REPRODUCTION

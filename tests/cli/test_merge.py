@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from tiny_project import Evoclaims, forget, trials_of
 
-from evoclaims.cli.storage import open_store
+from evoclaims.cli.store_folder import open_store
 from evoclaims.judging.verdict import Outcome
 from evoclaims.trials.store import Store
 from evoclaims.verdicts.claim_report import ClaimReport, save

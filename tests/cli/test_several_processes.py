@@ -19,12 +19,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from tiny_project import REPRODUCTION, Evoclaims, Project
 
-from evoclaims.cli import workers
-from evoclaims.cli.host import AUTO, Host, host_of
-from evoclaims.cli.missing import MissingBatch
-from evoclaims.cli.seats import Seat, seats_of, useful_processes
-from evoclaims.cli.worker import Ended, WorkOrder
-from evoclaims.cli.workers import ATTEMPTS, Workers, in_queue
+from evoclaims.cli.processes import workers
+from evoclaims.cli.processes.host import AUTO, Host, host_of
+from evoclaims.cli.processes.missing_batches import MissingBatch
+from evoclaims.cli.processes.seats import Seat, seats_of, useful_processes
+from evoclaims.cli.processes.worker import Ended, WorkOrder
+from evoclaims.cli.processes.workers import ATTEMPTS, Workers, in_queue
 from evoclaims.core.errors import UserError
 from evoclaims.envs.gates.parity import NParity
 from evoclaims.methods.hand_built import HandBuilt
@@ -388,7 +388,7 @@ def test_a_worker_ends_with_the_command_that_has_started_it(evoclaims: Evoclaims
     tail = tail.split("\n", 1)[1].replace('method == "right"', "False")
     project.pytester.makepyfile(tiny_paper=head + SLOW + tail)
     worker = subprocess.Popen(
-        [sys.executable, "-m", "evoclaims.cli.worker"],
+        [sys.executable, "-m", "evoclaims.cli.processes.worker"],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         stderr=subprocess.DEVNULL,

@@ -20,13 +20,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 from tiny_project import PYPROJECT, Evoclaims
 
-from evoclaims.cli import job_states, jobs, submit
-from evoclaims.cli.batch_job import BatchJob
-from evoclaims.cli.job_request import minutes_of
-from evoclaims.cli.job_states import Seen, State
-from evoclaims.cli.missing import MissingBatch
+from evoclaims.cli import jobs, submit
+from evoclaims.cli.cluster import job_states
+from evoclaims.cli.cluster.batch_job import BatchJob
+from evoclaims.cli.cluster.job_request import minutes_of
+from evoclaims.cli.cluster.job_states import Seen, State
+from evoclaims.cli.cluster.submissions import load_all
+from evoclaims.cli.processes.missing_batches import MissingBatch
 from evoclaims.cli.submit import dealt
-from evoclaims.cli.submitted import load_all
 from evoclaims.mutants.conditions import Job
 from evoclaims.paper.estimates import Estimate
 from evoclaims.trials.notice import announced, notice_path

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from evoclaims.cli.main import _parser
+from evoclaims.cli.arguments import parser
 from evoclaims.core.errors import UserError
 from evoclaims.envs import Robot
 from evoclaims.envs.ecorobot.robots import SIMPLE_ROB
@@ -25,7 +25,7 @@ COMMANDS = [*re.findall(r"^evoclaims (.*)$", SHELL, re.MULTILINE), *re.findall(r
 @pytest.mark.parametrize("command", sorted({command.partition("#")[0].strip() for command in COMMANDS}))
 def test_each_command_is_one_that_the_command_line_takes(command: str) -> None:
     words = shlex.split(command)
-    assert _parser().parse_args(words).command == words[0]
+    assert parser().parse_args(words).command == words[0]
 
 
 def test_each_option_of_pytest_is_one_that_the_plugin_takes(pytestconfig: pytest.Config) -> None:

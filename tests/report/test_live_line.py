@@ -20,7 +20,7 @@ from evoclaims.report.live_line import (
     duration,
 )
 from evoclaims.trials.progress import RunProgress
-from evoclaims.trials.running import Running
+from evoclaims.trials.shared_progress import Running
 
 WAITING = RunProgress("ppo on n_parity", "compiling", trials=3)
 TRAINING = RunProgress("ppo on n_parity", "training", 3, 1, 2000, 4000, 0.75, 1, 5, 200.0)

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from evoclaims.claims.workload import Workload, scale_of, seconds_of
-from evoclaims.trials.running import Running, running
+from evoclaims.trials.shared_progress import Running, running
 from evoclaims.trials.store import DamagedFileError, Store
 
 

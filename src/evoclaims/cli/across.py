@@ -13,17 +13,12 @@ from typing import Final
 
 from packaging.utils import canonicalize_name
 
-from evoclaims.claims.selection import selected
-from evoclaims.cli.elsewhere import Elsewhere
-from evoclaims.cli.project import open_project
-from evoclaims.cli.storage import open_store
-from evoclaims.cli.stored import REPORT, write
+from evoclaims.cli.elsewhere import opened
+from evoclaims.cli.output_files import REPORT, write
 from evoclaims.cli.terminal import styled
 from evoclaims.core.environments import Recipe, checked, checked_name, installed_here
 from evoclaims.core.errors import UnknownNameError, UserError
 from evoclaims.core.releases import released
-from evoclaims.core.tiers import TIERS
-from evoclaims.paper.config import find_root, load_config
 from evoclaims.report import across_shown, across_table
 from evoclaims.report.charts_of_verdicts import across_chart
 from evoclaims.report.console import PlainSpokenConsole
@@ -65,32 +60,6 @@ def main(options: argparse.Namespace) -> int:
         write(out, FORMS[options.form](found), ours=options.out is None)
         print(f"wrote {out}")
     return int(bool(found.changed or found.without_verdicts))
-
-
-def opened(options: argparse.Namespace, only: str | None) -> Elsewhere:
-    """Return what judges the claims of the project around the current folder, of which `only` names some.
-
-    Raises:
-        UserError: for an unknown tier or claim, without a project, or when the store cannot be written.
-    """
-    if options.tier not in TIERS:
-        raise UnknownNameError("tier", options.tier, TIERS)
-    config = load_config(find_root(Path.cwd()))
-    store = open_store(options.storage)
-    store.check_writable()
-    if only is not None and (names := _claims(options)):  # before minutes are spent on an environment
-        selected(only, names)
-    return Elsewhere(config.root, config.root / config.claims, store, options.tier, only, options.device)
-
-
-def _claims(options: argparse.Namespace) -> set[str]:
-    """Return the ids and names of the project's claims; none where what is installed here cannot collect them."""
-    try:
-        project = open_project(options.storage)
-        (reports,) = project.judge_sessions([(project.as_published(options.tier), options.tier)])
-    except UserError:
-        return set()
-    return {name for report in reports for name in (report.claim, report.name)}
 
 
 def _command() -> str:

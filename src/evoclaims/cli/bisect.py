@@ -6,7 +6,7 @@ import argparse
 from collections.abc import Callable, Mapping
 from typing import Final
 
-from evoclaims.cli.across import opened
+from evoclaims.cli.elsewhere import opened
 from evoclaims.core.environments import Recipe, checked, checked_name
 from evoclaims.core.errors import UnknownNameError, UserError
 from evoclaims.core.releases import between, released

@@ -9,9 +9,9 @@ from itertools import chain
 from pathlib import Path
 
 from evoclaims.cli.judging import judge
+from evoclaims.cli.output_files import write
 from evoclaims.cli.project import Project, open_project
-from evoclaims.cli.storage import open_store
-from evoclaims.cli.stored import write
+from evoclaims.cli.store_folder import open_store
 from evoclaims.core.errors import UserError
 from evoclaims.judging.baseline import DriftReport
 from evoclaims.judging.tripwire import DigestCheck

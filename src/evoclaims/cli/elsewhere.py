@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 import json
 import os
 import subprocess
@@ -11,9 +12,15 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
+from evoclaims.claims.selection import selected
+from evoclaims.cli.project import open_project
+from evoclaims.cli.store_folder import open_store
 from evoclaims.cli.terminal import terminal
 from evoclaims.core.environments import Environment, NotInstallableError, Recipe, make, reason
+from evoclaims.core.errors import UnknownNameError, UserError
 from evoclaims.core.printable import printable
+from evoclaims.core.tiers import TIERS
+from evoclaims.paper.config import find_root, load_config
 from evoclaims.report.live_line import LiveLine, duration
 from evoclaims.report.table_cells import totals
 from evoclaims.trials.store import Store
@@ -145,3 +152,29 @@ def _watched(command: list[str], folder: Path, log: Path) -> tuple[int, str]:
         finally:
             line_shown.close()
     return process.returncode, "".join(lines)
+
+
+def opened(options: argparse.Namespace, only: str | None) -> Elsewhere:
+    """Return what judges the claims of the project around the current folder, of which `only` names some.
+
+    Raises:
+        UserError: for an unknown tier or claim, without a project, or when the store cannot be written.
+    """
+    if options.tier not in TIERS:
+        raise UnknownNameError("tier", options.tier, TIERS)
+    config = load_config(find_root(Path.cwd()))
+    store = open_store(options.storage)
+    store.check_writable()
+    if only is not None and (names := _claims(options)):  # before minutes are spent on an environment
+        selected(only, names)
+    return Elsewhere(config.root, config.root / config.claims, store, options.tier, only, options.device)
+
+
+def _claims(options: argparse.Namespace) -> set[str]:
+    """Return the ids and names of the project's claims; none where what is installed here cannot collect them."""
+    try:
+        project = open_project(options.storage)
+        (reports,) = project.judge_sessions([(project.as_published(options.tier), options.tier)])
+    except UserError:
+        return set()
+    return {name for report in reports for name in (report.claim, report.name)}

@@ -10,7 +10,7 @@ import jax
 import numpy as np
 from numpy.typing import NDArray
 
-from evoclaims.cli.stored import Stored
+from evoclaims.cli.stored_trial import Stored
 from evoclaims.core.keys import EVALUATION, TRAINING, trial_key
 from evoclaims.envs.ecorobot.robot_task import RobotTask
 from evoclaims.trials.devices import MATMUL_PRECISION

@@ -6,8 +6,8 @@ import argparse
 import sys
 from pathlib import Path
 
+from evoclaims.cli.output_files import REPORT, write
 from evoclaims.cli.project import ALL_TIERS, Project, open_project
-from evoclaims.cli.stored import REPORT, write
 from evoclaims.core.canonical import content_hash
 from evoclaims.core.errors import UnknownNameError, UserError
 from evoclaims.paper import references

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from evoclaims.cli.job_states import GONE, Seen, State, states
+from evoclaims.cli.cluster.job_states import GONE, Seen, State, states
+from evoclaims.cli.cluster.submissions import Submission, SubmittedBatch, SubmittedJob, load_all, log_of
 from evoclaims.cli.project import Project, open_project
-from evoclaims.cli.submitted import Submission, SubmittedBatch, SubmittedJob, load_all, log_of
 from evoclaims.core.errors import UserError
 from evoclaims.trials.batches import StoredTrials
 from evoclaims.trials.notice import is_announced

@@ -12,8 +12,9 @@ from typing import Any, Final, get_args
 import numpy as np
 
 from evoclaims.cli.episodes import Outings, run_again
+from evoclaims.cli.output_files import FIGURES, write
 from evoclaims.cli.project import Project, open_project
-from evoclaims.cli.stored import FIGURES, Stored, describe, load, write
+from evoclaims.cli.stored_trial import Stored, describe, load
 from evoclaims.core.drawing import Format
 from evoclaims.core.errors import UnknownNameError, UserError
 from evoclaims.envs.ecorobot.robot_task import RobotTask

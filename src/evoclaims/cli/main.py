@@ -9,28 +9,14 @@ import os
 import signal
 import sys
 from collections.abc import Sequence
-from importlib import metadata
 
+from evoclaims.cli.arguments import IN_PROCESSES, parser
 from evoclaims.cli.terminal import OutputError, plain_output
 from evoclaims.core.errors import UserError
 from evoclaims.trials.allowance import end_without
 from evoclaims.trials.stopping import interrupted_by
 
 USER_ERROR, INTERRUPTED, CLOSED_PIPE = 2, 130, 141
-
-_WITHOUT_TIER = {"jobs", "verify", "merge", "tables"}
-_TIERS = {
-    **dict.fromkeys(("report", "accept", "compare", "export"), ("all", "smoke, full or all (default)")),
-    "replicate": ("full", "full (default: the paper's size) or smoke"),
-}
-"""Defaults of --tier, and how it is explained, where they are not those of the other commands."""
-
-_ON_DEVICES = {"plan", "run", "submit", "mutants", "power", "champion", "look", "across", "bisect"}
-_IN_PROCESSES = {"run", "mutants", "power"}
-_PROCESSES = (
-    "how many processes run trials (1, on all devices); auto: one for each GPU, and on processors as many as keep the "
-    "cores busy"
-)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -60,7 +46,7 @@ def _print_no_more() -> None:
 
 def _ended(arguments: Sequence[str] | None) -> int:
     """Run one command to its end, or print the sentence that says why it failed."""
-    options, unknown = _parser().parse_known_args(arguments)
+    options, unknown = parser().parse_known_args(arguments)
     if unknown:
         options.refuse(f"unrecognized arguments: {' '.join(unknown)}")
     try:
@@ -70,7 +56,7 @@ def _ended(arguments: Sequence[str] | None) -> int:
         print(f"evoclaims: {error}", file=sys.stderr)
         return USER_ERROR
     except KeyboardInterrupt:
-        goes_on = "; the same command goes on from the last checkpoint" if options.command in _IN_PROCESSES else ""
+        goes_on = "; the same command goes on from the last checkpoint" if options.command in IN_PROCESSES else ""
         print(f"\nevoclaims: interrupted{goes_on}.", file=sys.stderr)
         return INTERRUPTED
 
@@ -78,11 +64,11 @@ def _ended(arguments: Sequence[str] | None) -> int:
 def _done(options: argparse.Namespace) -> int:
     """Run one command to its end; return its exit status."""
     _check_folder()
-    from evoclaims.cli.storage import storage_of
+    from evoclaims.cli.store_folder import storage_of
 
     options.storage = storage_of(options.storage, options.command)
     if "numprocesses" in options:
-        from evoclaims.cli.host import host_of
+        from evoclaims.cli.processes.host import host_of
 
         options.host = host_of(options.numprocesses, options.device)
     command = importlib.import_module(f"evoclaims.cli.{options.command}")  # only now: --help waits for no jax
@@ -100,221 +86,3 @@ def _check_folder() -> None:
             f"The current folder cannot be used ({error.strerror or error}): if it was deleted and made anew, go into "
             "it again (cd .)."
         ) from error
-
-
-def _parser() -> argparse.ArgumentParser:
-    """Build the parser; its options have `refuse`, which ends the program with the usage of their command."""
-    parser = argparse.ArgumentParser(prog="evoclaims", description="Claims of a paper, judged by real trials.")
-    parser.add_argument("--version", action="version", version=f"evoclaims {metadata.version('evoclaims')}")
-    commands = parser.add_subparsers(dest="command", required=True, metavar="command")
-
-    def add(name: str, text: str, kept: str = ".evoclaims") -> argparse.ArgumentParser:
-        command = commands.add_parser(name, help=text, description=text)
-        command.set_defaults(refuse=command.error)
-        command.add_argument("--storage", metavar="DIR", help=f"folder of trials ({kept} in the project's root)")
-        if name not in _WITHOUT_TIER:
-            default, known = _TIERS.get(name, ("smoke", "smoke (default) or full"))
-            command.add_argument("--tier", default=default, help=known)
-        if name in _ON_DEVICES:
-            command.add_argument("--device", default="auto", help="auto (default), cpu or gpu")
-        if name in _IN_PROCESSES:
-            command.add_argument("--numprocesses", metavar="N", default="1", help=_PROCESSES)
-        return command
-
-    text = "write a project that runs, with a method, a task and two claims; or, with --from, that of a paper"
-    new = commands.add_parser("new", help=text, description=text)
-    new.set_defaults(storage=None, refuse=new.error)  # it reads no trials
-    new.add_argument("folder", metavar="DIR", help="where to: a folder that is new or empty")
-    new.add_argument("--from", dest="project", metavar="PAPER", default="skeleton", help="a paper, such as nisioti2025")
-
-    plan = add("plan", "say what a tier would run, what it costs here, and what its verdicts can show")
-    plan.add_argument("--variant", metavar="NAME", default="", help="what this variant of the protocol changes")
-    plan.add_argument("--like", metavar="KIND", help="times as of trials made on such a device, such as 'NVIDIA H200'")
-    plan.add_argument("--measure", action="store_true", help="time a few steps of conditions never run here")
-
-    text = "run missing trials and judge none; with --variant those that it changes, and say which verdicts it changes"
-    run = add("run", text)
-    run.add_argument("method", nargs="?", help="only this method")
-    run.add_argument("--on", metavar="TASK", help="only this task")
-    run.add_argument("--variant", metavar="NAME", default="", help="run what this variant changes, then judge by it")
-    run.add_argument("--trials", type=int, metavar="N", help="trials per condition (default: the tier's)")
-    run.add_argument(
-        "--time-limit",
-        metavar="TIME",
-        help="time that a batch of trials may take, such as 90s, 30min, 24h or none (24h, or what pyproject.toml says)",
-    )
-    run.add_argument("--retry", action="store_true", help="run trials again that ran out of time under this limit")
-    run.add_argument("--first-seed", type=int, default=0, metavar="SEED", help="seed of the first trial (0)")
-
-    submit = add("submit", "submit the batches that a tier lacks as jobs of SLURM, or of this machine; none twice")
-    submit.add_argument("method", nargs="?", help="only this method")
-    submit.add_argument("--on", metavar="TASK", help="only this task")
-    submit.add_argument("--variant", metavar="NAME", default="", help="what this variant of the protocol changes")
-    submit.add_argument("--cluster", default="slurm", help="slurm (default), or local: jobs on this machine")
-    submit.add_argument("--partition", metavar="NAME", help="SLURM's partition")
-    submit.add_argument("--gpus", type=int, metavar="N", help="GPUs of a job")
-    submit.add_argument("--cpus", type=int, metavar="N", help="CPU cores of a job")
-    submit.add_argument("--time", metavar="TIME", help="of a job, which goes on in another one if need be (2:00:00)")
-    submit.add_argument("--array", type=int, metavar="N", help="how many jobs run at a time (256; local: 1)")
-    submit.add_argument(
-        "--slurm", metavar="KEY=VALUE", action="append", default=[], help="another option of sbatch: account=lab"
-    )
-    submit.add_argument("--dry-run", action="store_true", help="only print the jobs and their estimated hours")
-
-    add("jobs", "show which submitted jobs are queued, running, done or failed, why, and where their logs are")
-
-    mutants = add("mutants", "plant faults in methods and tasks, run them, and write which of them the claims notice")
-    mutants.add_argument("--mutant", metavar="NAME", help="only this fault, such as minimizes")
-    mutants.add_argument("--of", metavar="TARGET", help="only faults of this method or this task")
-    mutants.add_argument("--stored", action="store_true", help="run nothing: judge the trials that have run")
-
-    power = add(
-        "power", "say from a pilot how often each claim ends as expected; exit status 1 when one does less than 0.95"
-    )
-    power.add_argument("--only", metavar="CLAIMS", help="only these claims, by id or name, such as G1,S2[cma_es]")
-    made = power.add_mutually_exclusive_group()
-    made.add_argument(
-        "--run",
-        action="store_true",
-        help="first run the trials of missing pilots, and write them; commit what it writes",
-    )
-    made.add_argument("--stored", action="store_true", help="first write missing pilots from trials that have run")
-    power.add_argument("--trials", type=int, default=50, metavar="N", help="trials per condition of a new pilot (50)")
-    power.add_argument(
-        "--first-seed",
-        type=int,
-        default=100,
-        metavar="SEED",
-        help="first seed of a new pilot, not one of the tier's (100)",
-    )
-    power.add_argument("--draws", type=int, default=1000, metavar="N", help="draws from the pilot (1000)")
-
-    status = add("status", "show the verdicts that the stored trials give, one line for each claim; run nothing")
-    status.add_argument("--only", metavar="IDS", help="only these claims, such as G1,G7; G: all of G1, G2, …")
-    status.add_argument(
-        "--variant", metavar="NAME", default="", help="the verdicts that this variant of the protocol may change"
-    )
-    status.add_argument(
-        "--why", action="store_true", help="also say why verdicts are accepted, inconclusive or not run"
-    )
-    status.add_argument("--as", dest="form", metavar="FORM", help="print csv, json or markdown instead of a table")
-
-    report = add("report", "write a web page and a Markdown file about all claims from the trials at hand; run nothing")
-    report.add_argument(
-        "--trajectories",
-        action="store_true",
-        help="run the champions of robots' tasks once more and draw their ways (minutes)",
-    )
-    report.add_argument("--out", metavar="FOLDER", help="where to (report/)")
-
-    champion = add("champion", "replay a stored trial's champion on every level, and draw or export its network")
-    champion.add_argument("method", help="the method")
-    champion.add_argument("--on", metavar="TASK", required=True, help="the task")
-    champion.add_argument("--seed", type=int, default=0, help="the trial's seed (0)")
-    champion.add_argument("--as", dest="form", metavar="FORM", help="also write its network: json, svg or png")
-    champion.add_argument("--out", metavar="FILE", help="where to (figures/METHOD-TASK-SEED.FORM)")
-
-    look = add("look", "draw a robot's task, or show what a stored champion does in it")
-    look.add_argument("task", help="the task")
-    look.add_argument("--method", help="the method whose champion is shown; else the task alone")
-    look.add_argument("--seed", type=int, default=0, help="the trial's seed (0)")
-    look.add_argument(
-        "--as",
-        dest="form",
-        metavar="FORM",
-        help="path (default): a picture of the paths of all episodes; page: an episode in 3D, for a browser; gif: an "
-        "episode, animated; elites: the map of MAP-Elites",
-    )
-    look.add_argument("--episode", type=int, default=0, metavar="N", help="which of the evaluation's episodes (0)")
-    look.add_argument(
-        "--out",
-        metavar="FILE",
-        help="where to (figures/TASK.svg, figures/METHOD-TASK-SEED-FORM.…); pictures are svg or png",
-    )
-
-    reproduce = add("reproduce", "redraw figures and tables of the paper from the trials at hand; run nothing")
-    reproduce.add_argument("figure", help="its name, such as fig3; all: every figure and table")
-    reproduce.add_argument("--out", metavar="DIR", help="folder for PNG, SVG and CSV (figures/TIER)")
-    reproduce.add_argument("--variant", metavar="NAME", default="", help="under this variant of the protocol")
-
-    replicate = add("replicate", "put the numbers that the paper has published beside those of the trials at hand")
-    replicate.add_argument(
-        "--variant", metavar="NAME", default="", help="under this variant of the protocol; all: under each, too"
-    )
-    replicate.add_argument("--as", dest="form", metavar="FORM", help="write a file instead: csv, json or markdown")
-    replicate.add_argument("--out", metavar="FILE", help="where to (report/replication.FORM)")
-
-    verify = add(
-        "verify",
-        "read every stored trial, champion and checkpoint back, and move bad ones aside so that their trials run again "
-        "(verdicts are not read: `evoclaims status` judges the trials anew)",
-    )
-    verify.add_argument("--dry-run", action="store_true", help="list bad files and leave them where they are")
-
-    merge = add("merge", "copy trials, champions and verdicts of other stores into one; what is there already stays")
-    merge.add_argument("stores", nargs="+", metavar="STORE", help="a folder of trials, such as another machine's")
-    merge.add_argument("--dry-run", action="store_true", help="say what would be copied, and copy nothing")
-
-    reference = add("reference", "write the stored trials of a tier as the committed reference trials")
-    reference.add_argument("--variant", metavar="NAME", default="", help="those that only this variant has")
-
-    add("accept", "write the verdicts of now into verdicts.toml, as accepted; exit status 1 when that changed the file")
-
-    compare = add(
-        "compare",
-        "show what changed: verdicts of now against the accepted ones; or a git revision against the working tree; or "
-        "a store (OLD) against --storage; or two revisions, or two stores, against each other; run nothing",
-    )
-    compare.add_argument("places", nargs="*", metavar="OLD [NEW]", help="a git revision or a folder of trials")
-    compare.add_argument("--fail", metavar="CHANGES", help="end with 1 on these, such as 'supported->refuted,*->error'")
-    compare.add_argument(
-        "--timeline", metavar="CLAIM", nargs="?", const="", help="list accepted verdicts by date, of CLAIM or of all"
-    )
-
-    compare.add_argument("--out", metavar="FILE", help="with --timeline: also draw it over dates and versions, as SVG")
-
-    across = add(
-        "across",
-        "judge claims in an environment for each release of a package, file of pins or Python, and compare with the "
-        "first; exit status 1 when a verdict changed, trials drifted, or an environment has no verdicts",
-        ".evoclaims-releases",
-    )
-    across.add_argument(
-        "--package",
-        nargs="+",
-        metavar=("NAME", "VERSION"),
-        help="a package and its versions on trial; all else stays as it is here; installed and newest are versions too",
-    )
-    across.add_argument("--constraints", nargs="+", metavar="FILE", help="an environment with the pins of each file")
-    across.add_argument("--python", nargs="+", metavar="VERSION", help="an environment with each Python, such as 3.13")
-    across.add_argument("--only", metavar="IDS", help="judge only these claims, such as G1,G7 or G6[neat-ppo]")
-    across.add_argument(
-        "--as", dest="form", metavar="FORM", help="also write it: markdown, csv, json, or a chart as svg"
-    )
-    across.add_argument("--out", metavar="FILE", help="where to (report/across.FORM; .md for markdown)")
-
-    bisect = add(
-        "bisect",
-        "find the release of a package in which a claim's verdict, or what its trials do, changed",
-        ".evoclaims-releases",
-    )
-    bisect.add_argument("claim", help="the claim, such as G9, or one case of it, such as 'G1[n_parity]'")
-    bisect.add_argument("--package", metavar="NAME", required=True, help="the package")
-    bisect.add_argument("--good", metavar="VERSION", required=True, help="a release before the change")
-    bisect.add_argument("--bad", metavar="VERSION", required=True, help="a later release, after it")
-    bisect.add_argument("--releases", nargs="+", metavar="VERSION", help="those between (default: as pip lists them)")
-    bisect.add_argument("--by", metavar="WHAT", help="verdict, drift or bits (default: the first of them that changed)")
-
-    export = add("export", "write the trials at hand, or the verdicts that they give, as a table")
-    export.add_argument("--verdicts", action="store_true", help="one row per claim instead of one per trial")
-    export.add_argument("--as", dest="form", metavar="FORM", default="json", help="json (default), csv or parquet")
-    export.add_argument("--out", metavar="FILE", help="where to (report/trials.FORM, report/verdicts.FORM)")
-
-    tables = add(
-        "tables", "write the tables in Markdown files anew from the reference trials; exit status 1 when one changed"
-    )
-    tables.add_argument("files", nargs="+", metavar="FILE", help="such as README.md")
-
-    badge = add("badge", "draw how many claims ended how, as a small SVG picture")
-    badge.add_argument("--out", metavar="FILE", help="where to (report/claims-TIER.svg)")
-    return parser

@@ -7,7 +7,7 @@ import os
 from collections import Counter
 from collections.abc import Iterator
 
-from evoclaims.cli.storage import open_store
+from evoclaims.cli.store_folder import open_store
 from evoclaims.core.errors import UserError
 from evoclaims.trials.merging import Merged, merge_trials
 from evoclaims.trials.store import Store

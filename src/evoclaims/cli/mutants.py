@@ -9,9 +9,9 @@ import textwrap
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
+from evoclaims.cli.processes.execution import Execution
+from evoclaims.cli.processes.worker import Ended, WorkOrder
 from evoclaims.cli.project import Project, open_project
-from evoclaims.cli.running import Execution
-from evoclaims.cli.worker import Ended, WorkOrder
 from evoclaims.core.errors import UnknownNameError, UserError
 from evoclaims.core.files import write_atomically
 from evoclaims.mutants import catalogue

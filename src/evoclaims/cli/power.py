@@ -9,16 +9,16 @@ from collections.abc import Mapping, Sequence
 
 from evoclaims.claims.fetching import StoredOnly
 from evoclaims.claims.power import Asserted, Listening, Pilots, asserted, only
+from evoclaims.cli.processes.execution import Execution
+from evoclaims.cli.processes.worker import WorkOrder
 from evoclaims.cli.project import Project, open_project
-from evoclaims.cli.reference import of_one_environment
-from evoclaims.cli.running import Execution
 from evoclaims.cli.terminal import styled
-from evoclaims.cli.worker import WorkOrder
 from evoclaims.core.errors import UserError
 from evoclaims.core.packages import recorded
 from evoclaims.judging.counting import MAX_TRIALS
 from evoclaims.judging.design import Design
 from evoclaims.mutants.conditions import Job
+from evoclaims.paper import references
 from evoclaims.paper.variant import Names
 from evoclaims.report import power_cells
 from evoclaims.report.console import PlainSpokenConsole, plain_table
@@ -101,7 +101,7 @@ def _make(
 def _write(project: Project, pilots: Pilots, names: Names, condition: Condition, seeds: Sequence[int]) -> None:
     """Write a pilot from stored trials of one environment, if all of them are there."""
     stored = [record for seed in seeds for record in project.store.records(TrialSpec(condition, seed).id)]
-    trials = of_one_environment([*filter(is_final, stored)], condition, seeds, len(seeds))
+    trials = references.of_one_environment([*filter(is_final, stored)], condition, seeds, len(seeds))
     if not trials:
         return
     if len(trials) < len(seeds):

@@ -12,7 +12,7 @@ from evoclaims.claims.as_published import AsPublished
 from evoclaims.claims.fetching import StoredOnly
 from evoclaims.claims.session import Session
 from evoclaims.cli.judging import judge
-from evoclaims.cli.storage import open_store
+from evoclaims.cli.store_folder import open_store
 from evoclaims.core.errors import UnknownNameError
 from evoclaims.paper.archive import Archive
 from evoclaims.paper.config import SuiteConfig, find_root, load_config, load_reproduction

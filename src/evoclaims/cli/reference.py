@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
-from itertools import takewhile
 
 from evoclaims.cli.project import open_project
 from evoclaims.core.errors import UserError
-from evoclaims.core.packages import agree, recorded
+from evoclaims.core.packages import recorded
 from evoclaims.judging.baseline import MIN_REFERENCES
 from evoclaims.paper import references
-from evoclaims.trials.result import TrialResult
-from evoclaims.trials.spec import Condition, TrialSpec
+from evoclaims.trials.spec import TrialSpec
 from evoclaims.trials.time_limit import is_final
 from evoclaims.verdicts.versions import change
 
@@ -39,7 +36,7 @@ def main(options: argparse.Namespace) -> int:
         stored = [record for seed in seeds for record in store.records(TrialSpec(condition, seed).id)]
         if not stored:
             continue
-        results = of_one_environment([*committed, *filter(is_final, stored)], condition, seeds, sizes[0])
+        results = references.of_one_environment([*committed, *filter(is_final, stored)], condition, seeds, sizes[0])
         size = max((size for size in sizes if size <= len(results)), default=0)
         needed = max(len(committed), sizes[0])
         if size < needed:
@@ -61,22 +58,3 @@ def main(options: argparse.Namespace) -> int:
             f"`evoclaims run --tier {options.tier}`."
         )
     return 0
-
-
-def of_one_environment(
-    records: Sequence[TrialResult], condition: Condition, seeds: Sequence[int], needed: int
-) -> list[TrialResult]:
-    """Return trials of the first seeds, made by one environment: this one if it has enough, else the newest.
-
-    Reference trials of mixed versions would be useless. If a seed has several records, the last one counts.
-    """
-    environments = [condition.versions]
-    for record in sorted(records, key=lambda record: str(record.timing.get("ended", "")), reverse=True):
-        versions = recorded(record.provenance, condition.packages)
-        if versions not in environments:
-            environments.append(versions)
-    runs = []
-    for versions in environments:
-        made = {record.seed: record for record in records if agree(record.provenance, versions)}
-        runs.append([made[seed] for seed in takewhile(made.__contains__, seeds)])
-    return next((run for run in runs if len(run) >= needed), max(runs, key=len))

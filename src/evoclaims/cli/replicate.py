@@ -7,8 +7,8 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Final
 
+from evoclaims.cli.output_files import REPORT, write
 from evoclaims.cli.project import Project, open_project
-from evoclaims.cli.stored import REPORT, write
 from evoclaims.cli.terminal import styled
 from evoclaims.core.errors import UnknownNameError, UserError
 from evoclaims.figures.figure import SIZES

@@ -10,9 +10,10 @@ from pathlib import Path
 from typing import Any
 
 from evoclaims.cli.episodes import run_again
+from evoclaims.cli.output_files import REPORT, write
 from evoclaims.cli.project import ALL_TIERS, Project, open_project
-from evoclaims.cli.storage import APART
-from evoclaims.cli.stored import REPORT, Stored, write
+from evoclaims.cli.store_folder import APART
+from evoclaims.cli.stored_trial import Stored
 from evoclaims.envs.ecorobot.robot_task import RobotTask
 from evoclaims.envs.ecorobot.views import pictures
 from evoclaims.figures.replication import replications

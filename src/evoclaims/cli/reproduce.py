@@ -8,8 +8,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from evoclaims.cli.output_files import FIGURES, write
 from evoclaims.cli.project import open_project
-from evoclaims.cli.stored import FIGURES, write
 from evoclaims.figures import catalogue, files
 
 ALL = "all"

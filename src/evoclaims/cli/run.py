@@ -6,17 +6,16 @@ import argparse
 import sys
 from collections.abc import Sequence
 
+from evoclaims.cli.chosen_conditions import choose
+from evoclaims.cli.processes.execution import Execution
+from evoclaims.cli.processes.worker import WorkOrder
 from evoclaims.cli.project import Project, open_project
-from evoclaims.cli.running import Execution
-from evoclaims.cli.stored import describe
+from evoclaims.cli.stored_trial import describe
 from evoclaims.cli.variant_cost import to_run
-from evoclaims.cli.worker import WorkOrder
-from evoclaims.core.errors import UnknownNameError, UserError
+from evoclaims.core.errors import UserError
 from evoclaims.judging.counting import MAX_TRIALS
 from evoclaims.judging.verdict import Outcome
 from evoclaims.mutants.conditions import Job
-from evoclaims.paper.reproduction import Reproduction, Tier
-from evoclaims.paper.variant import Names
 from evoclaims.trials.crashes import last_said
 from evoclaims.trials.imported import where_from
 from evoclaims.trials.spec import Condition, TrialSpec
@@ -88,39 +87,3 @@ def _print_matrix(project: Project, tier: str, variant: str) -> None:
             print(f"  {row.claim}: {said}")
     if not rows:
         print("  No claim can be judged yet: each needs all trials of its tier.")
-
-
-def choose(reproduction: Reproduction, options: argparse.Namespace) -> tuple[Tier, list[Names]]:
-    """Return the tier that options name, and which of its conditions they select; of a variant, what it changes.
-
-    Raises:
-        UserError: for an unknown name, and for conditions that the variant leaves as they are; it lists the known ones.
-    """
-    tier = reproduction.tier(options.tier, options.variant)
-    chosen = named(tier, options.method, options.on)
-    if not options.variant:
-        return tier, chosen
-    touched = reproduction.variants[options.variant].conditions.get(options.tier, {})
-    chosen = [names for names in chosen if names in touched]
-    if not chosen:
-        raise UserError(
-            f"The variant {options.variant} changes none of these conditions at the {options.tier} tier; it changes: "
-            f"{', '.join(sorted(' on '.join(names) for names in touched)) or 'none'}."
-        )
-    return tier, chosen
-
-
-def named(tier: Tier, method: str | None, task: str | None) -> list[Names]:
-    """Return the conditions that a method and a task select; an error for an unknown name lists the known ones.
-
-    An `optional` method, which needs packages that may not be installed, runs only when it is named.
-    """
-    if method is not None and task is not None:
-        tier.condition(method, task)
-    known = list(tier.conditions)
-    for name, position, kind in ((method, 0, "method"), (task, 1, "task")):
-        if name is not None and name not in {names[position] for names in known}:
-            raise UnknownNameError(kind, name, {names[position] for names in known})
-    if method is None:
-        known = [names for names in known if not getattr(tier.conditions[names].method, "optional", False)]
-    return [names for names in known if method in (None, names[0]) and task in (None, names[1])]

@@ -14,14 +14,22 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
-from evoclaims.cli.batch_job import SIGNAL_SECONDS, BatchJob
-from evoclaims.cli.job_request import JobRequest, clock, requested
-from evoclaims.cli.job_states import JOB_NAME
+from evoclaims.cli.chosen_conditions import choose
+from evoclaims.cli.cluster.batch_job import SIGNAL_SECONDS, BatchJob
+from evoclaims.cli.cluster.job_request import JobRequest, clock, requested
+from evoclaims.cli.cluster.job_states import JOB_NAME
+from evoclaims.cli.cluster.submissions import (
+    SCHEMA,
+    Submission,
+    SubmittedBatch,
+    SubmittedJob,
+    folder_of,
+    new_name,
+    save,
+)
 from evoclaims.cli.jobs import active
-from evoclaims.cli.missing import MissingBatch, missing_batches
+from evoclaims.cli.processes.missing_batches import MissingBatch, missing_batches
 from evoclaims.cli.project import Project, open_project
-from evoclaims.cli.run import choose
-from evoclaims.cli.submitted import SCHEMA, Submission, SubmittedBatch, SubmittedJob, folder_of, new_name, save
 from evoclaims.core.canonical import content_hash
 from evoclaims.core.errors import UserError
 from evoclaims.mutants.conditions import Job

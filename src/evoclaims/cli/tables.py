@@ -20,8 +20,8 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Final
 
+from evoclaims.cli.output_files import write
 from evoclaims.cli.project import Project, open_project
-from evoclaims.cli.stored import write
 from evoclaims.core.errors import UnknownNameError, UserError
 from evoclaims.figures.replication import replications
 from evoclaims.report import replication_cells, vocabulary

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from evoclaims.cli.running import Execution
+from evoclaims.cli.processes.execution import Execution
 from evoclaims.paper import references
 from evoclaims.paper.pace import known_pace
 from evoclaims.paper.variant import Names

@@ -8,7 +8,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from evoclaims.cli.storage import open_store
+from evoclaims.cli.store_folder import open_store
 from evoclaims.trials.integrity import verify
 
 

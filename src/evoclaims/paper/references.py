@@ -5,16 +5,19 @@ from __future__ import annotations
 import errno
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from itertools import takewhile
 from pathlib import Path
 
 from evoclaims.core.errors import UserError
 from evoclaims.core.files import read_file, write_atomically
+from evoclaims.core.packages import agree, recorded
 from evoclaims.core.provenance import what_fixes_bits
 from evoclaims.judging.baseline import DriftCase, DriftReport, check_drift
 from evoclaims.judging.tripwire import DigestCheck, compare_digests
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.result_codec import dump, parse
 from evoclaims.trials.result_schema import RecordError
+from evoclaims.trials.spec import Condition
 from evoclaims.trials.time_limit import is_final
 
 METRICS = ("mean_success", "last_fitness", "environment_steps")
@@ -71,6 +74,25 @@ def write(path: Path, results: Iterable[TrialResult]) -> None:
     """Write reference trials in the order of seeds."""
     ordered = sorted(results, key=lambda result: result.seed)
     write_atomically(path, b"".join(map(dump, ordered)))
+
+
+def of_one_environment(
+    records: Sequence[TrialResult], condition: Condition, seeds: Sequence[int], needed: int
+) -> list[TrialResult]:
+    """Return trials of the first seeds, made by one environment: this one if it has enough, else the newest.
+
+    Reference trials of mixed versions would be useless. If a seed has several records, the last one counts.
+    """
+    environments = [condition.versions]
+    for record in sorted(records, key=lambda record: str(record.timing.get("ended", "")), reverse=True):
+        versions = recorded(record.provenance, condition.packages)
+        if versions not in environments:
+            environments.append(versions)
+    runs = []
+    for versions in environments:
+        made = {record.seed: record for record in records if agree(record.provenance, versions)}
+        runs.append([made[seed] for seed in takewhile(made.__contains__, seeds)])
+    return next((run for run in runs if len(run) >= needed), max(runs, key=len))
 
 
 def drift_case(folder: Path, tier: str, method: str, task: str, new: Sequence[TrialResult]) -> DriftCase:

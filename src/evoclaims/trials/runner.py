@@ -30,7 +30,7 @@ from evoclaims.trials.program import Report
 from evoclaims.trials.progress import RunProgress, Watcher, ignore
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.result_making import curve_point, make_result, make_unfinished
-from evoclaims.trials.running import shared
+from evoclaims.trials.shared_progress import shared
 from evoclaims.trials.spec import Condition, TrialSpec
 from evoclaims.trials.stopping import postponed
 from evoclaims.trials.store import Store

@@ -11,7 +11,7 @@ from enum import StrEnum
 from pathlib import Path
 from typing import Final
 
-from evoclaims.cli.submitted import Submission
+from evoclaims.cli.cluster.submissions import Submission
 from evoclaims.core.errors import UserError
 
 JOB_NAME: Final = "evoclaims"

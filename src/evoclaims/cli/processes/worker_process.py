@@ -13,7 +13,7 @@ from typing import IO, Any
 
 import msgspec
 
-from evoclaims.cli.worker import Ended, Reply, Told, WorkOrder
+from evoclaims.cli.processes.worker import Ended, Reply, Told, WorkOrder
 from evoclaims.mutants.conditions import Job
 
 
@@ -23,7 +23,7 @@ class Process:
     def __init__(self, order: WorkOrder, environment: Mapping[str, str]) -> None:
         """Start it, with these environment variables besides the command's own."""
         self._process = subprocess.Popen(
-            [sys.executable, "-m", "evoclaims.cli.worker"],
+            [sys.executable, "-m", "evoclaims.cli.processes.worker"],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,

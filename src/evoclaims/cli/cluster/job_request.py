@@ -12,7 +12,7 @@ from typing import Any, Final
 
 from msgspec import ValidationError, convert
 
-from evoclaims.cli.submitted import Cluster
+from evoclaims.cli.cluster.submissions import Cluster
 from evoclaims.core.errors import UnknownNameError, UserError
 from evoclaims.report.formatting import plural
 from evoclaims.trials.time_limit import seconds_of

@@ -1,7 +1,7 @@
 """The running of named conditions one after the other, in this process or in a worker process of `--numprocesses N`.
 
-A worker (`python -m evoclaims.cli.worker`) reads a `WorkOrder` and then conditions from its standard input, a line of
-JSON each, and answers on its standard output when each has ended; it judges nothing. It ends with its input.
+A worker (`python -m evoclaims.cli.processes.worker`) reads a `WorkOrder` and then conditions from its standard input, a
+line of JSON each, and answers on its standard output when each has ended; it judges nothing. It ends with its input.
 """
 
 from __future__ import annotations

@@ -1,15 +1,13 @@
-"""A stored trial as commands use it, and the files that they write for the user."""
+"""A stored trial as commands use it: its record and its champion."""
 
 from __future__ import annotations
 
-import os
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 from evoclaims.cli.project import Project
 from evoclaims.core.errors import UserError
-from evoclaims.core.files import write_once, write_where_named
 from evoclaims.core.printable import printable
 from evoclaims.paper.pace import known_pace
 from evoclaims.report.live_line import duration
@@ -19,12 +17,6 @@ from evoclaims.trials.imported import where_from
 from evoclaims.trials.result import COMPLETE, TrialResult
 from evoclaims.trials.spec import Condition, TrialSpec
 from evoclaims.trials.time_limit import time_allowed
-
-REPORT: Final = Path("report")
-"""Where commands write what is to be read, unless --out says else."""
-
-FIGURES: Final = Path("figures")
-"""Where they write pictures."""
 
 
 @dataclass(frozen=True)
@@ -76,22 +68,3 @@ def describe(result: TrialResult) -> str:
         return f"{spent}{': ' * bool(reason)}{printable(reason)} {took}"
     success = " ".join(f"{value:.3f}" for value in result.levels["success"])
     return f"{spent}, success by level {success} {took}"
-
-
-def write(path: Path, data: bytes, name: str = "file", *, ours: bool = False) -> None:
-    """Write a file that the user named with --out, or a file in a folder named so.
-
-    Args:
-        path: the file.
-        data: its content.
-        name: what --out names: a file or a folder.
-        ours: whether nothing was named; `REPORT` or `FIGURES` is then made with a `.gitignore` that keeps git out.
-
-    Raises:
-        UserError: when it cannot be written there.
-    """
-    if path.is_dir():
-        raise UserError(f"{path} is a folder; name a file in it with --out.")
-    if ours and not os.path.lexists(path.parts[0]):
-        write_once(Path(path.parts[0], ".gitignore"), b"*\n", f"Name another {name} with --out.")
-    write_where_named(path, data, f"Name another {name} with --out.")

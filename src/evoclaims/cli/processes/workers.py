@@ -9,10 +9,10 @@ from collections import Counter, deque
 from collections.abc import Callable, Iterator, Sequence
 from typing import Final
 
-from evoclaims.cli.missing import MissingBatch
-from evoclaims.cli.seats import Seat
-from evoclaims.cli.worker import Ended, WorkOrder
-from evoclaims.cli.worker_process import Process
+from evoclaims.cli.processes.missing_batches import MissingBatch
+from evoclaims.cli.processes.seats import Seat
+from evoclaims.cli.processes.worker import Ended, WorkOrder
+from evoclaims.cli.processes.worker_process import Process
 from evoclaims.mutants.conditions import Job, sharing_programs
 from evoclaims.paper.variant import Conditions
 

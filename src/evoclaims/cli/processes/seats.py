@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
-from evoclaims.cli.host import AUTO, Host
-from evoclaims.cli.missing import MissingBatch
+from evoclaims.cli.processes.host import AUTO, Host
+from evoclaims.cli.processes.missing_batches import MissingBatch
 from evoclaims.mutants.conditions import Job
 from evoclaims.trials import devices, gpus
 

@@ -1,0 +1,1 @@
+"""Missing trials, run by this process or by several on this host."""
