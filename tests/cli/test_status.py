@@ -121,3 +121,33 @@ def test_a_torn_line_among_the_reference_trials_is_found_before_anything_is_judg
     code, _, err = evoclaims(command)
     assert (code, err.count("\n")) == (2, 1)
     assert "reference/smoke/right-parity.jsonl is no reference trial" in err
+
+
+def test_a_verdict_from_reference_trials_alone_is_told_as_one(
+    status: Evoclaims, evoclaims: Evoclaims, stored: Store
+) -> None:
+    assert "judged from committed" not in status()[1]
+    assert evoclaims("reference")[0] == 0
+    for record in stored.record_files(references.load(Path("reference/smoke/right-parity.jsonl"))[3].id):
+        record.unlink(missing_ok=True)
+    told = "judged from committed reference trials, where the store has none"
+    assert status()[1].splitlines()[-1] == f"{told}: 2 of 4 of these claims"
+    assert status("--only", "S1")[1].splitlines()[-1] == f"{told}: all of these claims"
+
+
+def test_a_pipe_has_whole_sentences_and_names_no_file_that_is_not_there(
+    status: Evoclaims, project: Project, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    sentence = "It is said at some length " * 8
+    project.write(CASES.replace('@says("S1")', f'@claim("S1", says="{sentence}", where="§1", smoke="{sentence}")'))
+    monkeypatch.delenv("COLUMNS")
+    _, out, _ = status()
+    assert sentence.strip() in out
+    assert "evidence" not in out
+    monkeypatch.setenv("COLUMNS", "80")
+    assert sentence.strip() not in status()[1]
+
+
+def test_controls_are_counted_apart(status: Evoclaims, project: Project) -> None:
+    project.write(CASES.replace('@says("S1")', '@claim("C1", says="It works", where="control", smoke="It works")'))
+    assert "claims (smoke): 1 supported, 2 refuted; controls: 1 supported" in status()[1]

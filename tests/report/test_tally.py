@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from evoclaims.judging.verdict import Outcome
-from evoclaims.report.tally import CONTROL, tally
-from evoclaims.verdicts.claim_report import ClaimReport
+from evoclaims.report.tally import tally
+from evoclaims.verdicts.claim_report import CONTROL, ClaimReport
 
 
 def _reports(where: str, *outcomes: Outcome) -> list[ClaimReport]:

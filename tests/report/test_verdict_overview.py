@@ -5,10 +5,9 @@ from __future__ import annotations
 from laboratory import Laboratory
 
 from evoclaims.judging.verdict import Outcome
-from evoclaims.report.tally import CONTROL
 from evoclaims.report.trial_summary import Reader
 from evoclaims.report.verdict_overview import overview
-from evoclaims.verdicts.claim_report import ClaimReport
+from evoclaims.verdicts.claim_report import CONTROL, ClaimReport
 
 
 def _report(claim: str, where: str) -> ClaimReport:

@@ -56,7 +56,8 @@ def _ended(arguments: Sequence[str] | None) -> int:
         print(f"evoclaims: {error}", file=sys.stderr)
         return USER_ERROR
     except KeyboardInterrupt:
-        goes_on = "; the same command goes on from the last checkpoint" if options.command in IN_PROCESSES else ""
+        trains = options.command in IN_PROCESSES and getattr(options, "run", True)  # `power` alone draws from a pilot
+        goes_on = "; the same command goes on from the last checkpoint" if trains else ""
         print(f"\nevoclaims: interrupted{goes_on}.", file=sys.stderr)
         return INTERRUPTED
 

@@ -164,7 +164,7 @@ def _spent(tier: Tier, costs: Costs) -> Table:
     for names, seconds in needed.items():
         hours = [_core_hours(seconds)] * cores
         table.add_row(" on ".join(names), *(_took(costs, [names], kind) for kind in kinds), *hours)
-    hours = [_core_hours(sum(filter(None, needed.values())))] * cores
+    hours = [_core_hours(sum(filter(None, needed.values()))) + AND_MORE * (None in needed.values())] * cores
     table.add_row("total", *(_took(costs, list(costs), kind) for kind in kinds), *hours, style="bold")
     return table
 

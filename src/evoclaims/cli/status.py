@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import argparse
+import os
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import Final
 
 from rich.console import Console
@@ -16,6 +18,7 @@ from evoclaims.judging.verdict import Outcome
 from evoclaims.paper.reproduction import Reproduction
 from evoclaims.report import table_cells, terminal_table
 from evoclaims.report.run_summary import run_summary
+from evoclaims.trials.store import Store
 from evoclaims.verdicts import export, history
 from evoclaims.verdicts.claim_report import ClaimReport
 from evoclaims.verdicts.robustness import matrix
@@ -26,6 +29,9 @@ FORMS: Final[Mapping[str, Callable[[Sequence[ClaimReport]], str]]] = {
     "markdown": run_summary,
 }
 """Ways to print verdicts for other programs, by name."""
+
+WHOLE: Final = 1000
+"""Columns in which every line has room."""
 
 
 def main(options: argparse.Namespace) -> int:
@@ -49,11 +55,32 @@ def main(options: argparse.Namespace) -> int:
             )
     if options.form is None:
         _print(reports, options.tier, options.why)
+        if said := _where_from(reports, project.store):
+            print(said)
         for protocol in plain:
             print(_changes(protocol, reports, project.reproduction, options.variant))
     else:
         print(FORMS[options.form](reports), end="")
     return int(not options.variant and any(report.failed for report in reports))
+
+
+def _where_from(reports: Sequence[ClaimReport], store: Store) -> str:
+    """Say how many claims were judged from committed reference trials, since the store lacks some of theirs."""
+    judged = [report for report in reports if report.n]
+    lacking = [
+        report
+        for report in judged
+        if any(not _is_stored(store, trial) for source in report.sources for trial in source.trials)
+    ]
+    if not lacking:
+        return ""
+    some = "all" if len(lacking) == len(judged) else f"{len(lacking)} of {len(judged)}"
+    return f"judged from committed reference trials, where the store has none: {some} of these claims"
+
+
+def _is_stored(store: Store, trial: str) -> bool:
+    """Whether the store has a record of a trial, made with any versions."""
+    return any(path.exists() for path in store.record_files(trial))
 
 
 def _changes(
@@ -69,13 +96,18 @@ def _changes(
 
 
 def _print(reports: Sequence[ClaimReport], tier: str, why: bool) -> None:
-    """Print the table, and why claims have failed; why every claim is not plainly supported where that is asked for."""
+    """Print the table, and why claims have failed; why every claim is not plainly supported where that is asked for.
+
+    A file or another program gets whole sentences, unless COLUMNS says how wide lines may be.
+    """
+    reports = [one if os.path.exists(one.evidence) else replace(one, evidence="") for one in reports]
     explained = [report for report in reports if why or report.failed]
     accepted = any(report.as_expected and report.outcome is not Outcome.SUPPORTED for report in reports)
     unexplained = accepted or any(report.outcome in (Outcome.INCONCLUSIVE, Outcome.NOT_RUN) for report in reports)
     console = Console(file=styled())
+    width = console.width if console.is_terminal or os.environ.get("COLUMNS") else WHOLE
     for part in (
-        terminal_table.verdict_table(reports, console.width, console.is_terminal),
+        terminal_table.verdict_table(reports, width, console.is_terminal),
         terminal_table.explanations(explained, console.width, console.is_terminal),
         "--why says why verdicts are accepted, inconclusive or not run" if unexplained and not why else "",
         table_cells.faults(reports),

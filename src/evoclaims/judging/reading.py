@@ -217,7 +217,9 @@ class LevelsReading(TrialReading):
         """Reject an unknown direction, and a vector with fewer than two levels."""
         _worst(self.better)
         if self.size < 2:
-            raise UserError(f"A profile has at least 2 levels; {self.describe()!r} has {self.size}.")
+            raise UserError(
+                f"A profile has at least 2 levels; {self.describe()!r} has {self.size}: say last_success instead."
+            )
 
     def plain(self) -> dict[str, Any]:
         """Return what the fingerprint hashes."""

@@ -68,7 +68,15 @@ def counts(reports: Iterable[ClaimReport]) -> dict[Tally, int]:
 
 
 def totals(reports: Sequence[ClaimReport]) -> str:
-    """Return the counts in one line, such as "3 supported, 1 refuted"."""
+    """Return the counts in one line, controls apart: "3 supported, 1 refuted; controls: 2 supported"."""
+    controls = [report for report in reports if report.is_control]
+    others = [report for report in reports if not report.is_control]
+    said = [_counted(others)] if others or not controls else []
+    return "; ".join([*said, *[f"controls: {_counted(controls)}"] * bool(controls)])
+
+
+def _counted(reports: Sequence[ClaimReport]) -> str:
+    """Return the counts of some reports."""
     return ", ".join(f"{count} {said}" for said, count in counts(reports).items()) or "no verdicts"
 
 

@@ -4,20 +4,16 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from typing import Final
 
 from evoclaims.judging.verdict import Outcome
 from evoclaims.report.formatting import plural
 from evoclaims.verdicts.claim_report import ClaimReport
 
-CONTROL: Final = "control"
-"""What a claim says in `where` that is not the paper's, but a check of the benchmark itself."""
-
 
 def tally(reports: Sequence[ClaimReport]) -> str:
     """Return the sentences, such as "Of 3 cases of the paper's sentences, 2 **supported** and 1 **refuted**."."""
-    controls = [report for report in reports if report.where == CONTROL]
-    papers = [report for report in reports if report.where != CONTROL]
+    controls = [report for report in reports if report.is_control]
+    papers = [report for report in reports if not report.is_control]
     said = f"Of {plural(len(papers), 'case')} of the paper's sentences, {_counted(papers)}."
     if controls:
         said += (

@@ -11,7 +11,6 @@ from evoclaims.judging.verdict import Outcome
 from evoclaims.report.formatting import plural
 from evoclaims.report.markdown_text import literal, table
 from evoclaims.report.table_cells import NONE, in_the_papers_order
-from evoclaims.report.tally import CONTROL
 from evoclaims.report.trial_summary import Reader
 from evoclaims.verdicts.claim_report import ClaimReport
 from evoclaims.verdicts.sensitivity import Tried
@@ -48,7 +47,7 @@ def overview(columns: Mapping[str, Sequence[ClaimReport]], sentences: Mapping[st
     controls: _Rows = {}
     for heading, reports in columns.items():
         for report in in_the_papers_order(reports):
-            rows = controls if report.where == CONTROL else papers
+            rows = controls if report.is_control else papers
             line = rows.setdefault((report.claim, sentences[report.name]), defaultdict(list))
             line[heading].append(report)
     tables = [

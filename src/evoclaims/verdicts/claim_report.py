@@ -6,7 +6,7 @@ import json
 import os
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from msgspec import convert
 
@@ -18,6 +18,9 @@ from evoclaims.judging.verdict import Outcome, Verdict
 from evoclaims.verdicts.sensitivity import Tally, Tried
 from evoclaims.verdicts.source_trials import SourceTrials, versions_of
 from evoclaims.verdicts.versions import Several
+
+CONTROL: Final = "control"
+"""What a claim says in `where` that is not the paper's, but a check of the benchmark itself."""
 
 
 @dataclass(frozen=True)
@@ -91,6 +94,11 @@ class ClaimReport:
     def name(self) -> str:
         """Id and parameters, such as "G1[n_parity]"."""
         return named(self.claim, self.case)
+
+    @property
+    def is_control(self) -> bool:
+        """Whether it checks the benchmark, and no sentence of the paper."""
+        return self.where == CONTROL
 
     @property
     def counted_as(self) -> Tally:

@@ -12,8 +12,8 @@ import queue
 import signal
 import sys
 import threading
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
 import msgspec
@@ -26,6 +26,7 @@ from evoclaims.core.raised import in_one_line
 from evoclaims.mutants import catalogue
 from evoclaims.mutants.conditions import Job, jobs, plantings
 from evoclaims.report.live_line import LiveLine
+from evoclaims.trials.progress import RunProgress
 from evoclaims.trials.spec import Condition
 
 USER_ERROR: Final = 2
@@ -99,8 +100,9 @@ def condition_of(project: Project, order: WorkOrder, job: Job) -> Condition:
 
 def run_jobs(project: Project, order: WorkOrder, asked: Iterable[Job], line: LiveLine) -> Iterator[Ended]:
     """Run the missing trials of conditions one after the other; an error in one does not stop the others."""
-    fetch = RunMissing(project.store, order.device, line, project.config.seconds(order.time_limit))
+    limit = project.config.seconds(order.time_limit)
     for job in asked:
+        fetch = RunMissing(project.store, order.device, _named(line, job), limit)
         try:
             condition = condition_of(project, order, job)
             with contextlib.closing(line):
@@ -111,6 +113,11 @@ def run_jobs(project: Project, order: WorkOrder, asked: Iterable[Job], line: Liv
             yield Ended(job, printable(in_one_line(error, project.config.root)), isinstance(error, StorageError))
         else:
             yield Ended(job, again=len(fetch.again.get(condition.id, ())))
+
+
+def _named(line: LiveLine, job: Job) -> Callable[[RunProgress], None]:
+    """Return a watcher that calls the condition as claims do; the task's own name may be another one's, too."""
+    return lambda progress: line(replace(progress, condition=job.label))
 
 
 def main() -> int:
