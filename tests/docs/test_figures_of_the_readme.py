@@ -13,7 +13,9 @@ ROOT = Path(__file__).parents[2]
 
 
 @pytest.mark.oldest
-@pytest.mark.parametrize(("picture", "variant"), [("figure3", ()), ("figure3-published", ("--variant", "published"))])
+@pytest.mark.parametrize(
+    ("picture", "variant"), [("figure3", ()), ("figure3-published_rows_so_far", ("--variant", "published_rows_so_far"))]
+)
 def test_figure_3_is_drawn_from_the_committed_trials(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, picture: str, variant: tuple[str, ...]
 ) -> None:

@@ -110,10 +110,12 @@ def test_rewards_of_neat_with_the_published_settings_are_those_of_its_trials() -
 @pytest.mark.parametrize(
     ("variant", "method", "task"),
     [
-        ("published", "neat", "n_parity"),
+        ("published_rows_so_far", "neat", "n_parity"),
+        ("published_rows_so_far", "hyperneat", "n_parity"),
+        ("published_rows_so_far", "ppo", "n_parity"),
         ("published", "hyperneat", "n_parity"),
         ("published", "cma_es", "simple_alu"),
-        ("published", "ppo", "n_parity"),
+        ("lucky_level_up", "ppo", "n_parity"),
         ("", "cma_es", "n_parity"),
         ("rows_so_far", "neat", "n_parity"),
         ("sigmoid", "hyperneat", "n_parity"),
@@ -123,6 +125,23 @@ def test_success_by_level_is_the_mean_of_the_trials(variant: str, method: str, t
     trials = committed(REPRODUCTION.references_of(variant), "full", method, task)
     levels = zip(*(trial.levels["success"] for trial in trials), strict=True)
     assert len(trials) == 10
+    assert " ".join(f"{statistics.mean(level):.2f}" for level in levels) in " ".join(PROTOCOL.split())
+
+
+@pytest.mark.parametrize("variant", ["", "published_neat"])
+def test_success_of_the_policies_saved_when_a_level_was_solved_is_that_of_the_trials(variant: str) -> None:
+    """A level that was solved counts 1, others as the final policy leaves them."""
+    trials = committed(REPRODUCTION.references_of(variant), "full", "neat", "n_parity")
+    levels = zip(
+        *(
+            [
+                1.0 if solved >= 0 else success
+                for solved, success in zip(trial.levels["solved_at"], trial.levels["success"], strict=True)
+            ]
+            for trial in trials
+        ),
+        strict=True,
+    )
     assert " ".join(f"{statistics.mean(level):.2f}" for level in levels) in " ".join(PROTOCOL.split())
 
 
