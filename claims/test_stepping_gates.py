@@ -30,7 +30,10 @@ PAIRS = [
         "neat",
         "hyperneat",
         "simple_alu",
-        marks=without_smoke(because="on two operations of the ALU both get most rows of the second right, and few all"),
+        marks=without_smoke(
+            because="on two operations of the ALU NEAT is above HyperNEAT, but ten trials a side show it in every "
+            "second run alone (power 0.48)"
+        ),
     ),
     pytest.param("neat", "ppo", "n_parity", marks=[NEAT_FORGETS, PPO_SOLVES_SMALL_GATES]),
     pytest.param("neat", "ppo", "simple_alu", marks=PPO_SOLVES_SMALL_GATES),
