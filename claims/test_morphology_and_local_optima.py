@@ -43,7 +43,7 @@ def test_the_ant_is_far_below_the_simplest_robot(trials, verdict):
 
 @claim(
     "D1",
-    says="In a simplified version of the deceptive maze HyperNEAT is able to avoid the local optimum and reach the "
+    says="in a simplified version of the deceptive maze ... HyperNEAT is able to avoid the local optimum and reach the "
     "target",
     where="§5.2.3, Fig. 10",
     smoke=None,

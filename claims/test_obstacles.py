@@ -90,8 +90,8 @@ def test_medium_obstacles_hold_back_neat_alone(trials, verdict):
 
 @claim(
     "O5",
-    says="For the high-difficulty task PPO fails dramatically while NEAT's performance degrades more gracefully: PPO "
-    "has gotten stuck at the first obstacle while NEAT overpasses the obstacles",
+    says="For the high-difficulty task, however, PPO fails dramatically while NEAT's performance degrades more "
+    "gracefully. ... PPO has gotten stuck at the first obstacle while NEAT overpasses the obstacles",
     where="§5.2.1, Fig. 8",
     smoke=None,
     because=NOBODY_RUNS_YET,

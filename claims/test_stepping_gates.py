@@ -186,8 +186,8 @@ def test_direct_encodings_perform_best(trials, verdict, claim_tier, direct, othe
 
 @claim(
     "G8",
-    says="NEAT's performance degrades slightly when directly solving 6-parity (without going through the intermediate "
-    "levels)",
+    says="When directly solving 6-parity (without going through the intermediate levels) ... NEAT's performance "
+    "degrades slightly",
     where="§5.1, Fig. 4",
     smoke=None,
     because="NEAT solves 3-parity with the curriculum and without it",

@@ -61,7 +61,7 @@ class Elsewhere:
     def judge(self, recipe: Recipe) -> Judged:
         """Make an environment, or take the kept one, and judge the claims in it; say what is done meanwhile."""
         began, label = time.monotonic(), printable(recipe.label)
-        # A trial's record says nothing of Python's version, so that another Python needs a store of its own.
+        # The name of a record's file has no version of Python, so that another Python needs a store of its own.
         store = Store(self.store.root / f"python{recipe.python}") if recipe.python else self.store
         try:
             begins = partial(print, f"{label}: making its environment", flush=True)

@@ -50,7 +50,7 @@ def steps_to(source: Source, condition: Condition, curve: str, value: float, lev
         reports = zip(steps, trial.curves[curve], _trained_levels(trial, levels), strict=True)
         first = next((at for at, found, on in reports if on == wanted and found >= value), math.inf)
         solved = trial.levels.get("solved_at")
-        if curve == "success" and value <= 1.0 and solved and solved[wanted] >= 0.0:
+        if curve == "success" and solved and solved[wanted] >= 0.0:
             first = min(first, solved[wanted])
         if math.isinf(first) and max(steps, default=0.0) < budget:
             raise UnreadableTrialError(

@@ -85,7 +85,7 @@ class Program:
         """Build the state of a trial that has not taken a step.
 
         Raises:
-            UserError: when method and task do not fit together (see `fit`).
+            UserError: when method and task do not fit together (see `compatibility.traced_progress`).
         """
         progress = self._progress
         method, task = self.condition.method, self.condition.task

@@ -36,7 +36,9 @@ class Acceptance:
 
 
 def accept(history: History, reports: Sequence[ClaimReport], archive: Archive, today: str) -> Acceptance:
-    """Append an entry for every claim whose outcome, fingerprint, reason, versions or device is not the last one's.
+    """Append an entry for every claim whose outcome, fingerprint, versions or device is not the last one's.
+
+    So it is where other trials gave another reason.
 
     A claim without a test at its tier has no verdicts there: those accepted earlier were about another sentence.
 
