@@ -1,7 +1,7 @@
 """The process of one trial of a training loop: `python -m evoclaims.trials.loop_process`.
 
-It reads a `LoopRequest` from its standard input, calls the function, examines the policy that this returns, and answers on
-its standard output. When its standard input ends, its parent is gone, and it ends with all that it has started.
+It reads a `LoopRequest` from its standard input, calls the function, examines the policy that this returns, and answers
+on its standard output. When its standard input ends, its parent is gone, and it ends with all that it has started.
 """
 
 from __future__ import annotations
