@@ -49,9 +49,10 @@ def _sentence(rows: list[dict[str, str]]) -> str:
         f"about N-parity is supported and {_are(undecided)} inconclusive, and {WORDS[both]} of these "
         f"{WORDS[undecided]} are so, too, where HyperNEAT's networks have sigmoids alone; with the published settings "
         f"of NEAT {_are(with_neat)} inconclusive; with the published network of CMA-ES {_are(network)} supported and "
-        f"{_are(network_undecided)} inconclusive; with all that the published scripts do otherwise, of the claims "
-        f"whose trials have run, {_are(all_supported)} supported and {_are(all_undecided)} inconclusive, and with the "
-        f"rows of all levels so far besides, {WORDS[and_rows]} and {WORDS[and_rows_undecided]} of those on the gates"
+        f"{_are(network_undecided)} inconclusive; with what the published scripts do otherwise, of the claims whose "
+        f"trials have run, {_are(all_supported)} supported and {_are(all_undecided)} inconclusive; and if N-parity "
+        f"also asks the rows of all levels so far, {WORDS[and_rows]} and {WORDS[and_rows_undecided]} of those on the "
+        "gates"
     )
 
 
@@ -79,10 +80,10 @@ def test_the_readme_tells_how_many_published_numbers_the_published_settings_give
     with_the_text = sum(text[number] == "inside" for number in ours)
     text_on_gates = sum(text[number] == "inside" for number in gates)
     assert (
-        f"With all that the published scripts do otherwise, {said} published numbers whose trials have run "
+        f"With what the published scripts do otherwise, {said} published numbers whose trials have run "
         f"replicate**; with the protocol of the text {with_the_text} of these do" in readme
     )
     assert (
-        f"If N-parity asks the rows of all levels so far besides, which no published script does with the curriculum, "
-        f"{with_rows} on the gates do (with the text's protocol {text_on_gates})" in readme
+        f"If N-parity also asks the rows of all levels so far, which no published script does with the curriculum, "
+        f"{with_rows} on the gates replicate (with the text's protocol {text_on_gates})" in readme
     )
