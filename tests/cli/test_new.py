@@ -137,4 +137,4 @@ def test_a_wheel_is_enough_to_judge_the_paper_s_claims(tmp_path: Path) -> None:
     assert _files(site / "evoclaims" / "projects" / "skeleton") == _files(SKELETON)
 
     shown = _run(paper, "-m", "evoclaims", "status", "--tier", "full", "--only", "C2", site=site)
-    assert "claims (full): 2 supported" in shown.stdout
+    assert "claims (full): controls: 2 supported" in shown.stdout
