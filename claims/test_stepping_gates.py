@@ -31,8 +31,8 @@ PAIRS = [
         "hyperneat",
         "simple_alu",
         marks=without_smoke(
-            because="on two operations of the ALU NEAT is above HyperNEAT, but ten trials a side show it in every "
-            "second run alone (power 0.48)"
+            because="on two operations of the ALU NEAT is above HyperNEAT, but ten trials a side show it in only "
+            "every second run (power 0.48)"
         ),
     ),
     pytest.param("neat", "ppo", "n_parity", marks=[NEAT_FORGETS, PPO_SOLVES_SMALL_GATES]),

@@ -51,8 +51,8 @@ def _sentence(rows: list[dict[str, str]]) -> str:
         f"of NEAT {_are(with_neat)} inconclusive; with the published network of CMA-ES {_are(network)} supported and "
         f"{_are(network_undecided)} inconclusive; with what the published scripts do otherwise, of the claims whose "
         f"trials have run, {_are(all_supported)} supported and {_are(all_undecided)} inconclusive; and if N-parity "
-        f"also asks the rows of all levels so far, {WORDS[and_rows]} and {WORDS[and_rows_undecided]} of those on the "
-        "gates"
+        f"also asks the rows of all levels so far, of those on the gates {_are(and_rows)} supported and "
+        f"{_are(and_rows_undecided)} inconclusive"
     )
 
 

@@ -25,11 +25,11 @@ def _trials(
     condition: Condition = CONDITION,
     count: int = 4,
     started: str = "monday",
-    cores: int | None = 1,
+    cores: float | None = 1,
 ) -> list[TrialResult]:
     """Return a batch of trials that spent half of the budget."""
     timing = {"run": run, "compile": 2.0, "batch": count, "started": started}
-    timing |= {"cores": cores} if platform == "cpu" and cores else {}
+    timing |= {"processor": run * cores} if platform == "cpu" and cores else {}
     return [
         sound(
             TrialSpec(condition, seed).plain,

@@ -30,10 +30,10 @@ def batch(made: Callable[..., TrialResult]) -> Callable[..., list[TrialResult]]:
         device: dict[str, Any],
         started: str = "now",
         condition: Condition = BETTER,
-        cores: int | None = 2,
+        processor: float | None = 120.0,
     ) -> list[TrialResult]:
         timing = {"run": 60.0, "compile": 3.0, "batch": len(seeds), "started": started}
-        timing |= {"cores": cores} if device is CPU and cores else {}
+        timing |= {"processor": processor} if device is CPU and processor is not None else {}
         return [replace(made(condition, seed, 1.0, device=device), timing=timing) for seed in seeds]
 
     return make
@@ -51,12 +51,12 @@ def test_a_batch_is_paid_once_and_batches_add_up(reproduction: Reproduction, bat
 
 
 def test_a_core_s_pace_is_the_tier_s_own_or_another_s(reproduction: Reproduction, batch: Any) -> None:
-    """Records have 100 environment steps and their seed: seeds 0 and 1 took two cores 60 s for 201 steps."""
+    """Records have 100 environment steps and their seed: seeds 0 and 1 took 120 s of cores for 201 steps."""
     _commit(reproduction, "smoke", batch(range(2), CPU))
     found = spent(reproduction, "full", "better", "small")
     assert (found.trials, found.seconds) == (0, {})
     assert found.core_seconds(201) == pytest.approx(120.0)
-    _commit(reproduction, "full", batch(range(1), CPU))
+    _commit(reproduction, "full", batch(range(1), CPU, processor=60.0))
     assert spent(reproduction, "full", "better", "small").core_seconds(100) == pytest.approx(60.0)
 
 
@@ -74,16 +74,18 @@ def test_a_variant_s_trials_are_its_own_and_its_pace_is_the_protocol_s_where_it_
     found = spent(reproduction, "full", "better", "small", "worse")
     assert (found.trials, found.seconds) == (5, {"NVIDIA H200": 63.0})
     assert spent(reproduction, "full", "better", "small").trials == 7
+    alike = replace(reproduction, variants={"worse": worse, "alike": worse})
+    assert spent(alike, "full", "better", "small", "alike") == found  # committed under the other's name
 
 
-def test_a_core_s_pace_is_not_known_where_no_record_tells_how_many_ran_side_by_side(
+def test_a_core_s_pace_is_not_known_where_no_record_tells_what_several_trials_took_of_it(
     reproduction: Reproduction, batch: Any
 ) -> None:
-    _commit(reproduction, "full", batch(range(2), CPU, cores=None))
+    _commit(reproduction, "full", batch(range(2), CPU, processor=None))
     assert spent(reproduction, "full", "better", "small").core_pace is None
     _commit(reproduction, "smoke", batch(range(2), CPU))
     assert spent(reproduction, "full", "better", "small").core_seconds(201) == pytest.approx(120.0)
-    _commit(reproduction, "full", batch(range(1), CPU, cores=None))  # a trial alone has one
+    _commit(reproduction, "full", batch(range(1), CPU, processor=None))  # a trial alone has one
     assert spent(reproduction, "full", "better", "small").core_seconds(100) == pytest.approx(60.0)
 
 

@@ -18,7 +18,6 @@ from evoclaims.envs.gates.parity import NParity
 from evoclaims.methods.base import Policy
 from evoclaims.methods.hand_built import HandBuilt
 from evoclaims.trials.budget import Budget
-from evoclaims.trials.devices import usable_cores
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.runner import run
 from evoclaims.trials.spec import Condition, TrialSpec
@@ -103,7 +102,7 @@ def test_a_record_says_what_it_is_and_where_it_was_made(results: list[TrialResul
         assert result.timing["batch"] == len(SEEDS)
         assert datetime.fromisoformat(result.timing["started"]) <= datetime.fromisoformat(result.timing["ended"])
         assert result.timing["run"] >= 0
-        assert result.timing["cores"] == usable_cores()
+        assert result.timing["processor"] >= 0
         assert result.timing["compile"] >= 0
 
 

@@ -171,9 +171,8 @@ def _work(session: Session, fetch: RunMissing, tier: str, group: TrialGroup, pla
     steps = condition.environment_steps * len(missing)
     here, elsewhere, slow = took(_made_here(session.store, condition, seeds), platform), None, None
     with suppress(UserError):  # what is wrong with the reference trials is told at the end of the run
-        folder = session.reproduction.references_of(session.variant)
-        trials = references.committed(folder, tier, group.method, group.task)
-        elsewhere = took((one for one in trials if one.condition == condition.id), platform)
+        folder = session.reproduction.references
+        elsewhere = took(references.of_condition(folder, tier, group.method, group.task, condition.id), platform)
         if platform == "cpu" and steps >= LONG:
             cost = spent(session.reproduction, tier, group.method, group.task, session.variant)
             slow = cost.core_seconds(steps)

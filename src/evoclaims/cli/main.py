@@ -56,7 +56,8 @@ def _ended(arguments: Sequence[str] | None) -> int:
         print(f"evoclaims: {error}", file=sys.stderr)
         return USER_ERROR
     except KeyboardInterrupt:
-        trains = options.command in IN_PROCESSES and getattr(options, "run", True)  # `power` alone draws from a pilot
+        runs = getattr(options, "run", True) and not getattr(options, "stored", False)  # `power` alone runs nothing
+        trains = options.command in IN_PROCESSES and runs
         goes_on = "; the same command goes on from the last checkpoint" if trains else ""
         print(f"\nevoclaims: interrupted{goes_on}.", file=sys.stderr)
         return INTERRUPTED

@@ -55,8 +55,7 @@ def main(options: argparse.Namespace) -> int:
     used = [names for names in read if tier.condition(*names).existing is None]
 
     def pace(condition: Condition, method: str, task: str) -> Pace | None:
-        folder = reproduction.references_of(variant)
-        known = known_pace(condition, store, folder, options.tier, method, task, kind)
+        known = known_pace(condition, store, reproduction.references, options.tier, method, task, kind)
         compiled = not isinstance(condition.method, TrainingLoop)  # a loop has no steps that could be timed
         return measured_pace(condition, chosen) if known is None and options.measure and compiled else known
 

@@ -5,13 +5,12 @@ from __future__ import annotations
 import argparse
 import os
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 from typing import Final
 
 from rich.console import Console
 
 from evoclaims.claims.selection import selected
-from evoclaims.cli.project import open_project
+from evoclaims.cli.project import Project, open_project
 from evoclaims.cli.terminal import styled
 from evoclaims.core.errors import UnknownNameError, UserError
 from evoclaims.judging.verdict import Outcome
@@ -55,7 +54,7 @@ def main(options: argparse.Namespace) -> int:
             )
     if options.form is None:
         _print(reports, options.tier, options.why)
-        if said := _where_from(reports, project.store):
+        if said := _where_from(reports, project):
             print(said)
         for protocol in plain:
             print(_changes(protocol, reports, project.reproduction, options.variant))
@@ -64,13 +63,22 @@ def main(options: argparse.Namespace) -> int:
     return int(not options.variant and any(report.failed for report in reports))
 
 
-def _where_from(reports: Sequence[ClaimReport], store: Store) -> str:
-    """Say how many claims were judged from committed reference trials, since the store lacks some of theirs."""
+def _where_from(reports: Sequence[ClaimReport], project: Project) -> str:
+    """Say how many claims were judged from committed reference trials, since the store lacks some of theirs.
+
+    Imported trials are in no store.
+    """
+    store, imported = project.store, {condition.id for condition in project.reproduction.imported}
     judged = [report for report in reports if report.n]
     lacking = [
         report
         for report in judged
-        if any(not _is_stored(store, trial) for source in report.sources for trial in source.trials)
+        if any(
+            not _is_stored(store, trial)
+            for source in report.sources
+            if source.condition not in imported
+            for trial in source.trials
+        )
     ]
     if not lacking:
         return ""
@@ -100,7 +108,6 @@ def _print(reports: Sequence[ClaimReport], tier: str, why: bool) -> None:
 
     A file or another program gets whole sentences, unless COLUMNS says how wide lines may be.
     """
-    reports = [one if os.path.exists(one.evidence) else replace(one, evidence="") for one in reports]
     explained = [report for report in reports if why or report.failed]
     accepted = any(report.as_expected and report.outcome is not Outcome.SUPPORTED for report in reports)
     unexplained = accepted or any(report.outcome in (Outcome.INCONCLUSIVE, Outcome.NOT_RUN) for report in reports)

@@ -23,14 +23,14 @@ def to_run(running: Execution, names: Sequence[Names]) -> list[Names]:
     reproduction, store = running.project.reproduction, running.project.store
     tier, variant, seeds = running.order.tier, running.order.variant, running.order.seeds
     varied, plain = reproduction.tier(tier, variant), reproduction.tier(tier)
-    folder, kind = reproduction.references_of(variant), devices.choose(running.device)[0].device_kind
+    folder, kind = reproduction.references, devices.choose(running.device)[0].device_kind
     chosen, seconds, unknown = [], 0.0, 0
     print(f"{variant}: {reproduction.variants[variant].says}")
     for method, task in names:
         condition = varied.condition(method, task)
         missing = sum(map(StoredTrials(store, condition, time_limit=running.limit).lacks, seeds))
-        committed = references.committed(folder, tier, method, task)
-        known = {one.seed for one in committed if one.condition == condition.id and one.status in COMPLETE}
+        committed = references.of_condition(folder, tier, method, task, condition.id)
+        known = {one.seed for one in committed if one.status in COMPLETE}
         says = "stored"
         if missing and known >= set(seeds):
             says = "committed, so not run; name method and task to run it here"
@@ -38,7 +38,7 @@ def to_run(running: Execution, names: Sequence[Names]) -> list[Names]:
             chosen.append((method, task))
         if missing and (method, task) in chosen:
             found = known_pace(condition, store, folder, tier, method, task, kind) or known_pace(
-                plain.condition(method, task), store, reproduction.references, tier, method, task, kind
+                plain.condition(method, task), store, folder, tier, method, task, kind
             )
             took = 0.0 if found is None else found.seconds(condition, missing)
             seconds, unknown = seconds + took, unknown + (found is None)

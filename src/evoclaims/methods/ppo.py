@@ -62,7 +62,8 @@ class Ppo:
 
     Attributes:
         policy_layers: widths of the policy's hidden layers (swish).
-        value_layers: widths of the value network's hidden layers; the paper gives none, the published code has 7 × 32.
+        value_layers: widths of the value network's hidden layers; the paper gives none, the published code has 7 × 32
+            on the gates, and with robots 5 × 256.
         environments: episodes run in parallel.
         unroll_length: steps of each environment in one trajectory.
         batch_size: trajectories per minibatch.

@@ -53,8 +53,7 @@ def known_pace(
     versions = condition.versions
     stored = (store.get(TrialSpec(condition, seed).id, versions) for seed in range(SEEDS_LOOKED_AT))
     trials = [trial for trial in stored if trial is not None and is_final(trial)]
-    committed = references.committed(folder, tier, method, task)
-    trials += [trial for trial in committed if trial.condition == condition.id]
+    trials += references.of_condition(folder, tier, method, task, condition.id)
     batch = largest(trial for trial in trials if trial.device.get("kind") == kind)
     if batch is None:
         return None

@@ -18,20 +18,19 @@ class RecordedBatch:
         trials: at least one, each once.
         compile, run: seconds, until the last trial had ended.
         layout: see `program.over_trials`.
-        cores: of a processor that ran trials side by side; None where the records do not tell.
+        processor: seconds of a processor's cores that running took; None where the records do not tell.
     """
 
     trials: Sequence[TrialResult]
     compile: float
     run: float
     layout: str
-    cores: int | None
+    processor: float | None
 
     @property
     def core_seconds(self) -> float | None:
-        """Seconds of a processor's core, as if all cores had been busy to the end; None where that is not told."""
-        cores = 1 if len(self.trials) == 1 else self.cores
-        return None if cores is None else self.run * min(cores, len(self.trials))
+        """Seconds of a processor's core; of a trial alone its running time, None where nothing is told of several."""
+        return self.run if self.processor is None and len(self.trials) == 1 else self.processor
 
     def seconds(self, trials: int) -> float:
         """Return about how long so many trials of the same condition take."""
@@ -59,6 +58,6 @@ def by_batch(trials: Iterable[TrialResult]) -> list[RecordedBatch]:
         together = list(each.values())
         compiling, running = (max(float(trial.timing[name]) for trial in together) for name in ("compile", "run"))
         layout = layout_on(str(together[0].device["platform"]))
-        cores = max((int(trial.timing.get("cores", 0)) for trial in together), default=0)
-        found.append(RecordedBatch(together, compiling, running, layout, cores or None))
+        told = [float(trial.timing["processor"]) for trial in together if "processor" in trial.timing]
+        found.append(RecordedBatch(together, compiling, running, layout, max(told, default=None)))
     return found

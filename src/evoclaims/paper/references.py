@@ -70,6 +70,18 @@ def committed(folder: Path, tier: str, method: str, task: str) -> tuple[TrialRes
     return load(path_of(folder, tier, method, task))
 
 
+def of_condition(folder: Path, tier: str, method: str, task: str, condition: str) -> tuple[TrialResult, ...]:
+    """Read the reference trials of a condition (its id), each once; raises as `load` does.
+
+    Variants of the protocol may share a condition, whose trials then lie under the name of one of them. `folder` has
+    all reference trials (`Reproduction.references`).
+    """
+    variants = folder / "variants"
+    places = [folder, *(sorted(variants.iterdir()) if variants.is_dir() else ())]
+    found = (trial for place in places for trial in committed(place, tier, method, task))
+    return tuple({trial.id: trial for trial in found if trial.condition == condition}.values())
+
+
 def write(path: Path, results: Iterable[TrialResult]) -> None:
     """Write reference trials in the order of seeds."""
     ordered = sorted(results, key=lambda result: result.seed)

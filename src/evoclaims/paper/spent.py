@@ -20,7 +20,7 @@ class Spent:
         trials: how many there are.
         seconds: of one accelerator, by its kind, with compiling; empty when no trial was made on one.
         core_pace: seconds of a CPU's core per environment step, by trials of the same method and task, if need be of
-            another tier; None where none was made on a CPU whose number of cores they tell.
+            another tier, or under the protocol where the variant has none; None where no record tells.
     """
 
     trials: int
@@ -39,8 +39,7 @@ def spent(reproduction: Reproduction, tier: str, method: str, task: str, variant
         UserError: when a file of reference trials cannot be read.
     """
     condition = reproduction.tier(tier, variant).condition(method, task)
-    committed = references.committed(reproduction.references_of(variant), tier, method, task)
-    trials = [trial for trial in committed if trial.condition == condition.id]
+    trials = references.of_condition(reproduction.references, tier, method, task, condition.id)
     seconds: dict[str, float] = defaultdict(float)
     for batch in _batches(trials):
         if batch.layout != "alone":
@@ -52,7 +51,7 @@ def spent(reproduction: Reproduction, tier: str, method: str, task: str, variant
 
 
 def _core_pace(trials: Iterable[TrialResult]) -> float | None:
-    """Return the seconds of a core per environment step, by batches whose records tell how many cores they had."""
+    """Return the seconds of a core per environment step, by batches whose records tell what they took of one."""
     batches = [batch for batch in _batches(trials) if batch.layout == "alone" and batch.core_seconds is not None]
     steps = sum(trial.metrics.get("environment_steps", 0.0) for batch in batches for trial in batch.trials)
     return sum(batch.core_seconds or 0.0 for batch in batches) / steps if steps else None

@@ -41,6 +41,7 @@ class Header:
         chunks: whole chunks of the budget done; the state may be further.
         curves: for each seed (as text), the points of its training curve so far, by name.
         run_seconds: spent on running so far.
+        processor_seconds: of processors' cores that running has taken so far; counted from 0 on by old checkpoints.
         compile_seconds: spent on compiling by all processes that ran the batch.
         started: when the batch began (UTC, ISO 8601).
         versions: hash of the versions that the condition depends on (`packages.short_hash`); empty in old checkpoints.
@@ -58,6 +59,7 @@ class Header:
     started: str
     versions: str = ""
     schema: int = SCHEMA
+    processor_seconds: float = 0.0
 
     @property
     def seeds(self) -> list[int]:

@@ -57,7 +57,8 @@ def halved(run: Run, tried: Header) -> int:
         if state is not None:  # else another process goes on with it
             _save(run, header, state, left[:half])
             now = datetime.now(UTC).isoformat()  # the second half begins anew: what both have had counts once
-            _save(run, replace(header, started=now, run_seconds=0.0, compile_seconds=0.0), state, left[half:])
+            anew = replace(header, started=now, run_seconds=0.0, compile_seconds=0.0, processor_seconds=0.0)
+            _save(run, anew, state, left[half:])
             checkpoint.remove(run.store.checkpoints, header)
     return half
 

@@ -33,8 +33,8 @@ class TrialResult:
         digest: hash of everything above that is deterministic, and of the champion's parameters: equal digests
             mean bit-identical trials.
         timing: seconds ("run", "compile", both shared by `batch` trials) and "started", "ended" (UTC, ISO 8601); for
-            a timed-out trial also "limit", the seconds that its batch was allowed; on a processor "cores", how many of
-            its cores ran trials side by side.
+            a timed-out trial also "limit", the seconds that its batch was allowed; on a processor "processor", the
+            seconds of its cores that running took.
         provenance: versions, device, flags and git revision (see `core.provenance`).
         champion: SHA-256 of the stored champion's file, filled in by `Store.put`; empty while there is none.
     """

@@ -77,7 +77,7 @@ class Timing(Struct):
     batch: Annotated[int, Meta(ge=1)]
     started: str
     ended: str = ""
-    cores: Annotated[int, Meta(ge=1)] | None = None
+    processor: Seconds | None = None
 
 
 class Device(Struct):

@@ -19,7 +19,7 @@ from evoclaims.trials import checkpoint
 from evoclaims.trials.allowance import Allowance, OutOfTimeError
 from evoclaims.trials.batches import Batch, Run, StoredTrials, batches, drop_finished_checkpoints
 from evoclaims.trials.checkpoint import Header
-from evoclaims.trials.devices import single_threaded_linear_algebra, usable_cores
+from evoclaims.trials.devices import single_threaded_linear_algebra
 from evoclaims.trials.halving import halved, is_exhausted
 from evoclaims.trials.imported import into_store
 from evoclaims.trials.lanes import Lanes, picked
@@ -188,11 +188,16 @@ def _advance(run: Run, batch: Batch, allowance: Allowance, strides: Strides) -> 
     cost = run.condition.cost
     end = min((batch.header.chunks + 1) * run.condition.budget.chunk(cost), run.condition.steps)
     until = strides.after(batch.steps, end)
-    began, compiled = time.perf_counter(), run.lanes.seconds
+    began, used, compiled = time.perf_counter(), time.process_time(), run.lanes.seconds
     state, report = allowance.spend(lambda: run.lanes.advance(batch.state, until, len(batch.header.lanes)))
-    seconds = time.perf_counter() - began - (run.lanes.seconds - compiled)
+    compiling = run.lanes.seconds - compiled
+    seconds, processor = time.perf_counter() - began - compiling, max(time.process_time() - used - compiling, 0.0)
     strides.took(until - batch.steps, seconds)
-    header = replace(batch.header, run_seconds=batch.header.run_seconds + seconds)
+    header = replace(
+        batch.header,
+        run_seconds=batch.header.run_seconds + seconds,
+        processor_seconds=batch.header.processor_seconds + processor,
+    )
     whole = until == end or all(report.ended[lane] for lane in batch.running)
     if whole:
         curves = dict(header.curves)
@@ -244,7 +249,7 @@ def _timing(run: Run, header: Header) -> dict[str, Any]:
         "batch": len(header.batch),
         "started": header.started,
     }
-    return {**timing, "cores": usable_cores()} if run.lanes.layout == "alone" else timing
+    return {**timing, "processor": header.processor_seconds} if run.lanes.layout == "alone" else timing
 
 
 def _rearranged(run: Run, batch: Batch) -> Batch:
