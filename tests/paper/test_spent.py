@@ -65,10 +65,10 @@ def test_a_variant_s_trials_are_its_own_and_its_pace_is_the_protocol_s_where_it_
 ) -> None:
     worse = Variant("The better is worse.", {"full": {("better", "small"): CONDITIONS["worse", "small"]}})
     reproduction = replace(reproduction, variants={"worse": worse})
-    _commit(reproduction, "full", [*batch(range(5), GPU), *batch(range(2), CPU, "later")])
+    _commit(reproduction, "full", [*batch(range(5), GPU), *batch(range(5, 7), CPU, "later")])
     found = spent(reproduction, "full", "better", "small", "worse")
     assert (found.trials, found.seconds) == (0, {})
-    assert found.core_seconds(201) == pytest.approx(120.0)
+    assert found.core_seconds(211) == pytest.approx(120.0)
     path = references.path_of(reproduction.references_of("worse"), "full", "better", "small")
     references.write(path, batch(range(5), GPU, condition=CONDITIONS["worse", "small"]))
     found = spent(reproduction, "full", "better", "small", "worse")
