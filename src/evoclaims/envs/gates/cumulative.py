@@ -16,8 +16,9 @@ from evoclaims.envs.gates.truth_table import TruthTable
 class CumulativeParity(NParity):
     """Level k asks the tables of levels 0 … k of N-parity, one after the other.
 
-    One of the published environments does so with its curriculum switched on. Rows of early levels are asked once for
-    every level so far, so forgetting them costs more than in `NParity`, and success weighs them the same way.
+    One of the published environments can do so; no published script does with the curriculum. Rows of early levels are
+    asked once for every level so far, so forgetting them costs more than in `NParity`, and success weighs them the same
+    way.
     """
 
     name: ClassVar[str] = "cumulative_parity"
