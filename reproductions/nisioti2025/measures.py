@@ -24,10 +24,6 @@ class PaperTrials(TrialGroup):
         """The final policy crosses at most `stones` stones, averaged over the examination's episodes."""
         return self.event(f"crosses at most {stones:g} stones", lambda t: t.metrics["stones"] <= stones)
 
-    def crosses_at_least(self, stones: float) -> Event:
-        """The final policy crosses at least `stones` stones, averaged over the examination's episodes."""
-        return self.event(f"crosses at least {stones:g} stones", lambda t: t.metrics["stones"] >= stones)
-
     @property
     def path_coverage(self) -> Measure:
         """Share of the reachable cells on the final policy's path."""

@@ -52,10 +52,10 @@ def _sentence(rows: list[dict[str, str]]) -> str:
         f"{WORDS[undecided]} are so, too, where HyperNEAT's networks have sigmoids alone; with the published settings "
         f"of NEAT {_are(with_neat)} inconclusive; with the published network of CMA-ES {_are(network)} supported and "
         f"{_are(network_undecided)} inconclusive; with the published level test of PPO {_are(level_test)} "
-        f"inconclusive; with what the published scripts do otherwise, of the claims whose trials have run, {_are(all_supported)} "
-        f"supported and {_are(all_undecided)} inconclusive; and if N-parity "
-        f"also asks the rows of all levels so far, of those on the gates {_are(and_rows)} supported and "
-        f"{_are(and_rows_undecided)} inconclusive"
+        f"inconclusive; with what the published scripts do otherwise, of the claims whose trials have run, "
+        f"{_are(all_supported)} supported and {_are(all_undecided)} inconclusive; and if N-parity also asks the rows "
+        f"of all levels so far, of those on the gates {_are(and_rows)} supported and {_are(and_rows_undecided)} "
+        "inconclusive"
     )
 
 

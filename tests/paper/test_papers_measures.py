@@ -66,7 +66,6 @@ def test_a_trial_that_diverged_counts_as_the_worst_robot(
     [
         (lambda g: g.crosses(7), "stones", [6.9, 7.0], (0, 1)),
         (lambda g: g.crosses_at_most(1), "stones", [0.0, 1.0, 1.1], (1, 1, 0)),
-        (lambda g: g.crosses_at_least(1.5), "stones", [1.4, 1.5, 2.0], (0, 1, 1)),
         (lambda g: g.passes_at_most(1), "obstacles", [0.0, 1.0, 1.1], (1, 1, 0)),
         (lambda g: g.ends_within(2.0), "distance", [1.9, 2.0, 2.1], (1, 1, 0)),
         (lambda g: g.reaches_the_target, "reached", [0.0, 0.5, 0.6], (0, 0, 1)),

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from evoclaims.report.badge import BLUE, GREEN, GREY, RED, colour_of, message_of, svg
-from evoclaims.verdicts.claim_report import ClaimReport
+from evoclaims.verdicts.claim_report import CONTROL, ClaimReport
 
 SVG = "{http://www.w3.org/2000/svg}"
 
@@ -63,6 +63,11 @@ def test_the_message_counts_outcomes_in_their_usual_order() -> None:
         "supported 2 / refuted 1 / inconclusive 1"
     )
     assert message_of([]) == "no claims"
+
+
+def test_the_message_counts_controls_of_the_benchmark_apart_from_the_papers_claims() -> None:
+    both = [*_reports("refuted", "supported"), report("C1", "supported", where=CONTROL)]
+    assert message_of(both) == "supported 1 / refuted 1; controls: supported 1"
 
 
 @pytest.mark.parametrize(

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Final
 
 from evoclaims.claims.collected import ClaimTest
 from evoclaims.claims.reporting import judged
@@ -22,8 +21,6 @@ from evoclaims.paper.trial_group import TrialGroup
 from evoclaims.paper.variant import Names
 from evoclaims.trials.result import TrialResult
 from evoclaims.verdicts.claim_report import ClaimReport, named
-
-_DECIDED: Final = (Outcome.SUPPORTED, Outcome.REFUTED, Outcome.INCONCLUSIVE)
 
 
 @dataclass(frozen=True)
@@ -72,7 +69,7 @@ class Asserted:
     def expected(self) -> Outcome:
         """The outcome that it should have: the accepted one, or supported."""
         expected = self.report.expected
-        return expected if expected in _DECIDED else Outcome.SUPPORTED
+        return expected if expected is not None and expected.judged else Outcome.SUPPORTED
 
 
 @dataclass(frozen=True)

@@ -21,9 +21,6 @@ KINDS: Final[Mapping[str, Callable[[Cell], bool]]] = {
 }
 """What can have changed against the first release, the weightiest first."""
 
-BROKEN: Final = (Outcome.ERROR, Outcome.NOT_RUN)
-"""Outcomes of claims that no trial decided."""
-
 
 def main(options: argparse.Namespace) -> int:
     """Find the release and print it; 1 when nothing changed between the two that are named."""
@@ -68,7 +65,7 @@ def _differs(first: Judged, now: Judged, kind: str) -> bool:
 
 def _broken(judged: Judged) -> set[tuple[str, Outcome]]:
     """Return the claims that broke or did not run: no sign of the change, unless they do so at one of the ends."""
-    return {(name, report.outcome) for name, report in judged.reports.items() if report.outcome in BROKEN}
+    return {(name, report.outcome) for name, report in judged.reports.items() if not report.outcome.judged}
 
 
 def _tell(change: Change, releases: list[str], tried: Mapping[int, Judged], package: str, what: str) -> None:

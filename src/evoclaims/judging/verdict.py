@@ -31,6 +31,11 @@ class Outcome(StrEnum):
         return _SYMBOLS[self]
 
     @property
+    def judged(self) -> bool:
+        """Whether it says something about the claim: not where nothing ran, or something broke."""
+        return self not in (Outcome.NOT_RUN, Outcome.ERROR)
+
+    @property
     def direction(self) -> Direction:
         """The p value to show first: against the claim if refuted, else for it."""
         return Direction.AGAINST if self is Outcome.REFUTED else Direction.FOR

@@ -15,7 +15,6 @@ from evoclaims.paper.reproduction import Reproduction
 from evoclaims.paper.variant import Names, Variant
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.spec import Condition
-from evoclaims.verdicts.acceptance import UNDECIDED
 from evoclaims.verdicts.claim_report import ClaimReport
 from evoclaims.verdicts.history import key_of
 from evoclaims.verdicts.mutation_matrix import Attempt, Fate, Matrix, Sensitivity, fate
@@ -119,7 +118,7 @@ def noticed(
             tuple(one for one in tries.values() if one is not None),
         )
 
-    return {key_of(report): row(report) for report in sound if report.outcome not in UNDECIDED}
+    return {key_of(report): row(report) for report in sound if report.outcome.judged}
 
 
 def merged(before: Matrix, now: Matrix, tier: str, applicable: Mapping[tuple[str, str], Collection[str]]) -> Matrix:

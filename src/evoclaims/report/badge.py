@@ -54,8 +54,8 @@ def svg(label: str, message: str, colour: str) -> str:
 
 
 def message_of(reports: Sequence[ClaimReport]) -> str:
-    """Return the number of claims by outcome, such as "supported 24 / refuted 5 / inconclusive 2"."""
-    return " / ".join(f"{said} {count}" for said, count in table_cells.counts(reports).items()) or "no claims"
+    """Return the claims by outcome, controls apart: "supported 24 / refuted 5; controls: supported 9"."""
+    return table_cells.totals(reports, "{outcome} {count}", " / ") if reports else "no claims"
 
 
 def colour_of(reports: Sequence[ClaimReport]) -> str:

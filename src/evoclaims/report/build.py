@@ -22,7 +22,6 @@ from evoclaims.report.formatting import Anchors, clean, counted, listed, places,
 from evoclaims.report.model import Board, ConditionTrials, Page, Section, ShownChampion
 from evoclaims.report.trial_summary import Reader, TrialSummary
 from evoclaims.trials.store import Store
-from evoclaims.verdicts.acceptance import UNDECIDED
 from evoclaims.verdicts.claim_report import ClaimReport
 from evoclaims.verdicts.history import AcceptedVerdict, History, eras, key_of
 from evoclaims.verdicts.mutation_matrix import Matrix, described
@@ -170,7 +169,7 @@ def _parts(report: ClaimReport, read: Mapping[str, Sequence[TrialSummary]]) -> t
 
 def _change(entries: Sequence[AcceptedVerdict], report: ClaimReport) -> str:
     """Say what differs from the last accepted verdict; empty if there is nothing to say."""
-    if not entries or report.verdict is None or report.outcome in UNDECIDED:
+    if not entries or report.verdict is None or not report.outcome.judged:
         return ""
     last = entries[-1]
     if last.fingerprint != report.fingerprint:

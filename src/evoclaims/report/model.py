@@ -97,9 +97,19 @@ class Board:
     sections: tuple[Section, ...]
 
     @property
+    def papers(self) -> tuple[Section, ...]:
+        """The claims of the paper, without the controls of the benchmark."""
+        return tuple(section for section in self.sections if not section.report.is_control)
+
+    @property
+    def controls(self) -> str:
+        """How the controls ended, such as "9 supported"; empty if there are none."""
+        return table_cells.counted(section.report for section in self.sections if section.report.is_control)
+
+    @property
     def counts(self) -> Mapping[Tally, int]:
-        """The number of claims by what they count as; of outcomes that no claim has, too."""
-        found = table_cells.counts(section.report for section in self.sections)
+        """The number of the paper's claims by what they count as; of outcomes that no claim has, too."""
+        found = table_cells.counts(section.report for section in self.papers)
         return {tally: found.get(tally, 0) for tally in Tally if tally in found or tally is not Tally.INSENSITIVE}
 
     @property

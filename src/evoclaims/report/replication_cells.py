@@ -88,7 +88,7 @@ def put_to_the_paper(reports: Sequence[ClaimReport]) -> list[str]:
 
 def is_decided(report: ClaimReport) -> bool:
     """Whether a claim, judged from the paper's own numbers, is a sentence of the paper for which they suffice."""
-    return "§" in report.where and report.outcome not in (Outcome.NOT_RUN, Outcome.ERROR)
+    return "§" in report.where and report.outcome.judged
 
 
 def would_not_pass(report: ClaimReport) -> str:

@@ -67,17 +67,22 @@ def counts(reports: Iterable[ClaimReport]) -> dict[Tally, int]:
     return {tally: found[tally] for tally in Tally if found[tally]}
 
 
-def totals(reports: Sequence[ClaimReport]) -> str:
-    """Return the counts in one line, controls apart: "3 supported, 1 refuted; controls: 2 supported"."""
-    controls = [report for report in reports if report.is_control]
-    others = [report for report in reports if not report.is_control]
-    said = [_counted(others)] if others or not controls else []
-    return "; ".join([*said, *[f"controls: {_counted(controls)}"] * bool(controls)])
+def counted(reports: Iterable[ClaimReport], each: str = "{count} {outcome}", between: str = ", ") -> str:
+    """Return how many claims count as what, such as "3 supported, 1 refuted"; empty if there are none.
+
+    Args:
+        reports: of the claims.
+        each: how one count is written.
+        between: what stands between two of them.
+    """
+    return between.join(each.format(count=count, outcome=tally) for tally, count in counts(reports).items())
 
 
-def _counted(reports: Sequence[ClaimReport]) -> str:
-    """Return the counts of some reports."""
-    return ", ".join(f"{count} {said}" for said, count in counts(reports).items()) or "no verdicts"
+def totals(reports: Sequence[ClaimReport], each: str = "{count} {outcome}", between: str = ", ") -> str:
+    """Return the same in one line, controls apart: "3 supported, 1 refuted; controls: 2 supported"."""
+    controls = counted((report for report in reports if report.is_control), each, between)
+    others = counted((report for report in reports if not report.is_control), each, between)
+    return "; ".join(filter(None, (others, controls and f"controls: {controls}"))) or "no verdicts"
 
 
 def faults(reports: Iterable[ClaimReport]) -> str:

@@ -8,14 +8,10 @@ from typing import Any
 
 from evoclaims.core.canonical import content_hash
 from evoclaims.core.printable import printable
-from evoclaims.judging.verdict import Outcome
 from evoclaims.paper.archive import Archive
 from evoclaims.trials.result import TrialResult
 from evoclaims.verdicts.claim_report import ClaimReport
 from evoclaims.verdicts.history import AcceptedVerdict, History, key_of
-
-UNDECIDED = (Outcome.NOT_RUN, Outcome.ERROR)
-"""Outcomes that say nothing about a claim and are never accepted."""
 
 
 @dataclass(frozen=True)
@@ -57,7 +53,7 @@ def accept(history: History, reports: Sequence[ClaimReport], archive: Archive, t
             if grown.pop(key, ()):
                 retired.append(f"{name}, which was {past[-1].outcome}: {printable(report.reason)}")
             continue
-        if report.outcome in UNDECIDED:
+        if not report.outcome.judged:
             kept = f"it stays {past[-1].outcome}, accepted on {past[-1].accepted}" if past else "nothing is accepted"
             left.append(f"{name} is {report.outcome} now ({printable(report.reason)}): {kept}")
             continue

@@ -165,7 +165,7 @@ def fate(sound: Outcome, faulty: Outcome, *, equivalent: bool, drifted: bool) ->
     """
     if equivalent and faulty is sound:
         return Fate.EQUIVALENT
-    if faulty in (Outcome.ERROR, Outcome.NOT_RUN):
+    if not faulty.judged:
         return Fate.BROKEN
     if faulty is not sound:
         return Fate.KILLED
