@@ -18,6 +18,7 @@ from evoclaims.trials.spec import Condition, TrialSpec
 from evoclaims.trials.store import Store
 from evoclaims.trials.success import check_shares, check_success
 from evoclaims.trials.table_file import TableFile, read_table
+from evoclaims.trials.table_rows import TrialRows
 
 REVISION: Final = 1
 """Raised when the same table gives other trials, so that old records are not taken for new ones."""
@@ -168,69 +169,18 @@ class Imported(Condition):
         Raises:
             UserError: when the table cannot be read, or lacks what it should have.
         """
-        by_seed: dict[int, list[int]] = {}
-        for row, seed in zip(self._rows, self._seeds(), strict=True):
-            by_seed.setdefault(seed, []).append(row)
-        ordered = sorted(by_seed.items())
-        return tuple(self._trial(k, seed, self._in_order(seed, found)) for k, (seed, found) in enumerate(ordered))
+        return tuple(self._trial(k, seed, rows) for k, (seed, rows) in enumerate(self._rows.by_seed()))
 
     def shares_trials_with(self, other: Condition) -> bool:
         """Whether both read a row of one table."""
         if not isinstance(other, Imported) or other.table.sha256 != self.table.sha256:
             return False
-        return not set(self._rows).isdisjoint(other._rows)
+        return not set(self._rows.chosen).isdisjoint(other._rows.chosen)
 
     @cached_property
-    def _rows(self) -> list[int]:
-        """The rows of the table that are read."""
-        return self.table.rows_where(self.where)
-
-    def _seeds(self) -> list[int]:
-        """Return the table's seeds in the rows that are read."""
-        found = self.table.numbers(self.seed, "the seeds", self._rows)
-        for row, seed in zip(self._rows, found, strict=True):
-            if seed is None or not seed.is_integer():
-                has = "no seed" if seed is None else f"the seed {seed!r}"
-                raise UserError(
-                    f"Row {row + 1} of {self.table.name} has {has} in the column {self.seed!r}: each trial has a "
-                    "whole number."
-                )
-        cells = self.table.column(self.seed, "the seeds")
-        return [_whole(cells[row], seed) for row, seed in zip(self._rows, found, strict=True) if seed is not None]
-
-    def _in_order(self, seed: int, rows: list[int]) -> list[int]:
-        """Return the rows of one trial in the order of steps.
-
-        Raises:
-            UserError: when two rows claim to be the same trial, or the same step of one.
-        """
-        if not self.step:
-            if len(rows) > 1:
-                listed = " and ".join(str(row + 1) for row in rows[:2])
-                raise UserError(
-                    f"{self.table.name} has {len(rows)} rows of seed {seed} (rows {listed}), and a row is a trial: "
-                    "choose among them by where={column: value}, or name the column of training steps by step=."
-                )
-            return rows
-        steps = dict(zip(rows, self._steps(rows), strict=True))
-        ordered = sorted(rows, key=steps.__getitem__)
-        for row, following in pairwise(ordered):
-            if steps[row] == steps[following]:
-                raise UserError(
-                    f"{self.table.name} has two rows of seed {seed} and {self.step} {steps[row]:g} (rows {row + 1} and "
-                    f"{following + 1}): if there are several trials of a seed, choose by where={{column: value}}."
-                )
-        return ordered
-
-    def _steps(self, rows: Sequence[int]) -> list[float]:
-        """Return the steps of some rows."""
-        found = self.table.numbers(self.step, "the steps", rows)
-        for row, step in zip(rows, found, strict=True):
-            if step is None or not 0 <= step < math.inf:
-                raise UserError(
-                    f"Row {row + 1} of {self.table.name} has no step, a number from 0 on, in the column {self.step!r}."
-                )
-        return [step for step in found if step is not None]
+    def _rows(self) -> TrialRows:
+        """The rows of the table that are read, and which trial each is of."""
+        return TrialRows(self.table, self.where, self.seed, self.step)
 
     def _trial(self, number: int, seed: int, rows: Sequence[int]) -> TrialResult:
         """Return the record of one trial: `number` is its seed here, `seed` that of the table."""
@@ -239,7 +189,7 @@ class Imported(Condition):
         curves: dict[str, tuple[float, ...]] = {}
         if self.step:
             drawn = {name: tuple(math.nan if x is None else x for x in values) for name, values in read.items()}
-            curves = {STEPS: tuple(self._steps(rows)), **drawn}
+            curves = {STEPS: tuple(self._rows.steps(rows)), **drawn}
             metrics.setdefault(STEPS, curves[STEPS][-1])
         what, advice = f"Seed {seed} of {self.table.name}", "choose another column, or give the metric another name"
         check_shares(what, metrics, advice)
@@ -276,14 +226,6 @@ class Imported(Condition):
             f"{self.table.name} has no number in row {row + 1} of the column {self.columns[name]!r}: write nan for a "
             "trial that diverged, or say empty_means_diverged=True if all empty cells mean that."
         )
-
-
-def _whole(cell: Any, number: float) -> int:
-    """Return the whole number in a cell that `number` is nearest to: a float has not the digits of large seeds."""
-    try:
-        return int(cell)
-    except ValueError:  # 1e3, 7.0
-        return int(number)
 
 
 def into_store(condition: Condition, seeds: Sequence[int], store: Store) -> list[TrialResult]:
