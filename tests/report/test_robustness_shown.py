@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from hand_made_verdicts import report
+
 from evoclaims.judging.verdict import Outcome
 from evoclaims.report.html import html
 from evoclaims.report.markdown import markdown
-from evoclaims.report.model import Page
+from evoclaims.report.model import Board, Page, Section
 from evoclaims.verdicts.robustness import Robustness
 
 ROW = Robustness("G1[<b>]", "smoke", Outcome.REFUTED, {"network": Outcome.SUPPORTED, "rows": Outcome.REFUTED})
@@ -48,3 +50,10 @@ def test_without_variants_nothing_is_said_of_them() -> None:
     bare = Page(title="A Paper", name="paper", boards=())
     assert "hang on a detail" not in html(bare)
     assert "hang on a detail" not in markdown(bare)
+
+
+def test_the_heading_of_a_variant_is_shown_whole_and_breaks_between_words() -> None:
+    board = Board("smoke", (Section(report("G1"), "G1", (), ("§1",)),))
+    row = Robustness("G1", "smoke", Outcome.SUPPORTED, {"large_<network>": Outcome.SUPPORTED})
+    page = replace(PAGE, boards=(board,), variants={"large_<network>": "a larger one"}, robustness=(row,))
+    assert '<span class="variant" title="a larger one">large_<wbr>&lt;network&gt;</span>' in html(page)
