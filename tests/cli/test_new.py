@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import json
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -15,6 +16,7 @@ from evoclaims import cli
 
 ROOT = Path(__file__).parents[2]
 SKELETON = ROOT / "src" / "evoclaims" / "projects" / "skeleton"
+PAGE = re.compile(r"docs/[\w.]+\.md")
 
 
 def _new(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str, str]:
@@ -52,8 +54,11 @@ def test_a_paper_is_unpacked_whole(tmp_path: Path, capsys: pytest.CaptureFixture
     status, said, _ = _new(capsys, str(tmp_path / "paper"), "--from", "nisioti2025")
     assert status == 0
     assert "evoclaims status --tier full" in said
-    for part in ("claims", "reproductions"):
+    for part in ("claims", "reproductions", "docs"):
         assert _files(tmp_path / "paper" / part) == _files(ROOT / part)
+    named = {page for text in _files(tmp_path / "paper" / "claims").values() for page in PAGE.findall(text.decode())}
+    assert len(named) > 2
+    assert all((tmp_path / "paper" / page).is_file() for page in named)
     assert "[tool.evoclaims]" in (tmp_path / "paper" / "pyproject.toml").read_text()
 
 

@@ -17,8 +17,9 @@ PROJECTS: Final = Path(__file__).parents[1] / "projects"
 CHECKOUT: Final = PROJECTS.parents[2]
 """Where a paper's claims and its reproduction are in evoclaims' own repository; a wheel has them in `PROJECTS`."""
 
-PARTS: Final = ("reproductions", "claims", "pyproject.toml")
-"""What a project consists of; its settings come last, so that a part of one is none."""
+PARTS: Final = ("docs", "reproductions", "claims", "pyproject.toml")
+"""What a project consists of, with the pages that its claims name, if any; its settings come last, so that a part of
+one is none."""
 
 
 def main(options: argparse.Namespace) -> int:
@@ -60,8 +61,9 @@ def _write(project: Path, folder: Path) -> None:
         UserError: when it cannot be written.
     """
     try:
+        elsewhere = project if (project / "claims").exists() else CHECKOUT
         for part in PARTS:
-            source = project / part if (project / part).exists() else CHECKOUT / part
+            source = (project if (project / part).exists() else elsewhere) / part
             for path in sorted([source, *source.rglob("*")]):
                 target = folder / part / path.relative_to(source)
                 if path.is_file() and target.parent.name != "__pycache__":
