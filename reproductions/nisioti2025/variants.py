@@ -125,7 +125,7 @@ def _published_value_network(method: str, task: str, condition: Condition) -> Co
 
 
 def _published(method: str, task: str, condition: Condition) -> Condition | None:
-    """All that the published scripts do otherwise, but for PPO's value network with robots, which has not run.
+    """All that the published scripts do otherwise, but for PPO's value network with robots: they have not run together.
 
     With the curriculum they ask N-parity for the level's rows alone, as the paper's text has it.
     """
