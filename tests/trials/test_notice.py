@@ -127,7 +127,7 @@ def test_a_process_waits_for_another_that_lives_and_says_for_whom(
     said = waits(tmp_path, sleep=sleep)
     assert slept == [0.2] * 3
     who = f"process {runner.pid} on {socket.gethostname()}"
-    assert said == [f"waiting for {who}, which runs the same trials"] * 3
+    assert said == [f"waiting for {who}, which runs the same condition"] * 3
 
 
 @pytest.mark.parametrize("collected", [True, False], ids=["collected", "zombie"])
@@ -241,7 +241,7 @@ def test_a_process_that_was_taken_over_from_leaves_the_others_notice_alone(tmp_p
 @pytest.mark.parametrize("text", ["", "{", '{"pid": 1}', "[" * 100_000, "\x00\xff", "filelock/2\npid=-1\n"])
 def test_a_text_that_is_no_notice_is_stale(tmp_path: Path, hasty: None, text: str) -> None:
     forge(tmp_path).write_text(text)
-    assert set(waits(tmp_path)) == {"waiting for another process, which runs the same trials"}
+    assert set(waits(tmp_path)) == {"waiting for another process, which runs the same condition"}
 
 
 @pytest.mark.parametrize(

@@ -80,7 +80,7 @@ def announced(
             lease.force_break()  # filelock keeps leases of zombies, and stale leases on network folders
             continue
         who = f"process {owner.pid} on {owner.hostname.partition(_CONTAINER)[0]}" if owner else "another process"
-        tell(f"waiting for {who}, which runs the same trials")
+        tell(f"waiting for {who}, which runs the same condition")
         sleep(poll)
     try:
         yield
