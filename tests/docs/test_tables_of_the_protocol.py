@@ -77,6 +77,26 @@ def test_comparisons_with_the_control_cost_given_back_are_those_of_the_trials(
     assert f"| {part} | {' | '.join(f'A12 {text}' for text in found)} |" in PROTOCOL
 
 
+@pytest.mark.parametrize(
+    ("variant", "said"),
+    [
+        ("", "the protocol"),
+        ("published_ppo", "`published_ppo`: unroll, discount, updates"),
+        ("published_value_network", "`published_value_network`"),
+        ("few_environments", "`few_environments`"),
+        ("published_course", "`published_course` (2,000 steps, no cost)"),
+        ("published", "`published`: all of these"),
+    ],
+)
+def test_rewards_of_ppo_among_obstacles_by_setting_are_those_of_its_trials(variant: str, said: str) -> None:
+    trials = committed(REPRODUCTION.references_of(variant), "full", "ppo", "obstacles")
+    rewards = [_examined(trial) for trial in trials]
+    passed = statistics.mean(float(trial.metrics["obstacles"]) for trial in trials)
+    assert len(trials) == 10
+    cells = [said, f"{statistics.mean(rewards):,.0f}", f"{min(rewards):,.0f}, {max(rewards):,.0f}", f"{passed:.1f}"]
+    assert _line(cells) in PROTOCOL
+
+
 @pytest.mark.parametrize("method", NAMES)
 def test_training_lengths_are_those_of_the_conditions(method: str) -> None:
     cells = [NAMES[method]]

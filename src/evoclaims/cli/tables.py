@@ -106,7 +106,8 @@ def _details(project: Project, words: list[str]) -> str:
     rows = matrix(plain, dict(zip(asked[1:], varied, strict=True)))
     tried = [name for name in asked[1:] if any(name in row.outcomes for row in rows)]
     left = ", ".join(name for name in asked[1:] if name not in tried)
-    return "\n\n".join(filter(None, (robustness(rows, tried), f"Not run: {literal(left)}." if left else "")))
+    unjudged = f"No claim's trials have all run under: {literal(left)}." if left else ""
+    return "\n\n".join(filter(None, (robustness(rows, tried), unjudged)))
 
 
 def _numbers(project: Project, words: list[str]) -> str:
