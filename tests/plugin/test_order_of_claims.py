@@ -106,6 +106,8 @@ def test_a_run_that_takes_processors_hours_is_told_of_beforehand(project: Any, s
     paper = project.path / "tiny_paper.py"
     paper.write_text(paper.read_text().replace("Tier(conditions(2)", "Tier(conditions(10**9)"))
     told = "The missing trials take up to "
+    refused = project.run("--claims-only=other", "--claims-device=cpu", own_store=True)
+    assert told not in str(refused.stdout)  # nor does anything run
     result = project.run("-m", "full", "--claims-device=cpu", own_store=True)
     (line,) = [line for line in result.outlines if told in line]
     hours = re.search(r"up to ([\d,]+) hours of a processor's core here\. `evoclaims plan` of this tier says", line)

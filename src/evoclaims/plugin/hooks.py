@@ -101,12 +101,12 @@ def pytest_collection_modifyitems(session: pytest.Session, config: pytest.Config
 
 
 def _refuse(config: pytest.Config, items: list[pytest.Item], error: UserError) -> None:
-    """End the run with a sentence; an xdist worker only passes it on to its controller and runs nothing."""
+    """End the run with a sentence; an xdist worker only passes it on to its controller. Nothing runs."""
+    items.clear()  # pytest goes on to `pytest_collection_finish`
     output: dict[str, Any] | None = getattr(config, "workeroutput", None)
     if output is None:
         raise pytest.UsageError(str(error)) from error
     output[TROUBLE] = str(error)
-    items.clear()
 
 
 @pytest.hookimpl(tryfirst=True)
