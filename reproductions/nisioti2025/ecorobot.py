@@ -45,20 +45,22 @@ HIERARCHICAL, MEDIUM, HIGH = "obstacles", "obstacles_medium", "obstacles_high"
 CHEETAH_RUN, ANT_RUN = "locomotion_half_cheetah", "locomotion_ant"
 
 _QUARTER = math.pi / 2
-SIMPLE_ROB_SUBSTRATE = Substrate(
-    (
-        (
-            # x, y, heading, and the velocities along x and y: inside the body. Then the rays, where they leave it, from
-            # right over front to left. The bias last.
-            *((0.5, 0.0), (0.0, 0.5), (0.0, 0.0), (-0.5, 0.0), (0.0, -0.5)),
-            *on_circle([-_QUARTER, -_QUARTER / 2, 0.0, _QUARTER / 2, _QUARTER]),
-            (-0.25, -0.25),
-        ),
-        on_circle([2 * math.pi * i / 16 for i in range(16)], radius=0.75),
-        on_circle([_QUARTER, 0.0, math.pi, -_QUARTER]),
+
+
+def simple_rob_substrate(hidden: int) -> Substrate:
+    """Return positions of sensors and motors (north, east, west, south) on the robot (Fig. 11), and of hidden neurons.
+
+    Where those are is arbitrary, says its caption.
+    """
+    sensors = (
+        # x, y, heading, and the velocities along x and y: inside the body. Then the rays, where they leave it, from
+        # right over front to left. The bias last.
+        *((0.5, 0.0), (0.0, 0.5), (0.0, 0.0), (-0.5, 0.0), (0.0, -0.5)),
+        *on_circle([-_QUARTER, -_QUARTER / 2, 0.0, _QUARTER / 2, _QUARTER]),
+        (-0.25, -0.25),
     )
-)
-"""Positions of sensors and motors (north, east, west, south) on the robot (the paper's figure of the substrate)."""
+    around = on_circle([2 * math.pi * i / hidden for i in range(hidden)], radius=0.75)
+    return Substrate((sensors, around, on_circle([_QUARTER, 0.0, math.pi, -_QUARTER])))
 
 
 @dataclass(frozen=True)
@@ -109,7 +111,7 @@ def _conditions(size: Size) -> Conditions:
     """Return every condition at a size."""
     tasks = size.tasks
     simple = {name for name, task in tasks.items() if task.robot == SIMPLE_ROB}
-    placed = HyperNeat(size.cppn, substrate=SIMPLE_ROB_SUBSTRATE)
+    placed = HyperNeat(size.cppn, substrate=simple_rob_substrate(hidden=16))
     layered = HyperNeat(size.cppn, extent="unit")
     cma_es = CmaEs(population=size.cma_es, network=AllSkips(hidden=size.hidden))
     methods: dict[str, Mapping[str, Method[Any]]] = {

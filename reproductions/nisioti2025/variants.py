@@ -69,6 +69,14 @@ def _published_evolution(condition: Condition, population: int, most: int) -> Co
     return replace(condition, method=replace(evolved, settings=settings))
 
 
+def _wide_substrate(method: str, task: str, condition: Condition) -> Condition | None:
+    """HyperNEAT with 32 hidden neurons around the simplest robot, as the caption of Fig. 11 says."""
+    evolved: Any = condition.method
+    if not isinstance(evolved, HyperNeat) or evolved.substrate != ecorobot.simple_rob_substrate(hidden=16):
+        return None
+    return replace(condition, method=replace(evolved, substrate=ecorobot.simple_rob_substrate(hidden=32)))
+
+
 def _sigmoid(method: str, task: str, condition: Condition) -> Condition | None:
     """HyperNEAT with only sigmoids in its CPPNs."""
     evolved: Any = condition.method
@@ -185,6 +193,11 @@ VARIANTS = {
         "HyperNEAT adds nodes to its CPPNs with probability 0.1, keeps old records on a new level, and has at most "
         "1,024 genomes in 20 species, with robots 512 (smoke: half), as in the published code",
         _published_hyperneat,
+    ),
+    "wide_substrate": _variant(
+        "HyperNEAT's networks have 32 hidden neurons around the simplest robot, as the paper's caption says (the published "
+        "code has 16)",
+        _wide_substrate,
     ),
     "sigmoid": _variant("HyperNEAT's CPPNs have sigmoids only, as in the published code", _sigmoid),
     "lucky_level_up": _variant(
