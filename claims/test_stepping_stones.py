@@ -79,7 +79,7 @@ def test_others_reach_three_stones(trials, verdict, claim_tier, method):
 
 @claim(
     "S3",
-    says="PPO reaches only the first stepping stone",
+    says="Both RL methods get stuck at the first stepping stone",
     where="§5.2.1, Fig. 5",
     smoke="PPO reaches, unlike a random policy, the first of three stepping stones, but not the others, unlike NEAT",
 )

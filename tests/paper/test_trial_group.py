@@ -82,6 +82,7 @@ def test_each_measure_reads_its_own_number(group: Any, name: str, values: tuple[
         (lambda g: g.solves_no_level_beyond(-1), (1, 1, 0)),
         (lambda g: g.solves_no_level_beyond(0), (1, 1, 0)),
         (lambda g: g.success_everywhere_is(0.5), (0, 1, 0)),
+        (lambda g: g.last_success_is(0.25), (0, 1, 0)),
     ],
 )
 def test_each_event_holds_where_its_name_says(group: Any, event: Any, held: tuple[int, ...]) -> None:
@@ -121,6 +122,7 @@ def test_measures_and_events_have_names_of_their_own_since_fingerprints_hash_the
         made.solves_no_level_beyond(0),
         made.solves_no_level_beyond(-1),
         made.success_everywhere_is(0.0),
+        made.last_success_is(0.0),
     ]
     names = [thing.name for thing in (*measures, *events, made.success)]
     assert len(set(names)) == len(names)

@@ -174,6 +174,10 @@ class TrialGroup:
                 else f"{self.label} has a single level, which is 0, and so none beyond it."
             )
 
+    def last_success_is(self, value: float) -> Event:
+        """The final policy's success on the last level is exactly `value`."""
+        return self.event(f"success on the last level is {value:g}", lambda t: t.metrics["last_success"] == value)
+
     def success_everywhere_is(self, value: float) -> Event:
         """The final policy's success is exactly `value` on every level."""
         name = "solves every level" if value == 1.0 else f"success is {value:g} on every level"
