@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import fields, replace
 from typing import Any
 
 from evoclaims import Condition, Variant, changed
@@ -10,6 +10,7 @@ from evoclaims.envs import CumulativeParity, NParity, Obstacles, RobotTask, Simp
 from evoclaims.methods import CmaEs, HandBuilt, HyperNeat, LevelTest, Neat, Ppo, SeldomDecomposedCmaEs
 from evoclaims.networks import AllSkips, Mlp
 from reproductions.nisioti2025 import ecorobot, stepping_gates
+from reproductions.nisioti2025.first_level_ppo import FirstLevelPpo
 from reproductions.nisioti2025.published_course import PublishedObstacles
 
 
@@ -87,12 +88,24 @@ def _sigmoid(method: str, task: str, condition: Condition) -> Condition | None:
 
 
 def _lucky_level_up(method: str, task: str, condition: Condition) -> Condition | None:
-    """PPO moves up a level when it answers 128 random rows correctly; tested 49 times in a whole budget."""
+    """PPO moves up a level when its stochastic policy answers 128 random rows correctly, tested 49 times in a budget.
+
+    The published code asks its deterministic policy.
+    """
     learner: Any = condition.method
     if not isinstance(learner, Ppo) or isinstance(condition.task, RobotTask):
         return None
     test = LevelTest(every=max(1, condition.steps // 49), sampled_episodes=128)
     return replace(condition, method=replace(learner, level_test=test))
+
+
+def _first_level(method: str, task: str, condition: Condition) -> Condition | None:
+    """PPO never trains on a level after the first; only its test goes on."""
+    learner: Any = condition.method
+    if not isinstance(learner, Ppo) or isinstance(condition.task, RobotTask) or condition.progression == "direct":
+        return None
+    settings = {field.name: getattr(learner, field.name) for field in fields(learner)}
+    return replace(condition, method=FirstLevelPpo(**settings))
 
 
 def _published_ppo(method: str, task: str, condition: Condition) -> Condition | None:
@@ -195,14 +208,18 @@ VARIANTS = {
         _published_hyperneat,
     ),
     "wide_substrate": _variant(
-        "HyperNEAT's networks have 32 hidden neurons around the simplest robot, as the paper's caption says (the published "
-        "code has 16)",
+        "HyperNEAT's networks have 32 hidden neurons around the simplest robot, as the paper's caption says (the "
+        "published code has 16)",
         _wide_substrate,
     ),
     "sigmoid": _variant("HyperNEAT's CPPNs have sigmoids only, as in the published code", _sigmoid),
     "lucky_level_up": _variant(
-        "PPO goes up a level when its stochastic policy answers 128 random rows right, as in the published code",
+        "PPO goes up a level when its stochastic policy answers 128 random rows right, in 49 tests; in the published "
+        "code its deterministic one does",
         _lucky_level_up,
+    ),
+    "first_level": _variant(
+        "PPO trains on the first level all along, and only its test goes up, as in the published code", _first_level
     ),
     "published_ppo": _variant(
         "PPO with robots unrolls 20 steps, discounts by 0.95 and updates 8 times a batch, as in the published code",

@@ -140,7 +140,7 @@ class Ppo:
     def step(self, key: PRNGKeyArray, task: Task, level: Int[Array, ""], state: PpoState) -> tuple[PpoState, Progress]:
         """Collect batch_size × minibatches trajectories, then train on them in updates_per_batch passes."""
         reset_key, act_key, train_key, test_key = streams(key, "reset", "act", "train", "test")
-        interaction = state.interaction.at_level(task, reset_key, level)
+        interaction = state.interaction.at_level(task, reset_key, self.trained_level(level))
         act = self._act(task, state)
         rounds = self.batch_size * self.minibatches // self.environments
         interaction, data = collect(task, act, act_key, interaction, rounds, self.unroll_length)
@@ -170,6 +170,10 @@ class Ppo:
             healthy=jnp.all(jnp.stack(jax.tree.leaves(finite))),
             metrics={"training_reward": jnp.mean(data.reward)},
         )
+
+    def trained_level(self, level: Int[Array, ""]) -> Int[Array, ""]:
+        """Return the level that a trial at `level` trains on: that one."""
+        return level
 
     def best(self, task: Task, state: PpoState) -> Policy:
         """Return the current deterministic policy."""
