@@ -14,7 +14,7 @@ import threading
 import time
 import weakref
 from collections.abc import Callable
-from concurrent.futures import Future
+from concurrent.futures import Future, wait
 from typing import Any, Final, TypeVar
 
 T = TypeVar("T")
@@ -22,8 +22,11 @@ T = TypeVar("T")
 LOOK_SECONDS: Final = 1.0
 """Time between two looks at the clock; more than twice this is not counted: the process was stopped."""
 
-_working: weakref.WeakSet[threading.Thread] = weakref.WeakSet()
-"""All threads that work; known before they start, since several interrupts may come at any time."""
+_working: weakref.WeakSet[Future[Any]] = weakref.WeakSet()
+"""What all threads make; known before they start, since several interrupts may come at any time.
+
+Threads are not asked: before Python 3.13 a thread whose `join` was interrupted says that it has ended, and it has not.
+"""
 
 
 class OutOfTimeError(Exception):
@@ -55,22 +58,22 @@ class Allowance:
             raise OutOfTimeError
         made: Future[T] = Future()
         thread = threading.Thread(target=_do, args=(work, made), name="evoclaims work", daemon=True)
-        _working.add(thread)
+        _working.add(made)
         thread.start()
         try:
-            self._wait(thread)
+            self._wait(made)
         except BaseException:  # on an interrupt, wait for the work, as on this thread; a second one ends the wait
-            self._wait(thread)
+            self._wait(made)
             raise
         if not made.done():
             raise OutOfTimeError
         return made.result()
 
-    def _wait(self, thread: threading.Thread) -> None:
-        """Wait until the thread has ended or the time is over."""
-        while thread.is_alive() and self.left > 0:
+    def _wait(self, made: Future[Any]) -> None:
+        """Wait until the work is done or the time is over."""
+        while not made.done() and self.left > 0:
             began = time.monotonic()
-            thread.join(min(LOOK_SECONDS, self.left))
+            wait([made], min(LOOK_SECONDS, self.left))
             self.left -= min(time.monotonic() - began, 2 * LOOK_SECONDS)
 
 
@@ -79,7 +82,7 @@ def end_without(status: int) -> None:
 
     The interpreter's normal exit would wait for such a thread, or crash it (a segmentation fault).
     """
-    if any(thread.is_alive() for thread in _working):
+    if not all(made.done() for made in _working):
         for stream in filter(None, (sys.stdout, sys.stderr)):
             with contextlib.suppress(OSError):  # a full disk
                 stream.flush()
