@@ -1,16 +1,19 @@
-"""The plan of this paper's full tier, which has long names and large numbers, on terminals of any width."""
+"""The plan of this paper's full tier, with long names and large numbers, on any terminal; that of a damaged store."""
 
 from __future__ import annotations
 
 import json
+import re
 from collections import Counter
 from pathlib import Path
 
 import pytest
 from rich.cells import cell_len
+from tiny_project import Evoclaims, Project, forget, trials_of
 
 from evoclaims import cli
 from evoclaims.report.live_line import duration
+from evoclaims.trials.store import Store
 from reproductions.nisioti2025 import REPRODUCTION
 
 ROOT = Path(__file__).parents[2]
@@ -43,3 +46,26 @@ def test_the_full_plan_fits_eighty_columns_and_says_there_what_it_says_on_a_wide
     }
     seconds = sum(timing["run"] + timing["compile"] for timing in batches.values())
     assert took[:4] == duration(seconds).split()
+
+
+@pytest.mark.oldest
+def test_a_damaged_record_is_planned_and_submitted_as_a_trial_to_run_and_named_by_the_run(
+    evoclaims: Evoclaims, project: Project, stored: Store
+) -> None:
+    """Trials of the right network are missing, so that nothing has read the wrong one's before they are counted."""
+    project.write(c="verdict(trials('right', on='parity').last_success > trials('wrong', on='parity').last_success)")
+    forget(stored, trials_of(stored, "hand_built")[:2])
+    record = stored.record_files(trials_of(stored, "hand_built_negated")[3].id)[-1]
+    torn = record.read_bytes()[:50]
+    record.write_bytes(torn)
+    status, out, err = evoclaims("plan")
+    assert (status, err) == (0, "")
+    assert re.search(r"^right on parity +8 +2 +8 +\d+ s$", out, re.MULTILINE)
+    assert re.search(r"^wrong on parity +9 +1 +4 +\d+ s$", out, re.MULTILINE)
+    said = evoclaims("submit", "wrong", "--dry-run", "--cluster=local")[1]
+    assert "wrong on parity: 1 trial, about" in said
+    for command in (["run", "wrong"], ["run", "--variant=traded"]):
+        status, out, err = evoclaims(*command)
+        assert (status, err.count(f"Cannot use {record}: ")) == (1, 1)
+    assert "traded: The right network is wrong\n  right on parity (smoke): 1 trial to run" in out
+    assert record.read_bytes() == torn

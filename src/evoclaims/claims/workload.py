@@ -166,7 +166,7 @@ def _work(session: Session, fetch: RunMissing, tier: str, group: TrialGroup, pla
     condition, versions, design = group.condition, group.condition.versions, session.design(tier)
     seeds = design.seeds(design.last.n)
     stored = StoredTrials(session.store, condition, fetch.any_version, fetch.time_limit)
-    missing = [seed for seed in seeds if condition.existing is None and _lacks(stored, seed)]
+    missing = stored.missing(seeds) if condition.existing is None else []
     timed = len(missing) or len(seeds)
     steps = condition.environment_steps * len(missing)
     here, elsewhere, slow = took(_made_here(session.store, condition, seeds), platform), None, None
@@ -187,14 +187,6 @@ def _work(session: Session, fetch: RunMissing, tier: str, group: TrialGroup, pla
         elsewhere=None if elsewhere is None else elsewhere.seconds(timed),
         core_seconds=slow,
     )
-
-
-def _lacks(stored: StoredTrials, seed: int) -> bool:
-    """Whether a trial must be run; one whose record is damaged is not."""
-    try:
-        return stored.lacks(seed)
-    except DamagedFileError:
-        return False
 
 
 def _made_here(store: Store, condition: Condition, seeds: Sequence[int]) -> Iterator[TrialResult]:

@@ -14,7 +14,6 @@ from evoclaims.cli.project import Project, open_project
 from evoclaims.core.errors import UserError
 from evoclaims.trials.batches import StoredTrials
 from evoclaims.trials.notice import is_announced
-from evoclaims.trials.store import DamagedFileError
 
 TAIL: Final = 20_000
 """Bytes at the end of a log in which a reason is looked for."""
@@ -97,10 +96,7 @@ def _lacks(project: Project, place: Place) -> bool:
         return False
     stored = StoredTrials(project.store, condition, time_limit=project.config.seconds(None))
     seeds = tier.design.seeds(tier.design.last.n)
-    try:
-        return condition.id == place.batch.condition and any(stored.lacks(seed) for seed in seeds)
-    except DamagedFileError:  # whoever runs the trial names the file
-        return True
+    return condition.id == place.batch.condition and bool(stored.missing(seeds))
 
 
 def _told(project: Project, place: Place, seen: Seen, log: Path) -> tuple[str, str]:

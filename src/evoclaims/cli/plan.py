@@ -119,7 +119,7 @@ def _conditions(
     steps, seconds, unknown = 0, 0.0, False
     for names in used:
         condition = tier.condition(*names)
-        missing = sum(map(StoredTrials(store, condition, time_limit=limit).lacks, seeds))
+        missing = len(StoredTrials(store, condition, time_limit=limit).missing(seeds))
         owed = missing * condition.environment_steps
         pace = paces[names]
         time = 0.0 if not missing else None if pace is None else pace.seconds(condition, missing)
@@ -169,9 +169,9 @@ def _spent(tier: Tier, costs: Costs) -> Table:
 
 
 def _has_run(store: Store, tier: Tier, names: Names) -> bool:
-    """Whether the store has a trial of a condition, made with the installed versions."""
-    stored = StoredTrials(store, tier.condition(*names))
-    return any(map(stored.get, tier.design.seeds(tier.design.last.n)))
+    """Whether the store has a trial of a condition that came to its end, made with the installed versions."""
+    seeds = tier.design.seeds(tier.design.last.n)
+    return len(StoredTrials(store, tier.condition(*names)).missing(seeds)) < len(seeds)
 
 
 def _kinds(costs: Costs) -> list[str]:

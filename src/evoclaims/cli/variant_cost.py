@@ -28,7 +28,7 @@ def to_run(running: Execution, names: Sequence[Names]) -> list[Names]:
     print(f"{variant}: {reproduction.variants[variant].says}")
     for method, task in names:
         condition = varied.condition(method, task)
-        missing = sum(map(StoredTrials(store, condition, time_limit=running.limit).lacks, seeds))
+        missing = len(StoredTrials(store, condition, time_limit=running.limit).missing(seeds))
         committed = references.of_condition(folder, tier, method, task, condition.id)
         known = {one.seed for one in committed if one.status in COMPLETE}
         says = "stored"

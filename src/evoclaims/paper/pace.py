@@ -12,9 +12,10 @@ import numpy as np
 
 from evoclaims.paper import references
 from evoclaims.paper.recorded_batches import largest
+from evoclaims.trials.batches import StoredTrials
 from evoclaims.trials.devices import usable_cores
 from evoclaims.trials.lanes import Lanes
-from evoclaims.trials.spec import Condition, TrialSpec
+from evoclaims.trials.spec import Condition
 from evoclaims.trials.store import Store
 from evoclaims.trials.time_limit import is_final
 
@@ -50,9 +51,8 @@ def known_pace(
     kind: str,
 ) -> Pace | None:
     """Return the pace of stored or reference trials of this condition on this kind of device, or None."""
-    versions = condition.versions
-    stored = (store.get(TrialSpec(condition, seed).id, versions) for seed in range(SEEDS_LOOKED_AT))
-    trials = [trial for trial in stored if trial is not None and is_final(trial)]
+    stored = StoredTrials(store, condition, any_version=True).sound(range(SEEDS_LOOKED_AT))
+    trials = list(filter(is_final, stored))
     trials += references.of_condition(folder, tier, method, task, condition.id)
     batch = largest(trial for trial in trials if trial.device.get("kind") == kind)
     if batch is None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from functools import partial
@@ -51,8 +52,20 @@ class StoredTrials:
         return is_final(self.get(seed))
 
     def lacks(self, seed: int) -> bool:
-        """Whether the trial of a seed must be run."""
+        """Whether the trial of a seed must be run; raises as `get` does."""
         return not answers(self.get(seed), self.time_limit)
+
+    def missing(self, seeds: Sequence[int]) -> list[int]:
+        """Return the seeds whose trials must be run, damaged ones among them: whoever runs those names the file."""
+        there = {result.seed for result in self.sound(seeds) if answers(result, self.time_limit)}
+        return [seed for seed in seeds if seed not in there]
+
+    def sound(self, seeds: Iterable[int]) -> Iterator[TrialResult]:
+        """Yield the stored trials of these seeds that can be read."""
+        for seed in seeds:
+            with suppress(DamagedFileError):
+                if (result := self.get(seed)) is not None:
+                    yield result
 
     def answer(self, results: Iterable[TrialResult | None]) -> bool:
         """Whether none of these trials must be run."""

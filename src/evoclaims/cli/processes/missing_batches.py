@@ -9,10 +9,9 @@ from evoclaims.cli.project import Project
 from evoclaims.mutants.conditions import Job
 from evoclaims.paper.estimates import Estimate, Missing, committed, estimates
 from evoclaims.paper.variant import Names
+from evoclaims.trials.batches import StoredTrials
 from evoclaims.trials.result import TrialResult
-from evoclaims.trials.spec import Condition, TrialSpec
-from evoclaims.trials.store import DamagedFileError, Store
-from evoclaims.trials.time_limit import answers
+from evoclaims.trials.spec import Condition
 
 
 @dataclass(frozen=True)
@@ -43,25 +42,11 @@ def missing_batches(
     for job, condition in wanted.items():
         if condition.existing is not None:
             continue
-        found = [_looked_up(project.store, TrialSpec(condition, seed)) for seed in seeds]
-        owed[job] = tuple(seed for seed, (here, _) in zip(seeds, found, strict=True) if not answers(here, limit))
+        owed[job] = tuple(StoredTrials(project.store, condition, time_limit=limit).missing(seeds))
         if owed[job]:
-            earlier = [trial for _, trial in found if trial is not None]
+            earlier = list(StoredTrials(project.store, condition, any_version=True).sound(seeds))
             if job.names not in reference:  # a condition may have many faults
                 reference[job.names] = committed(project.reproduction, tier, *job.names)
             known[job] = Missing(condition, len(owed[job]), [*earlier, *reference[job.names]])
     batches = [MissingBatch(job, owed[job], found) for job, found in estimates(known, platform).items()]
     return sorted(batches, key=lambda batch: -batch.estimate.seconds())
-
-
-def _looked_up(store: Store, spec: TrialSpec) -> tuple[TrialResult | None, TrialResult | None]:
-    """Return the record made with this environment's versions, and the best of any; damaged ones count as missing.
-
-    Whoever runs the trial names the damaged file.
-    """
-    versions = spec.condition.versions
-    try:
-        here = store.made_with(spec.id, versions)
-        return here, here or store.get(spec.id, versions)
-    except DamagedFileError:
-        return None, None
