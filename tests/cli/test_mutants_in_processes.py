@@ -9,9 +9,9 @@ from pathlib import Path
 import pytest
 from tiny_project import REPRODUCTION, Evoclaims, Project
 
+from evoclaims.cli.processes.job import Job, sharing_programs
 from evoclaims.envs.gates.parity import NParity
 from evoclaims.methods.hand_built import HandBuilt
-from evoclaims.mutants.conditions import Job, sharing_programs
 from evoclaims.trials.budget import Budget
 from evoclaims.trials.spec import Condition
 from evoclaims.trials.store import Store

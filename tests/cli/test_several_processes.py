@@ -21,6 +21,7 @@ from tiny_project import REPRODUCTION, Evoclaims, Project
 
 from evoclaims.cli.processes import workers
 from evoclaims.cli.processes.host import AUTO, Host, host_of
+from evoclaims.cli.processes.job import Job
 from evoclaims.cli.processes.missing_batches import MissingBatch
 from evoclaims.cli.processes.seats import Seat, seats_of, useful_processes
 from evoclaims.cli.processes.worker import Ended, WorkOrder
@@ -28,7 +29,6 @@ from evoclaims.cli.processes.workers import ATTEMPTS, Workers, in_queue
 from evoclaims.core.errors import UserError
 from evoclaims.envs.gates.parity import NParity
 from evoclaims.methods.hand_built import HandBuilt
-from evoclaims.mutants.conditions import Job
 from evoclaims.paper.estimates import Estimate
 from evoclaims.trials import gpus
 from evoclaims.trials.budget import Budget

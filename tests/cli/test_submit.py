@@ -26,9 +26,9 @@ from evoclaims.cli.cluster.batch_job import BatchJob
 from evoclaims.cli.cluster.job_request import minutes_of
 from evoclaims.cli.cluster.job_states import Seen, State
 from evoclaims.cli.cluster.submissions import load_all
+from evoclaims.cli.processes.job import Job
 from evoclaims.cli.processes.missing_batches import MissingBatch
 from evoclaims.cli.submit import dealt
-from evoclaims.mutants.conditions import Job
 from evoclaims.paper.estimates import Estimate
 from evoclaims.trials.notice import announced, notice_path
 from evoclaims.trials.store import Store

@@ -10,12 +10,13 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from evoclaims.cli.processes.execution import Execution
+from evoclaims.cli.processes.job import Job, jobs
 from evoclaims.cli.processes.worker import Ended, WorkOrder
 from evoclaims.cli.project import Project, open_project
 from evoclaims.core.errors import UnknownNameError, UserError
 from evoclaims.core.files import write_atomically
 from evoclaims.mutants import catalogue
-from evoclaims.mutants.conditions import Job, Planted, jobs, plantings
+from evoclaims.mutants.conditions import Planted, plantings
 from evoclaims.mutants.trying import Comparison, merged, noticed, under_faults
 from evoclaims.trials.spec import Condition
 from evoclaims.verdicts import mutation_matrix

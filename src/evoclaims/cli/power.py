@@ -10,6 +10,7 @@ from collections.abc import Mapping, Sequence
 from evoclaims.claims.fetching import StoredOnly
 from evoclaims.claims.power import Asserted, Listening, Pilots, asserted, only
 from evoclaims.cli.processes.execution import Execution
+from evoclaims.cli.processes.job import Job
 from evoclaims.cli.processes.worker import WorkOrder
 from evoclaims.cli.project import Project, open_project
 from evoclaims.cli.terminal import styled
@@ -17,7 +18,6 @@ from evoclaims.core.errors import UserError
 from evoclaims.core.packages import recorded
 from evoclaims.judging.counting import MAX_TRIALS
 from evoclaims.judging.design import Design
-from evoclaims.mutants.conditions import Job
 from evoclaims.paper import references
 from evoclaims.paper.variant import Names
 from evoclaims.report import power_cells

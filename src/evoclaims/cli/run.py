@@ -8,6 +8,7 @@ from collections.abc import Sequence
 
 from evoclaims.cli.chosen_conditions import choose
 from evoclaims.cli.processes.execution import Execution
+from evoclaims.cli.processes.job import Job
 from evoclaims.cli.processes.worker import WorkOrder
 from evoclaims.cli.project import Project, open_project
 from evoclaims.cli.stored_trial import describe
@@ -15,7 +16,6 @@ from evoclaims.cli.variant_cost import to_run
 from evoclaims.core.errors import UserError
 from evoclaims.judging.counting import MAX_TRIALS
 from evoclaims.judging.verdict import Outcome
-from evoclaims.mutants.conditions import Job
 from evoclaims.trials.crashes import last_said
 from evoclaims.trials.imported import where_from
 from evoclaims.trials.spec import Condition, TrialSpec

@@ -28,11 +28,11 @@ from evoclaims.cli.cluster.submissions import (
     save,
 )
 from evoclaims.cli.jobs import active
+from evoclaims.cli.processes.job import Job
 from evoclaims.cli.processes.missing_batches import MissingBatch, missing_batches
 from evoclaims.cli.project import Project, open_project
 from evoclaims.core.canonical import content_hash
 from evoclaims.core.errors import UserError
-from evoclaims.mutants.conditions import Job
 from evoclaims.report.formatting import plural
 from evoclaims.report.live_line import duration
 from evoclaims.trials.devices import usable_cores

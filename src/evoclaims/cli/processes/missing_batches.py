@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from evoclaims.cli.processes.job import Job
 from evoclaims.cli.project import Project
-from evoclaims.mutants.conditions import Job
 from evoclaims.paper.estimates import Estimate, Missing, committed, estimates
 from evoclaims.paper.variant import Names
 from evoclaims.trials.batches import StoredTrials

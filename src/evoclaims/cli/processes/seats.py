@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from evoclaims.cli.processes.host import AUTO, Host
+from evoclaims.cli.processes.job import Job
 from evoclaims.cli.processes.missing_batches import MissingBatch
-from evoclaims.mutants.conditions import Job
 from evoclaims.trials import devices, gpus
 
 

@@ -19,12 +19,13 @@ from typing import Any, Final
 import msgspec
 
 from evoclaims.claims.fetching import RunMissing
+from evoclaims.cli.processes.job import Job, jobs
 from evoclaims.cli.project import Project, open_project
 from evoclaims.core.errors import StorageError, UserError
 from evoclaims.core.printable import printable
 from evoclaims.core.raised import in_one_line
 from evoclaims.mutants import catalogue
-from evoclaims.mutants.conditions import Job, jobs, plantings
+from evoclaims.mutants.conditions import plantings
 from evoclaims.report.live_line import LiveLine
 from evoclaims.trials.progress import RunProgress
 from evoclaims.trials.spec import Condition

@@ -13,8 +13,8 @@ from typing import IO, Any
 
 import msgspec
 
+from evoclaims.cli.processes.job import Job
 from evoclaims.cli.processes.worker import Ended, Reply, Told, WorkOrder
-from evoclaims.mutants.conditions import Job
 
 
 class Process:

@@ -9,11 +9,11 @@ from collections import Counter, deque
 from collections.abc import Callable, Iterator, Sequence
 from typing import Final
 
+from evoclaims.cli.processes.job import Job, sharing_programs
 from evoclaims.cli.processes.missing_batches import MissingBatch
 from evoclaims.cli.processes.seats import Seat
 from evoclaims.cli.processes.worker import Ended, WorkOrder
 from evoclaims.cli.processes.worker_process import Process
-from evoclaims.mutants.conditions import Job, sharing_programs
 from evoclaims.paper.variant import Conditions
 
 ATTEMPTS: Final = 3
