@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from evoclaims.claims.session import Session
-from evoclaims.core.errors import UserError
+from evoclaims.core.errors import UnknownNameError, UserError
 from evoclaims.judging.design import FIXED_10
 from evoclaims.judging.measure import Event, Measure
 from evoclaims.paper.reproduction import Reproduction, Tier
@@ -187,3 +187,16 @@ def test_trials_that_are_none_are_refused(reproduction: Reproduction) -> None:
 def test_a_variant_is_of_tiers_that_there_are(tmp_path: Path) -> None:
     with pytest.raises(UserError, match="There is no tier for the variant 'other' named 'smok'. Did you mean 'smoke'"):
         Reproduction("tiny", "", tmp_path, {"smoke": Tier({}, FIXED_10)}, variants={"other": Variant("", {"smok": {}})})
+
+
+def test_what_a_variant_changes_is_of_one_tier_and_the_protocol_itself_changes_nothing(
+    reproduction: Reproduction,
+) -> None:
+    names, one = ("better", "small"), reproduction.tier("smoke").condition("worse", "small")
+    varied = replace(reproduction, variants={"worse": Variant("worse", {"smoke": {names: one}})})
+    assert varied.changed_by("worse", "smoke") == {names: one}
+    assert varied.tier("smoke", "worse").condition(*names) == one
+    assert varied.changed_by("worse", "full") == varied.changed_by("", "smoke") == {}
+    for variant, tier, said in (("wors", "full", "variant named 'wors'"), ("", "ful", "tier named 'ful'")):
+        with pytest.raises(UnknownNameError, match=f"There is no {said}. Did you mean"):
+            varied.changed_by(variant, tier)

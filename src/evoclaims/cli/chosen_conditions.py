@@ -19,7 +19,7 @@ def choose(reproduction: Reproduction, options: argparse.Namespace) -> tuple[Tie
     chosen = named(tier, options.method, options.on)
     if not options.variant:
         return tier, chosen
-    touched = reproduction.variants[options.variant].conditions.get(options.tier, {})
+    touched = reproduction.changed_by(options.variant, options.tier)
     chosen = [names for names in chosen if names in touched]
     if not chosen:
         raise UserError(

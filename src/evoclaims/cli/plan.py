@@ -45,7 +45,7 @@ def main(options: argparse.Namespace) -> int:
     kind = options.like or chosen[0].device_kind
     (reports,) = project.judge_variants([(options.tier, variant)])
     if variant:
-        touched = reproduction.variants[variant].conditions.get(options.tier, {})
+        touched = reproduction.changed_by(variant, options.tier)
         reports = [report for report in reports if not touched.keys().isdisjoint(_read([report]))]
         read = [names for names in _read(reports) if names in touched]
         if not read:

@@ -22,7 +22,7 @@ def main(options: argparse.Namespace) -> int:
     (reports,) = project.judge_variants([(options.tier, options.variant)])
     used = sorted({(source.method, source.task) for report in reports for source in report.sources})
     if options.variant:
-        changes = reproduction.variants[options.variant].conditions.get(options.tier, {})
+        changes = reproduction.changed_by(options.variant, options.tier)
         used = [names for names in used if names in changes]
     # A claim is judged after each look; the drift check needs MIN_REFERENCES trials.
     looks = [look.n for look in tier.design.looks[:-1]]

@@ -79,11 +79,14 @@ def main(options: argparse.Namespace) -> int:
 
 def _tried(project: Project, tier: str) -> list[str]:
     """Return the variants that have run at a tier."""
-    seeds = project.reproduction.tier(tier).design.seeds(1)
+    reproduction = project.reproduction
+    seeds = reproduction.tier(tier).design.seeds(1)
     return [
         name
-        for name, variant in project.reproduction.variants.items()
-        if any(project.archive.trials(condition, seeds)[0] for condition in variant.conditions.get(tier, {}).values())
+        for name in reproduction.variants
+        if any(
+            project.archive.trials(condition, seeds)[0] for condition in reproduction.changed_by(name, tier).values()
+        )
     ]
 
 

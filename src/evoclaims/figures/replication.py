@@ -96,12 +96,12 @@ def replications(
     """
     published = reproduction.published
     scopes = [Scope(archive, reproduction, tier, variant) for variant in variants]
-    plain, changed = reproduction.tier(tier), {scope.variant: scope.tier for scope in scopes}
+    changed = {variant: reproduction.changed_by(variant, tier) for variant in variants}
     found = []
     for quantity, method, task, at, reported in _numbers(published):
         for scope in scopes:
             names = method, task
-            if scope.variant and plain.conditions.get(names) == changed[scope.variant].conditions.get(names):
+            if scope.variant and names not in changed[scope.variant]:
                 continue
             readings, level = _ours(scope, quantity, method, task, at)
             if not scope.variant or readings.values:

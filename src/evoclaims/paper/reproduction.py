@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from evoclaims.core.errors import UnknownNameError, UserError, require_known
+from evoclaims.core.errors import UserError, require_known
 from evoclaims.core.tiers import TIERS
 from evoclaims.judging.design import Design
 from evoclaims.paper.reported import FILE, Published, load_published
@@ -116,13 +116,17 @@ class Reproduction:
 
     def tier(self, name: str, variant: str = "") -> Tier:
         """Return a tier, changed by a variant if one is named; an `UnknownNameError` lists the known ones."""
-        require_known("tier", name, self.tiers)
+        changes = self.changed_by(variant, name)
+        tier = self.tiers[name]
+        return replace(tier, conditions={**tier.conditions, **changes}) if changes else tier
+
+    def changed_by(self, variant: str, tier: str) -> Conditions:
+        """Return what a variant changes at a tier, nothing without one; an `UnknownNameError` lists the known ones."""
+        require_known("tier", tier, self.tiers)
         if not variant:
-            return self.tiers[name]
-        if variant not in self.variants:
-            raise UnknownNameError("variant", variant, self.variants)
-        tier, changes = self.tiers[name], self.variants[variant].conditions.get(name, {})
-        return replace(tier, conditions={**tier.conditions, **changes})
+            return {}
+        require_known("variant", variant, self.variants)
+        return self.variants[variant].conditions.get(tier, {})
 
     @property
     def published(self) -> Published:
