@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from evoclaims.judging.verdict import Outcome
 from evoclaims.report.tally import tally
 from evoclaims.verdicts.claim_report import CONTROL, ClaimReport
+from evoclaims.verdicts.sensitivity import Tried
 
 
 def _reports(where: str, *outcomes: Outcome) -> list[ClaimReport]:
@@ -30,3 +33,11 @@ def test_every_outcome_is_counted_once_and_controls_apart(
     papers: tuple[Outcome, ...], controls: tuple[Outcome, ...], said: str
 ) -> None:
     assert tally([*_reports("§5", *papers), *_reports(CONTROL, *controls)]) == said
+
+
+def test_support_that_no_planted_fault_changes_is_counted_apart() -> None:
+    sound, insensitive, refuted = _reports("§5", Outcome.SUPPORTED, Outcome.SUPPORTED, Outcome.REFUTED)
+    reports = [sound, replace(insensitive, tried=Tried.INSENSITIVE), replace(refuted, tried=Tried.INSENSITIVE)]
+    assert tally(reports) == (
+        "Of 3 cases of the paper's sentences, 1 **supported**, 1 **supported but insensitive** and 1 **refuted**."
+    )

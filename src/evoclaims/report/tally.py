@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Sequence
 
-from evoclaims.judging.verdict import Outcome
+from evoclaims.report import table_cells
 from evoclaims.report.formatting import plural
 from evoclaims.verdicts.claim_report import ClaimReport
 
@@ -23,7 +22,6 @@ def tally(reports: Sequence[ClaimReport]) -> str:
 
 
 def _counted(reports: Sequence[ClaimReport]) -> str:
-    """Return how many ended how, such as "17 **supported** and 3 **not run**"."""
-    ended = Counter(report.outcome for report in reports)
-    told = [f"{ended[outcome]} **{outcome}**" for outcome in Outcome if ended[outcome]]
+    """Return how many count as what, such as "17 **supported** and 3 **not run**"."""
+    told = [f"{count} **{ended}**" for ended, count in table_cells.counts(reports).items()]
     return " and ".join(filter(None, (", ".join(told[:-1]), told[-1]))) if told else "none"
