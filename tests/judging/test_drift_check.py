@@ -7,7 +7,7 @@ import math
 
 import pytest
 
-from evoclaims.judging.baseline import DriftCase, check_drift
+from evoclaims.judging.drift import DriftCase, check_drift
 
 BEFORE = [0.50, 0.52, 0.54, 0.56, 0.58, 0.60, 0.62, 0.64, 0.66, 0.68]
 

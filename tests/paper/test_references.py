@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from evoclaims.core.errors import UserError
-from evoclaims.judging.baseline import DriftCase
+from evoclaims.judging.drift import DriftCase
 from evoclaims.paper import references
 from evoclaims.paper.reproduction import Reproduction
 from evoclaims.trials.result import TrialResult

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from rich.cells import cell_len
 
-from evoclaims.judging.baseline import DriftReport, DriftRow
+from evoclaims.judging.drift import DriftReport, DriftRow
 from evoclaims.judging.verdict import Outcome
 from evoclaims.report.table_cells import totals
 from evoclaims.report.terminal_table import drift_lines, explanations, verdict_table

@@ -14,8 +14,8 @@ from evoclaims.claims.reporting import expecting, judged
 from evoclaims.core.errors import UserError
 from evoclaims.core.packages import agree, recorded
 from evoclaims.judging.assertion import Assertion
-from evoclaims.judging.baseline import DriftReport
 from evoclaims.judging.design import Design, Look
+from evoclaims.judging.drift import DriftReport
 from evoclaims.judging.fingerprint import fingerprint
 from evoclaims.judging.judge import judge
 from evoclaims.judging.measure import Event, Measure, Profile

@@ -7,7 +7,7 @@ import argparse
 from evoclaims.cli.project import open_project
 from evoclaims.core.errors import UserError
 from evoclaims.core.packages import recorded
-from evoclaims.judging.baseline import MIN_REFERENCES
+from evoclaims.judging.drift import MIN_REFERENCES
 from evoclaims.paper import references
 from evoclaims.trials.spec import TrialSpec
 from evoclaims.trials.time_limit import is_final

@@ -6,7 +6,7 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 
-from evoclaims.judging.baseline import ALPHA, DriftCase, check_drift
+from evoclaims.judging.drift import ALPHA, DriftCase, check_drift
 from evoclaims.judging.verdict import Outcome
 from evoclaims.mutants.conditions import Planted
 from evoclaims.paper.archive import Archive

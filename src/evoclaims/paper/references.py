@@ -12,7 +12,7 @@ from evoclaims.core.errors import UserError
 from evoclaims.core.files import read_file, write_atomically
 from evoclaims.core.packages import agree, recorded
 from evoclaims.core.provenance import what_fixes_bits
-from evoclaims.judging.baseline import DriftCase, DriftReport, check_drift
+from evoclaims.judging.drift import DriftCase, DriftReport, check_drift
 from evoclaims.judging.tripwire import DigestCheck, compare_digests
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.result_codec import dump, parse

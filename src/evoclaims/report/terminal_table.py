@@ -13,7 +13,7 @@ from rich.cells import cell_len, set_cell_size
 from rich.text import Text
 
 from evoclaims.core.printable import printable
-from evoclaims.judging.baseline import DriftReport
+from evoclaims.judging.drift import DriftReport
 from evoclaims.judging.verdict import Outcome
 from evoclaims.report import table_cells
 from evoclaims.report.console import PlainSpokenConsole

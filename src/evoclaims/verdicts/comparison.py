@@ -10,7 +10,7 @@ from pathlib import Path, PurePosixPath
 
 from evoclaims.core.errors import UserError
 from evoclaims.core.packages import Versions, agree, depends_on
-from evoclaims.judging.baseline import DriftReport
+from evoclaims.judging.drift import DriftReport
 from evoclaims.judging.tripwire import DigestCheck
 from evoclaims.judging.verdict import Outcome
 from evoclaims.paper import references

@@ -9,7 +9,7 @@ from typing import Any
 from evoclaims.core.packages import Versions, agree, recorded
 from evoclaims.core.printable import printable
 from evoclaims.core.provenance import what_fixes_bits
-from evoclaims.judging.baseline import DriftCase, DriftReport, check_drift
+from evoclaims.judging.drift import DriftCase, DriftReport, check_drift
 from evoclaims.judging.verdict import Outcome
 from evoclaims.paper.references import METRICS
 from evoclaims.trials.result import TrialResult
