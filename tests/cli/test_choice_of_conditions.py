@@ -1,6 +1,8 @@
-"""Which conditions `evoclaims run` runs."""
+"""Which conditions `evoclaims run` runs, and which trials that ran out of time."""
 
 from __future__ import annotations
+
+from pathlib import Path
 
 import jax
 from tiny_project import Evoclaims
@@ -9,6 +11,7 @@ from evoclaims.cli.chosen_conditions import named
 from evoclaims.cli.project import open_project
 from evoclaims.trials.result_making import make_unfinished
 from evoclaims.trials.spec import TrialSpec
+from evoclaims.trials.store import Store
 from reproductions.nisioti2025 import REPRODUCTION
 
 
@@ -20,12 +23,37 @@ def test_a_method_that_may_not_be_installed_runs_only_when_it_is_named() -> None
     assert named(tier, "neat_tensorneat", "n_parity") == [("neat_tensorneat", "n_parity")]
 
 
-def test_trials_of_a_variant_that_ran_out_of_less_time_are_counted_among_those_to_run(evoclaims: Evoclaims) -> None:
+def _out_of_time(variant: str, limit: float) -> None:
+    """Store a trial of the right network, seed 0, whose batch had so many seconds."""
     project = open_project(".evoclaims")
-    condition = project.reproduction.tier("smoke", "traded").condition("right", "parity")
-    timing = {"run": 1.0, "compile": 0.0, "batch": 1, "started": "2025-01-01T00:00:00+00:00", "limit": 1.0}
+    condition = project.reproduction.tier("smoke", variant).condition("right", "parity")
+    timing = {"run": 1.0, "compile": 0.0, "batch": 1, "started": "2025-01-01T00:00:00+00:00", "limit": limit}
     project.store.put(make_unfinished(TrialSpec(condition, 0), "timeout", {}, timing, jax.devices("cpu")), {})
+
+
+def test_trials_of_a_variant_that_ran_out_of_less_time_are_counted_among_those_to_run(evoclaims: Evoclaims) -> None:
+    _out_of_time("traded", 1.0)
     status, out, _ = evoclaims("run", "--variant=traded", "--trials=1")
     assert status == 0
     assert "  right on parity (smoke): 1 trial to run, time unknown\n" in out
     assert "  seed 0: done" in out
+
+
+def test_a_trial_that_ran_out_of_as_much_time_runs_again_only_with_retry(evoclaims: Evoclaims) -> None:
+    _out_of_time("", 60.0)
+    (late,) = Store(Path(".evoclaims")).record_paths()
+    command = ("run", "right", "--trials=2", "--time-limit=60s")
+    for _ in range(2):
+        status, out, _ = evoclaims(*command)
+        assert status == 0
+        assert "  seed 0: timeout after 0 environment steps: its batch had 1 min" in out
+        assert "as much again by --retry" in out
+        assert "  seed 1: done" in out
+    (done,) = (path for path in Store(Path(".evoclaims")).record_paths() if path != late)
+    before = done.read_bytes()
+    status, out, _ = evoclaims(*command, "--retry")
+    assert status == 0
+    assert "  seed 0: done" in out
+    assert "timeout" not in out
+    assert done.read_bytes() == before  # what came to its end does not run again
+    assert "  seed 0: done" in evoclaims(*command)[1]

@@ -138,6 +138,16 @@ def test_trying_writes_and_submits_nothing(evoclaims: Evoclaims, slurm: StandIn)
     ]
 
 
+def test_the_cores_of_a_job_are_told_and_asked_for(evoclaims: Evoclaims, slurm: StandIn) -> None:
+    status, out, _ = evoclaims("submit", "right", "--cpus=4", "--dry-run")
+    assert status == 0
+    assert "1 batch of the smoke tier in 1 job on SLURM, at most 1 at a time, each with 4 CPU cores, " in out
+    assert not slurm.script.exists()
+    assert "CPU core" not in evoclaims("submit", "right", "--dry-run")[1]
+    assert evoclaims("submit", "right", "--cpus=4")[0] == 0
+    assert "cpus-per-task=4" in slurm.asked()
+
+
 @pytest.mark.usefixtures("stored")
 def test_only_what_is_missing_is_submitted(evoclaims: Evoclaims, slurm: StandIn) -> None:
     assert "Nothing to submit: no batch of the smoke tier is missing." in evoclaims("submit", "right")[1]
@@ -192,6 +202,7 @@ def test_jobs_of_this_machine_are_estimated_on_its_gpus(evoclaims: Evoclaims, mo
         (["--time=soon"], "A time limit is a length of time"),
         (["--time=0"], "A job needs some time, not '0'."),
         (["--gpus=-1"], "--gpus takes a number from 0 up, not -1."),
+        (["--cpus=-1", "--dry-run"], "--cpus takes a number from 0 up, not -1."),
         (["--array=0"], "--array takes a number from 1 up, not 0."),
         (["--slurm=time=3"], "The option time of sbatch cannot be passed through: use --time."),
         (["--slurm=output=x"], "The option output of sbatch cannot be passed through: evoclaims sets it."),
