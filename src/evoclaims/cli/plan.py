@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Final
 
 from rich.table import Table
 
+from evoclaims.claims.fetching import NotStoredError, StoredOnly
 from evoclaims.cli.project import open_project
 from evoclaims.cli.terminal import styled
 from evoclaims.core.errors import UserError
@@ -22,8 +24,9 @@ from evoclaims.report.live_line import duration
 from evoclaims.trials import devices
 from evoclaims.trials.batches import StoredTrials
 from evoclaims.trials.imported import where_from
+from evoclaims.trials.result import TrialResult
 from evoclaims.trials.spec import Condition
-from evoclaims.trials.store import Store
+from evoclaims.trials.store import DamagedFileError, Store
 from evoclaims.verdicts.claim_report import ClaimReport
 
 Costs = Mapping[Names, Spent]
@@ -43,7 +46,8 @@ def main(options: argparse.Namespace) -> int:
     tier = reproduction.tier(options.tier, variant)
     chosen = devices.choose(options.device)
     kind = options.like or chosen[0].device_kind
-    (reports,) = project.judge_variants([(options.tier, variant)])
+    session = replace(project.session(variant), fetch=_SoundOnly(project.archive))
+    (reports,) = project.judge_sessions([(session, options.tier)])
     if variant:
         touched = reproduction.changed_by(variant, options.tier)
         reports = [report for report in reports if not touched.keys().isdisjoint(_read([report]))]
@@ -96,6 +100,17 @@ def main(options: argparse.Namespace) -> int:
     if any(pace is None for pace in paces.values()):
         console.print("\nTimes are unknown where no trial has run on such a device; --measure times a few steps.")
     return 0
+
+
+class _SoundOnly(StoredOnly):
+    """Trials at hand; damaged ones are missing, so that the conditions of their claims are planned, too."""
+
+    def __call__(self, condition: Condition, seeds: Sequence[int]) -> Sequence[TrialResult]:
+        """Return one trial per seed, or raise `NotStoredError`."""
+        try:
+            return super().__call__(condition, seeds)
+        except DamagedFileError as error:
+            raise NotStoredError(str(error), condition.id) from error
 
 
 def _read(reports: Sequence[ClaimReport]) -> list[Names]:
