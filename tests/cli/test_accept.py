@@ -82,6 +82,14 @@ def test_the_history_of_a_claim_that_is_gone_is_kept_and_said(accepted: Evoclaim
     assert "kept:" not in accepted("accept", "--tier=full")[1]
 
 
+def test_claims_that_are_gone_are_said_in_the_order_of_their_names(accepted: Evoclaims) -> None:
+    kept = history.load(FILE)
+    gone = [f"gone_{letter}" for letter in "abcdef"]
+    FILE.write_text(history.dump({**kept, **{("smoke", name): kept["smoke", "a"] for name in gone}}))
+    _, out, _ = accepted("accept", "--tier=smoke")
+    assert [line.split()[1] for line in out.splitlines() if line.startswith("kept: ")] == gone
+
+
 def test_accepted_verdicts_that_are_torn_are_not_written_over(evoclaims: Evoclaims) -> None:
     FILE.write_text("torn =")
     status, _, err = evoclaims("accept")

@@ -22,7 +22,7 @@ def main(options: argparse.Namespace) -> int:
     for line in made.left:
         print(f"left alone: {line}")
     now = {history.key_of(report) for report in reports}
-    for tier, claim in before.keys() - now:
+    for tier, claim in sorted(before.keys() - now):
         if tier in tiers:
             print(f"kept: {claim} ({tier}), which is no longer among the claims")
     if not (made.accepted or made.retired):
