@@ -76,27 +76,33 @@ class Environments:
     def letters(self, report: ClaimReport) -> str:
         """Return the letters of a report's trials, such as "A" or "A, C"."""
         found = {
-            self._letter(trial.origin.device, _shown(trial.origin.versions, source.versions))
+            self._place(trial.origin.device, _shown(trial.origin.versions, source.versions))
             for source in report.sources
             for trial in self._reader.read(source.trials, source.installed)
         }
-        return ", ".join(sorted(found))
+        return ", ".join(map(_letter, sorted(found)))
 
     def legend(self) -> str:
         """Return a line for each letter."""
         return "\n".join(
-            f"* {letter}: {literal(device)}; {literal(', '.join(map(' '.join, sorted(versions.items()))))}"
-            for letter, (device, versions) in zip(string.ascii_uppercase, self._known, strict=False)
+            f"* {_letter(place)}: {literal(device)}; {literal(', '.join(map(' '.join, sorted(versions.items()))))}"
+            for place, (device, versions) in enumerate(self._known)
         )
 
-    def _letter(self, device: str, versions: Versions) -> str:
-        """Return the letter of the first environment that differs in nothing, after adding what it did not know."""
-        for letter, (known, together) in zip(string.ascii_uppercase, self._known, strict=False):
+    def _place(self, device: str, versions: Versions) -> int:
+        """Return the place of the first environment that differs in nothing, after adding what it did not know."""
+        for place, (known, together) in enumerate(self._known):
             if known == device and all(together.get(name, version) == version for name, version in versions.items()):
                 together.update(versions)
-                return letter
+                return place
         self._known.append((device, dict(versions)))
-        return string.ascii_uppercase[len(self._known) - 1]
+        return len(self._known) - 1
+
+
+def _letter(place: int) -> str:
+    """Return the letter of the environment at a place, counted from 0; after Z come A1 to Z1, then A2."""
+    again, which = divmod(place, len(string.ascii_uppercase))
+    return string.ascii_uppercase[which] + (str(again) if again else "")
 
 
 def _shown(versions: Iterable[tuple[str, str]], needed: Iterable[str]) -> Versions:
