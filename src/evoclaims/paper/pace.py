@@ -17,7 +17,6 @@ from evoclaims.trials.devices import usable_cores
 from evoclaims.trials.lanes import Lanes
 from evoclaims.trials.spec import Condition
 from evoclaims.trials.store import Store
-from evoclaims.trials.time_limit import is_final
 
 SEEDS_LOOKED_AT = 64
 
@@ -51,8 +50,7 @@ def known_pace(
     kind: str,
 ) -> Pace | None:
     """Return the pace of stored or reference trials of this condition on this kind of device, or None."""
-    stored = StoredTrials(store, condition, any_version=True).sound(range(SEEDS_LOOKED_AT))
-    trials = list(filter(is_final, stored))
+    trials = list(StoredTrials(store, condition, any_version=True).sound(range(SEEDS_LOOKED_AT)))
     trials += references.of_condition(folder, tier, method, task, condition.id)
     batch = largest(trial for trial in trials if trial.device.get("kind") == kind)
     if batch is None:
