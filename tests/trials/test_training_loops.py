@@ -250,3 +250,15 @@ def test_a_package_that_is_not_installed_is_named_before_anything_runs(store: St
     with pytest.raises(UserError, match=r"needs no-such-thing, not installed here: pip install no-such-thing"):
         run(condition(toy_loops.in_every_way, packages=("no-such-thing",)), [0], store, cpus)
     assert not store.ids()
+
+
+def test_stored_trials_of_any_version_are_read_where_their_package_is_not_installed(
+    tmp_path: Path, store: Store, cpus: list[Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    noting = condition(toy_loops.notes, packages=("pytest",), file=str(tmp_path / "begun"))
+    (made,) = run(noting, [0], store, cpus)
+    monkeypatch.setattr("evoclaims.core.packages.version_of", lambda name: None)
+    assert run(noting, [0], store, cpus, any_version=True) == [made]
+    for seeds, any_version in (([0], False), ([0, 1], True)):
+        with pytest.raises(UserError, match="needs pytest, not installed here"):
+            run(noting, seeds, store, cpus, any_version=any_version)

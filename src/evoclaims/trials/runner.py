@@ -75,8 +75,9 @@ def run(
         return into_store(condition, seeds, store)
     stored = StoredTrials(store, condition, any_version, time_limit)
     wanted = list(dict.fromkeys(seeds))
-    make = _maker(stored, devices, checkpoint_seconds, len(wanted))
+    make: Maker | None = None  # it asks for all that running needs, which reading does not
     while not stored.answer(found := [stored.get(seed) for seed in wanted]):
+        make = make or _maker(stored, devices, checkpoint_seconds, len(wanted))
         store.check_writable()
         with (
             announced(store.root, condition.id, lambda text: watch(RunProgress(condition.label, text, len(seeds)))),
