@@ -61,7 +61,7 @@ def filled(text: str, project: Project) -> str:
     """Return a Markdown text with its tables written anew.
 
     Raises:
-        UserError: when it has none, or one of an unknown kind.
+        UserError: when it has none, or one of an unknown kind or of more than its kind can show.
     """
     if not _TABLE.search(text):
         raise UserError(
@@ -93,14 +93,13 @@ def _verdicts(project: Project, words: list[str]) -> str:
 
 def _tally(project: Project, words: list[str]) -> str:
     """Return how many verdicts of a tier ended how."""
-    (tier,) = words or list(project.reproduction.tiers)[-1:]
-    (reports,) = project.judge_variants([(tier, "")])
+    (reports,) = project.judge_variants([(_tier(project, words), "")])
     return tally(reports)
 
 
 def _details(project: Project, words: list[str]) -> str:
     """Return the verdicts of a tier under the protocol and under each variant, of the claims that a variant touches."""
-    (tier,) = words or list(project.reproduction.tiers)[-1:]
+    tier = _tier(project, words)
     asked = ["", *project.reproduction.variants]
     plain, *varied = project.judge_variants([(tier, name) for name in asked])
     rows = matrix(plain, dict(zip(asked[1:], varied, strict=True)))
@@ -108,6 +107,15 @@ def _details(project: Project, words: list[str]) -> str:
     left = ", ".join(name for name in asked[1:] if name not in tried)
     unjudged = f"No claim's trials have all run under: {literal(left)}." if left else ""
     return "\n\n".join(filter(None, (robustness(rows, tried), unjudged)))
+
+
+def _tier(project: Project, words: list[str]) -> str:
+    """Return the tier that a table is of: the last one unless it is named."""
+    tier, *more = words or list(project.reproduction.tiers)[-1:]
+    if more:
+        raise UserError(f"A table of this kind is of one tier, not of {', '.join(words)}: write one for each.")
+    project.reproduction.tier(tier)
+    return tier
 
 
 def _numbers(project: Project, words: list[str]) -> str:
