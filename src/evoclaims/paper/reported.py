@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, TypeGuard
 
 from evoclaims.core.errors import UserError, require_known
 
@@ -73,38 +73,62 @@ def load_published(path: Path) -> Published:
     """Read a file of published numbers.
 
     Raises:
-        UserError: when it is missing, damaged, or a number lacks its place.
+        UserError: when it is missing, damaged, or a number lacks its place, or something has the place of a number.
     """
     try:
         plain = tomllib.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:
         raise UserError(f"Cannot read the published numbers in {path}: {error}.") from error
-    plots, tables = plain.get("plots", {}), plain.get("tables", {})
-    wrong = [
-        *(f"{task}.{name}" for task, found in plots.items() for name, plot in found.items() if not _is_plot(plot)),
-        *(name for name, table in tables.items() if not table.get("place") or not table.get("values")),
-        *sorted(set(plain) - {"plots", "tables", "trials"}),
-    ]
-    if not isinstance(trials := plain.get("trials", 2), int) or trials < 2:  # fewer have no spread
-        wrong.append("trials")
-    if wrong:
+    if wrong := [*_wrong_plots(plain.get("plots", {})), *_wrong_tables(plain.get("tables", {})), *_wrong_rest(plain)]:
         raise UserError(
-            f"{path} holds [plots.TASK.QUANTITY] with a place and methods (each with mean, and error of the same "
-            "length where known; scale = [lowest, highest] and precision), [tables.NAME] with a place and values, and "
-            f"trials = how many each mean is of, at least 2; these are neither: {', '.join(wrong)}."
+            f"{path} holds [plots.TASK.QUANTITY] with a place and methods (each with a list mean, and an error of the "
+            "same length where known; scale = [lowest, highest] and precision), [tables.NAME] with a place and values, "
+            f"and trials = how many each mean is of, at least 2; these are neither: {', '.join(wrong)}."
         )
-    return Published(plots, tables, plain.get("trials"))
+    return Published(plain.get("plots", {}), plain.get("tables", {}), plain.get("trials"))
+
+
+def _wrong_plots(plots: Any) -> Iterator[str]:
+    """Yield the names of what is among the plots and is none."""
+    for task, found in plots.items() if isinstance(plots, dict) else [("plots", plots)]:
+        if isinstance(found, dict):
+            yield from (f"{task}.{name}" for name, plot in found.items() if not _is_plot(plot))
+        else:
+            yield task
+
+
+def _wrong_tables(tables: Any) -> Iterator[str]:
+    """Yield the names of what is among the tables and is none."""
+    for name, table in tables.items() if isinstance(tables, dict) else [("tables", tables)]:
+        if not (isinstance(table, dict) and table.get("place") and table.get("values")):
+            yield name
+
+
+def _wrong_rest(plain: Mapping[str, Any]) -> Iterator[str]:
+    """Yield the names of what is neither a plot nor a table, except a number of trials that have a spread."""
+    yield from sorted(set(plain) - {"plots", "tables", "trials"})
+    if not isinstance(trials := plain.get("trials", 2), int) or trials < 2:
+        yield "trials"
 
 
 def _is_plot(plot: Any) -> bool:
     """Whether a plot has its place, and each method has numbers on its scale and, if any errors, as many."""
+    if not (isinstance(plot, dict) and plot.get("place") and plot.get("methods") and isinstance(plot["methods"], dict)):
+        return False
     scale = plot.get("scale", [-math.inf, math.inf])
-    if not (isinstance(scale, list) and len(scale) == 2):
+    if not (_are_numbers([plot.get("precision", 0.0)]) and _are_numbers(scale) and len(scale) == 2):
         return False
     low, high = scale
-    return bool(plot.get("place") and plot.get("methods")) and all(
-        numbers.get("mean")
-        and len(numbers.get("error", numbers["mean"])) == len(numbers["mean"])
-        and all(low <= mean <= high for mean in numbers["mean"])
+    return all(
+        isinstance(numbers, dict)
+        and _are_numbers(means := numbers.get("mean"))
+        and _are_numbers(errors := numbers.get("error", means))
+        and len(errors) == len(means) > 0
+        and all(low <= mean <= high for mean in means)
         for numbers in plot["methods"].values()
     )
+
+
+def _are_numbers(found: Any) -> TypeGuard[list[float]]:
+    """Whether something is a list of numbers."""
+    return isinstance(found, list) and all(isinstance(one, int | float) for one in found)
