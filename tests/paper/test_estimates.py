@@ -6,14 +6,18 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import pytest
-from made_trials import sound
+from hand_made_paper import CONDITIONS
+from made_trials import trial_of
 
 from evoclaims.envs.gates.parity import NParity
 from evoclaims.methods.hand_built import HandBuilt
-from evoclaims.paper.estimates import COMPILE_SECONDS, Missing, estimates
+from evoclaims.paper import references
+from evoclaims.paper.estimates import COMPILE_SECONDS, Missing, committed, estimates
+from evoclaims.paper.reproduction import Reproduction
+from evoclaims.paper.variant import Variant
 from evoclaims.trials.budget import Budget
 from evoclaims.trials.result import TrialResult
-from evoclaims.trials.spec import Condition, TrialSpec
+from evoclaims.trials.spec import Condition
 
 CONDITION = Condition(HandBuilt(), NParity(2), "curriculum", Budget(generations=100))
 LONGER = replace(CONDITION, budget=Budget(generations=400))
@@ -31,11 +35,11 @@ def _trials(
     timing = {"run": run, "compile": 2.0, "batch": count, "started": started}
     timing |= {"processor": run * cores} if platform == "cpu" and cores else {}
     return [
-        sound(
-            TrialSpec(condition, seed).plain,
+        trial_of(
+            condition,
+            seed,
+            1.0,
             metrics={"environment_steps": condition.environment_steps / 2},
-            levels={},
-            curves={},
             timing=timing,
             provenance={"device": {"platform": platform, "kind": platform, "count": 1}},
         )
@@ -79,6 +83,19 @@ def test_a_trial_that_is_both_stored_and_committed_ran_once() -> None:
     assert _seconds("cpu", (CONDITION, 8, [*batch, *batch])) == _seconds("cpu", (CONDITION, 8, batch))
     longer = _seconds("cpu", (LONGER, 4, batch))
     assert _seconds("cpu", (LONGER, 4, [*batch, *batch])) == longer
+
+
+def test_the_protocols_trials_come_first_and_a_variants_own_tell_of_the_variant(reproduction: Reproduction) -> None:
+    names = "better", "small"
+    variants = {"slow": Variant("It is slow", {"full": {names: LONGER}})}
+    reproduction = replace(reproduction, variants=variants)
+    for variant, tier, run in (("", "smoke", 20.0), ("", "full", 40.0), ("slow", "full", 1000.0)):
+        path = references.path_of(reproduction.references_of(variant), tier, *names)
+        condition = reproduction.tier(tier, variant).condition(*names)
+        references.write(path, _trials(run, condition=condition, started=f"{variant} {tier}"))
+    found = committed(reproduction, "full", *names)
+    assert [trial.timing["run"] for trial in found[::4]] == [40.0, 20.0, 1000.0]
+    assert _seconds("cpu", (LONGER, 4, found), (CONDITIONS[names], 4, found)) == [1002.0, 42.0]
 
 
 def test_what_has_not_run_on_such_a_device_counts_by_its_budget_at_the_pace_of_the_others() -> None:

@@ -61,9 +61,10 @@ class Missing:
 
 
 def committed(reproduction: Reproduction, tier: str, method: str, task: str) -> tuple[TrialResult, ...]:
-    """Return the reference trials of a method on a task, those of `tier` first."""
+    """Return the reference trials of a method on a task: the protocol's, those of `tier` first, then its variants'."""
     tiers = sorted(reproduction.tiers, key=lambda name: name != tier)
-    files = (references.committed(reproduction.references, name, method, task) for name in tiers)
+    folders = map(reproduction.references_of, ("", *reproduction.variants))
+    files = (references.committed(folder, name, method, task) for folder in folders for name in tiers)
     return tuple(itertools.chain.from_iterable(files))
 
 
