@@ -17,6 +17,8 @@ from evoclaims.core.errors import UserError
 from evoclaims.paper import references
 from evoclaims.paper.archive import Archive
 from evoclaims.paper.reproduction import Reproduction
+from evoclaims.paper.variant import Variant
+from evoclaims.trials.budget import Budget
 from evoclaims.trials.progress import ignore
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.spec import Condition
@@ -176,6 +178,32 @@ def test_shifted_trials_have_drifted(session: Session, says: Claim, made: Made) 
     drift, _ = session.drift(_settled(session, made, says, lambda seed: 0.5 + seed / 100))
     assert drift.drifted
     assert [row.metric for row in drift.rows if row.drifted] == ["mean_success", "last_fitness"]
+
+
+def test_under_a_variant_what_it_does_not_change_is_compared_too(session: Session, says: Claim, made: Made) -> None:
+    """The variant "other" has the conditions of "longer", whose reference trials lie under that name alone."""
+    longer = replace(_pair(session)[0].condition, budget=Budget(generations=3))
+    changes = {name: Variant("", {"smoke": {("better", "small"): longer}}) for name in ("longer", "other")}
+    reproduction = replace(session.reproduction, variants=changes)
+    worse = _pair(session)[1].condition
+    for folder, name, condition in (
+        (reproduction.references, "better", _pair(session)[0].condition),
+        (reproduction.references, "worse", worse),
+        (reproduction.references_of("longer"), "better", longer),
+    ):
+        path = references.path_of(folder, "smoke", name, "small")
+        references.write(path, [made(condition, seed, seed / 100) for seed in range(10)])
+    for seed in range(6):
+        session.store.put(made(longer, seed, seed / 100), {})
+        session.store.put(made(worse, seed, 0.5 + seed / 100), {})
+    for variant in changes:
+        under = replace(session, reproduction=reproduction, variant=variant)
+        better, same = _pair(under)
+        drift, _ = under.drift([under.settle(ClaimTest(says, "smoke", ""), better.mean_success > same.mean_success)])
+        assert [(row.label, row.status) for row in drift.rows if row.metric == "mean_success"] == [
+            ("better on small (smoke)", "no drift"),
+            ("worse on small (smoke)", "drift"),
+        ]
 
 
 def test_without_reference_trials_nothing_is_said_to_be_unchanged(session: Session, says: Claim, made: Made) -> None:

@@ -102,11 +102,8 @@ def test_trials_are_compared_to_the_bit_where_all_that_fixes_bits_is_the_same(
     reproduction: Reproduction, made: Made, then: dict[str, Any], compared: int
 ) -> None:
     condition = reproduction.tier("smoke").condition("better", "small")
-    path = references.path_of(reproduction.references, "smoke", "better", "small")
-    references.write(path, [made(condition, 3, 0.5, **then)])
-    case = references.drift_case(
-        reproduction.references, "smoke", "better", "small", [made(condition, 3, 1.0, **SAYS), made(condition, 4, 1.0)]
-    )
+    new = [made(condition, 3, 1.0, **SAYS), made(condition, 4, 1.0)]
+    case = references.paired("a", new, [made(condition, 3, 0.5, **then)])
     _, check = references.compare([case])
     assert (check.compared, [change.seed for change in check.changed]) == (compared, [3] * compared)
 

@@ -124,9 +124,8 @@ class Session:
 
     def drift(self, reports: Sequence[ClaimReport]) -> tuple[DriftReport, DigestCheck]:
         """Compare the trials behind `reports` with the committed reference trials of their tiers."""
-        folder = self.reproduction.references_of(self.variant)
         cases = [
-            references.drift_case(folder, used.tier, used.method, used.task, trials)
+            references.paired(f"{used.method} on {used.task} ({used.tier})", trials, self._reference(used))
             for used in self._used(reports)
             if (trials := self._trials(used))
         ]
@@ -166,6 +165,14 @@ class Session:
                 found[names].ids.update(source.trials)
                 found[names].again.update(source.again)
         return [used for _, used in sorted(found.items())]
+
+    def _reference(self, used: _Used) -> tuple[TrialResult, ...]:
+        """Return a condition's reference trials: the variant's own, or those of the protocol or another variant."""
+        names = used.tier, used.method, used.task
+        own = references.committed(self.reproduction.references_of(self.variant), *names)
+        if any(trial.condition == used.condition.id for trial in own):
+            return own
+        return references.of_condition(self.reproduction.references, *names, used.condition.id) or own
 
     def _trials(self, used: _Used) -> list[TrialResult]:
         """Return the stored trials that a condition's claims were judged from."""

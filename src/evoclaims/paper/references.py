@@ -107,11 +107,6 @@ def of_one_environment(
     return next((run for run in runs if len(run) >= needed), max(runs, key=len))
 
 
-def drift_case(folder: Path, tier: str, method: str, task: str, new: Sequence[TrialResult]) -> DriftCase:
-    """Pair new trials of one condition (at least one) with its reference trials."""
-    return paired(f"{method} on {task} ({tier})", new, committed(folder, tier, method, task))
-
-
 def paired(label: str, new: Sequence[TrialResult], reference: Sequence[TrialResult]) -> DriftCase:
     """Pair new trials of one condition (at least one) with earlier ones.
 
