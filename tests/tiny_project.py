@@ -6,13 +6,14 @@ import json
 import shutil
 import sys
 from collections.abc import Callable, Iterable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from evoclaims import cli
-from evoclaims.trials.result import TrialResult
+from evoclaims.trials.result import TrialResult, digest
 from evoclaims.trials.store import Store
 
 FILES = {".evoclaims", "pyproject.toml", "tiny_paper.py", "claims", "__pycache__"}
@@ -200,6 +201,33 @@ def stored(project: Project, trials_of_both: Path) -> Store:
 def trials_of(store: Store, method: str) -> list[TrialResult]:
     """Return a store's trials of a method, called as the package calls it."""
     return [trial for trial in store.results([]) if trial.spec["method"]["name"] == method]
+
+
+def aged(trial: TrialResult) -> TrialResult:
+    """Return a trial as numpy 1.0 might have made it."""
+    versions = {**trial.provenance["versions"], "numpy": "1.0"}
+    return replace(trial, provenance={**trial.provenance, "versions": versions}, champion="")
+
+
+def spoiled(trial: TrialResult) -> TrialResult:
+    """Return what a broken library might have made of a trial that went well."""
+    levels = {name: (0.0,) * len(values) for name, values in trial.levels.items()}
+    metrics = {**trial.metrics, "mean_success": 0.0}
+    new = digest(trial.status, metrics, levels, trial.curves, b"")
+    return replace(trial, metrics=metrics, levels=levels, digest=new, champion="")
+
+
+def out_of_time(trial: TrialResult) -> TrialResult:
+    """Return a trial as it is where its time did not suffice."""
+    timing = {**trial.timing, "limit": 1.0}
+    return replace(
+        spoiled(trial),
+        status="timeout",
+        metrics={},
+        levels={},
+        timing=timing,
+        digest=digest("timeout", {}, {}, trial.curves, b""),
+    )
 
 
 def forget(store: Store, trials: Iterable[TrialResult]) -> None:

@@ -9,9 +9,13 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from tiny_project import aged, forget, spoiled, trials_of
 
 from evoclaims.cli import main
+from evoclaims.core.errors import UserError
 from evoclaims.judging.verdict import Outcome
+from evoclaims.paper import references
+from evoclaims.trials.store import Store
 from evoclaims.verdicts import history
 
 Sentence = Callable[[pytest.RunResult, str], None]
@@ -86,6 +90,49 @@ def test_a_changed_verdict_says_why_it_may_have_changed(accepted: Any) -> None:
         "its trials are other draws of the same experiment (device abacus -> cpu, n 7 -> 10); whether they drifted is"
     )
     assert f"a (smoke): refuted -> supported: {draws} not known: with 10 trials a side" in shown
+
+
+def test_what_other_trials_have_changed_is_not_said_to_be_from_the_same(accepted: Any, stored: Store) -> None:
+    """The store has wrong trials of other versions; those of the accepted verdict are the reference trials."""
+    right = trials_of(stored, "hand_built")
+    references.write(references.path_of(Path("reference"), "smoke", "right", "parity"), right)
+    forget(stored, right)
+    for trial in right:
+        stored.put(aged(spoiled(trial)), {})
+    said = "the trials of right on parity (smoke) have drifted from the reference trials, as said above"
+    for option in ("--claims-any-version", "--claims-stored"):
+        shown = accepted.run(option, "--claims-only=a", own_store=True).stdout.str()
+        assert f"a (smoke): supported -> refuted: {said}" in shown
+
+
+def test_no_torn_file_of_reference_trials_that_a_run_does_not_need_hides_its_verdicts(
+    accepted: Any, stored: Store
+) -> None:
+    _edit(outcome=Outcome.REFUTED)
+    torn = references.path_of(Path("reference"), "full", "wrong", "parity")
+    torn.parent.mkdir(parents=True)
+    torn.write_text("torn\n")
+    right = trials_of(stored, "hand_built")
+    forget(stored, right)
+    for trial in right:
+        stored.put(aged(trial), {})
+    result = accepted.run("--claims-any-version", "--claims-only=a", own_store=True)
+    assert result.ret == 0
+    result.stdout.fnmatch_lines(["a (smoke): refuted -> supported: *", "claims: 1 supported; *"])
+
+
+def test_reasons_that_cannot_be_found_are_an_error_after_the_verdicts(
+    accepted: Any, sentence: Sentence, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*_: object) -> str:
+        raise UserError("The disk is gone.")
+
+    _edit(outcome=Outcome.REFUTED)
+    monkeypatch.setattr("evoclaims.verdicts.reasons.reason", fail)
+    result = accepted.run()
+    assert result.ret == 1
+    sentence(result, "error: The disk is gone.")
+    result.stdout.fnmatch_lines(["a (smoke): refuted -> supported", "claims: 1 supported, 1 inconclusive; 1 of them *"])
 
 
 def test_claims_that_a_run_leaves_out_are_not_gone(accepted: Any) -> None:

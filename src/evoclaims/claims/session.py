@@ -22,6 +22,7 @@ from evoclaims.judging.measure import Event, Measure, Profile
 from evoclaims.judging.tripwire import DigestCheck
 from evoclaims.judging.verdict import Outcome, Verdict
 from evoclaims.paper import references
+from evoclaims.paper.archive import Archive
 from evoclaims.paper.reproduction import Reproduction
 from evoclaims.paper.trial_group import Fetch, TrialGroup
 from evoclaims.trials.result import TrialResult
@@ -73,6 +74,11 @@ class Session:
             UserError: when the file holds no matrix.
         """
         return mutation_matrix.load(self.reproduction.folder / mutation_matrix.FILE)
+
+    @property
+    def judged_from(self) -> Archive | Store:
+        """Where `get` returns the record of a trial that was judged, if it has several."""
+        return self.fetch.archive if isinstance(self.fetch, StoredOnly) else self.store
 
     def group(self, method: str, on: str, tier: str) -> TrialGroup:
         """Return the trials of a method on a task, not yet run."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -44,6 +44,7 @@ class Summary:
         self._drift: tuple[DriftReport, DigestCheck] | None = None
         self._upgrade: Upgrade | None = None
         self._regression: Regression | None = None
+        self._reasons: Mapping[tuple[str, str], str] = {}
         self._troubles: list[str] = []
         self._died: list[str] = []
 
@@ -92,6 +93,8 @@ class Summary:
                 self._upgrade = make_session(self._config).upgrade(self.reports)
             with self._telling():
                 self._compare_with_accepted()
+            with self._telling():
+                self._reasons = self._why_changed()
         with self._telling():
             self._write_json()
         if refused and not self.reports:
@@ -207,23 +210,21 @@ class Summary:
         if self._upgrade is not None:
             notes += self._upgrade.lines
         notes += verdict_changes(self.reports)
-        return [*notes, *(self._regression.lines(self._reasons()) if self._regression else ())]
+        return [*notes, *(self._regression.lines(self._reasons) if self._regression else ())]
 
-    def _reasons(self) -> dict[tuple[str, str], str]:
+    def _why_changed(self) -> dict[tuple[str, str], str]:
         """Return why verdicts may differ from the accepted ones, by tier and claim."""
         changed = self._regression.changed if self._regression else {}
         if not changed or self._drift is None:
             return {}
-        from evoclaims.paper.archive import Archive
         from evoclaims.verdicts.acceptance import entry_of
         from evoclaims.verdicts.history import key_of
         from evoclaims.verdicts.reasons import reason
 
-        session = make_session(self._config)
-        archive = Archive(session.store, session.reproduction.references, session.reproduction.imported)
+        judged_from = make_session(self._config).judged_from
         judged = {key_of(report): report for report in self.reports if report.n}
         return {
-            key: reason(judged[key], old, entry_of(judged[key], archive, ""), *self._drift)
+            key: reason(judged[key], old, entry_of(judged[key], judged_from, ""), *self._drift)
             for key, old in changed.items()
             if key in judged
         }

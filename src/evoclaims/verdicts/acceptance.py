@@ -10,6 +10,7 @@ from evoclaims.core.canonical import content_hash
 from evoclaims.core.printable import printable
 from evoclaims.paper.archive import Archive
 from evoclaims.trials.result import TrialResult
+from evoclaims.trials.store import Store
 from evoclaims.verdicts.claim_report import ClaimReport
 from evoclaims.verdicts.history import AcceptedVerdict, History, key_of
 
@@ -65,14 +66,14 @@ def accept(history: History, reports: Sequence[ClaimReport], archive: Archive, t
     return Acceptance(grown, tuple(accepted), tuple(retired), tuple(left))
 
 
-def entry_of(report: ClaimReport, archive: Archive, today: str) -> AcceptedVerdict:
-    """Return the entry that records a judged claim.
+def entry_of(report: ClaimReport, judged_from: Archive | Store, today: str) -> AcceptedVerdict:
+    """Return the entry that records a claim, which was judged from trials of an archive, or of a store alone.
 
     Raises:
         UserError: when a trial behind it is damaged.
     """
     preferred = {trial: source.installed for source in report.sources for trial in source.trials}
-    found = (archive.get(trial, versions) for trial, versions in preferred.items())
+    found = (judged_from.get(trial, versions) for trial, versions in preferred.items())
     trials = [trial for trial in found if trial is not None]
     return AcceptedVerdict(
         outcome=report.outcome,
