@@ -206,6 +206,32 @@ def test_under_a_variant_what_it_does_not_change_is_compared_too(session: Sessio
         ]
 
 
+def test_stored_trials_that_were_not_judged_have_no_part_in_the_drift(
+    session: Session, says: Claim, made: Made
+) -> None:
+    """Those that ran out of time here stand back behind older ones, and older ones behind committed ones of here."""
+    better, store = _pair(session)[0].condition, session.store
+    packages = list(better.versions)
+    here = {"versions": dict(better.versions), "depends_on": packages}
+    before = {"versions": {**better.versions, "jax": "0.0.1"}, "depends_on": packages}
+    path = references.path_of(session.reproduction.references, "smoke", "better", "small")
+    references.write(path, [made(better, seed, 1.0, **before) for seed in range(10)])
+    for seed in range(10):
+        store.put(made(better, seed, 0.0, "timeout", **here), {})
+        store.put(made(better, seed, 1.0, **before), {})
+
+    def statuses(archive: Archive) -> set[str]:
+        reading = replace(session, fetch=StoredOnly(archive), trials=10)
+        group = reading.group("better", "small", "smoke")
+        report = reading.settle(ClaimTest(says, "smoke", ""), group.solves_every_level.in_most_trials())
+        assert report.outcome == "supported"
+        return {row.status for row in reading.drift([report])[0].rows}
+
+    assert statuses(Archive(store)) == {"no drift"}
+    references.write(path, [made(better, seed, 1.0, **here) for seed in range(10)])
+    assert statuses(Archive(store, session.reproduction.references)) == set()
+
+
 def test_without_reference_trials_nothing_is_said_to_be_unchanged(session: Session, says: Claim, made: Made) -> None:
     drift, _ = session.drift(_settled(session, made, says, lambda seed: 1.0))
     assert {row.status for row in drift.rows} == {"no reference"}

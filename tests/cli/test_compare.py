@@ -11,11 +11,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from tiny_project import Evoclaims, Project, trials_of
+from tiny_project import Evoclaims, Project, aged, forget, out_of_time, spoiled, trials_of
 
 from evoclaims.judging.verdict import Outcome
 from evoclaims.paper import references
-from evoclaims.trials.result import TrialResult, digest
+from evoclaims.trials.result import TrialResult
 from evoclaims.trials.store import Store
 from evoclaims.verdicts import history
 
@@ -58,14 +58,6 @@ def _edit(**changes: Any) -> None:
     """Change the accepted verdict of `a`."""
     kept = history.load(FILE)
     FILE.write_text(history.dump({**kept, ("smoke", "a"): (replace(kept["smoke", "a"][0], **changes),)}))
-
-
-def _spoiled(trial: TrialResult) -> TrialResult:
-    """Return what a broken library might have made of a trial that went well."""
-    levels = {name: (0.0,) * len(values) for name, values in trial.levels.items()}
-    metrics = {**trial.metrics, "mean_success": 0.0}
-    new = digest(trial.status, metrics, levels, trial.curves, b"")
-    return replace(trial, metrics=metrics, levels=levels, digest=new, champion="")
 
 
 def _copy(to: str, change: Callable[[TrialResult], TrialResult] = lambda trial: trial) -> None:
@@ -113,7 +105,7 @@ def test_a_tier_can_be_left_out_of_a_comparison(accepted: Evoclaims) -> None:
 
 def test_new_trials_that_drifted_from_the_references_are_said(evoclaims: Evoclaims) -> None:
     path = references.path_of(Path("reference"), "smoke", "right", "parity")
-    references.write(path, map(_spoiled, trials_of(Store(OWN), "hand_built")))
+    references.write(path, map(spoiled, trials_of(Store(OWN), "hand_built")))
     evoclaims("accept", "--tier=smoke")
     _, out, _ = evoclaims("compare", "--tier=smoke")
     assert "  DRIFT in smoke/right-parity: mean_success is " in out
@@ -154,7 +146,7 @@ def test_a_revisions_accepted_verdicts_are_compared_with_those_of_the_working_tr
     git("commit", "-m", "sound")
     assert accepted("compare", "HEAD", "--fail=*->*")[0] == 0
     _edit(outcome=Outcome.REFUTED)
-    references.write(path, map(_spoiled, right))
+    references.write(path, map(spoiled, right))
     Path("tiny_paper.py").write_text(Path("tiny_paper.py").read_text() + "\n")
     status, out, _ = accepted("compare", "HEAD", "--fail=supported->refuted")
     assert status == 1
@@ -182,7 +174,7 @@ def test_no_code_of_a_revision_is_run(accepted: Evoclaims, git: Callable[..., No
 
 def test_two_stores_are_each_judged_from_their_own_trials(evoclaims: Evoclaims) -> None:
     _copy("sound")
-    _copy("spoiled", _spoiled)
+    _copy("spoiled", spoiled)
     path = references.path_of(Path("reference"), "smoke", "wrong", "parity")
     references.write(path, trials_of(Store(OWN), "hand_built_negated"))
     status, out, _ = evoclaims("compare", "sound", "spoiled", "--tier=smoke", "--fail=supported->refuted")
@@ -193,8 +185,38 @@ def test_two_stores_are_each_judged_from_their_own_trials(evoclaims: Evoclaims) 
     assert "verdicts: 1 changed, 1 not run, then or now" in out  # the reference trials of `b` are of neither store
 
 
+def test_an_old_store_is_judged_from_its_own_trials_also_where_reference_trials_are_newer(evoclaims: Evoclaims) -> None:
+    _copy("old", lambda trial: aged(spoiled(trial)))
+    path = references.path_of(Path("reference"), "smoke", "right", "parity")
+    references.write(path, trials_of(Store(OWN), "hand_built"))
+    status, out, _ = evoclaims("compare", "./old", "--tier=smoke", "--fail=refuted->supported")
+    assert status == 1
+    assert "FAIL a (smoke): refuted -> supported" in out
+    assert "  DRIFT in smoke/right-parity: mean_success is higher now" in out
+
+
+def test_trials_that_ran_out_of_time_here_are_no_drift_of_those_that_are_judged(evoclaims: Evoclaims) -> None:
+    store, right = Store(OWN), trials_of(Store(OWN), "hand_built")
+    references.write(references.path_of(Path("reference"), "smoke", "right", "parity"), map(aged, right))
+    assert evoclaims("accept", "--tier=smoke")[0] == 1
+    forget(store, right)
+    for trial in right:
+        store.put(aged(trial), {})
+        store.put(out_of_time(trial), {})
+    _, out, _ = evoclaims("compare", "--tier=smoke", "--fail=*->*")
+    assert "verdicts: 2 the same\n" in out
+    assert "trials: 3 comparisons, 0 drifted" in out
+    forget(store, right)
+    for trial in right:
+        store.put(aged(spoiled(trial)), {})
+    references.write(references.path_of(Path("reference"), "smoke", "right", "parity"), right)
+    _, out, _ = evoclaims("compare", "--tier=smoke", "--fail=*->*")
+    assert "verdicts: 2 the same\n" in out  # from the reference trials, which this environment has made
+    assert "trials: 0 comparisons, 0 drifted" in out
+
+
 def test_one_store_is_compared_with_the_projects_own(evoclaims: Evoclaims) -> None:
-    _copy("spoiled", _spoiled)
+    _copy("spoiled", spoiled)
     status, out, _ = evoclaims("compare", "./spoiled", "--fail=refuted->supported,not run->refuted")
     assert status == 1
     assert f"new: the store {OWN}" in out

@@ -8,7 +8,7 @@ import json
 from pathlib import Path
 
 import pytest
-from tiny_project import Evoclaims, Project
+from tiny_project import Evoclaims, Project, aged, forget, spoiled, trials_of
 
 from evoclaims.paper import references
 from evoclaims.trials.store import Store
@@ -130,9 +130,24 @@ def test_a_verdict_from_reference_trials_alone_is_told_as_one(
     assert evoclaims("reference")[0] == 0
     for record in stored.record_files(references.load(Path("reference/smoke/right-parity.jsonl"))[3].id):
         record.unlink(missing_ok=True)
-    told = "judged from committed reference trials, where the store has none"
+    told = "judged from committed reference trials, where the store has no better ones"
     assert status()[1].splitlines()[-1] == f"{told}: 2 of 4 of these claims"
     assert status("--only", "S1")[1].splitlines()[-1] == f"{told}: all of these claims"
+
+
+def test_a_verdict_from_reference_trials_that_go_before_older_ones_is_told_too(
+    status: Evoclaims, evoclaims: Evoclaims, stored: Store
+) -> None:
+    assert evoclaims("reference")[0] == 0
+    right = trials_of(stored, "hand_built")
+    forget(stored, right)
+    for trial in right:
+        stored.put(aged(spoiled(trial)), {})
+    lines = status("--only", "S1")[1].splitlines()
+    assert "claims (smoke): 1 supported" in lines
+    assert (
+        lines[-1] == "judged from committed reference trials, where the store has no better ones: all of these claims"
+    )
 
 
 def test_a_pipe_has_whole_sentences(status: Evoclaims, project: Project, monkeypatch: pytest.MonkeyPatch) -> None:

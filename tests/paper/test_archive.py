@@ -51,6 +51,23 @@ def test_a_stored_trial_of_other_versions_comes_before_one_that_ran_out_of_time_
     assert [trial and trial.status for trial in Archive(store).trials(condition, [0])] == ["done"]
 
 
+def test_what_is_judged_is_stored_unless_a_committed_trial_goes_before_it(
+    tmp_path: Path, store: Store, made: Any, reproduction: Reproduction
+) -> None:
+    condition = reproduction.tier("smoke").condition("better", "small")
+    here, packages = dict(condition.versions), list(condition.versions)
+    ours = {"versions": here, "depends_on": packages}
+    older = {"versions": {**here, "jax": "0.0.1"}, "depends_on": packages}
+    for seed, status, provenance in ((0, "done", ours), (1, "done", older), (2, "timeout", ours), (3, "done", older)):
+        store.put(made(condition, seed, 1.0, status, **provenance), {})
+    committed = [made(condition, seed, 1.0, **ours) for seed in (0, 1, 2, 4)]
+    references.write(references.path_of(tmp_path / "reference", "smoke", "better", "small"), committed)
+    archive = Archive(store, tmp_path / "reference")
+    ids = [made(condition, seed, 1.0).id for seed in range(6)]
+    assert [archive.get(trial, here) is not None for trial in ids] == [True, True, True, True, True, False]
+    assert [archive.stored(trial, here) is not None for trial in ids] == [True, False, False, True, False, False]
+
+
 def test_a_torn_file_of_reference_trials_is_said(
     tmp_path: Path, store: Store, made: Any, reproduction: Reproduction
 ) -> None:

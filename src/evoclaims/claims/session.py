@@ -182,7 +182,8 @@ class Session:
 
     def _trials(self, used: _Used) -> list[TrialResult]:
         """Return the stored trials that a condition's claims were judged from."""
-        stored = (self.store.get(trial, used.condition.versions) for trial in sorted(used.ids))
+        get = self.fetch.archive.stored if isinstance(self.fetch, StoredOnly) else self.store.get
+        stored = (get(trial, used.condition.versions) for trial in sorted(used.ids))
         return [trial for trial in stored if trial is not None]
 
 

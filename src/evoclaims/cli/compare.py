@@ -8,6 +8,8 @@ from dataclasses import replace
 from itertools import chain
 from pathlib import Path
 
+from evoclaims.claims.fetching import StoredOnly
+from evoclaims.claims.session import Session
 from evoclaims.cli.judging import judge
 from evoclaims.cli.output_files import write
 from evoclaims.cli.project import Project, open_project
@@ -15,6 +17,7 @@ from evoclaims.cli.store_folder import open_store
 from evoclaims.core.errors import UserError
 from evoclaims.judging.drift import DriftReport
 from evoclaims.judging.tripwire import DigestCheck
+from evoclaims.paper.archive import Archive
 from evoclaims.report.charts_of_verdicts import timeline_chart
 from evoclaims.report.verdict_chart import svg
 from evoclaims.trials.store import Store
@@ -75,11 +78,9 @@ def _sides(project: Project, tiers: Sequence[str], places: Sequence[str]) -> tup
         accepted = comparison.working_tree(reproduction)
         if not accepted.verdicts:
             raise UserError("No verdict has been accepted yet: `evoclaims accept` accepts those of now.")
-        store, reports = project.store, project.judge(*tiers)
         now = replace(
-            comparison.store(reproduction, store, reports),
-            verdicts=transitions.standings(reports),
-            name=f"judged from the store {store.root}, and from reference trials where it has none",
+            comparison.store(reproduction, project.archive, project.judge(*tiers)),
+            name=f"judged from the store {project.store.root}, and from reference trials where it has none",
         )
         return replace(accepted, name="accepted verdicts, and reference trials"), now
     found = [_place(project, place) for place in places]
@@ -117,15 +118,16 @@ def _place(project: Project, name: str) -> GitRevision | Store:
 
 
 def _stores(project: Project, tiers: Sequence[str], old: Store, new: Store) -> tuple[Side, Side]:
-    """Judge two stores, each from its own trials."""
+    """Judge two stores, each from its own trials alone."""
     for store in (old, new):
         if not store.ids():
             raise UserError(f"The folder {store.root} holds no trials, so there is nothing to compare.")
-    sessions = [replace(project, storage=str(store.root)).session() for store in (old, new)]
+    reproduction = project.reproduction
+    rooted = [Store(store.root.absolute()) for store in (old, new)]  # found even if a claim test changes the folder
+    sessions = [Session(reproduction, store, StoredOnly(Archive(store))) for store in rooted]
     found = judge(project.config, [(session, tier) for tier in tiers for session in sessions])
     before, after = chain.from_iterable(found[::2]), chain.from_iterable(found[1::2])
-    reproduction = project.reproduction
-    return comparison.store(reproduction, old, before), comparison.store(reproduction, new, after)
+    return comparison.store(reproduction, Archive(old), before), comparison.store(reproduction, Archive(new), after)
 
 
 def _drift_lines(drift: DriftReport, digests: DigestCheck, new: Side) -> Iterator[str]:

@@ -17,7 +17,6 @@ from evoclaims.judging.verdict import Outcome
 from evoclaims.paper.reproduction import Reproduction
 from evoclaims.report import table_cells, terminal_table
 from evoclaims.report.run_summary import run_summary
-from evoclaims.trials.store import Store
 from evoclaims.verdicts import export, history
 from evoclaims.verdicts.claim_report import ClaimReport
 from evoclaims.verdicts.robustness import matrix
@@ -64,17 +63,17 @@ def main(options: argparse.Namespace) -> int:
 
 
 def _where_from(reports: Sequence[ClaimReport], project: Project) -> str:
-    """Say how many claims were judged from committed reference trials, since the store lacks some of theirs.
+    """Say how many claims were judged from committed reference trials, which went before those of the store.
 
     Imported trials are in no store.
     """
-    store, imported = project.store, {condition.id for condition in project.reproduction.imported}
+    imported = {condition.id for condition in project.reproduction.imported}
     judged = [report for report in reports if report.n]
     lacking = [
         report
         for report in judged
         if any(
-            not _is_stored(store, trial)
+            project.archive.stored(trial, source.installed) is None
             for source in report.sources
             if source.condition not in imported
             for trial in source.trials
@@ -83,12 +82,7 @@ def _where_from(reports: Sequence[ClaimReport], project: Project) -> str:
     if not lacking:
         return ""
     some = "all" if len(lacking) == len(judged) else f"{len(lacking)} of {len(judged)}"
-    return f"judged from committed reference trials, where the store has none: {some} of these claims"
-
-
-def _is_stored(store: Store, trial: str) -> bool:
-    """Whether the store has a record of a trial, made with any versions."""
-    return any(path.exists() for path in store.record_files(trial))
+    return f"judged from committed reference trials, where the store has no better ones: {some} of these claims"
 
 
 def _changes(

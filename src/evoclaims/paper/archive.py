@@ -60,6 +60,11 @@ class Archive:
         records = self.store.records(trial)
         return newest(filter(is_final, records)) or newest(committed) or here or newest(records)
 
+    def stored(self, trial: str, versions: Versions | None = None) -> TrialResult | None:
+        """Return what `get` returns if it is a record of the store; None if it is a committed or an imported one."""
+        found = self.get(trial, versions)
+        return None if any(found is one for one in self._committed.get(trial, ())) else found
+
     def trials(self, condition: Condition, seeds: Sequence[int]) -> tuple[TrialResult | None, ...]:
         """Return a condition's trial for each seed, or None; this environment's records come first."""
         return tuple(self.get(TrialSpec(condition, seed).id, condition.versions) for seed in seeds)

@@ -2,22 +2,22 @@
 
 from __future__ import annotations
 
-import itertools
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath
 
 from evoclaims.core.errors import UserError
-from evoclaims.core.packages import Versions, agree, depends_on
+from evoclaims.core.packages import Versions, depends_on
 from evoclaims.judging.drift import DriftReport
 from evoclaims.judging.tripwire import DigestCheck
-from evoclaims.judging.verdict import Outcome
 from evoclaims.paper import references
+from evoclaims.paper.archive import Archive
 from evoclaims.paper.condition_names import names_of
 from evoclaims.paper.reproduction import Reproduction
 from evoclaims.trials.result import TrialResult
-from evoclaims.trials.store import DamagedFileError, Store, newest
+from evoclaims.trials.store import DamagedFileError
 from evoclaims.verdicts import history, transitions
 from evoclaims.verdicts.claim_report import ClaimReport
 from evoclaims.verdicts.git_revision import GitRevision
@@ -92,13 +92,13 @@ def revision(reproduction: Reproduction, at: GitRevision) -> Side:
     return Side(f"the revision {at.name} ({at.sha[:12]})", transitions.accepted(accepted), trials)
 
 
-def store(reproduction: Reproduction, of: Store, reports: Iterable[ClaimReport]) -> Side:
-    """Return verdicts and trials of a store; claims with trials that it lacks are not run.
+def store(reproduction: Reproduction, archive: Archive, reports: Iterable[ClaimReport]) -> Side:
+    """Return the verdicts from a store, and those of its trials that are judged.
 
     Args:
         reproduction: only trials of its conditions are used.
-        of: the store.
-        reports: verdicts judged from it, and from committed reference trials where it has none.
+        archive: the store, and what else the verdicts come from; trials that are judged from there are left out.
+        reports: verdicts judged from `archive`.
     """
     names, damaged = names_of(reproduction), list[DamagedFileError]()
     trials: dict[str, list[TrialResult]] = defaultdict(list)
@@ -106,35 +106,25 @@ def store(reproduction: Reproduction, of: Store, reports: Iterable[ClaimReport])
         condition: reproduction.tier(known[0].tier, known[0].variant).condition(known[0].method, known[0].task).versions
         for condition, known in names.items()
     }
-    for trial in _one_of_each(of.results(damaged), versions):
+    found = {record.id: record.condition for record in archive.store.results(damaged) if record.condition in names}
+    for trial in _judged(archive, {trial: versions[condition] for trial, condition in found.items()}):
         for name in names[trial.condition]:
             folder = reproduction.references_of(name.variant)
             path = references.path_of(folder, name.tier, name.method, name.task)
             trials[_named(path.relative_to(reproduction.references))].append(trial)
-    held = {trial.id for kept in trials.values() for trial in kept}
-    own = [
-        report
-        if all(held.issuperset(source.trials) for source in report.sources)
-        else replace(report, outcome=Outcome.NOT_RUN)
-        for report in reports
-    ]
     troubles = tuple(f"not read: {error}" for error in damaged)
-    return Side(f"the store {of.root}", transitions.standings(own), trials, troubles)
+    return Side(f"the store {archive.store.root}", transitions.standings(reports), trials, troubles)
 
 
-def _one_of_each(records: Iterable[TrialResult], versions: Mapping[str, Versions]) -> Iterator[TrialResult]:
-    """Return the judged record of each trial of known conditions: this environment's, or else the newest.
+def _judged(archive: Archive, trials: Mapping[str, Versions]) -> Iterator[TrialResult]:
+    """Yield the store's records of trials that are judged, given the installed versions of what each depends on.
 
-    Args:
-        records: grouped by trial.
-        versions: installed versions of the packages that a condition depends on, by the condition's id.
+    A trial with a damaged record is not judged.
     """
-    for _, several in itertools.groupby(records, key=lambda record: record.id):
-        found = [record for record in several if record.condition in versions]
-        here = [record for record in found if agree(record.provenance, versions[record.condition])]
-        chosen = newest(here or found)
-        if chosen is not None:
-            yield chosen
+    for trial, versions in trials.items():
+        with suppress(DamagedFileError):
+            if (record := archive.stored(trial, versions)) is not None:
+                yield record
 
 
 def compare_trials(old: Side, new: Side) -> tuple[DriftReport, DigestCheck]:
