@@ -36,6 +36,7 @@ def test_a_second_run_runs_nothing(evoclaims: Evoclaims, monkeypatch: pytest.Mon
     assert trials[0] == trials[1]
     assert len(trials[0]) == 3
     assert second[0] == 0
+    assert ["nothing was run: all were stored" in out for _, out, _ in (first, second)] == [False, True]
 
 
 def test_run_can_be_held_to_a_task_and_a_tier(evoclaims: Evoclaims, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -16,6 +16,7 @@ from evoclaims.cli.variant_cost import to_run
 from evoclaims.core.errors import UserError
 from evoclaims.judging.counting import MAX_TRIALS
 from evoclaims.judging.verdict import Outcome
+from evoclaims.trials.batches import StoredTrials
 from evoclaims.trials.crashes import last_said
 from evoclaims.trials.imported import where_from
 from evoclaims.trials.spec import Condition, TrialSpec
@@ -48,10 +49,16 @@ def main(options: argparse.Namespace) -> int:
     if options.retry:
         for condition in wanted.values():
             store.forget_timeouts((TrialSpec(condition, seed).id for seed in seeds), condition.versions)
+    complete = {job for job, condition in wanted.items() if not StoredTrials(store, condition).missing(seeds)}
     failed = 0
     for ended in running.run(wanted, lambda text: print(f"  {text}", flush=True)):
         name = f"{ended.job.label} ({options.tier})"
-        failed += bool(ended.error) or _print_trials(store, name, wanted[ended.job], seeds, ended.again)
+        note = ""
+        if ended.again:
+            note = f"{ended.again} of these were run again, since the stored ones were made with other versions"
+        elif ended.job in complete:
+            note = "nothing was run: all were stored (a method or a task whose code has changed needs a new `revision`)"
+        failed += bool(ended.error) or _print_trials(store, name, wanted[ended.job], seeds, note)
     if failed and len(chosen) > 1:
         print(f"evoclaims: {failed} of {len(chosen)} conditions failed.", file=sys.stderr)
     if options.variant:
@@ -59,11 +66,11 @@ def main(options: argparse.Namespace) -> int:
     return int(failed > 0)
 
 
-def _print_trials(store: Store, name: str, condition: Condition, seeds: Sequence[int], again: int) -> bool:
+def _print_trials(store: Store, name: str, condition: Condition, seeds: Sequence[int], note: str) -> bool:
     """List the trials of a condition, and return whether one of them has crashed."""
     print(name)
-    if again:
-        print(f"  {again} of these were run again, since the stored ones were made with other versions")
+    if note:
+        print(f"  {note}")
     results = [store.get(TrialSpec(condition, seed).id, condition.versions) for seed in seeds]
     for result in filter(None, results):
         print(f"  {describe(result)}")
