@@ -10,6 +10,7 @@ import pytest
 
 from evoclaims.judging.effect import a12
 from evoclaims.judging.exact import rank_test
+from evoclaims.judging.kinds.greater import GreaterTests
 from evoclaims.paper.references import committed
 from evoclaims.trials.result import TrialResult
 from reproductions.nisioti2025 import REPRODUCTION
@@ -75,6 +76,13 @@ def test_comparisons_with_the_control_cost_given_back_are_those_of_the_trials(
         _higher(_rewards(one, task, reward), _rewards(other, task, reward)) for reward in (_examined, _without_cost)
     )
     assert f"| {part} | {' | '.join(f'A12 {text}' for text in found)} |" in PROTOCOL
+
+
+def test_without_the_control_cost_ppo_would_not_be_above_cma_es() -> None:
+    ppo, cma_es = (_rewards(method, "obstacles", _without_cost) for method in ("ppo", "cma_es"))
+    tests = GreaterTests(ppo, cma_es, REPRODUCTION.tiers["full"].design.a12_margin)
+    told = f"PPO is above it in {tests.wins} of {tests.pairs} pairs, p = {tests.margin.p:.2g} against"
+    assert told in " ".join(PROTOCOL.split())
 
 
 @pytest.mark.parametrize(
