@@ -13,7 +13,7 @@ from evoclaims.claims.claim import Claim
 from evoclaims.claims.collected import ClaimTest
 from evoclaims.claims.fetching import NotStoredError, RunMissing, StoredOnly
 from evoclaims.claims.session import Session, Verdicts
-from evoclaims.core.errors import UserError
+from evoclaims.core.errors import UnknownNameError, UserError
 from evoclaims.paper import references
 from evoclaims.paper.archive import Archive
 from evoclaims.paper.reproduction import Reproduction
@@ -92,6 +92,19 @@ def test_an_unknown_name_is_a_sentence_with_the_known_ones(
     with pytest.raises(UserError) as caught:
         session.group(*names)
     assert str(caught.value) == f"There is {sentence}"
+
+
+def test_a_condition_that_only_the_other_tier_has_is_named_with_that_tier(session: Session) -> None:
+    plain = session.reproduction
+    fewer = {("better", "small"): plain.tiers["full"].conditions["better", "small"]}
+    lacking = replace(plain, tiers={**plain.tiers, "full": replace(plain.tiers["full"], conditions=fewer)})
+    here = replace(session, reproduction=lacking)
+    for method, task, what in (("worse", "small", "method 'worse'"), ("better", "large", "task 'large' for better")):
+        with pytest.raises(UnknownNameError) as caught:
+            here.group(method, task, "full")
+        assert str(caught.value) == (f"The full tier has no {what} (smoke has it): add a condition to the full tier.")
+    with pytest.raises(UserError, match="no method named 'wors'"):
+        here.group("wors", "small", "full")
 
 
 def test_trials_that_may_not_be_run_end_a_claim_as_not_run(

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from evoclaims.core.errors import UserError, require_known
+from evoclaims.core.errors import UnknownNameError, UserError, require_known
 from evoclaims.core.tiers import TIERS
 from evoclaims.judging.design import Design
 from evoclaims.paper.reported import FILE, Published, load_published
@@ -16,6 +16,16 @@ from evoclaims.trials.imported import Imported
 from evoclaims.trials.spec import Condition
 
 
+class OtherTierError(UnknownNameError):
+    """A condition that only other tiers have; an `UnknownNameError` whose message says which."""
+
+    def __init__(self, tier: str, what: str, others: Iterable[str]) -> None:
+        """Build the message from the `tier` without it, such as "full", `what` it lacks, and the `others`."""
+        UserError.__init__(
+            self, f"The {tier} tier has no {what} ({' and '.join(others)} has it): add a condition to the {tier} tier."
+        )
+
+
 @dataclass(frozen=True)
 class Tier:
     """One size at which the paper's claims are run.
@@ -23,10 +33,14 @@ class Tier:
     Attributes:
         conditions: by method and task, as claims name them: `{("ppo", "n_parity"): Condition(...)}`.
         design: how many trials are judged, with which error rates.
+        name: such as "smoke"; the reproduction gives it.
+        others: what the reproduction's other tiers have, by name; the reproduction gives them, for errors.
     """
 
     conditions: Mapping[tuple[str, str], Condition]
     design: Design
+    name: str = field(default="", kw_only=True, compare=False, repr=False)
+    others: Mapping[str, Collection[Names]] = field(default_factory=dict, kw_only=True, compare=False, repr=False)
 
     def __post_init__(self) -> None:
         """Reject a number of trials in the place of the design."""
@@ -36,12 +50,22 @@ class Tier:
             )
 
     def condition(self, method: str, task: str) -> Condition:
-        """Return the condition of a method on a task; an `UnknownNameError` lists the known ones."""
+        """Return the condition of a method on a task; an `UnknownNameError` lists the known ones, or tiers with it."""
         methods = {m for m, _ in self.conditions}
+        if method not in methods:
+            self._require_nowhere_else(f"method {method!r}", lambda names: names[0] == method)
         require_known("method", method, methods)
         tasks = {t for m, t in self.conditions if m == method}
+        if task not in tasks:
+            self._require_nowhere_else(f"task {task!r} for {method}", lambda names: names == (method, task))
         require_known(f"task for {method}", task, tasks)
         return self.conditions[method, task]
+
+    def _require_nowhere_else(self, what: str, is_it: Callable[[Names], bool]) -> None:
+        """Raise an `OtherTierError` if other tiers have what this one lacks."""
+        others = [tier for tier, conditions in self.others.items() if any(map(is_it, conditions))]
+        if others:
+            raise OtherTierError(self.name, what, others)
 
 
 @dataclass(frozen=True)
@@ -88,7 +112,16 @@ class Reproduction:
                 f"The reproduction {self.name!r} says trials={self.trials!r}: name a subclass of TrialGroup whose "
                 "properties are the paper's own measures, or leave it out."
             )
-        tiers = {name: replace(tier, conditions=self._found(tier.conditions)) for name, tier in self.tiers.items()}
+        has = {name: tuple(tier.conditions) for name, tier in self.tiers.items()}
+        tiers = {
+            name: replace(
+                tier,
+                conditions=self._found(tier.conditions),
+                name=name,
+                others={other: names for other, names in has.items() if other != name},
+            )
+            for name, tier in self.tiers.items()
+        }
         object.__setattr__(self, "tiers", tiers)
         for name, one in self.variants.items():
             for tier in one.conditions:  # an unknown one would change nothing, in silence
