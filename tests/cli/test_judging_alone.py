@@ -156,6 +156,25 @@ def test_claims_that_something_leaves_out_are_an_error_and_not_forgotten(
     assert not Path("verdicts.toml").exists()
 
 
+@pytest.mark.parametrize("command", ["status", "accept", "badge"])
+def test_claims_in_a_file_that_is_not_collected_are_missed_in_a_sentence(evoclaims: Evoclaims, command: str) -> None:
+    Path("claims/test_claims.py").rename("claims/hill.py")
+    status, out, err = evoclaims(command)
+    assert (status, out, err.count("\n")) == (2, "", 1)
+    assert f"No claim found in {Path('claims').resolve()}: claims are in files test_*.py or *_test.py, on fun" in err
+    assert "on functions test*, each with @claim(...)." in err
+    Path("pyproject.toml").write_text(PYPROJECT + 'python_files = "hill*.py"\n')
+    assert f"claims (smoke): {VERDICTS.split(': ')[1]}" in evoclaims("status")[1]
+
+
+def test_a_claim_whose_name_begins_with_another_word_is_a_sentence(project: Project, evoclaims: Evoclaims) -> None:
+    path = project.path / "claims" / "test_claims.py"
+    path.write_text(path.read_text().replace("def test_b", "def check_b"))
+    status, out, err = evoclaims("status")
+    assert (status, out, err.count("\n")) == (2, "", 1)
+    assert "test_claims.py: the function check_b has @claim(...), and pytest takes none of this name for a test" in err
+
+
 def test_a_claim_that_is_marked_to_be_skipped_is_spoken_of(project: Project, evoclaims: Evoclaims) -> None:
     path = project.path / "claims" / "test_claims.py"
     path.write_text(path.read_text().replace("@says('b')", "@pytest.mark.skip(reason='later')\n@says('b')"))

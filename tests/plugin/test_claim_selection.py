@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
+from tiny_project import PYPROJECT
 
 Sentence = Callable[[pytest.RunResult, str], None]
 
@@ -162,6 +163,20 @@ def test_the_fixtures_are_refused_to_tests_that_are_no_claims(project: Any) -> N
     result = project.run()
     assert result.ret == pytest.ExitCode.TESTS_FAILED
     result.stdout.fnmatch_lines(["*UserError: The fixtures `trials` and `verdict` are for tests marked with @claim*"])
+
+
+@pytest.mark.parametrize("indent", [("", ""), ("class TestThem:\n", "    ")])
+def test_a_claim_that_pytest_takes_for_no_test_is_a_sentence(
+    project: Any, sentence: Sentence, indent: tuple[str, str]
+) -> None:
+    first, before = indent
+    claimed = f"{first}{before}@says('a')\n{before}def check_a(trials, verdict):\n{before}    pass\n"
+    project.write(f"{claimed}\ndef test_other():\n    pass\n")
+    result = project.run()
+    assert result.ret == pytest.ExitCode.INTERRUPTED
+    sentence(result, "the function check_a has @claim(...), and pytest takes none of this name for a test, so that")
+    (project.path / "pyproject.toml").write_text(PYPROJECT + 'python_functions = "check"\n')
+    assert "a" in {report["claim"] for report in project.json()["claims"]}
 
 
 def test_a_claim_without_a_text_is_a_sentence_at_collection(project: Any) -> None:

@@ -69,6 +69,11 @@ def judge(config: SuiteConfig, asked: Sequence[tuple[Session, str]]) -> list[lis
     if run.troubles:
         rest = f", and {len(run.troubles) - 1} more such errors" if len(run.troubles) > 1 else ""
         raise UserError(f"The claims in {run.claims} cannot be collected: {run.troubles[0]}{rest}.")
+    if not run.has_claims:
+        raise UserError(
+            f"No claim found in {run.claims}: claims are in files {run.files}, on functions {run.functions}, each with "
+            "@claim(...)."
+        )
     run.check_complete()
     return run.reports
 
@@ -86,6 +91,7 @@ class _Run:
         self.reports: list[list[ClaimReport]] = [[] for _ in asked]
         self.troubles: list[str] = []
         self.interrupted = False
+        self.files = self.functions = ""
         self._root = config.root
         self._asked = asked
         self._collected: list[pytest.Item] = []
@@ -94,6 +100,8 @@ class _Run:
     def pytest_configure(self, config: pytest.Config) -> None:
         """Keep the plugin from making a session of its own."""
         config.stash[SESSION] = self._asked[0][0]
+        self.files = " or ".join(config.getini("python_files"))
+        self.functions = " or ".join(f"{name.removesuffix('*')}*" for name in config.getini("python_functions"))
 
     @pytest.hookimpl(wrapper=True, tryfirst=True)
     def pytest_load_initial_conftests(
@@ -154,6 +162,11 @@ class _Run:
         plain = getattr(report, ATTRIBUTE, None)
         if plain is not None:
             self._now.append(ClaimReport.from_json(plain))
+
+    @property
+    def has_claims(self) -> bool:
+        """Whether any claim was collected."""
+        return bool(claim_tests(self._collected))
 
     def check_complete(self) -> None:
         """Raise if claims were collected but have no report.

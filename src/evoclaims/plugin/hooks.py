@@ -17,6 +17,7 @@ from evoclaims.core.tiers import TIERS
 from evoclaims.plugin import options
 from evoclaims.plugin.distribution import Distribution, prepare
 from evoclaims.plugin.options import pytest_addoption as pytest_addoption
+from evoclaims.plugin.overlooked import pytest_pycollect_makeitem as pytest_pycollect_makeitem
 from evoclaims.plugin.own_gpu import pytest_load_initial_conftests as pytest_load_initial_conftests
 from evoclaims.plugin.own_gpu import pytest_xdist_auto_num_workers as pytest_xdist_auto_num_workers
 from evoclaims.plugin.progress import QUIET, ProgressLine, progress_of
