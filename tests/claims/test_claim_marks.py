@@ -46,6 +46,13 @@ def test_a_claim_that_lacks_a_text_says_which(lacking: str) -> None:
         claim(texts.pop("id"), **texts)
 
 
+@pytest.mark.parametrize("word", ["id", "says", "where", "smoke"])
+def test_what_is_no_text_is_refused_with_what_it_is(word: str) -> None:
+    texts: dict[str, Any] = {"id": "T1", **TEXTS, word: 1}
+    with pytest.raises(UserError, match=f"has 1 as its {word}, which is no text: write it in quotes"):
+        claim(texts.pop("id"), **texts)
+
+
 def test_an_accepted_outcome_must_be_known_and_have_a_reason() -> None:
     with pytest.raises(UserError, match="There is no outcome 'rejected'; known: supported, refuted"):
         expected("rejected", because="it is")

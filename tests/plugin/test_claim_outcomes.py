@@ -112,6 +112,15 @@ def test_a_bare_assert_cannot_bypass_the_judge(project: Any) -> None:
             "trials('rigth', on='parity')",
             "There is no method named 'rigth'. Did you mean 'right'? Known: broken, coin,",
         ),
+        (
+            "trials('right', 'parity')",
+            "trials('right', 'parity') does not say on which task: write trials('right', on='p",
+        ),
+        ("trials('right')", "trials('right') does not say on which task: write trials('right', on=task)."),
+        (
+            "verdict(trials('right', on='parity').solves_every_level.in_most_trials)",
+            "verdict(...) was given the function in_most_trials itself: call it, as in in_most_trials().",
+        ),
         ("trials('right', on='partiy')", "There is no task for right named 'partiy'. Did you mean 'parity'? Known: pa"),
     ],
 )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import subprocess
 import sys
 from dataclasses import dataclass, make_dataclass, replace
@@ -111,6 +112,23 @@ OTHERS = {
 def test_what_a_method_lacks_to_be_told_apart_is_a_sentence(body: dict[str, Any], what: str) -> None:
     with pytest.raises(UserError, match=what):
         _ = Condition(type("Mine", (), body)(), NParity(3), "direct", Budget(generations=1)).id
+
+
+@pytest.mark.parametrize(
+    ("functions", "what"),
+    [
+        (
+            "init step cost",
+            "Mine has no function best: write `def best(self, …)` in it. A method has init, step, best, ",
+        ),
+        ("step", "Mine has no function init and no best and no cost: write `def init(self, …)` in it. A method has "),
+    ],
+)
+def test_a_method_that_lacks_a_function_is_a_sentence(functions: str, what: str) -> None:
+    has = {"name": "mine", "revision": 1, **dict.fromkeys(functions.split(), print)}
+    mine: Any = make_dataclass("Mine", [], namespace=has, frozen=True)
+    with pytest.raises(UserError, match=re.escape(what)):
+        _ = replace(CONDITION, method=mine()).id
 
 
 def test_a_method_that_can_be_changed_after_its_trials_have_an_id_is_a_sentence() -> None:

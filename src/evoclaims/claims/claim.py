@@ -69,6 +69,8 @@ def claim(
         UserError: when a text is missing, or `because` would have to explain two things.
     """
     for word, text in {"id": claim_id, "says": says, "where": where, "smoke": smoke}.items():
+        if not (isinstance(text, str) or (text is None and word == "smoke")):
+            raise UserError(f"The claim {claim_id!r} has {text!r} as its {word}, which is no text: write it in quotes.")
         if text is not None and not text.strip():
             raise UserError(f"The claim {claim_id or '(without id)'} lacks its {word}.")
     if smoke is None and expect is not None:

@@ -202,6 +202,9 @@ class Verdicts:
         """
         if not isinstance(assertion, Assertion):
             alone = isinstance(assertion, Measure | Event | Profile)
+            if callable(assertion):
+                name = getattr(assertion, "__name__", type(assertion).__name__)
+                raise UserError(f"verdict(...) was given the function {name} itself: call it, as in {name}().")
             raise UserError(
                 f"verdict(...) takes an assertion about trials, such as verdict(a.mean_success > b.mean_success), "
                 f"not {f'{assertion.name!r} alone: say what holds of it' if alone else repr(assertion)}."

@@ -41,7 +41,17 @@ class Mlp:
     def apply(
         self, parameters: Float[Array, " parameters"], observation: Float[Array, " inputs"], outputs: int
     ) -> Float[Array, " outputs"]:
-        """Map one observation to outputs in (-1, 1)."""
+        """Map one observation to outputs in (-1, 1).
+
+        Raises:
+            UserError: when there are more or fewer parameters than these sizes take.
+        """
+        inputs = observation.shape[-1]
+        if parameters.shape != (self.size(inputs, outputs),):
+            raise UserError(
+                f"A perceptron with layers={self.layers}, skip={self.skip} from {inputs} inputs to {outputs} outputs "
+                f"takes {self.size(inputs, outputs)} parameters, as its `size` says, and has {parameters.size}."
+            )
         signal, start = observation, 0
         widths = (*self.layers, outputs)
         for depth, width in enumerate(widths):

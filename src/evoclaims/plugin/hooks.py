@@ -175,7 +175,13 @@ def trials(request: pytest.FixtureRequest, claim_tier: str) -> Callable[..., Tri
     """Return `trials(method, on=task)`: a condition's trials, run when a verdict needs them."""
     session = make_session(request.config)
 
-    def group(method: str, *, on: str) -> TrialGroup:
+    def group(method: str, *rest: object, on: str | None = None) -> TrialGroup:
+        if rest or on is None:
+            task = repr(on or rest[0]) if on or rest else "task"
+            raise UserError(
+                f"trials({', '.join(map(repr, (method, *rest)))}) does not say on which task: write "
+                f"trials({method!r}, on={task})."
+            )
         return session.group(method, on, claim_tier)
 
     return group

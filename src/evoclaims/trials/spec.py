@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from numbers import Real
@@ -21,7 +22,7 @@ ENGINE_REVISION = 1
 """Raised when the engine changes what a trial computes, so that old records are not taken for new ones."""
 
 
-def _described(component: Any) -> dict[str, Any]:
+def _described(component: Any, functions: Sequence[str] = ()) -> dict[str, Any]:
     """Return name, revision and parameters of a method or task, as plain JSON; a `UserError` says what is missing."""
     if isinstance(component, type):
         raise UserError(
@@ -41,6 +42,12 @@ def _described(component: Any) -> dict[str, Any]:
         raise UserError(
             f"{kind} is no {'dataclass' if frozen is None else 'frozen dataclass'}: write @dataclass(frozen=True) "
             "above the class, since the fields of a method or task tell its trials apart."
+        )
+    lacking = [name for name in functions if not callable(getattr(component, name, None))]
+    if lacking:
+        raise UserError(
+            f"{kind} has no function {' and no '.join(lacking)}: write `def {lacking[0]}(self, …)` in it. A method has "
+            f"{', '.join(functions)}."
         )
     require_whole_numbers(component)
     inherited = not is_own(type(component)) and not _has_own_name(component)
@@ -86,7 +93,7 @@ class Condition:
         """The condition as plain JSON: what its id hashes."""
         return {
             "engine": ENGINE_REVISION,
-            "method": _described(self.method),
+            "method": _described(self.method, ("init", "step", "best", "cost")),
             "task": _described(self.task),
             "progression": self.progression,
             "budget": as_plain(self.budget),
