@@ -65,6 +65,22 @@ def test_a_setting_that_is_no_text_is_a_sentence(project: Path, text: str) -> No
         load_config(project)
 
 
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ('reproducton = "a_tiny_paper"\n', "has the unknown key 'reproducton'. Did you mean 'reproduction'? Known: cl"),
+        (TABLE + "claim = 'x'\n", "has the unknown key 'claim'. Did you mean 'claims'?"),
+        (TABLE + "time_limit = 2\n", 'has time_limit = 2, which is no text: write it in quotes, as time_limit = "…".'),
+        (TABLE + "slurm = 3\n", "has slurm = 3, which is no table."),
+    ],
+)
+def test_the_wrong_key_is_named_first(project: Path, text: str, said: str) -> None:
+    (project / "pyproject.toml").write_text(text if TABLE in text else f"[tool.evoclaims]\n{text}")
+    with pytest.raises(UserError) as caught:
+        load_config(project)
+    assert _sentence(caught).startswith(f"[tool.evoclaims] {said}")
+
+
 def test_a_pyproject_that_is_not_toml_is_named(project: Path) -> None:
     (project / "pyproject.toml").write_text("[tool\n")
     with pytest.raises(UserError, match="Cannot read .*pyproject"):
@@ -87,6 +103,20 @@ def test_a_reproduction_is_imported_from_the_project(project: Path) -> None:
 @pytest.mark.parametrize("name", ["a_tiny_paper_of_others", "a_tiny_paper_of_others.part"])
 def test_a_module_that_is_not_there_is_a_sentence(project: Path, name: str) -> None:
     with pytest.raises(UserError, match=f"There is no module '{name}'") as caught:
+        load_reproduction(SuiteConfig(project, name))
+    _sentence(caught)
+
+
+@pytest.mark.parametrize(
+    ("name", "meant"), [("a_tiny_paper.our_papr", "a_tiny_paper.our_paper"), ("a_tiny_papr.our_paper", "a_tiny_paper")]
+)
+def test_a_misspelled_module_is_told_the_one_that_it_resembles(project: Path, name: str, meant: str) -> None:
+    (project / "a_tiny_paper").mkdir()
+    (project / "a_tiny_paper" / "__init__.py").touch()
+    (project / "a_tiny_paper" / "our_paper.py").touch()
+    with pytest.raises(
+        UserError, match=f"no module '{name}' in .* names. Did you mean '{meant}'. Known: {meant}."
+    ) as caught:
         load_reproduction(SuiteConfig(project, name))
     _sentence(caught)
 

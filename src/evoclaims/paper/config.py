@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from evoclaims.core.errors import UserError
+from evoclaims.core.errors import UserError, guess
 from evoclaims.paper.importing import import_module
 from evoclaims.trials.time_limit import DEFAULT_LIMIT, seconds_of
 
@@ -68,14 +68,25 @@ def load_config(root: Path) -> SuiteConfig:
     found = _tool_tables(root / "pyproject.toml").get("evoclaims")
     table = dict(found) if isinstance(found, dict) else {}
     slurm = table.pop("slurm", {})
-    known = {"reproduction"} <= set(table) <= {"reproduction", "claims", "time_limit"}
-    if not known or not isinstance(slurm, dict) or not all(isinstance(value, str) for value in table.values()):
+    trouble = _trouble(table, slurm)
+    if trouble or "reproduction" not in table:
         raise UserError(
-            f'{root / "pyproject.toml"} needs a [tool.evoclaims] table with reproduction = "package.module" and, if '
-            'it is not "claims", claims = "folder"; time_limit = "24h" if trials may take another time; a table slurm '
-            "for a site's jobs; no other keys."
+            f'{trouble}{root / "pyproject.toml"} needs a [tool.evoclaims] table with reproduction = "package.module" '
+            'and, if it is not "claims", claims = "folder"; time_limit = "24h" if trials may take another time; a '
+            "table slurm for a site's jobs; no other keys."
         )
     return SuiteConfig(root=root, **table, slurm=slurm)
+
+
+def _trouble(table: Mapping[str, object], slurm: object) -> str:
+    """Say which key of the table is wrong; nothing if none is."""
+    keys = ("reproduction", "claims", "time_limit")
+    for key, value in table.items():
+        if key not in keys:
+            return f"[tool.evoclaims] has the unknown key {key!r}.{guess(key, (*keys, 'slurm'))} "
+        if not isinstance(value, str):
+            return f'[tool.evoclaims] has {key} = {value!r}, which is no text: write it in quotes, as {key} = "…". '
+    return "" if isinstance(slurm, dict) else f"[tool.evoclaims] has slurm = {slurm!r}, which is no table. "
 
 
 def make_importable(root: Path) -> None:

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import importlib
+import pkgutil
+import sys
 from pathlib import Path
 from types import ModuleType
 
-from evoclaims.core.errors import UserError
+from evoclaims.core.errors import UserError, guess
 from evoclaims.core.raised import in_one_line
 
 
@@ -27,6 +29,15 @@ def import_module(name: str, root: Path, named_by: str) -> ModuleType:
         raise
     except BaseException as error:  # a module may raise SystemExit as well
         if isinstance(error, ModuleNotFoundError) and error.name and f"{name}.".startswith(f"{error.name}."):
-            raise UserError(f"There is no module {name!r} in {root}, which {named_by} names.") from error
+            meant = _meant(error.name, root)
+            raise UserError(f"There is no module {name!r} in {root}, which {named_by} names.{meant}") from error
         said = in_one_line(error, root)
         raise UserError(f"The module {name!r}, which {named_by} names, does not import: {said}.") from error
+
+
+def _meant(lacking: str, root: Path) -> str:
+    """Return which modules are beside one that is not there, and the one that it resembles; nothing without any."""
+    package = lacking.rpartition(".")[0]
+    folders = list(getattr(sys.modules.get(package), "__path__", ())) if package else [str(root)]
+    beside = [f"{package}.{one.name}".removeprefix(".") for one in pkgutil.iter_modules(folders)]
+    return guess(lacking, beside) if beside else ""
