@@ -95,15 +95,26 @@ def test_tests_are_chosen_by_the_ids_of_claims_which_are_parts_of_their_names(pr
     assert project.run(odd).ret == 0
 
 
-@pytest.mark.parametrize("arguments", [("-k", "G11"), ("-m", "full and smoke"), ("--claims-tier=full", "-m", "smoke")])
-def test_a_selection_that_finds_nothing_says_how_claims_are_selected(project: Any, arguments: tuple[str, ...]) -> None:
+@pytest.mark.parametrize(
+    ("arguments", "asked"),
+    [
+        (("-k", "G11"), "-k G11"),
+        (("-m", "xfail"), "-m xfail"),
+        (("-m", "full and smoke"), "-m 'full and smoke'"),
+        (("-m", "smoke", "-k", "G11"), "-m smoke with -k G11"),
+        (("--claims-tier=full", "-m", "smoke"), "--claims-tier full with -m smoke, which are two tiers"),
+    ],
+)
+def test_a_selection_that_finds_nothing_says_what_was_asked_and_how_claims_are_selected(
+    project: Any, arguments: tuple[str, ...], asked: str
+) -> None:
     project.write(a="supported", G10="supported", G9="supported")
     result = project.run(*arguments)
     assert result.ret == pytest.ExitCode.NO_TESTS_COLLECTED
     result.stdout.fnmatch_lines(
         [
-            "No claim was selected: --claims-only=G9 selects claims by their ids, -m smoke and -m full their tier. "
-            "Claims here: G9, G10, a."
+            f"No claim was selected by {asked}: --claims-only=G9 selects claims by their ids, -m smoke and -m full "
+            "their tier. Claims here: G9, G10, a."
         ]
     )
     project.write("def test_it():\n    pass\n")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shlex
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -183,9 +184,17 @@ class Summary:
         known: set[str] = self._config.stash[KNOWN]
         names = sorted(known, key=lambda name: in_order(("", name)))
         return (
-            f"No claim was selected: --claims-only={names[0]} selects claims by their ids, -m smoke and -m full their "
-            f"tier. Claims here: {', '.join(names)}."
+            f"No claim was selected{self._asked()}: --claims-only={names[0]} selects claims by their ids, "
+            f"{' and '.join(f'-m {tier}' for tier in TIERS)} their tier. Claims here: {', '.join(names)}."
         )
+
+    def _asked(self) -> str:
+        """Say which options together have selected no claim; nothing where none of them was given."""
+        mark, tier = self._config.getoption("markexpr", ""), self._config.getoption("claims_tier")
+        given = {"--claims-tier": tier, "-m": mark, "-k": self._config.getoption("keyword", "")}
+        told = [f"{option} {shlex.quote(value)}" for option, value in given.items() if value]
+        two = ", which are two tiers" if mark in TIERS and tier not in (None, mark) else ""
+        return f" by {' with '.join(told)}{two}" if told else ""
 
     def _said(self, text: str) -> str:
         """Return a line that is safe for the terminal."""
