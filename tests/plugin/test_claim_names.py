@@ -103,6 +103,37 @@ def test_two_claim_tests_of_one_name_are_a_sentence_that_names_both(
     assert not (project.path / ".evoclaims" / "trials").exists()
 
 
+BESIDE = """
+@says("X1")
+def test_plain(trials, verdict):
+    verdict(trials("right", on="parity").mean_success > 0)
+
+@pytest.mark.parametrize("method", ["right", "wrong"])
+@says("{0}")
+def test_cases(trials, verdict, method):
+    verdict(trials(method, on="parity").mean_success > 0)
+
+@pytest.mark.parametrize("method", ["coin"])
+@claim("{0}", says="another sentence", where="§2", smoke="in small")
+def test_other(trials, verdict, method):
+    verdict(trials(method, on="parity").mean_success > 0)
+"""
+
+
+def test_a_claim_without_parameters_shares_its_id_with_no_cases_of_another_test(
+    project: Any, sentence: Sentence
+) -> None:
+    project.write(BESIDE.format("X1"))
+    result = project.run(own_store=True)
+    assert result.ret == pytest.ExitCode.USAGE_ERROR
+    sentence(
+        result, "Two claim tests have the id X1, claims/test_claims.py::test_plain[X1-smoke] without parameters and"
+    )
+    sentence(result, "claims/test_claims.py::test_cases[right-X1-smoke] with some, so that")
+    project.write(BESIDE.format("X2"))  # two sentences under one id, each with its own cases
+    assert project.run("--collect-only").ret == 0
+
+
 def test_the_command_line_refuses_two_claims_of_one_name_too(project: Any, capsys: pytest.CaptureFixture[str]) -> None:
     project.write(IN_THE_ID)
     for command in ("status", "accept"):

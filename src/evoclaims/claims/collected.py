@@ -66,7 +66,8 @@ def claim_tests(items: Iterable[pytest.Item]) -> dict[pytest.Item, ClaimTest]:
     """Return what every claim test among `items` judges, after checking that their names are unique.
 
     Raises:
-        UserError: as `ClaimTest.of` does, or when two tests have the same name and tier.
+        UserError: as `ClaimTest.of` does, when two tests have the same name and tier, or when one test without
+            parameters has the id of others with some.
     """
     tests = {item: ClaimTest.of(item) for item in items if item.get_closest_marker("claim")}
     first: dict[tuple[str, str], pytest.Item] = {}
@@ -77,5 +78,14 @@ def claim_tests(items: Iterable[pytest.Item]) -> dict[pytest.Item, ClaimTest]:
             raise UserError(
                 f"Two claim tests are called {name} at the {tier} tier, {other.nodeid} and {item.nodeid}, so that the "
                 "verdict of one would take the other's place: give one of them another claim id or other parameter ids."
+            )
+    whole = {(test.claim.id, test.tier): item for item, test in tests.items() if not test.case}
+    for item, test in tests.items():
+        plain = whole.get((test.claim.id, test.tier))
+        if test.case and plain:
+            raise UserError(
+                f"Two claim tests have the id {test.claim.id}, {plain.nodeid} without parameters and "
+                f"{item.nodeid} with some, so that {test.claim.id} would mean one claim and all of its cases: give one "
+                "of them another claim id, or both parameters."
             )
     return tests
