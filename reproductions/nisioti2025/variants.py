@@ -108,6 +108,14 @@ def _first_level(method: str, task: str, condition: Condition) -> Condition | No
     return replace(condition, method=FirstLevelPpo(**settings))
 
 
+def _whole_tables(method: str, task: str, condition: Condition) -> Condition | None:
+    """PPO on 6-parity without the curriculum, with whole tables for episodes: a misspelt mode in the published code."""
+    asked = condition.task
+    if not isinstance(condition.method, Ppo) or not isinstance(asked, NParity) or condition.progression != "direct":
+        return None
+    return replace(condition, task=replace(asked, sampling="exhaustive"))
+
+
 def _published_ppo(method: str, task: str, condition: Condition) -> Condition | None:
     """PPO on robots, with the published code's hyperparameters."""
     learner: Any = condition.method
@@ -220,6 +228,9 @@ VARIANTS = {
     ),
     "first_level": _variant(
         "PPO trains on the first level all along, and only its test goes up, as in the published code", _first_level
+    ),
+    "whole_tables": _variant(
+        "PPO's episodes on 6-parity without the curriculum are whole tables, as in the published code", _whole_tables
     ),
     "published_ppo": _variant(
         "PPO with robots unrolls 20 steps, discounts by 0.95 and updates 8 times a batch, as in the published code",

@@ -46,3 +46,10 @@ def test_only_ppo_with_a_curriculum_is_changed_and_keeps_its_settings() -> None:
         assert isinstance(condition.method, FirstLevelPpo)
         assert vars(condition.method) == vars(ours.method)
         assert (condition.task, condition.id == ours.id) == (ours.task, False)
+
+
+def test_whole_tables_are_the_episodes_of_ppo_without_the_curriculum_alone() -> None:
+    conditions = REPRODUCTION.variants["whole_tables"].conditions["full"]
+    ((names, condition),) = conditions.items()
+    assert names == ("ppo", "n_parity_direct")
+    assert (condition.task.horizon, REPRODUCTION.tiers["full"].conditions[names].task.horizon) == (64, 1)
