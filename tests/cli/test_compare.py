@@ -71,7 +71,7 @@ def test_what_is_as_accepted_is_counted_and_not_listed(accepted: Evoclaims) -> N
     assert status == 0
     assert out.splitlines()[:4] == [
         "old: accepted verdicts, and reference trials",
-        f"new: judged from the store {OWN}, and from reference trials where it has none",
+        f"new: judged from the store {OWN}, and from reference trials where it has no better ones",
         "verdicts: 2 the same",
         "trials: 0 comparisons, 0 drifted (exact rank tests, Holm, α = 0.01)",
     ]

@@ -80,7 +80,7 @@ def _sides(project: Project, tiers: Sequence[str], places: Sequence[str]) -> tup
             raise UserError("No verdict has been accepted yet: `evoclaims accept` accepts those of now.")
         now = replace(
             comparison.store(reproduction, project.archive, project.judge(*tiers)),
-            name=f"judged from the store {project.store.root}, and from reference trials where it has none",
+            name=f"judged from the store {project.store.root}, and from reference trials where it has no better ones",
         )
         return replace(accepted, name="accepted verdicts, and reference trials"), now
     found = [_place(project, place) for place in places]

@@ -44,8 +44,8 @@ class LevelTest:
         every: training steps between tests. 0 means no tests: the trial stays on its level, and its reported fitness is
             the mean training reward times the horizon. For one-level tasks with long episodes.
         sampled_episodes: 0 tests the deterministic policy with the task's own examination; otherwise, how many training
-            episodes of the *stochastic* policy must all be without error, as in the authors' published code (128).
-            Such an episode is one step, on a row drawn from the level.
+            episodes of the *stochastic* policy must all be without error (the authors' published code asks 128 of its
+            deterministic policy). Such an episode is one step, on a row drawn from the level.
     """
 
     every: int = 1
