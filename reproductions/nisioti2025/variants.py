@@ -154,7 +154,7 @@ def _published_value_network(method: str, task: str, condition: Condition) -> Co
 
 
 def _published(method: str, task: str, condition: Condition) -> Condition | None:
-    """All that the published scripts do otherwise.
+    """What the published scripts do otherwise, but for `_first_level` and `_whole_tables`, which have not run.
 
     With the curriculum they ask N-parity for the level's rows alone, as the paper's text has it.
     """
@@ -251,8 +251,9 @@ VARIANTS = {
         _published_course,
     ),
     "published": _variant(
-        "What the published scripts do otherwise, at once: all of the above, without rows_so_far, which is not theirs "
-        "(nor their maze, where stones pay nothing)",
+        "What the published scripts do otherwise, at once: all of the above, without rows_so_far and "
+        "wide_substrate, which are not theirs, and first_level and whole_tables, which have not run (nor their maze, "
+        "where stones pay nothing)",
         _published,
     ),
     "published_rows_so_far": _variant(
