@@ -23,3 +23,10 @@ def test_the_committed_matrix_is_about_accepted_verdicts_and_known_mutants() -> 
     assert MATRIX.keys() <= accepted.keys()
     tried = {attempt.mutant for row in MATRIX.values() for attempt in row.attempts}
     assert tried <= catalogue.load(REPRODUCTION).keys()
+
+
+def test_the_committed_matrix_is_of_the_verdicts_that_are_accepted_now() -> None:
+    """A claim that is judged otherwise than when its faults were tried counts as not tried in a run."""
+    latest = {key: entries[-1] for key, entries in history.load(REPRODUCTION.folder / history.FILE).items()}
+    tried = {key: (row.fingerprint, row.outcome) for key, row in MATRIX.items()}
+    assert tried == {key: (latest[key].fingerprint, latest[key].outcome) for key in MATRIX}, "run `evoclaims mutants`"
