@@ -71,6 +71,7 @@ class Size:
         tasks: by the names that claims use.
         neat, limbed_neat: settings of NEAT with the simplest robot and with robots that have limbs.
         cppn: settings of HyperNEAT's CPPNs.
+        around: hidden neurons of HyperNEAT's networks around the simplest robot (others have 16).
         cma_es: population of CMA-ES.
         hidden: neurons of the network that CMA-ES trains.
         ppo: PPO.
@@ -82,6 +83,7 @@ class Size:
     neat: Settings
     limbed_neat: Settings
     cppn: Settings
+    around: int
     cma_es: int
     hidden: int
     ppo: Ppo
@@ -111,7 +113,7 @@ def _conditions(size: Size) -> Conditions:
     """Return every condition at a size."""
     tasks = size.tasks
     simple = {name for name, task in tasks.items() if task.robot == SIMPLE_ROB}
-    placed = HyperNeat(size.cppn, substrate=simple_rob_substrate(hidden=16))
+    placed = HyperNeat(size.cppn, substrate=simple_rob_substrate(hidden=size.around))
     layered = HyperNeat(size.cppn, extent="unit")
     cma_es = CmaEs(population=size.cma_es, network=AllSkips(hidden=size.hidden))
     methods: dict[str, Mapping[str, Method[Any]]] = {
@@ -153,6 +155,7 @@ FULL = _conditions(
         neat=_EVOLVING,
         limbed_neat=_EVOLVING,
         cppn=replace(_EVOLVING, activations=CPPN_FUNCTIONS),
+        around=32,
         cma_es=256,
         hidden=24,
         ppo=Ppo(
@@ -205,6 +208,7 @@ SMOKE = _conditions(
         neat=replace(_SMALL, population=128),
         limbed_neat=replace(_SMALL, nodes=64, connections=320),
         cppn=replace(_SMALL, activations=CPPN_FUNCTIONS),
+        around=16,
         cma_es=128,
         hidden=12,
         ppo=Ppo(
