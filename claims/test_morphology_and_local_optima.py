@@ -52,7 +52,7 @@ def test_the_ant_is_far_below_the_simplest_robot(trials, verdict):
 @expected(
     Outcome.REFUTED,
     tier="full",
-    because="eight trials of ten stay in the local optimum, 0.9 m from the target; two reach it in six episodes of ten",
+    because="eight trials of ten stay in the local optimum, 0.9 m from the target; two reach it in every episode",
 )
 def test_hyperneat_escapes_the_local_optimum(trials, verdict):
     hyperneat = trials("hyperneat", on="deceptive_maze_easy")

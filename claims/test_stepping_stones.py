@@ -13,7 +13,7 @@ EVOLVED = [
         marks=expected(
             Outcome.REFUTED,
             tier="full",
-            because="champions that crossed two stones in the one episode that made them champions cross 0.1 to 1.2 in "
+            because="champions that crossed two stones in the one episode that made them champions cross 0.0 to 1.1 in "
             "ten others (docs/protocol.md)",
         ),
     ),

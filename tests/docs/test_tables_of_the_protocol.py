@@ -144,6 +144,9 @@ def test_rewards_of_neat_with_the_published_settings_are_those_of_its_trials() -
         ("published", "hyperneat", "n_parity"),
         ("published", "cma_es", "simple_alu"),
         ("lucky_level_up", "ppo", "n_parity"),
+        ("first_level", "ppo", "n_parity"),
+        ("rows_so_far", "ppo", "n_parity"),
+        ("", "ppo", "n_parity"),
         ("", "cma_es", "n_parity"),
         ("rows_so_far", "neat", "n_parity"),
         ("sigmoid", "hyperneat", "n_parity"),
@@ -154,6 +157,32 @@ def test_success_by_level_is_the_mean_of_the_trials(variant: str, method: str, t
     levels = zip(*(trial.levels["success"] for trial in trials), strict=True)
     assert len(trials) == 10
     assert " ".join(f"{statistics.mean(level):.2f}" for level in levels) in " ".join(PROTOCOL.split())
+
+
+@pytest.mark.parametrize(
+    ("heading", "method", "task"),
+    [
+        ("half-cheetah, plain ground", "ppo", "locomotion_half_cheetah"),
+        ("obstacles of rising height", "ppo", "obstacles"),
+        ("all high", "ppo", "obstacles_high"),
+        ("stones", "ppo", "stones"),
+        ("stones, shown the goal", "goal_ppo", "stones"),
+        ("stones, the ant", "ppo", "stones_ant"),
+        ("easy deceptive maze", "ppo", "deceptive_maze_easy"),
+    ],
+)
+def test_rewards_of_ppo_with_either_value_network_are_those_of_the_trials(heading: str, method: str, task: str) -> None:
+    places = 2 if task == "deceptive_maze_easy" else 0
+    cells = [heading]
+    for references in (REPRODUCTION.references, REPRODUCTION.references_of("published_value_network")):
+        trials = committed(references, "full", method, task)
+        rewards = [_examined(trial) for trial in trials]
+        assert len(trials) == 10
+        cell = f"{statistics.mean(rewards):,.{places}f} ± {statistics.stdev(rewards):,.{places}f}"
+        if "stones" in task:
+            cell += f" ({statistics.mean(float(trial.metrics['stones']) for trial in trials):.2f} stones)"
+        cells.append(cell)
+    assert _line(cells) in PROTOCOL
 
 
 @pytest.mark.parametrize("variant", ["", "published_neat"])
