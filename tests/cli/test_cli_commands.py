@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -37,6 +38,25 @@ def test_a_second_run_runs_nothing(evoclaims: Evoclaims, monkeypatch: pytest.Mon
     assert len(trials[0]) == 3
     assert second[0] == 0
     assert ["nothing was run: all were stored" in out for _, out, _ in (first, second)] == [False, True]
+
+
+def test_an_edited_method_of_the_same_revision_is_told_wherever_its_trials_count(
+    evoclaims: Evoclaims, project: Any
+) -> None:
+    project.write(a="undecided")
+    told = "the code of tiny_paper.Coin was edited after trials had run, and they still count"
+    paper = Path("tiny_paper.py")
+
+    def after(old: str = "", new: str = "") -> list[bool]:
+        text = paper.read_text(encoding="utf-8")
+        paper.write_text(text.replace(old, new) if old else text, encoding="utf-8")
+        sys.modules.pop("tiny_paper", None)
+        return [told in evoclaims(*command)[1] for command in (("run", "coin"), ("run", "coin"), ("status",))]
+
+    assert after() == [False, False, False]
+    assert after("1.0, -1.0)", "2.0, -2.0)") == [True, True, True]
+    assert "a (smoke)" in evoclaims("status")[1].partition(told)[2]
+    assert after("revision: ClassVar[int] = 1", "revision: ClassVar[int] = 2") == [False, False, False]
 
 
 def test_run_can_be_held_to_a_task_and_a_tier(evoclaims: Evoclaims, monkeypatch: pytest.MonkeyPatch) -> None:

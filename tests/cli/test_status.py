@@ -156,8 +156,10 @@ def test_a_pipe_has_whole_sentences(status: Evoclaims, project: Project, monkeyp
     monkeypatch.delenv("COLUMNS")
     _, out, _ = status()
     assert sentence.strip() in out
+    assert sentence.strip() in str(project.run().stdout)
     monkeypatch.setenv("COLUMNS", "80")
     assert sentence.strip() not in status()[1]
+    assert sentence.strip() not in str(project.run().stdout)
 
 
 def test_controls_are_counted_apart(status: Evoclaims, project: Project) -> None:

@@ -58,11 +58,13 @@ def expecting(report: ClaimReport, expectation: Expectation | None) -> ClaimRepo
 def _source(group: TrialGroup, seeds: Sequence[int], again: Collection[int]) -> SourceTrials:
     """Describe one condition of a report."""
     condition = group.condition
+    trials = group.fetch(seeds) if seeds else ()
     return SourceTrials(
         method=group.method,
         task=group.task,
         condition=group.fingerprint,
         trials=tuple(TrialSpec(condition, seed).id for seed in seeds),
-        versions=found_in(group.fetch(seeds), condition.packages) if seeds else {},
+        versions=found_in(trials, condition.packages) if seeds else {},
         again=tuple(sorted(again)),
+        edited=condition.edited_since(trials),
     )

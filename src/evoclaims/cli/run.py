@@ -21,6 +21,7 @@ from evoclaims.trials.crashes import last_said
 from evoclaims.trials.imported import where_from
 from evoclaims.trials.spec import Condition, TrialSpec
 from evoclaims.trials.store import Store
+from evoclaims.verdicts import edited_code
 from evoclaims.verdicts.robustness import matrix
 
 
@@ -57,7 +58,7 @@ def main(options: argparse.Namespace) -> int:
         if ended.again:
             note = f"{ended.again} of these were run again, since the stored ones were made with other versions"
         elif ended.job in complete:
-            note = "nothing was run: all were stored (a method or a task whose code has changed needs a new `revision`)"
+            note = "nothing was run: all were stored"
         failed += bool(ended.error) or _print_trials(store, name, wanted[ended.job], seeds, note)
     if failed and len(chosen) > 1:
         print(f"evoclaims: {failed} of {len(chosen)} conditions failed.", file=sys.stderr)
@@ -71,10 +72,13 @@ def _print_trials(store: Store, name: str, condition: Condition, seeds: Sequence
     print(name)
     if note:
         print(f"  {note}")
-    results = [store.get(TrialSpec(condition, seed).id, condition.versions) for seed in seeds]
-    for result in filter(None, results):
+    found = (store.get(TrialSpec(condition, seed).id, condition.versions) for seed in seeds)
+    results = [result for result in found if result is not None]
+    for name in condition.edited_since(results):
+        print(f"  {edited_code.said(name)}")
+    for result in results:
         print(f"  {describe(result)}")
-    crashed = [result for result in filter(None, results) if result.status == "crashed"]
+    crashed = [result for result in results if result.status == "crashed"]
     said = last_said(crashed[0]).splitlines() if crashed else []
     if len(said) > 1:
         print(f"  what seed {crashed[0].seed} said last:", *said, sep="\n    ")

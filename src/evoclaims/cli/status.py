@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import os
 from collections.abc import Callable, Mapping, Sequence
 from typing import Final
 
@@ -27,9 +26,6 @@ FORMS: Final[Mapping[str, Callable[[Sequence[ClaimReport]], str]]] = {
     "markdown": run_summary,
 }
 """Ways to print verdicts for other programs, by name."""
-
-WHOLE: Final = 1000
-"""Columns in which every line has room."""
 
 
 def main(options: argparse.Namespace) -> int:
@@ -106,7 +102,7 @@ def _print(reports: Sequence[ClaimReport], tier: str, why: bool) -> None:
     accepted = any(report.as_expected and report.outcome is not Outcome.SUPPORTED for report in reports)
     unexplained = accepted or any(report.outcome in (Outcome.INCONCLUSIVE, Outcome.NOT_RUN) for report in reports)
     console = Console(file=styled())
-    width = console.width if console.is_terminal or os.environ.get("COLUMNS") else WHOLE
+    width = terminal_table.columns(console.width, console.is_terminal)
     for part in (
         terminal_table.verdict_table(reports, width, console.is_terminal),
         terminal_table.explanations(explained, console.width, console.is_terminal),

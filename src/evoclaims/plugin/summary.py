@@ -152,7 +152,8 @@ class Summary:
         writer = self._config.get_terminal_writer()
         width, colour = writer.fullwidth, writer.hasmarkup
         terminalreporter.section("claims")
-        terminalreporter.write_line(self._drawn(terminal_table.verdict_table(self.reports, width, colour)))
+        room = terminal_table.columns(width, terminalreporter.isatty)
+        terminalreporter.write_line(self._drawn(terminal_table.verdict_table(self.reports, room, colour)))
         terminalreporter.write_line("")
         explained = terminal_table.explanations(self.reports, width, colour)
         if explained:

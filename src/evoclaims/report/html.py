@@ -68,6 +68,8 @@ def _pieces(page: Page) -> Iterator[tuple[str, str]]:
     for key, condition in page.conditions.items():
         yield f"trials {names[key]}", render("trials.html.j2").render(condition=condition)
         yield f"settings {names[key]}", render("settings.html.j2").render(condition=condition)
+    if page.history:
+        yield "all history", chart_svg(page.history)
     yield "all figures", render("drawn_figures.html.j2").render(figures=page.figures)
 
 

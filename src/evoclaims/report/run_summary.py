@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from evoclaims.judging.verdict import Outcome
 from evoclaims.report import table_cells
 from evoclaims.report.markdown_text import literal, table
-from evoclaims.verdicts import history, mixed_versions
+from evoclaims.verdicts import edited_code, history, mixed_versions
 from evoclaims.verdicts.claim_report import ClaimReport
 
 COLUMNS = ("claim", "what is claimed", "verdict", "n", "p", "why")
@@ -18,7 +18,8 @@ def run_summary(reports: Sequence[ClaimReport], notes: Sequence[str] = ()) -> st
     rows = (map(literal, _cells(report)) for report in history.ordered(reports))
     lines = ["## Claims", "", f"**{literal(table_cells.totals(reports))}**", ""]
     lines += [table(COLUMNS, rows, numbers=("n", "p"))]
-    further = filter(None, (table_cells.faults(reports), *mixed_versions.lines(reports), *notes))
+    of_trials = (*mixed_versions.lines(reports), *edited_code.lines(reports))
+    further = filter(None, (table_cells.faults(reports), *of_trials, *notes))
     lines += ["", *(f"* {literal(note)}" for note in further)]
     return "\n".join(lines).rstrip("\n") + "\n"
 

@@ -17,12 +17,15 @@ from evoclaims.judging.drift import DriftReport
 from evoclaims.judging.verdict import Outcome
 from evoclaims.report import table_cells
 from evoclaims.report.console import PlainSpokenConsole
-from evoclaims.verdicts import history, mixed_versions
+from evoclaims.verdicts import edited_code, history, mixed_versions
 from evoclaims.verdicts.claim_report import ClaimReport
 from evoclaims.verdicts.sensitivity import Tried
 
 SENTENCE: Final = 16
 """Columns of the terminal that other columns leave to the sentence, if they can."""
+
+WHOLE: Final = 1000
+"""Columns in which every line has room."""
 
 _CLAIMED: Final = "what is claimed"
 _GAP: Final = "  "
@@ -34,6 +37,11 @@ _COLOURS = {
     Outcome.ERROR: "bold red",
     Outcome.NOT_RUN: "dim",
 }
+
+
+def columns(width: int, is_terminal: bool) -> int:
+    """Return how wide the table may be: a file or another program gets whole sentences, unless COLUMNS says it."""
+    return width if is_terminal or os.environ.get("COLUMNS") else WHOLE
 
 
 def verdict_table(reports: Sequence[ClaimReport], width: int, colour: bool) -> str:
@@ -59,7 +67,7 @@ def verdict_table(reports: Sequence[ClaimReport], width: int, colour: bool) -> s
         captions.append("* looked into and accepted")
     if any(report.tried is Tried.INSENSITIVE for report in reports):
         captions.append("insensitive: no fault planted in the claim's methods changes its verdict, so it is no support")
-    captions += mixed_versions.lines(reports)
+    captions += mixed_versions.lines(reports) + edited_code.lines(reports)
     return "\n".join([*(_rendered(line, width, colour).rstrip() for line in lines), *captions])
 
 

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from evoclaims.core.packages import DEPENDS_ON
 from evoclaims.core.provenance import collect, device_of
+from evoclaims.core.source_code import CODE
 from evoclaims.methods.base import Method, PartlyUsed
 from evoclaims.trials.arrays import pack
 from evoclaims.trials.curriculum import NEVER
@@ -151,6 +152,7 @@ def provenance(devices: Sequence[jax.Device], condition: Condition) -> dict[str,
         **found,
         "versions": {**found["versions"], **condition.versions},
         DEPENDS_ON: list(condition.packages),
+        **({CODE: dict(condition.code)} if condition.code else {}),
         "device": device_of(devices),
         "matmul_precision": MATMUL_PRECISION,
     }

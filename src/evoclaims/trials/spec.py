@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from numbers import Real
@@ -11,6 +11,7 @@ from typing import Any, Literal, get_args
 from evoclaims.core.canonical import as_plain, content_hash, fields_of, is_own, require_whole_numbers
 from evoclaims.core.errors import UserError, require_known
 from evoclaims.core.packages import ALWAYS, installed, packages_of
+from evoclaims.core.source_code import CODE, code_of
 from evoclaims.envs.base import Task
 from evoclaims.methods.base import Method
 from evoclaims.trials.budget import Budget
@@ -85,8 +86,9 @@ class Condition:
     budget: Budget
 
     def __post_init__(self) -> None:
-        """Reject an unknown progression."""
+        """Reject an unknown progression, and look at the code before anybody edits it during a run."""
         require_known("progression", self.progression, get_args(Progression))
+        _ = self.code
 
     @cached_property
     def plain(self) -> dict[str, Any]:
@@ -116,6 +118,16 @@ class Condition:
     def versions(self) -> dict[str, str | None]:
         """The versions of `packages` in this environment: trials stored with others do not count for it."""
         return installed(self.packages)
+
+    @cached_property
+    def code(self) -> dict[str, str]:
+        """Hashes of the project's own code of the method and the task, by class; they are not part of the id."""
+        return code_of(self.method, self.task)
+
+    def edited_since(self, trials: Iterable[TrialResult]) -> tuple[str, ...]:
+        """Return the classes whose code some of these trials of the condition ran otherwise than it is now."""
+        recorded = [code for trial in trials if isinstance(code := trial.provenance.get(CODE), Mapping)]
+        return tuple(name for name, now in self.code.items() if any(code.get(name, now) != now for code in recorded))
 
     @property
     def programs(self) -> str:

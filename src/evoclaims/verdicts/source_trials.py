@@ -20,6 +20,7 @@ class SourceTrials:
         trials: their ids.
         versions: the different versions that the trials were made with, by package that it depends on.
         again: seeds that this run repeated because the store's trials were made with other versions.
+        edited: the project's classes whose code the trials ran otherwise than it is now.
     """
 
     method: str
@@ -28,6 +29,7 @@ class SourceTrials:
     trials: tuple[str, ...]
     versions: Several
     again: tuple[int, ...]
+    edited: tuple[str, ...] = ()
 
     @property
     def label(self) -> str:

@@ -1,0 +1,144 @@
+"""The code of a project's own methods and tasks as hashes, which tell that it was edited after trials had run."""
+
+from __future__ import annotations
+
+import ast
+import dataclasses
+import inspect
+import sys
+import sysconfig
+from collections.abc import Iterator, Mapping
+from functools import cache, partial
+from pathlib import Path
+from textwrap import dedent
+from types import ModuleType
+from typing import Any, Final
+
+from evoclaims.core.canonical import content_hash, is_own
+
+CODE: Final = "code"
+"""Key under which a trial's provenance has these hashes."""
+
+DIGITS: Final = 16
+"""Of a hash that are kept."""
+
+_IN_THE_ID: Final = ("name", "revision", "packages")
+"""Class variables of a method or task that its trials' ids or versions hold."""
+
+
+def code_of(*components: Any) -> dict[str, str]:
+    """Return hashes of the code of components and of the parts in their fields, by "module.Class".
+
+    Classes of this package and of installed ones are left out: trials record their versions. A hash is of the class,
+    its bases, and the functions, classes and constants that these name, directly or through each other. Comments,
+    docstrings, layout and what ids hold anyhow (values of fields, `revision`) do not count. What is reached in other
+    ways, such as by the attribute of an object, is not seen.
+    """
+    code = {one for component in components for one in _code(component)}
+    found = {f"{one.__module__}.{one.__qualname__}": _hash(one) for one in code if _is_the_projects(one)}
+    return {name: found[name] for name in sorted(found)}
+
+
+def _code(component: Any) -> Iterator[Any]:
+    """Yield the classes of a component and of the parts in its fields, and the function of a training loop."""
+    if isinstance(component, Mapping):
+        component = tuple(component.values())
+    if isinstance(component, tuple | list):
+        for part in component:
+            yield from _code(part)
+    elif dataclasses.is_dataclass(component) and not isinstance(component, type):
+        yield type(component)
+        module, _, name = str(getattr(component, "place", "")).partition(":")
+        if name and inspect.isfunction(function := getattr(sys.modules.get(module), name, None)):
+            yield function
+        for field in dataclasses.fields(component):
+            yield from _code(getattr(component, field.name))
+
+
+@cache
+def _installed() -> tuple[str, ...]:
+    """Return the folders of Python and of installed packages."""
+    return tuple(map(sysconfig.get_path, ("stdlib", "platstdlib", "purelib", "platlib")))
+
+
+def _is_the_projects(one: Any) -> bool:
+    """Whether a class or function is of the user's own files: not of this package, Python's, or an installed one."""
+    if is_own(one):
+        return False
+    try:
+        file = Path(inspect.getfile(one))
+    except (TypeError, OSError):  # built in
+        return False
+    return not any(file.is_relative_to(folder) for folder in _installed())
+
+
+@cache
+def _hash(code: Any) -> str:
+    """Return a hash of the code of a class or function and of all of the project's that it names."""
+    found: dict[str, str] = {}
+    held = [code]
+    while held:
+        one = _bare(held.pop())
+        if not (inspect.isclass(one) or inspect.isfunction(one)) or not _is_the_projects(one):
+            continue
+        name = f"{one.__module__}.{one.__qualname__}"
+        if name in found:
+            continue
+        tree = _tree(one)
+        found[name] = ast.unparse(tree)
+        held += one.__bases__ if inspect.isclass(one) else ()
+        for word, value in _named(tree, vars(sys.modules.get(one.__module__, one))):
+            if _is_constant(value):
+                found[f"{name}: {word}"] = repr(value)
+            else:
+                held.append(value)
+    return content_hash(found)[:DIGITS]
+
+
+def _bare(one: Any) -> Any:
+    """Return the function behind decorators, such as `jax.jit`, and partial applications; other things as they are."""
+    try:
+        while (inner := inspect.unwrap(one.func if isinstance(one, partial) else one)) is not one:
+            one = inner
+    except Exception:  # anything can bear a name in a module, also what answers no questions
+        return None
+    return one
+
+
+def _is_constant(value: Any) -> bool:
+    """Whether a value is a number, a word, or a tuple of these."""
+    return all(map(_is_constant, value)) if isinstance(value, tuple) else isinstance(value, bool | int | float | str)
+
+
+def _tree(one: Any) -> ast.Module:
+    """Return the code of a class or function without what does not count; empty where its text cannot be had."""
+    try:
+        tree = ast.parse(dedent(inspect.getsource(one)))
+    except (OSError, TypeError, SyntaxError):
+        return ast.Module([], [])
+    for node in ast.walk(tree):
+        if isinstance(node, ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef):
+            if ast.get_docstring(node) is not None:
+                node.body = node.body[1:] or [ast.Pass()]
+            if isinstance(node, ast.ClassDef):
+                for statement in node.body:
+                    if isinstance(statement, ast.AnnAssign) and _is_in_the_id(statement):
+                        statement.value = None
+    return tree
+
+
+def _is_in_the_id(statement: ast.AnnAssign) -> bool:
+    """Whether a class's annotated variable is a field, or a class variable that ids or versions hold."""
+    variable = "ClassVar" in ast.unparse(statement.annotation)
+    return not variable or ast.unparse(statement.target) in _IN_THE_ID
+
+
+def _named(tree: ast.Module, there: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
+    """Yield what a module has of the names that code uses, and what modules have that it names as "module.name"."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Name) and node.id in there:
+            yield node.id, there[node.id]
+        elif isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name):
+            holder = there.get(node.value.id)
+            if isinstance(holder, ModuleType) and hasattr(holder, node.attr):
+                yield f"{node.value.id}.{node.attr}", getattr(holder, node.attr)

@@ -1,0 +1,160 @@
+"""The hashes of a project's own code change with what computes, and with nothing else."""
+
+from __future__ import annotations
+
+import importlib
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from evoclaims import TrainingLoop
+from evoclaims.core.source_code import code_of
+from evoclaims.envs import NParity
+from evoclaims.methods import HandBuilt
+
+METHOD = '''
+"""A method."""
+from dataclasses import dataclass
+from functools import partial
+from typing import ClassVar
+
+import jax
+from evoclaims.methods import CmaEs
+
+import its_helpers
+from its_helpers import Part
+
+RATE = 0.5
+UNUSED = 1
+
+
+@partial(jax.jit, static_argnums=1)
+def moved(x, far):
+    return x + its_helpers.shift(far)
+
+
+def unused(x):
+    return x
+
+
+@dataclass(frozen=True)
+class Own(CmaEs):
+    """Climbs."""
+
+    name: ClassVar[str] = "own"
+    revision: ClassVar[int] = 1
+    power: ClassVar[int] = 2
+    spread: float = 0.5
+    part: Part = Part()
+
+    def step(self, x):
+        """Take a step."""
+        y = moved(x, RATE)  # up
+        return y ** self.power
+
+
+def trained(task, seed, budget):
+    return {"last_fitness": RATE}
+'''
+
+HELPERS = """
+from dataclasses import dataclass
+
+
+def shift(far):
+    return far + 1
+
+
+@dataclass(frozen=True)
+class Base:
+    def twice(self, x):
+        return 2 * x
+
+
+@dataclass(frozen=True)
+class Part(Base):
+    width: int = 3
+"""
+
+Found = Callable[..., dict[str, str]]
+
+
+@pytest.fixture
+def found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Found]:
+    """Return a function that writes the two files with a replacement, and returns the hashes of `make(module)`."""
+    monkeypatch.syspath_prepend(str(tmp_path))
+    names = ("its_method", "its_helpers")
+
+    def forget() -> None:
+        for name in names:
+            sys.modules.pop(name, None)
+
+    def find(old: str = "", new: str = "", make: Callable[[Any], Any] = lambda module: module.Own()) -> dict[str, str]:
+        assert old in METHOD + HELPERS
+        for name, text in zip(names, (METHOD, HELPERS), strict=True):
+            (tmp_path / f"{name}.py").write_text(text.replace(old, new) if old else text, encoding="utf-8")
+        forget()
+        importlib.invalidate_caches()
+        sys.dont_write_bytecode, before = True, sys.dont_write_bytecode
+        try:
+            return code_of(make(importlib.import_module("its_method")), NParity(2))
+        finally:
+            sys.dont_write_bytecode = before
+
+    yield find
+    forget()
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("y ** self.power", "y * self.power"),
+        ("power: ClassVar[int] = 2", "power: ClassVar[int] = 3"),
+        ("x + its_helpers", "x - its_helpers"),
+        ("RATE = 0.5", "RATE = 0.25"),
+        ("return far + 1", "return far + 2"),
+    ],
+)
+def test_what_computes_changes_the_hash_of_the_method(found: Found, old: str, new: str) -> None:
+    before, after = found(), found(old, new)
+    assert before.keys() == after.keys() == {"its_method.Own", "its_helpers.Part"}
+    assert before["its_method.Own"] != after["its_method.Own"]
+    assert before["its_helpers.Part"] == after["its_helpers.Part"]
+
+
+def test_the_base_of_a_part_is_part_of_it(found: Found) -> None:
+    before, after = found(), found("return 2 * x", "return x + x")
+    assert before["its_helpers.Part"] != after["its_helpers.Part"]
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ('"""Climbs."""', '"""Climbs up."""'),
+        ('        """Take a step."""\n', ""),
+        ("  # up", ""),
+        ("y = moved(x, RATE)", "y = moved(\n            x, RATE\n        )"),
+        ("revision: ClassVar[int] = 1", "revision: ClassVar[int] = 2"),
+        ("spread: float = 0.5", "spread: float = 0.25"),
+        ("UNUSED = 1", "UNUSED = 2"),
+        ("def unused(x):\n    return x", "def unused(x):\n    return -x"),
+    ],
+)
+def test_words_layout_what_ids_hold_and_what_is_not_used_change_nothing(found: Found, old: str, new: str) -> None:
+    assert found() == found(old, new)
+
+
+def test_code_of_this_package_has_no_hash_since_trials_record_its_version() -> None:
+    assert code_of(HandBuilt(), NParity(3)) == {}
+
+
+def test_the_function_of_a_training_loop_is_looked_at(found: Found) -> None:
+    def loop(module: Any) -> TrainingLoop:
+        return TrainingLoop(module.trained, packages=())
+
+    before, after = found(make=loop), found("RATE}", "2 * RATE}", make=loop)
+    assert list(before) == list(after) == ["its_method.trained"]
+    assert before != after
