@@ -70,7 +70,7 @@ def test_cma_es_solves_every_level(trials, verdict, task):
     tier="full",
     because="ten trials end at levels 1 to 4 and forget earlier ones: on the rows of one level alone, answering always "
     "the same is as good as what solved the level before. Asked the rows of all levels so far, as one published "
-    "environment does, NEAT comes to the published curve (docs/protocol.md)",
+    "environment does, and with the published settings, NEAT comes to the published curve (docs/protocol.md)",
 )
 def test_neat_solves_parity(trials, verdict):
     neat = trials("neat", on="n_parity")

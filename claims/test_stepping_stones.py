@@ -13,8 +13,8 @@ EVOLVED = [
         marks=expected(
             Outcome.REFUTED,
             tier="full",
-            because="champions that crossed two stones in the one episode that made them champions cross 0.0 to 1.1 in "
-            "ten others (docs/protocol.md)",
+            because="champions whose one episode in training collects 1,800 to 2,700 cross 0.0 to 1.1 stones (mean "
+            "0.5) in ten other episodes (docs/protocol.md)",
         ),
     ),
     pytest.param(
