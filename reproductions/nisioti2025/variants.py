@@ -252,12 +252,13 @@ VARIANTS = {
         _published_course,
     ),
     "published": _variant(
-        "What the published scripts do otherwise, at once: all of the above, without rows_so_far and "
+        "What the published scripts do otherwise, at once: every variant of one detail but rows_so_far and "
         "lucky_level_up, which are not theirs (nor their maze, where stones pay nothing)",
         _published,
     ),
     "published_rows_so_far": _variant(
-        "The gates as under published, and N-parity asks the rows of all levels so far, with which Figure 3 comes out",
+        "The gates as under published, and N-parity asks the rows of all levels so far, with which NEAT's curve in "
+        "Figure 3 comes out",
         _published_rows_so_far,
     ),
 }
