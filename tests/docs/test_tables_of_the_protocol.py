@@ -209,3 +209,33 @@ def test_direct_encodings_on_average_over_levels_of_simple_alu_are_those_of_the_
 
     neat, cma_es = (a12(means(method), means("hyperneat")) for method in ("neat", "cma_es"))
     assert f"on Simple ALU NEAT's A12 against HyperNEAT is {neat:.2f}, CMA-ES's {cma_es:.2f}" in PROTOCOL
+
+
+def test_what_is_left_of_the_reward_of_the_episode_that_made_a_champion_is_that_of_the_trials() -> None:
+    def left(method: str) -> str:
+        trials = committed(REPRODUCTION.references, "full", method, "stones")
+        shares = [100 * _examined(trial) / _of_training(trial) for trial in trials]
+        return f"{min(shares):.0f} to {max(shares):.0f}%"
+
+    said = " ".join(PROTOCOL.split())
+    assert f"HyperNEAT's last champions collect {left('hyperneat')} of what they had" in said
+    assert f"made them champions, NEAT's {left('neat')} (" in said
+
+
+@pytest.mark.parametrize(
+    ("variant", "said"), [("", "6-parity ({} on average)"), ("whole_tables", "published mode, it is none ({})")]
+)
+def test_success_of_ppo_without_the_curriculum_is_that_of_the_trials(variant: str, said: str) -> None:
+    trials = committed(REPRODUCTION.references_of(variant), "full", "ppo", "n_parity_direct")
+    mean = statistics.mean(float(trial.metrics["last_success"]) for trial in trials)
+    assert said.format(f"{mean:.2f}") in " ".join(PROTOCOL.split())
+
+
+def test_how_many_verdicts_the_published_value_network_touches_is_that_of_the_table() -> None:
+    lines = [line.strip("| ").split(" | ") for line in PROTOCOL.splitlines() if line.startswith("| ")]
+    head = next(cells for cells in lines if cells[:3] == ["claim", "tier", "the protocol"])
+    column = head.index(r"published\_value\_network")
+    cells = [cells[column] for cells in lines if len(cells) == len(head) and cells[1] == "full"]
+    judged = [cell for cell in cells if cell != "–"]
+    assert sum(cell.startswith("**") for cell in judged) == 1
+    assert f"of {len(judged)} verdicts, one is another" in PROTOCOL
