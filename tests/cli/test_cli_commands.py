@@ -313,7 +313,7 @@ def test_plan_tells_what_the_reference_trials_have_cost(evoclaims: Evoclaims, st
     device = {"platform": "gpu", "kind": "NVIDIA Abacus", "count": 1}
     timing = {"run": 7000.0, "compile": 200.0, "batch": 10, "started": "2026-01-01T00:00:00+00:00"}
     references.write(path, [replace(t, provenance={"device": device}, timing=timing) for t in references.load(path)])
-    Path("reference/smoke/wrong-parity.jsonl").unlink()
+    made_here = Path("reference/smoke/wrong-parity.jsonl").rename("wrong-parity.jsonl")
     out = evoclaims("plan")[1]
     assert re.search(r"took on one *\n.*NVIDIA Abacus$", out, re.MULTILINE)
     assert re.search(r"^right on parity +10 +0 +0 +0 s$", out, re.MULTILINE)
@@ -323,6 +323,10 @@ def test_plan_tells_what_the_reference_trials_have_cost(evoclaims: Evoclaims, st
     assert "Fewer than 10 reference trials: wrong on parity (0)." in out
     assert re.search(r"^a +10 +.*✓ ✗ +2 h 00 min$", out, re.MULTILINE)
     assert re.search(r"^b +10 +.*✓ ✗ +not run$", out, re.MULTILINE)
+    made_here.rename("reference/smoke/wrong-parity.jsonl")
+    out = evoclaims("plan")[1]
+    assert re.search(r"^wrong on parity +– ", out, re.MULTILINE)
+    assert re.search(r"^total +2 h 00 min .*\n +and elsewhere", out, re.MULTILINE)
 
 
 def test_plan_tells_the_hours_of_a_cpu_core(evoclaims: Evoclaims, stored: Store) -> None:

@@ -35,6 +35,9 @@ Costs = Mapping[Names, Spent]
 HOUR: Final = 3600
 """Seconds."""
 
+AND_ELSEWHERE: Final = "\nand elsewhere"
+"""Follows a sum without conditions whose trials ran on other devices."""
+
 AND_MORE: Final = "\nand more"
 """Says of a sum that some of it is unknown; on a line of its own, so that the column stays narrow."""
 
@@ -201,7 +204,8 @@ def _took(costs: Costs, names: Sequence[Names], kind: str) -> str:
     missing = any(not cost.trials for cost in found)
     if not seconds:
         return "not run" if missing else "–"
-    return duration(seconds) + AND_MORE * missing
+    elsewhere = any(cost.trials and kind not in cost.seconds for cost in found)
+    return duration(seconds) + AND_ELSEWHERE * elsewhere + AND_MORE * missing
 
 
 def _core_hours(seconds: float | None) -> str:

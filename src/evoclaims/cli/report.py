@@ -70,7 +70,7 @@ def main(options: argparse.Namespace) -> int:
     )
     folder = Path(options.out or REPORT)
     for name, text in (("index.html", html(page)), ("report.md", markdown(page))):
-        write(folder / name, text.encode(), ours=options.out is None)
+        write(folder / name, text.encode(), "folder", ours=options.out is None)
         print(f"wrote {folder / name}")
     for board in page.boards:
         print(f"claims ({board.tier}): {table_cells.totals(verdicts[board.tier])}")

@@ -57,7 +57,10 @@ def known_pace(
         return None
     steps = [trial.metrics["steps"] for trial in batch.trials]
     work = sum(steps) if batch.layout == "alone" else max(steps)
-    return Pace(batch.run / max(work, 1), batch.compile, batch.layout)
+    took = batch.run
+    if batch.layout == "alone":  # it may have had more cores than there are here
+        took = max(took, (batch.core_seconds or 0.0) / usable_cores())
+    return Pace(took / max(work, 1), batch.compile, batch.layout)
 
 
 def measured_pace(condition: Condition, devices: Sequence[jax.Device]) -> Pace:
