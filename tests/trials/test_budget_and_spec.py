@@ -20,6 +20,7 @@ from evoclaims.envs.gates.parity import NParity
 from evoclaims.methods.cma_es import CmaEs
 from evoclaims.methods.hand_built import HandBuilt
 from evoclaims.methods.random_search import RandomSearch
+from evoclaims.methods.training_loop import TrainingLoop
 from evoclaims.networks.all_skips import AllSkips
 from evoclaims.networks.mlp import Mlp
 from evoclaims.trials.budget import Budget
@@ -129,6 +130,41 @@ def test_a_method_that_lacks_a_function_is_a_sentence(functions: str, what: str)
     mine: Any = make_dataclass("Mine", [], namespace=has, frozen=True)
     with pytest.raises(UserError, match=re.escape(what)):
         _ = replace(CONDITION, method=mine()).id
+
+
+_TASK: dict[str, Any] = {
+    **{"name": "mine", "revision": 1, "levels": 1, "observation_size": 1, "action_size": 1, "horizon": 1},
+    **dict.fromkeys(("reset", "step", "episode", "examine"), print),
+}
+
+
+@pytest.mark.parametrize(
+    ("lacks", "what"),
+    [
+        (
+            ("examine",),
+            "Mine has no function examine: write `def examine(self, …)` in it. A task has reset, step, episode, "
+            "examine.",
+        ),
+        (("reset", "step"), "Mine has no function reset and no step: write `def reset(self, …)` in it. A task has "),
+        (
+            ("levels", "horizon"),
+            "Mine has no levels and no horizon: write `levels: ClassVar[int] = …` in it, or a field or property of "
+            "that name. A task says levels, observation_size, action_size, horizon.",
+        ),
+    ],
+)
+def test_a_task_that_lacks_a_function_or_a_size_is_a_sentence(lacks: tuple[str, ...], what: str) -> None:
+    mine: Any = make_dataclass(
+        "Mine", [], namespace={name: has for name, has in _TASK.items() if name not in lacks}, frozen=True
+    )
+    with pytest.raises(UserError, match=re.escape(what)):
+        _ = replace(CONDITION, task=mine()).id
+
+
+def test_the_task_of_a_training_loop_needs_nothing_that_only_the_engine_asks_for() -> None:
+    mine: Any = make_dataclass("Mine", [], namespace={"name": "mine", "revision": 1}, frozen=True)
+    assert replace(CONDITION, method=TrainingLoop("loops:train", packages=()), task=mine()).id
 
 
 def test_a_method_that_can_be_changed_after_its_trials_have_an_id_is_a_sentence() -> None:

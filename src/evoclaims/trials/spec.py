@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from inspect import getattr_static
 from numbers import Real
-from typing import Any, Literal, get_args
+from typing import Any, Final, Literal, get_args
 
 from evoclaims.core.canonical import as_plain, content_hash, fields_of, is_own, require_whole_numbers
 from evoclaims.core.errors import UserError, require_known
@@ -14,6 +15,7 @@ from evoclaims.core.packages import ALWAYS, installed, packages_of
 from evoclaims.core.source_code import CODE, code_of
 from evoclaims.envs.base import Task
 from evoclaims.methods.base import Method
+from evoclaims.methods.training_loop import TrainingLoop
 from evoclaims.trials.budget import Budget
 from evoclaims.trials.result import TrialResult
 
@@ -23,8 +25,18 @@ ENGINE_REVISION = 1
 """Raised when the engine changes what a trial computes, so that old records are not taken for new ones."""
 
 
-def _described(component: Any, functions: Sequence[str] = ()) -> dict[str, Any]:
-    """Return name, revision and parameters of a method or task, as plain JSON; a `UserError` says what is missing."""
+_NEEDS: Final = {
+    "method": (("init", "step", "best", "cost"), ()),
+    "task": (("reset", "step", "episode", "examine"), ("levels", "observation_size", "action_size", "horizon")),
+}
+"""The functions and the numbers that a method and a task have (see `Method` and `Task`)."""
+
+
+def _described(component: Any, kind_of: Literal["method", "task", ""]) -> dict[str, Any]:
+    """Return name, revision and parameters of a component, as plain JSON; a `UserError` says what is missing.
+
+    As a method or a task it needs what these have; a training loop's task, which no engine plays, needs neither.
+    """
     if isinstance(component, type):
         raise UserError(
             f"{component.__name__} is a class, where an object of it is needed: write {component.__name__}()."
@@ -44,11 +56,18 @@ def _described(component: Any, functions: Sequence[str] = ()) -> dict[str, Any]:
             f"{kind} is no {'dataclass' if frozen is None else 'frozen dataclass'}: write @dataclass(frozen=True) "
             "above the class, since the fields of a method or task tell its trials apart."
         )
+    functions, numbers = _NEEDS.get(kind_of, ((), ()))
     lacking = [name for name in functions if not callable(getattr(component, name, None))]
     if lacking:
         raise UserError(
-            f"{kind} has no function {' and no '.join(lacking)}: write `def {lacking[0]}(self, …)` in it. A method has "
-            f"{', '.join(functions)}."
+            f"{kind} has no function {' and no '.join(lacking)}: write `def {lacking[0]}(self, …)` in it. A {kind_of} "
+            f"has {', '.join(functions)}."
+        )
+    unsaid = [name for name in numbers if getattr_static(component, name, None) is None]  # to read one may take long
+    if unsaid:
+        raise UserError(
+            f"{kind} has no {' and no '.join(unsaid)}: write `{unsaid[0]}: ClassVar[int] = …` in it, or a field or "
+            f"property of that name. A {kind_of} says {', '.join(numbers)}."
         )
     require_whole_numbers(component)
     inherited = not is_own(type(component)) and not _has_own_name(component)
@@ -95,8 +114,8 @@ class Condition:
         """The condition as plain JSON: what its id hashes."""
         return {
             "engine": ENGINE_REVISION,
-            "method": _described(self.method, ("init", "step", "best", "cost")),
-            "task": _described(self.task),
+            "method": _described(self.method, "method"),
+            "task": _described(self.task, "" if isinstance(self.method, TrainingLoop) else "task"),
             "progression": self.progression,
             "budget": as_plain(self.budget),
         }
