@@ -57,3 +57,16 @@ def test_a_trial_that_ran_out_of_as_much_time_runs_again_only_with_retry(evoclai
     assert "timeout" not in out
     assert done.read_bytes() == before  # what came to its end does not run again
     assert "  seed 0: done" in evoclaims(*command)[1]
+
+
+def test_retry_leaves_a_torn_record_to_its_own_condition_and_runs_the_others(evoclaims: Evoclaims) -> None:
+    assert evoclaims("run", "wrong", "--trials=1")[0] == 0
+    (torn,) = Store(Path(".evoclaims")).record_paths()
+    torn.write_bytes(torn.read_bytes()[:-9])
+    _out_of_time("", 60.0)
+    status, out, err = evoclaims("run", "--on=parity", "--trials=1", "--time-limit=60s", "--retry")
+    assert status == 1
+    assert "evoclaims: wrong on parity (smoke) failed: Cannot use " in err
+    assert "run `evoclaims verify`, which moves the file aside" in err
+    assert "right on parity (smoke)\n  seed 0: done" in out
+    assert "timeout" not in out

@@ -199,14 +199,13 @@ class Store(StoreFiles):
     def forget_timeouts(self, trial_ids: Iterable[str], versions: Versions) -> None:
         """Remove the "timeout" records of these trials and versions, so that the trials are run again.
 
-        They have no champion.
+        They have no champion. Damaged records stay: whoever runs their trials names the file.
 
         Raises:
-            DamagedFileError: when a record is torn, edited, foreign or unreadable.
             StorageError: when a record cannot be removed.
         """
         for path in (path for trial_id in trial_ids for path in self.record_files(trial_id)):
-            present = self.read(path)
+            present = next(self.results([], [path]), None)
             if present is not None and present.status == "timeout" and agree(present.provenance, versions):
                 try:
                     path.unlink(missing_ok=True)
