@@ -8,7 +8,7 @@ import shutil
 from collections.abc import Callable
 
 import pytest
-from tiny_project import Project
+from tiny_project import REPRODUCTION, Project
 
 from evoclaims.cli import main
 
@@ -91,3 +91,39 @@ def test_the_command_runs_what_a_variant_changes_and_says_what_hangs_on_it(
     assert shown.index("8 trials to run") < shown.index("\nright on parity (smoke)\n")
     assert main(["run", "wrong", "--variant", "traded"]) == 2
     assert "changes none of these conditions" in capsys.readouterr().err
+
+
+def test_a_condition_that_another_variant_has_committed_is_not_written_again(
+    project: Project, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    one = '{"traded": Variant('
+    assert one in REPRODUCTION
+    swapped = '"swapped": Variant("It is swapped", {"smoke": traded_in(1)})'
+    twice = REPRODUCTION.replace(one, f"{{{swapped}, {one[1:]}")
+    monkeypatch.chdir(project.path)
+    project.pytester.makepyfile(tiny_paper=twice)
+    project.write(first="supported", second="refuted")
+    shutil.copytree(project.store, ".evoclaims")
+    assert main(["reference", "--variant", "traded"]) == 0
+    before = sorted(project.path.glob("reference/**/*.jsonl"))
+    assert len(before) == 1
+    capsys.readouterr()
+    assert main(["reference", "--variant", "swapped"]) == 0
+    said = "left alone: right on parity: the same condition as under traded, committed there\n"
+    assert capsys.readouterr().out == said
+    assert sorted(project.path.glob("reference/**/*.jsonl")) == before
+    assert main(["reference", "--variant", "traded"]) == 0  # under its own name it is written anew
+    assert "wrote " in capsys.readouterr().out
+
+
+def test_a_variant_without_trials_says_how_they_are_run(
+    project: Project, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(project.path)
+    project.write(first="supported")
+    assert main(["reference", "--variant", "traded"]) == 2
+    said = (
+        "evoclaims: No condition of the smoke tier that traded changes has 10 stored trials; run them first with "
+        "`evoclaims run --tier smoke --variant traded`.\n"
+    )
+    assert capsys.readouterr().err == said

@@ -15,7 +15,10 @@ from evoclaims.verdicts.versions import change
 
 
 def main(options: argparse.Namespace) -> int:
-    """Write one file per condition that the tier's claims use and the store holds enough trials of."""
+    """Write one file per condition that the tier's claims use and the store holds enough trials of.
+
+    A variant's condition that is committed under another name, and not under its own, is said and not written.
+    """
     project = open_project(options.storage)
     reproduction, store = project.reproduction, project.store
     tier = reproduction.tier(options.tier, options.variant)
@@ -27,9 +30,15 @@ def main(options: argparse.Namespace) -> int:
     # A claim is judged after each look; the drift check needs MIN_REFERENCES trials.
     looks = [look.n for look in tier.design.looks[:-1]]
     sizes = [*looks, max(tier.design.last.n, MIN_REFERENCES)]
-    written = 0
+    written, shared = 0, 0
     for method, task in used:
         condition = tier.condition(method, task)
+        places = references.by_variant(reproduction.references, options.tier, method, task, condition.id)
+        if options.variant and places and options.variant not in places:
+            shared += 1
+            under = " and ".join(name or "the protocol itself" for name in places)
+            print(f"left alone: {method} on {task}: the same condition as under {under}, committed there")
+            continue
         seeds = range(tier.design.first_seed, tier.design.first_seed + sizes[-1])
         path = references.path_of(reproduction.references_of(options.variant), options.tier, method, task)
         committed = [trial for trial in references.load(path) if trial.condition == condition.id]
@@ -52,9 +61,11 @@ def main(options: argparse.Namespace) -> int:
             f"wrote {path}: {size} trials"
             + (f", made with other versions than are installed: {there}" if there else "")
         )
-    if not written:
+    if not (written or (used and shared == len(used))):
+        variant = options.variant
+        of, named = (f" that {variant} changes", f" --variant {variant}") if variant else ("", "")
         raise UserError(
-            f"No condition of the {options.tier} tier has {sizes[0]} stored trials; run them first with "
-            f"`evoclaims run --tier {options.tier}`."
+            f"No {'other ' * bool(shared)}condition of the {options.tier} tier{of} has {sizes[0]} stored trials; run "
+            f"them first with `evoclaims run --tier {options.tier}{named}`."
         )
     return 0

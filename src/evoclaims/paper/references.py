@@ -76,10 +76,19 @@ def of_condition(folder: Path, tier: str, method: str, task: str, condition: str
     Variants of the protocol may share a condition, whose trials then lie under the name of one of them. `folder` has
     all reference trials (`Reproduction.references`).
     """
+    found = by_variant(folder, tier, method, task, condition).values()
+    return tuple({trial.id: trial for trials in found for trial in trials}.values())
+
+
+def by_variant(folder: Path, tier: str, method: str, task: str, condition: str) -> dict[str, list[TrialResult]]:
+    """Read what `of_condition` does, by the name of the variant under which it lies; "" is the protocol's own."""
     variants = folder / "variants"
-    places = [folder, *(sorted(variants.iterdir()) if variants.is_dir() else ())]
-    found = (trial for place in places for trial in committed(place, tier, method, task))
-    return tuple({trial.id: trial for trial in found if trial.condition == condition}.values())
+    places = [("", folder), *((one.name, one) for one in (sorted(variants.iterdir()) if variants.is_dir() else ()))]
+    found = {
+        name: [trial for trial in committed(place, tier, method, task) if trial.condition == condition]
+        for name, place in places
+    }
+    return {name: trials for name, trials in found.items() if trials}
 
 
 def write(path: Path, results: Iterable[TrialResult]) -> None:
