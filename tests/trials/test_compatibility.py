@@ -125,6 +125,15 @@ STEPS: dict[str, Any] = {
         lambda state, told: (state, replace(told, metrics={"level": told.fitness}))
     ),
     "a step of 'walker' returns a Progress, not two values: state, Progress(...).": lambda state, told: told,
+    "a step of 'walker' returns None (without a `return`?), not two values: state, Progress(...).": lambda *_: None,
+    "a step of 'walker' reports None (without a `return`?) as its metrics, not a table such as {'gap': gap} ({} if it "
+    "has none).": lambda state, told: (state, replace(told, metrics=None)),
+    "a step of 'walker' reports a metric 1, whose name is no text: write it in quotes.": (
+        lambda state, told: (state, replace(told, metrics={1: told.fitness}))
+    ),
+    "a step of 'walker' reports a metric 'x' of a list, which is no array, not a real number of shape ().": (
+        lambda state, told: (state, replace(told, metrics={"x": [told.fitness]}))
+    ),
     "'walker' changes its state by a step: its structure is another one afterwards.": (
         lambda state, told: ((state, state), told)
     ),
@@ -170,6 +179,9 @@ STATES: dict[str, Any] = {
     "a mark `terminated` of shape () and type float32, not of shape () and type bool.": (
         lambda made: replace(made, terminated=jnp.zeros(()))
     ),
+    "an observation of a list, which is no array, not of shape (3,) and type float32.": (
+        lambda made: replace(made, observation=list(made.observation))
+    ),
     "a mark `truncated` of shape (1,) and type bool, not of shape () and type bool.": (
         lambda made: replace(made, truncated=made.truncated[None])
     ),
@@ -194,8 +206,16 @@ def test_a_task_that_gives_no_task_state_is_refused(only: str) -> None:
 @pytest.mark.parametrize("size", ["action_size", "horizon", "levels"])
 def test_a_task_without_actions_time_or_levels_is_refused(size: str) -> None:
     empty = type("Empty", (NParity,), {size: 0})
-    with pytest.raises(UserError, match=f"{BOTH}'n_parity' has {size} = 0, and it takes at least 1"):
+    with pytest.raises(UserError, match=f"{BOTH}'n_parity' has {size} = 0, and it takes a whole number, at least 1"):
         traced_progress(Walker(), empty(3))
+
+
+@pytest.mark.parametrize("size", ["observation_size", "action_size", "horizon", "levels"])
+@pytest.mark.parametrize("given", ["3", 3.0])
+def test_a_size_that_is_no_whole_number_is_refused(size: str, given: Any) -> None:
+    odd = type("Odd", (NParity,), {size: given})
+    with pytest.raises(UserError, match=f"{BOTH}'n_parity' has {size} = {given!r}, and it takes a whole number"):
+        traced_progress(Walker(), odd(3))
 
 
 @pytest.mark.parametrize("cost", [0, -1, 2.5, None])

@@ -131,7 +131,13 @@ def fitting(task: Task, action: Float[Array, " action"]) -> Float[Array, " actio
     Raises:
         MisfitError: when its shape or dtype is not that of the task's actions.
     """
-    found, wanted = jnp.asarray(action), (task.action_size,)
+    wanted = (task.action_size,)
+    try:
+        found = jnp.asarray(action)
+    except (TypeError, ValueError) as error:  # None, a word, rows of different lengths
+        raise MisfitError(
+            f"an action is {action!r}, which is no array, and {task.name!r} takes shape {wanted} and type float32"
+        ) from error
     if found.shape != wanted or found.dtype != jnp.float32:
         raise MisfitError(
             f"an action has shape {found.shape} and type {found.dtype}, and {task.name!r} takes shape {wanted} and "

@@ -5,9 +5,10 @@ jax broadcasts silently. A policy whose action is a scalar would be scored wrong
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
-from typing import Any, Final
+from typing import Any, Final, SupportsIndex
 
 import jax
 import jax.numpy as jnp
@@ -61,9 +62,10 @@ def traced_progress(method: Method[Any], task: Task) -> Progress:
         UserError: when something has a wrong shape, type or structure; names both.
     """
     with both_named(method, task):
-        for name in ("action_size", "horizon", "levels"):
-            if getattr(task, name) < 1:
-                raise MisfitError(f"{task.name!r} has {name} = {getattr(task, name)}, and it takes at least 1")
+        for name, least in (("observation_size", 0), ("action_size", 1), ("horizon", 1), ("levels", 1)):
+            size = getattr(task, name)
+            if not (isinstance(size, SupportsIndex) and operator.index(size) >= least):
+                raise MisfitError(f"{task.name!r} has {name} = {size!r}, and it takes a whole number, at least {least}")
         begun, shown = jax.make_jaxpr(lambda seed, level: task.reset(_key(seed), level), return_shape=True)(
             _NUMBER, _NUMBER
         )
@@ -86,12 +88,18 @@ def traced_progress(method: Method[Any], task: Task) -> Progress:
             told: object = method.step(_key(seed), task, level, state)
             if not (isinstance(told, tuple) and len(told) == 2):
                 raise MisfitError(
-                    f"a step of {method.name!r} returns a {type(told).__name__}, not two values: state, Progress(...)"
+                    f"a step of {method.name!r} returns {_kind(told)}, not two values: state, Progress(...)"
                 )
             after, progress = told
             return strong(after), progress
 
-        after, progress = jax.eval_shape(step, _NUMBER, _NUMBER, before)
+        try:
+            after, progress = jax.eval_shape(step, _NUMBER, _NUMBER, before)
+        except UserError:
+            raise
+        except Exception:
+            _check_episode(method, task, before)  # it may be to blame, and is seldom: tracing it takes as long again
+            raise
         _check_unchanged(f"{method.name!r} changes its state by a step", before, after)
         return _checked_progress(method, progress)
 
@@ -99,11 +107,41 @@ def traced_progress(method: Method[Any], task: Task) -> Progress:
 def _policy(method: Method[Any], task: Task, state: Any) -> Policy:
     """Return the policy that a method has trained, which must be one."""
     policy = method.best(task, state)
+    what = f"'best' of {method.name!r} returns"
     if not isinstance(policy, Policy):
+        raise MisfitError(f"{what} {_kind(policy)}, not Policy(parameters, function)")
+    if not callable(policy.function):
+        raise MisfitError(f"{what} a Policy with {policy.function!r} as its function, which cannot be called")
+    odd = [leaf for leaf in jax.tree.leaves(policy.parameters) if not _is_array(leaf)]
+    if odd:
         raise MisfitError(
-            f"'best' of {method.name!r} returns a {type(policy).__name__}, not Policy(parameters, function)"
+            f"{what} a Policy with {odd[0]!r} among its parameters, which are arrays: jnp.asarray makes one"
         )
     return policy
+
+
+def _check_episode(method: Method[Any], task: Task, state: Any) -> None:
+    """Check what an episode of a task returns, where something fails that plays one; other errors are not its own.
+
+    Raises:
+        MisfitError: when it is no `Episode`, or its numbers are none.
+    """
+
+    def play(seed: Int[Array, ""], level: Int[Array, ""], state: Any) -> None:
+        episode: object = task.episode(_policy(method, task, state), _key(seed), level)
+        what = f"an episode of {task.name!r} gives"
+        if not isinstance(episode, Episode):
+            raise MisfitError(f"{what} {_kind(episode)}, not an Episode")
+        for name, leaf in (("fitness", episode.fitness), ("success", episode.success)):
+            if not isinstance(leaf, float):  # which jax takes for an array
+                _check(f"{what} a {name}", leaf, (), jnp.float32)
+
+    try:
+        jax.eval_shape(play, _NUMBER, _NUMBER, state)
+    except UserError:
+        raise
+    except Exception:
+        return
 
 
 def check_scores(task: Task, final: Episode) -> None:
@@ -114,10 +152,10 @@ def check_scores(task: Task, final: Episode) -> None:
     """
     what = f"the examination by {task.name!r} gives"
     if not isinstance(final, Episode):
-        raise MisfitError(f"{what} a {type(final).__name__}, not an Episode")
+        raise MisfitError(f"{what} {_kind(final)}, not an Episode")
     for name, leaf in (("fitness", final.fitness), ("success", final.success)):
         _check(f"{what} a {name}", leaf, (task.levels,), jnp.float32)
-    _check_numbers(f"{what} a metric", final.metrics, (task.levels,), METRICS)
+    _check_numbers(what, final.metrics, (task.levels,), METRICS)
 
 
 def _key(seed: Int[Array, ""]) -> Array:
@@ -129,7 +167,7 @@ def _check_task_state(task: Task, function: str, state: TaskState) -> None:
     """Check the task state that `reset` or `step` returns."""
     what = f"the {function} of {task.name!r} gives"
     if not isinstance(state, TaskState):
-        raise MisfitError(f"{what} a {type(state).__name__}, not a TaskState")
+        raise MisfitError(f"{what} {_kind(state)}, not a TaskState")
     _check(f"{what} an observation", state.observation, (task.observation_size,), jnp.float32)
     _check(f"{what} a reward", state.reward, (), jnp.float32)
     _check(f"{what} a mark `terminated`", state.terminated, (), jnp.bool_)
@@ -140,26 +178,35 @@ def _checked_progress(method: Method[Any], progress: object) -> Progress:
     """Check and return what a step reports to the engine."""
     what = f"a step of {method.name!r} reports"
     if not isinstance(progress, Progress):
-        raise MisfitError(f"{what} a {type(progress).__name__}, and the engine takes a Progress")
+        raise MisfitError(f"{what} {_kind(progress)}, and the engine takes a Progress")
     _check(f"{what} a fitness", progress.fitness, (), jnp.float32)
     _check(f"{what} a success", progress.success, (), jnp.float32)
     _check(f"{what} a mark `healthy`", progress.healthy, (), jnp.bool_)
-    _check_numbers(f"{what} a metric", progress.metrics, (), CURVES)
+    _check_numbers(what, progress.metrics, (), CURVES)
     return progress
 
 
-def _check_numbers(what: str, metrics: Mapping[str, Any], shape: tuple[int, ...], taken: Collection[str]) -> None:
-    """Check that metrics are real numbers of one shape, and that none hides one of the engine's names in `taken`."""
+def _check_numbers(what: str, metrics: object, shape: tuple[int, ...], taken: Collection[str]) -> None:
+    """Check that metrics are real numbers of one shape by name, none of them a name of the engine's own in `taken`."""
+    if not isinstance(metrics, Mapping):
+        raise MisfitError(
+            f"{what} {_kind(metrics)} as its metrics, not a table such as {{'gap': gap}} ({{}} if it has none)"
+        )
     for name, leaf in metrics.items():
+        if not isinstance(name, str):
+            raise MisfitError(f"{what} a metric {name!r}, whose name is no text: write it in quotes")
         if name in taken:
-            raise MisfitError(f"{what} {name!r}, which is a name of the engine's own numbers: give it another name")
-        if leaf.shape != shape or not (np.can_cast(leaf.dtype, np.float64) or leaf.dtype == jnp.bfloat16):
-            raise MisfitError(f"{what} {name!r} of {_described(leaf)}, not a real number of shape {shape}")
+            raise MisfitError(
+                f"{what} a metric {name!r}, which is a name of the engine's own numbers: give it another name"
+            )
+        real = _is_array(leaf) and (np.can_cast(leaf.dtype, np.float64) or leaf.dtype == jnp.bfloat16)
+        if not real or leaf.shape != shape:
+            raise MisfitError(f"{what} a metric {name!r} of {_described(leaf)}, not a real number of shape {shape}")
 
 
 def _check(what: str, leaf: Any, shape: tuple[int, ...], dtype: Any) -> None:
     """Check one array's shape and type."""
-    if (leaf.shape, leaf.dtype) != (shape, np.dtype(dtype)):
+    if not _is_array(leaf) or (leaf.shape, leaf.dtype) != (shape, np.dtype(dtype)):
         raise MisfitError(f"{what} of {_described(leaf)}, not of shape {shape} and type {np.dtype(dtype)}")
 
 
@@ -175,6 +222,18 @@ def _check_unchanged(what: str, before: Any, after: Any) -> None:
             raise MisfitError(f"{what}: {place} is of {_described(was)} before and of {_described(now)} afterwards")
 
 
+def _is_array(leaf: object) -> bool:
+    """Whether there is one array, or the shape of one; a list of arrays is none."""
+    return hasattr(leaf, "shape") and hasattr(leaf, "dtype")
+
+
+def _kind(value: object) -> str:
+    """Return in words what stands in the place of something else."""
+    if value is None:
+        return "None (without a `return`?)"
+    return "an array" if _is_array(value) else f"a {type(value).__name__}"
+
+
 def _described(leaf: Any) -> str:
     """Return shape and type in words."""
-    return f"shape {leaf.shape} and type {leaf.dtype}"
+    return f"shape {leaf.shape} and type {leaf.dtype}" if _is_array(leaf) else f"{_kind(leaf)}, which is no array"
