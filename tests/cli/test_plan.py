@@ -85,3 +85,17 @@ def test_a_damaged_record_hides_no_condition_of_the_claims_that_read_it(evoclaim
     assert status == 0
     assert re.search(r"^right on parity +9 +1 +4 +\d+ s$", out, re.MULTILINE)
     assert evoclaims("status")[1].endswith("claims (smoke): 1 supported, 1 error\n")
+
+
+def test_a_method_whose_steps_cannot_be_timed_is_named_and_the_others_are_planned(
+    evoclaims: Evoclaims, project: Project
+) -> None:
+    project.write(a="supported", d="error")
+    status, out, err = evoclaims("plan", "--measure")
+    place = 1 + Path("tiny_paper.py").read_text().splitlines().index('        raise RuntimeError("out of order")')
+    said = f"RuntimeError: out of order (tiny_paper.py, line {place})"
+    assert (status, err) == (1, f"evoclaims: broken on parity cannot be timed: {said}.\n")
+    assert re.search(r"^broken on parity +0 +10 +4\d +unknown$", out, re.MULTILINE)
+    assert re.search(r"^right on parity +0 +10 +4\d +\d+ s$", out, re.MULTILINE)
+    assert re.search(r"^d +10 +0.05 ", out, re.MULTILINE)
+    assert "--measure times a few steps" not in out

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Final
@@ -13,6 +14,8 @@ from evoclaims.claims.fetching import NotStoredError, StoredOnly
 from evoclaims.cli.project import open_project
 from evoclaims.cli.terminal import styled
 from evoclaims.core.errors import UserError
+from evoclaims.core.printable import printable
+from evoclaims.core.raised import in_one_line
 from evoclaims.judging.verdict import Outcome
 from evoclaims.methods.training_loop import TrainingLoop
 from evoclaims.paper.pace import Pace, known_pace, measured_pace
@@ -43,7 +46,7 @@ AND_MORE: Final = "\nand more"
 
 
 def main(options: argparse.Namespace) -> int:
-    """Print conditions with their cost, then claims with their attainable p."""
+    """Print conditions with their cost, then claims with their attainable p; 1 when a step cannot be timed."""
     project = open_project(options.storage)
     reproduction, store, variant = project.reproduction, project.store, options.variant
     tier = reproduction.tier(options.tier, variant)
@@ -61,10 +64,19 @@ def main(options: argparse.Namespace) -> int:
         read = _read(reports)
     used = [names for names in read if tier.condition(*names).existing is None]
 
+    untimed: list[str] = []
+
     def pace(condition: Condition, method: str, task: str) -> Pace | None:
         known = known_pace(condition, store, reproduction.references, options.tier, method, task, kind)
-        compiled = not isinstance(condition.method, TrainingLoop)  # a loop has no steps that could be timed
-        return measured_pace(condition, chosen) if known is None and options.measure and compiled else known
+        if known is not None or not options.measure or isinstance(condition.method, TrainingLoop):  # that has no steps
+            return known
+        try:
+            return measured_pace(condition, chosen)
+        except KeyboardInterrupt:
+            raise
+        except BaseException as error:  # an error in a method or a task must not hide the others, as in `run_jobs`
+            untimed.append(f"{method} on {task} cannot be timed: {in_one_line(error, project.config.root)}.")
+            return None
 
     paces = {names: pace(tier.condition(*names), *names) for names in used}
     costs = {names: spent(reproduction, options.tier, *names, variant) for names in read}
@@ -100,9 +112,11 @@ def main(options: argparse.Namespace) -> int:
     for report in reports:
         if report.outcome is Outcome.ERROR and not report.attainable:
             console.print(f"{report.name}: error: {report.reason}")
-    if any(pace is None for pace in paces.values()):
+    if any(pace is None for pace in paces.values()) and not untimed:
         console.print("\nTimes are unknown where no trial has run on such a device; --measure times a few steps.")
-    return 0
+    for said in untimed:
+        print(f"evoclaims: {printable(said)}", file=sys.stderr)
+    return int(bool(untimed))
 
 
 class _SoundOnly(StoredOnly):
