@@ -19,6 +19,7 @@ from evoclaims.envs.gates.parity import NParity
 from evoclaims.envs.gates.truth_table import TruthTable
 from evoclaims.methods.base import Policy, Progress
 from evoclaims.methods.hand_built import HandBuilt
+from evoclaims.methods.random_search import RandomSearch
 from evoclaims.trials.budget import Budget
 from evoclaims.trials.compatibility import CURVES, METRICS, traced_progress
 from evoclaims.trials.program import Program
@@ -227,6 +228,12 @@ def test_a_step_that_costs_no_whole_number_of_environment_steps_is_refused(
     method = type("Costing", (Walker,), {"cost": lambda self, task: cost})()
     with pytest.raises(UserError, match=rf"A step of 'walker' on 'n_parity' costs {cost} environment steps"):
         run(Condition(method, TASK, "direct", budget), [0], Store(tmp_path), cpus)
+
+
+def test_a_task_without_time_is_to_blame_where_a_step_costs_a_multiple_of_it() -> None:
+    empty = type("Empty", (NParity,), {"name": "empty", "horizon": 0})
+    with pytest.raises(UserError, match=r"'empty' has horizon = 0: its episodes take at least 1 step\."):
+        _ = Condition(RandomSearch(2), empty(3), "direct", Budget(generations=1)).cost
 
 
 def test_the_engine_keeps_the_names_of_all_its_own_numbers(tmp_path: Any, cpus: list[Any]) -> None:

@@ -178,6 +178,8 @@ class Condition:
         """
         cost = self.method.cost(self.task)
         if not (isinstance(cost, Real) and cost >= 1 and cost % 1 == 0):
+            if (horizon := self.task.horizon) == 0:  # of which most methods' costs are multiples
+                raise UserError(f"{self.task.name!r} has horizon = {horizon}: its episodes take at least 1 step.")
             raise UserError(
                 f"A step of {self.method.name!r} on {self.task.name!r} costs {cost!r} environment steps by its `cost`, "
                 "which has to return a whole number of them, at least 1."
