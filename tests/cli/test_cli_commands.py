@@ -184,6 +184,25 @@ def test_a_method_or_task_that_raises_is_a_sentence_and_the_other_conditions_run
     assert evoclaims("run", "right")[0] == 0
 
 
+def test_what_the_projects_own_code_raises_in_any_command_is_a_sentence_with_its_place(evoclaims: Evoclaims) -> None:
+    reproduction = Path("tiny_paper.py")
+    lines = reproduction.read_text().splitlines()
+    place = lines.index("        return task.horizon")
+    lines[place] = "        return task.nothing"
+    reproduction.write_text("\n".join(lines).replace('"right": HandBuilt()', '"right": Coin()'))
+    status, _, err = evoclaims("plan")
+    said = f"AttributeError: 'NParity' object has no attribute 'nothing' (tiny_paper.py, line {place + 1})"
+    assert (status, err) == (2, f"evoclaims: {said}.\n")
+
+
+def test_an_error_that_may_be_of_evoclaims_keeps_its_traceback(
+    evoclaims: Evoclaims, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("evoclaims.cli.plan.devices.choose", lambda name: 1 / 0)
+    with pytest.raises(ZeroDivisionError):
+        evoclaims("plan")
+
+
 def test_a_record_that_is_damaged_keeps_no_other_condition_from_running(evoclaims: Evoclaims, stored: Store) -> None:
     (record,) = (path for path in stored.record_files(stored.ids()[3]) if path.exists())
     record.write_bytes(record.read_bytes()[:50])

@@ -9,6 +9,7 @@ import os
 import signal
 import sys
 from collections.abc import Sequence
+from pathlib import Path
 
 from evoclaims.cli.arguments import IN_PROCESSES, parser
 from evoclaims.cli.terminal import OutputError, plain_output
@@ -61,6 +62,24 @@ def _ended(arguments: Sequence[str] | None) -> int:
         goes_on = "; the same command goes on from the last checkpoint" if trains else ""
         print(f"\nevoclaims: interrupted{goes_on}.", file=sys.stderr)
         return INTERRUPTED
+    except Exception as error:
+        if told := _raised_in_project(error):
+            print(f"evoclaims: {told}.", file=sys.stderr)
+            return USER_ERROR
+        raise
+
+
+def _raised_in_project(error: Exception) -> str:
+    """Return in one line what the project's own code has raised; empty for an error that may be of evoclaims."""
+    from evoclaims.core.printable import printable
+    from evoclaims.core.raised import in_one_line, is_of_project
+    from evoclaims.paper.config import find_root
+
+    try:
+        root = find_root(Path.cwd())
+    except (UserError, OSError):
+        return ""
+    return printable(in_one_line(error, root)) if is_of_project(error, root) else ""
 
 
 def _done(options: argparse.Namespace) -> int:

@@ -25,6 +25,12 @@ def in_one_line(error: BaseException, root: Path) -> str:
     return told.removesuffix(".") + f" ({place})" * bool(place)
 
 
+def is_of_project(error: BaseException, root: Path) -> bool:
+    """Whether an exception has passed through the user's own files in the project `root`."""
+    frames = (Path(frame.f_code.co_filename) for frame, _ in traceback.walk_tb(error.__traceback__))
+    return any(_is_of(file, root) for file in frames if not str(file).startswith("<"))
+
+
 def _place(error: BaseException, root: Path) -> str:
     """Return where an exception was raised, such as "my_paper/tasks.py, line 7"; empty if not known."""
     if isinstance(error, SyntaxError):  # a module that does not compile has no frame
