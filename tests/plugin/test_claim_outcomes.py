@@ -165,3 +165,28 @@ def test_junit_properties_tell_the_verdict(project: Any) -> None:
     assert found["a"] == ("supported", "smoke", "10", [])
     assert found["b"][:3] == ("refuted", "smoke", "10")
     assert found["b"][3][0].startswith("b (smoke) is refuted: p = ")
+
+
+def test_what_a_claims_own_code_raises_has_its_place_in_the_table(project: Any) -> None:
+    project.write(
+        """
+@says("a")
+def test_a(trials, verdict):
+    right = trials("right", on="parity")
+    verdict(right.event("odd", lambda trial: trial.metric["x"] > 1).in_most_trials())
+
+
+@says("b")
+def test_b(trial, verdict):
+    pass
+"""
+    )
+    lines = (project.path / "claims" / "test_claims.py").read_text().splitlines()
+    (line,) = (number for number, text in enumerate(lines, start=1) if "metric[" in text)
+    result = project.run()
+    result.stdout.fnmatch_lines(
+        [
+            f"E a: AttributeError: 'TrialResult' object has no attribute 'metric' (claims/test_claims.py, line {line})",
+            "E b: There is no fixture named 'trial': a claim takes trials and verdict.",
+        ]
+    )

@@ -7,12 +7,14 @@ from __future__ import annotations
 
 import signal
 from collections.abc import Callable, Generator
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
 
 from evoclaims.core.errors import UserError
 from evoclaims.core.printable import shown
+from evoclaims.core.raised import in_one_line
 from evoclaims.core.tiers import TIERS
 from evoclaims.plugin import options
 from evoclaims.plugin.distribution import Distribution, prepare
@@ -260,7 +262,7 @@ def _claim_report(item: pytest.Item, call: pytest.CallInfo[None], report: pytest
         why = said.removeprefix("Skipped: ") or "no reason given"
         return unjudged(test, Outcome.NOT_RUN, f"its test was skipped ({why})")
     if call.excinfo is not None:
-        claimed = unjudged(test, Outcome.ERROR, _sentence(call.excinfo))
+        claimed = unjudged(test, Outcome.ERROR, _sentence(call.excinfo, item.config.rootpath))
     elif verdicts is None or verdicts.report is None:
         claimed = unjudged(test, Outcome.ERROR, "the test ended without calling verdict(...), so it judged nothing")
     else:
@@ -268,10 +270,12 @@ def _claim_report(item: pytest.Item, call: pytest.CallInfo[None], report: pytest
     return make_session(item.config).complete(claimed, expectation_of(item, test.tier))
 
 
-def _sentence(excinfo: pytest.ExceptionInfo[BaseException]) -> str:
-    """Return an exception as one line."""
+def _sentence(excinfo: pytest.ExceptionInfo[BaseException], root: Path) -> str:
+    """Return an exception as one line, with its place in the project `root` if it is none of evoclaims' own."""
+    if isinstance(excinfo.value, pytest.FixtureLookupError) and excinfo.value.argname:
+        return f"There is no fixture named {excinfo.value.argname!r}: a claim takes trials and verdict."
     text = str(excinfo.value).strip().splitlines()
-    return text[0] if text and excinfo.errisinstance(UserError) else f"{excinfo.typename}: {text[0] if text else ''}"
+    return text[0] if text and excinfo.errisinstance(UserError) else in_one_line(excinfo.value, root)
 
 
 def pytest_report_teststatus(
