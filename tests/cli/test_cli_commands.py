@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from tiny_project import Evoclaims, Project
+from tiny_project import Evoclaims, Project, trials_of
 
 from evoclaims.cli import main
 from evoclaims.judging.design import SEQUENTIAL
@@ -468,3 +468,12 @@ def test_stored_trials_join_those_that_are_committed(evoclaims: Evoclaims, monke
     evoclaims("run", "wrong", "--trials", "4", "--storage", "few")
     status, _, err = evoclaims("reference", "--storage", "few")
     assert (status, "No condition of the smoke tier has 5 stored trials" in err) == (2, True)
+
+
+def test_reference_says_which_claim_it_cannot_write_the_trials_of(evoclaims: Evoclaims, stored: Store) -> None:
+    record = stored.record_files(trials_of(stored, "hand_built_negated")[3].id)[-1]
+    record.write_bytes(record.read_bytes()[:50])
+    status, out, _ = evoclaims("reference")
+    assert status == 0
+    assert f"left alone: what b alone reads, which is error now: Cannot use {record.absolute()}: " in out
+    assert [path.name for path in Path("reference/smoke").iterdir()] == ["right-parity.jsonl"]

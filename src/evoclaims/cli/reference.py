@@ -7,7 +7,9 @@ import argparse
 from evoclaims.cli.project import open_project
 from evoclaims.core.errors import UserError
 from evoclaims.core.packages import recorded
+from evoclaims.core.printable import printable
 from evoclaims.judging.drift import MIN_REFERENCES
+from evoclaims.judging.verdict import Outcome
 from evoclaims.paper import references
 from evoclaims.trials.spec import TrialSpec
 from evoclaims.trials.time_limit import is_final
@@ -23,6 +25,9 @@ def main(options: argparse.Namespace) -> int:
     reproduction, store = project.reproduction, project.store
     tier = reproduction.tier(options.tier, options.variant)
     (reports,) = project.judge_variants([(options.tier, options.variant)])
+    for report in reports:
+        if report.outcome is Outcome.ERROR and not report.sources:  # such as a damaged record: what it reads is unknown
+            print(printable(f"left alone: what {report.name} alone reads, which is error now: {report.reason}"))
     used = sorted({(source.method, source.task) for report in reports for source in report.sources})
     if options.variant:
         changes = reproduction.changed_by(options.variant, options.tier)
