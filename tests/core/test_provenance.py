@@ -41,6 +41,7 @@ def test_provenance_is_plain_json_with_every_part() -> None:
         "versions",
         "device",
         "machine",
+        "instructions",
         "xla_flags",
         "matmul_precision",
         "x64",
@@ -87,7 +88,9 @@ def test_the_generator_of_random_bits_is_named() -> None:
     assert provenance.collect()["prng"]["implementation"] == "threefry2x32"
 
 
-@pytest.mark.parametrize("part", ["machine", "versions", "xla_flags", "matmul_precision", "x64", "prng"])
+@pytest.mark.parametrize(
+    "part", ["machine", "instructions", "versions", "xla_flags", "matmul_precision", "x64", "prng"]
+)
 def test_bits_hang_on_every_part_that_can_change_them(part: str) -> None:
     known = provenance.collect()
     assert provenance.what_fixes_bits({**known, part: "another"}) != provenance.what_fixes_bits(known)
@@ -103,6 +106,7 @@ def test_bits_hang_on_the_kind_of_device_and_on_cuda_where_a_gpu_is_used() -> No
     changed = {"git": {"sha": "b"}, "cuda": {"nvidia-cublas": "2"}}
     assert provenance.what_fixes_bits({**cpu, **changed}) == provenance.what_fixes_bits(cpu) == {"kind": "cpu"}
     assert provenance.what_fixes_bits({**gpu, **changed}) != provenance.what_fixes_bits(gpu)
+    assert provenance.what_fixes_bits({**gpu, "instructions": "znver4 avx512f"}) == provenance.what_fixes_bits(gpu)
     assert provenance.what_fixes_bits(gpu)["kind"] == "H200"
 
 
@@ -185,3 +189,14 @@ def test_a_git_that_prints_nonsense_gives_no_sha(monkeypatch: pytest.MonkeyPatch
 
     monkeypatch.setattr(subprocess, "run", nonsense)
     assert provenance.git_state() == {"sha": None, "dirty": True}
+
+
+def test_processors_of_one_name_are_told_apart_by_their_widest_vectors(monkeypatch: pytest.MonkeyPatch) -> None:
+    from llvmlite import binding
+
+    monkeypatch.setattr(binding, "get_host_cpu_name", lambda: "znver4")
+    told = []
+    for features in ({"avx": True, "avx2": True, "avx512f": True}, {"avx": True, "avx2": True, "avx512f": False}, {}):
+        monkeypatch.setattr(binding, "get_host_cpu_features", lambda features=features: features)
+        told.append(provenance.instructions())
+    assert told == ["znver4 avx512f", "znver4 avx2", "znver4"]

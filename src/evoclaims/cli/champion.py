@@ -85,5 +85,6 @@ def _judgement(replay: Replay) -> str:
         )
     return (
         "The replay differs from the stored record, which was made with the same versions on the same kind of machine: "
-        "the code computes something else now, or the record is not this champion's."
+        "the code computes something else now, the record is not this champion's, or it is of an older release, which "
+        "does not tell processors of one name apart."
     )

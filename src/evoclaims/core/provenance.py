@@ -36,6 +36,9 @@ CUDA: Final = re.compile(r"jax-cuda\d+-(plugin|pjrt)|nvidia-.+")
 FIXES_BITS: Final = ("machine", "versions", "xla_flags", "matmul_precision", "x64", "prng")
 """Parts of a provenance that can change a result's bits, besides the device."""
 
+VECTORS: Final = ("avx512f", "avx2", "avx", "neon", "sse2")
+"""Instruction sets for vectors as LLVM calls them, the widest first."""
+
 GIT_SECONDS: Final = 5.0
 """Time limit for git; on a slow network folder, a missing revision is better than a stalled run."""
 
@@ -45,9 +48,9 @@ def collect() -> dict[str, Any]:
 
     Returns:
         "git" ({"sha", "dirty"} of the repository around the current folder, or None), "versions" (by package
-        name, None where absent, and "python"), "cuda" (versions of the CUDA packages by name; empty
-        if none), "device" ({"platform", "kind", "count"}), "machine" (a string
-        such as "Linux x86_64 AMD EPYC 7B13"), "xla_flags" (string or None), "matmul_precision" (string or None),
+        name, None where absent, and "python"), "cuda" (versions of the CUDA packages by name; empty if none),
+        "device" ({"platform", "kind", "count"}), "machine" (a string such as "Linux x86_64 AMD EPYC 7B13"),
+        "instructions" (see `instructions`), "xla_flags" (string or None), "matmul_precision" (string or None),
         "x64" (bool) and "prng" ({"implementation", "partitionable"}: jax's generator of random bits).
     """
     return copy.deepcopy(_collected())
@@ -66,6 +69,7 @@ def _collected() -> dict[str, Any]:
         "cuda": cuda_versions(),
         "device": device_of(jax.devices()),
         "machine": machine_class(),
+        "instructions": instructions(),
         "xla_flags": os.environ.get("XLA_FLAGS"),
         "matmul_precision": None if precision is None else str(precision),
         "x64": bool(config.jax_enable_x64),
@@ -80,10 +84,10 @@ def what_fixes_bits(provenance: Mapping[str, Any]) -> dict[str, Any]:
     """Return the parts of a provenance that determine a computation's bits, if present.
 
     Two runs of the same program with these parts equal should be bit-identical. CUDA's versions count only on a
-    GPU.
+    GPU, and the processor's instructions only on a CPU.
     """
     device = provenance.get("device") or {}
-    names = (*FIXES_BITS, "cuda") if device.get("platform") == "gpu" else FIXES_BITS
+    names = (*FIXES_BITS, "cuda" if device.get("platform") == "gpu" else "instructions")
     return {"kind": device.get("kind"), **{name: provenance[name] for name in names if name in provenance}}
 
 
@@ -149,6 +153,21 @@ def device_of(devices: Sequence[Any]) -> dict[str, Any]:
 def machine_class() -> str:
     """Return operating system, architecture and processor; equal machines should give equal bits."""
     return " ".join(f"{platform.system()} {platform.machine()} {_processor()}".split())
+
+
+def instructions() -> str | None:
+    """Return the processor that programs are compiled for and its widest vectors, such as "znver3 avx2".
+
+    The operating system's name of it may leave this open: a virtual "AMD EPYC" has AVX-512 or has not, and other bits
+    with it. None where llvmlite, which knows what XLA's compiler does, is not installed.
+    """
+    try:
+        from llvmlite import binding
+    except (ImportError, OSError):
+        return None
+    features = binding.get_host_cpu_features()
+    widest = next((name for name in VECTORS if features.get(name)), "")
+    return f"{binding.get_host_cpu_name()} {widest}".strip()
 
 
 def _processor() -> str:

@@ -113,6 +113,7 @@ class Provenance(Struct):
     cuda: dict[str, str] | None = None
     device: Device | None = None
     machine: str | None = None
+    instructions: str | None = None
     xla_flags: str | None = None
     matmul_precision: str | None = None
     x64: bool | None = None

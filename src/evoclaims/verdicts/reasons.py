@@ -30,8 +30,8 @@ def reason(
         return f"the trials of {', '.join(drifted)} have drifted from the reference trials, as said above"
     if {change.condition for change in digests.changed} & {source.condition for source in report.sources}:
         return (
-            "the same seeds gave other trials with the same versions on the same kind of machine, so that the code "
-            "which runs them has changed"
+            "the same seeds gave other trials with the same versions on a machine of the same name: the code which "
+            "runs them has changed, or its processor is another one, which records of older releases do not tell"
         )
     moved = ", ".join([*changes(old, new), *([f"n {old.n} -> {new.n}"] if old.n != new.n else [])])
     by = f" ({moved})" if moved else ""
