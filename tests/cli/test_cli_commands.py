@@ -41,8 +41,9 @@ def test_a_second_run_runs_nothing(evoclaims: Evoclaims, monkeypatch: pytest.Mon
 
 
 def test_an_edited_method_of_the_same_revision_is_told_wherever_its_trials_count(
-    evoclaims: Evoclaims, project: Any
+    evoclaims: Evoclaims, project: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr(sys, "dont_write_bytecode", True)  # two edits in one second would share it
     project.write(a="undecided")
     told = "the code of tiny_paper.Coin was edited after trials had run, and they still count"
     paper = Path("tiny_paper.py")
