@@ -158,8 +158,8 @@ def machine_class() -> str:
 def instructions() -> str | None:
     """Return the processor that programs are compiled for and its widest vectors, such as "znver3 avx2".
 
-    The operating system's name of it may leave this open: a virtual "AMD EPYC" has AVX-512 or has not, and other bits
-    with it. None where llvmlite, which knows what XLA's compiler does, is not installed.
+    The operating system's name of it may leave this open, as "AMD EPYC" does on virtual machines, which are of several
+    kinds and give other bits. None where llvmlite, which knows what XLA's compiler does, is not installed.
     """
     try:
         from llvmlite import binding
