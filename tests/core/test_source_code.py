@@ -147,6 +147,28 @@ def test_words_layout_what_ids_hold_and_what_is_not_used_change_nothing(found: F
     assert found() == found(old, new)
 
 
+def test_a_hash_is_the_same_under_every_release_of_python(found: Found) -> None:
+    quoted = "y = moved(x, RATE) if f\"{', '.join(x)} {x!r:>{RATE}}\" else None"
+    # Computed with Python 3.11, 3.12 and 3.13. Since 3.12 `ast.unparse` writes the quotes of such an f-string otherwise.
+    assert found("y = moved(x, RATE)", quoted)["its_method.Own"] == "7f89fd0b35fd9fb8"
+
+
+@pytest.mark.parametrize("folder", ["target", "site-packages", "lib/python3/dist-packages"])
+def test_installed_code_has_no_hash_wherever_it_is(
+    folder: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    elsewhere = tmp_path / folder
+    elsewhere.mkdir(parents=True)
+    (elsewhere / "its_package.py").write_text(HELPERS, encoding="utf-8")
+    if folder == "target":  # of pip install --target
+        (elsewhere / "its_package-1.dist-info").mkdir()
+    monkeypatch.syspath_prepend(str(elsewhere))
+    try:
+        assert code_of(importlib.import_module("its_package").Part()) == {}
+    finally:
+        sys.modules.pop("its_package")
+
+
 def test_code_of_this_package_has_no_hash_since_trials_record_its_version() -> None:
     assert code_of(HandBuilt(), NParity(3)) == {}
 

@@ -16,7 +16,7 @@ from typing import Any, Final
 
 from evoclaims.core.canonical import content_hash, is_own
 
-CODE: Final = "code"
+CODE: Final = "code_hashes"
 """Key under which a trial's provenance has these hashes."""
 
 DIGITS: Final = 16
@@ -24,6 +24,12 @@ DIGITS: Final = 16
 
 _IN_THE_ID: Final = ("name", "revision", "packages")
 """Class variables of a method or task that its trials' ids or versions hold."""
+
+_SAYS_NOTHING: Final = ("ctx", "kind", "type_comment")
+"""Fields of a syntax tree that its place, or nothing that computes, decides."""
+
+_OF_PACKAGES: Final = ("site-packages", "dist-packages")
+"""Names of folders of installed packages."""
 
 
 def code_of(*components: Any) -> dict[str, str]:
@@ -56,9 +62,23 @@ def _code(component: Any) -> Iterator[Any]:
 
 
 @cache
-def _installed() -> tuple[str, ...]:
-    """Return the folders of Python and of installed packages."""
+def _of_python() -> tuple[str, ...]:
+    """Return the folders of Python and of what is installed in its environment."""
     return tuple(map(sysconfig.get_path, ("stdlib", "platstdlib", "purelib", "platlib")))
+
+
+@cache
+def _holds_packages(folder: str) -> bool:
+    """Whether packages are installed in a folder of `sys.path`, as by `pip install --target`."""
+    return any(Path(folder).glob("*.dist-info"))
+
+
+def _is_installed(file: Path) -> bool:
+    """Whether a file is Python's, or an installed package's, wherever that is: also another user's, or a system's."""
+    if not {*_OF_PACKAGES}.isdisjoint(file.parts) or any(map(file.is_relative_to, _of_python())):
+        return True
+    roots = [folder for folder in sys.path if folder and file.is_relative_to(folder)]
+    return bool(roots) and _holds_packages(max(roots, key=len))
 
 
 def _is_the_projects(one: Any) -> bool:
@@ -66,16 +86,15 @@ def _is_the_projects(one: Any) -> bool:
     if is_own(one):
         return False
     try:
-        file = Path(inspect.getfile(one))
+        return not _is_installed(Path(inspect.getfile(one)))
     except (TypeError, OSError):  # built in
         return False
-    return not any(file.is_relative_to(folder) for folder in _installed())
 
 
 @cache
 def _hash(code: Any) -> str:
     """Return a hash of the code of a class or function and of all of the project's that it names."""
-    found: dict[str, str] = {}
+    found: dict[str, Any] = {}
     held = [code]
     while held:
         one = _bare(held.pop())
@@ -85,7 +104,7 @@ def _hash(code: Any) -> str:
         if name in found:
             continue
         tree = _tree(one)
-        found[name] = ast.unparse(tree)
+        found[name] = _as_lists(tree)
         held += one.__bases__ if inspect.isclass(one) else ()
         for word, value in _named(tree, vars(sys.modules.get(one.__module__, one))):
             if _is_constant(value):
@@ -125,6 +144,18 @@ def _tree(one: Any) -> ast.Module:
                     if isinstance(statement, ast.AnnAssign) and _is_in_the_id(statement):
                         statement.value = None
     return tree
+
+
+def _as_lists(node: Any) -> Any:
+    """Return a syntax tree as lists and words: under every release of Python the same, which `ast.unparse` is not."""
+    if isinstance(node, ast.JoinedStr):  # some releases end it with an empty word
+        node = ast.JoinedStr([part for part in node.values if getattr(part, "value", None) != ""])
+    if isinstance(node, list):
+        return [_as_lists(one) for one in node]
+    if isinstance(node, ast.AST):
+        fields = [(name, value) for name, value in ast.iter_fields(node) if name not in _SAYS_NOTHING]
+        return [type(node).__name__, *([name, _as_lists(value)] for name, value in fields if value not in (None, []))]
+    return node if isinstance(node, str) else [type(node).__name__, repr(node)]
 
 
 def _is_in_the_id(statement: ast.AnnAssign) -> bool:

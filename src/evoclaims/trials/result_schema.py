@@ -109,7 +109,7 @@ class Provenance(Struct):
     git: GitState | None = None
     versions: dict[str, str | None] | None = None
     depends_on: list[str] | None = None
-    code: dict[str, str] | None = None
+    code_hashes: dict[str, str] | None = None
     cuda: dict[str, str] | None = None
     device: Device | None = None
     machine: str | None = None
