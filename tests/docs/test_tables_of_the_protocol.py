@@ -105,6 +105,28 @@ def test_rewards_of_ppo_among_obstacles_by_setting_are_those_of_its_trials(varia
     assert _line(cells) in PROTOCOL
 
 
+@pytest.mark.parametrize(
+    ("method", "number", "plot"),
+    [("neat", 10, "4,250 ± 115"), ("cma_es", 5, "2,350 ± 150"), ("ppo", 10, "3,540 ± 340")],
+)
+def test_rewards_among_obstacles_with_all_published_settings_are_those_of_the_trials(
+    method: str, number: int, plot: str
+) -> None:
+    trials = committed(REPRODUCTION.references_of("published"), "full", method, "obstacles")
+    rewards = [_examined(trial) for trial in trials]
+    passed = statistics.mean(float(trial.metrics["obstacles"]) for trial in trials)
+    assert len(trials) == number
+    said = f"{NAMES[method]}, {'ten' if number == 10 else 'five'} trials"
+    bounds = f"{min(rewards):,.0f}, {max(rewards):,.0f}"
+    assert _line([said, f"{statistics.mean(rewards):,.0f}", bounds, f"{passed:.1f}", plot]) in PROTOCOL
+
+
+def test_no_genome_among_obstacles_earns_what_would_end_the_published_run() -> None:
+    trials = committed(REPRODUCTION.references_of("published"), "full", "neat", "obstacles")
+    most = max(max(trial.curves["fitness"]) for trial in trials)
+    assert f"more than {most:,.0f} in one" in " ".join(PROTOCOL.split())
+
+
 @pytest.mark.parametrize("method", NAMES)
 def test_training_lengths_are_those_of_the_conditions(method: str) -> None:
     cells = [NAMES[method]]
