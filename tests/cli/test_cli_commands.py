@@ -4,17 +4,13 @@ from __future__ import annotations
 
 import re
 import sys
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
-from tiny_project import Evoclaims, Project, trials_of
+from tiny_project import Evoclaims
 
 from evoclaims.cli import main
-from evoclaims.judging.design import SEQUENTIAL
-from evoclaims.paper import references
-from evoclaims.paper.reproduction import Reproduction
 from evoclaims.trials.store import Store
 
 
@@ -261,149 +257,6 @@ def test_claims_that_cannot_be_collected_are_named_with_the_reason(
     assert "No module named 'a_package_that_is_not_installed'" in err
 
 
-def test_plan_counts_what_is_stored_and_what_is_missing(evoclaims: Evoclaims) -> None:
-    status, out, _ = evoclaims("plan")
-    assert status == 0
-    assert re.search(r"^right on parity +0 +10 +40 +unknown$", out, re.MULTILINE)
-    assert re.search(r"^total +80 +unknown$", out, re.MULTILINE)
-    assert "Times are by" not in out
-    assert re.search(r"^a +10 +0.05 +0.028 +\S+ +✓ ✗$", out, re.MULTILINE)
-    assert "--measure times a few steps" in out
-    assert "coin" not in out  # no claim asks for it
-    evoclaims("run", "right", "--trials", "4")
-    status, out, _ = evoclaims("plan")
-    assert re.search(r"^right on parity +4 +6 +24 +\d+ s$", out, re.MULTILINE)
-    assert re.search(r"^wrong on parity +0 +10 +40 +unknown$", out, re.MULTILINE)
-
-
-def test_plan_says_which_claim_cannot_be_judged_and_why(evoclaims: Evoclaims, project: Project) -> None:
-    project.write(c="verdict(trials('rigth', on='parity').mean_success > 0)")
-    status, out, _ = evoclaims("plan")
-    assert status == 0
-    assert "c: error: There is no method named 'rigth'. Did you mean 'right'?" in " ".join(out.split())
-
-
-def test_plan_shows_whole_numbers_on_a_narrow_terminal(evoclaims: Evoclaims, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("COLUMNS", "52")
-    _, out, _ = evoclaims("plan")
-    assert re.search(r"^right on +0 +10 +40 +unknown *\nparity *$", out, re.MULTILINE), out
-    assert re.search(r"^a +10 +0.05 +0.028 +\S+ +✓ ✗$", out, re.MULTILINE), out
-    monkeypatch.setenv("COLUMNS", "30")  # too narrow for the numbers alone: lines are longer, and nothing is cut
-    _, out, _ = evoclaims("plan")
-    assert re.search(r"^right on parity +0 +10 +40 +unknown$", out, re.MULTILINE), out
-    assert re.search(r"^a +10 +0.05 +0.028 +\S+ +✓ ✗$", out, re.MULTILINE), out
-    monkeypatch.setenv("COLUMNS", "0")  # a terminal that knows no size
-    _, out, _ = evoclaims("plan")
-    assert re.search(r"^right on parity +0 +10 +40 +unknown$", out, re.MULTILINE), out
-
-
-def test_plan_tells_times_as_of_a_device_that_trials_were_made_on(evoclaims: Evoclaims) -> None:
-    evoclaims("run", "right", "--trials", "4")
-    status, out, _ = evoclaims("plan", "--like", "cpu")
-    assert status == 0
-    assert "as they took on one cpu" in out
-    assert re.search(r"^right on parity +4 +6 +24 +\d+ s$", out, re.MULTILINE)
-    status, _, err = evoclaims("plan", "--like", "abacus")
-    assert status == 2
-    assert "No trial of the smoke tier at hand was made on a device called 'abacus'" in err
-
-
-def test_plan_of_a_variant_has_what_it_changes_and_the_claims_that_read_it(
-    evoclaims: Evoclaims, project: Project, stored: Store
-) -> None:
-    """The variant's right network is the protocol's wrong one, whose trials are stored."""
-    assert evoclaims("reference")[0] == 0
-    status, out, _ = evoclaims("plan", "--variant", "traded")
-    assert status == 0
-    assert "Conditions of the smoke tier that traded changes, on " in out
-    assert re.search(r"^right on parity +10 +0 +0 +0 s$", out, re.MULTILINE)
-    assert "wrong on parity" not in out
-    assert re.search(r"^a +10 +0.05 ", out, re.MULTILINE)
-    assert not re.search(r"^b ", out, re.MULTILINE)
-    project.write(b="refuted")
-    status, _, err = evoclaims("plan", "--variant", "traded")
-    assert status == 2
-    assert err == "evoclaims: The variant traded changes no condition that claims of the smoke tier read.\n"
-
-
-def test_plan_tells_what_the_reference_trials_have_cost(evoclaims: Evoclaims, stored: Store) -> None:
-    assert "reference trials" not in evoclaims("plan")[1]
-    assert evoclaims("reference")[0] == 0
-    path = Path("reference/smoke/right-parity.jsonl")
-    device = {"platform": "gpu", "kind": "NVIDIA Abacus", "count": 1}
-    timing = {"run": 7000.0, "compile": 200.0, "batch": 10, "started": "2026-01-01T00:00:00+00:00"}
-    references.write(path, [replace(t, provenance={"device": device}, timing=timing) for t in references.load(path)])
-    made_here = Path("reference/smoke/wrong-parity.jsonl").rename("wrong-parity.jsonl")
-    out = evoclaims("plan")[1]
-    assert re.search(r"took on one *\n.*NVIDIA Abacus$", out, re.MULTILINE)
-    assert re.search(r"^right on parity +10 +0 +0 +0 s$", out, re.MULTILINE)
-    assert re.search(r"^right on parity +2 h 00 min$", out, re.MULTILINE)
-    assert re.search(r"^wrong on parity +not run$", out, re.MULTILINE)
-    assert re.search(r"^total +2 h 00 min *\n +and more$", out, re.MULTILINE)
-    assert "Fewer than 10 reference trials: wrong on parity (0)." in out
-    assert re.search(r"^a +10 +.*✓ ✗ +2 h 00 min$", out, re.MULTILINE)
-    assert re.search(r"^b +10 +.*✓ ✗ +not run$", out, re.MULTILINE)
-    made_here.rename("reference/smoke/wrong-parity.jsonl")
-    out = evoclaims("plan")[1]
-    assert re.search(r"^wrong on parity +– ", out, re.MULTILINE)
-    assert re.search(r"^total +2 h 00 min .*\n +and elsewhere", out, re.MULTILINE)
-
-
-def test_plan_tells_the_hours_of_a_cpu_core(evoclaims: Evoclaims, stored: Store) -> None:
-    assert evoclaims("reference")[0] == 0
-    out = evoclaims("plan", "--tier", "full")[1]
-    assert re.search(r" CPU\n.* core hours$", out, re.MULTILINE)
-    assert "took on one" not in out
-    assert re.search(r"^right on parity +0 +10 +80 +unknown$", out, re.MULTILINE)
-    assert re.search(r"^right on parity +< 1$", out, re.MULTILINE)
-
-
-def test_plan_times_a_few_steps_where_it_is_asked_to_and_stores_none(evoclaims: Evoclaims) -> None:
-    status, out, _ = evoclaims("plan", "--measure", "--tier", "full")
-    assert status == 0
-    assert re.search(r"^right on parity +0 +10 +80 +\d+ s$", out, re.MULTILINE)
-    assert "unknown" not in out
-    assert not Path(".evoclaims/trials").exists()
-
-
-def test_verify_moves_bad_files_aside_and_the_trials_run_again(evoclaims: Evoclaims, stored: Store) -> None:
-    assert evoclaims("verify")[:2] == (0, "20 trials in .evoclaims, 0 problems\n")
-    record = stored.record_files(stored.ids()[3])[-1]
-    record.write_bytes(record.read_bytes()[:50])
-    stored.checkpoints.mkdir()
-    (stored.checkpoints / "torn.npz").write_bytes(b"PK")
-    status, out, _ = evoclaims("verify", "--dry-run")
-    assert (status, out.splitlines()[-1]) == (1, "20 trials in .evoclaims, 3 problems")
-    assert record.exists()
-    status, out, _ = evoclaims("status")
-    assert (status, out.splitlines()[-1].count("1 error")) == (1, 1)
-    assert "run `evoclaims verify`" in out
-    status, out, _ = evoclaims("verify")
-    assert (status, out.splitlines()[-1]) == (1, "19 trials in .evoclaims, 3 problems")
-    assert str(record) in out
-    assert not record.exists()
-    assert evoclaims("verify")[0] == 0
-    for method in ("right", "wrong"):
-        evoclaims("run", method)
-    assert len(stored.ids()) == 20
-
-
-def test_verify_reads_no_verdicts_and_says_so(evoclaims: Evoclaims, stored: Store) -> None:
-    verdict = stored.root / "verdicts" / "smoke" / "a.json"
-    verdict.parent.mkdir(parents=True)
-    verdict.write_text("torn")
-    assert evoclaims("verify")[:2] == (0, "20 trials in .evoclaims, 0 problems\n")
-    assert evoclaims("status")[1].splitlines()[-1] == "claims (smoke): 1 supported, 1 refuted"
-
-
-def test_the_help_of_verify_says_what_is_read(capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(SystemExit):
-        main(["verify", "--help"])
-    text = " ".join(capsys.readouterr().out.split())
-    assert "read every stored trial, champion and checkpoint back" in text
-    assert "verdicts are not read: `evoclaims status` judges the trials anew" in text
-
-
 def test_a_device_without_enough_memory_is_one_sentence(evoclaims: Evoclaims, monkeypatch: pytest.MonkeyPatch) -> None:
     import jax
 
@@ -419,62 +272,3 @@ def test_a_device_without_enough_memory_is_one_sentence(evoclaims: Evoclaims, mo
     assert (
         "does not hold 1 trial of hand_built on n_parity at once, and fewer cannot be run. Close what else uses" in err
     )
-
-
-def test_reference_commits_the_trials_of_every_condition_that_has_enough(evoclaims: Evoclaims) -> None:
-    evoclaims("run", "right")
-    evoclaims("run", "wrong", "--trials", "9")
-    status, out, _ = evoclaims("reference")
-    path = references.path_of(Path.cwd() / "reference", "smoke", "right", "parity")
-    assert status == 0
-    assert f"wrote {path}: 10 trials" in out
-    assert "left alone: wrong on parity: 9 of 10 trials are stored or committed" in out
-    assert [trial.seed for trial in references.load(path)] == list(range(10))
-    assert not references.path_of(Path.cwd() / "reference", "smoke", "wrong", "parity").exists()
-
-
-def test_reference_takes_the_trials_of_a_look_and_never_fewer_than_are_committed(
-    evoclaims: Evoclaims, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    plain = Reproduction.tier
-    monkeypatch.setattr(Reproduction, "tier", lambda self, *names: replace(plain(self, *names), design=SEQUENTIAL))
-    evoclaims("run", "right", "--trials", "6")
-    evoclaims("run", "wrong", "--trials", "4")
-    status, out, _ = evoclaims("reference")
-    path = references.path_of(Path.cwd() / "reference", "smoke", "right", "parity")
-    assert status == 0
-    assert f"wrote {path}: 5 trials" in out
-    assert "left alone: wrong on parity: 4 of 5 trials are stored or committed" in out
-    evoclaims("run", "right")
-    assert f"wrote {path}: 10 trials" in evoclaims("reference")[1]
-    before = [(trial.seed, trial.digest) for trial in references.load(path)]
-    assert len(before) == 10
-    evoclaims("run", "right", "--trials", "6", "--storage", "other")
-    assert f"wrote {path}: 10 trials" in evoclaims("reference", "--storage", "other")[1]
-    assert [(trial.seed, trial.digest) for trial in references.load(path)] == before
-
-
-def test_stored_trials_join_those_that_are_committed(evoclaims: Evoclaims, monkeypatch: pytest.MonkeyPatch) -> None:
-    plain = Reproduction.tier
-    monkeypatch.setattr(Reproduction, "tier", lambda self, *names: replace(plain(self, *names), design=SEQUENTIAL))
-    evoclaims("run", "right", "--trials", "5")
-    evoclaims("reference")
-    evoclaims("run", "right", "--trials", "4", "--first-seed", "5", "--storage", "later")
-    status, out, err = evoclaims("reference", "--storage", "later")
-    path = references.path_of(Path.cwd() / "reference", "smoke", "right", "parity")
-    assert f"wrote {path}: 5 trials" in out
-    evoclaims("run", "right", "--trials", "5", "--first-seed", "5", "--storage", "later")
-    assert f"wrote {path}: 10 trials" in evoclaims("reference", "--storage", "later")[1]
-    assert [trial.seed for trial in references.load(path)] == list(range(10))
-    evoclaims("run", "wrong", "--trials", "4", "--storage", "few")
-    status, _, err = evoclaims("reference", "--storage", "few")
-    assert (status, "No condition of the smoke tier has 5 stored trials" in err) == (2, True)
-
-
-def test_reference_says_which_claim_it_cannot_write_the_trials_of(evoclaims: Evoclaims, stored: Store) -> None:
-    record = stored.record_files(trials_of(stored, "hand_built_negated")[3].id)[-1]
-    record.write_bytes(record.read_bytes()[:50])
-    status, out, _ = evoclaims("reference")
-    assert status == 0
-    assert f"left alone: what b alone reads, which is error now: Cannot use {record.absolute()}: " in out
-    assert [path.name for path in Path("reference/smoke").iterdir()] == ["right-parity.jsonl"]

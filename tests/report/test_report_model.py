@@ -122,6 +122,17 @@ def test_trials_from_mixed_devices_and_changed_code_are_said(lab: Laboratory) ->
     ]
 
 
+def test_a_method_edited_after_its_trials_is_said(filled: Laboratory) -> None:
+    report = filled.judge(better_wins)
+    one, *others = report.sources
+    edited = replace(report, sources=(replace(one, edited=("my_paper.Own",)), *others))
+    assert filled.section(report).warnings == ()
+    assert filled.section(edited).warnings == (
+        "The code of my_paper.Own was edited after trials had run, and they still count: if it computes something else "
+        "now, raise its `revision`, and they run again.",
+    )
+
+
 def test_a_provenance_that_says_little_breaks_nothing(lab: Laboratory) -> None:
     lab.put("better", [1.0] * 6, provenance={"device": None, "git": {}, "versions": None, "x64": False, "deep": {}})
     section = lab.section(lab.judge(better_solves))

@@ -46,7 +46,8 @@ def main(options: argparse.Namespace) -> int:
             continue
         seeds = range(tier.design.first_seed, tier.design.first_seed + sizes[-1])
         path = references.path_of(reproduction.references_of(options.variant), options.tier, method, task)
-        committed = [trial for trial in references.load(path) if trial.condition == condition.id]
+        there = references.load(path)
+        committed = [trial for trial in there if trial.condition == condition.id]
         stored = [record for seed in seeds for record in store.records(TrialSpec(condition, seed).id)]
         if not stored:
             continue
@@ -61,10 +62,12 @@ def main(options: argparse.Namespace) -> int:
             continue
         references.write(path, results[:size])
         written += 1
-        there = change(recorded(results[0].provenance, condition.packages), condition.versions)
+        upgraded = change(recorded(results[0].provenance, condition.packages), condition.versions)
+        gone = len(there) - len(committed)
         print(
             f"wrote {path}: {size} trials"
-            + (f", made with other versions than are installed: {there}" if there else "")
+            + (f", in place of {gone} of another condition (its settings, budget or revision were others)" if gone else "")
+            + (f", made with other versions than are installed: {upgraded}" if upgraded else "")
         )
     if not (written or (used and shared == len(used))):
         variant = options.variant

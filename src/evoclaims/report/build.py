@@ -22,6 +22,7 @@ from evoclaims.report.formatting import Anchors, clean, counted, listed, places,
 from evoclaims.report.model import Board, ConditionTrials, Page, Section, ShownChampion
 from evoclaims.report.trial_summary import Reader, TrialSummary
 from evoclaims.trials.store import Store
+from evoclaims.verdicts import edited_code
 from evoclaims.verdicts.claim_report import ClaimReport
 from evoclaims.verdicts.history import AcceptedVerdict, History, eras, key_of
 from evoclaims.verdicts.mutation_matrix import Matrix, described
@@ -133,7 +134,7 @@ class _Gathering:
             parts=_parts(report, read),
             conditions=tuple(self._condition(report.tier, source) for source in report.sources if source.trials),
             made=made,
-            warnings=(*_broken(every), *origin.warnings(made), *filter(None, [failing])),
+            warnings=(*_broken(every), *origin.warnings(made), *_edited(report), *filter(None, [failing])),
             history=eras(entries),
             change=_change(entries, report),
             faults=described(self.mutants, report) if report.n else "",
@@ -165,6 +166,12 @@ def _parts(report: ClaimReport, read: Mapping[str, Sequence[TrialSummary]]) -> t
     if report.verdict is not None and report.verdict.evidence:
         return judged_parts(report.verdict)
     return tuple(unjudged_part(label, trials) for label, trials in read.items() if trials)
+
+
+def _edited(report: ClaimReport) -> list[str]:
+    """Return a sentence for each method or task that was edited after trials of a claim had run."""
+    said = [clean(edited_code.said(name)) for name in edited_code.edited(report)]
+    return [f"{words[0].upper()}{words[1:]}." for words in said]
 
 
 def _change(entries: Sequence[AcceptedVerdict], report: ClaimReport) -> str:

@@ -14,9 +14,14 @@ def lines(reports: Sequence[ClaimReport]) -> list[str]:
     """Return a line for each method or task that was edited after trials behind claims had run, if any."""
     claims: dict[str, list[str]] = defaultdict(list)
     for report in reports:
-        for name in sorted({name for source in report.sources for name in source.edited}):
+        for name in edited(report):
             claims[name].append(f"{report.name} ({report.tier})")
     return [printable(f"{said(name)}: {listed(names)}") for name, names in sorted(claims.items())]
+
+
+def edited(report: ClaimReport) -> list[str]:
+    """Return the methods and tasks that were edited after trials behind a claim had run."""
+    return sorted({name for source in report.sources for name in source.edited})
 
 
 def said(name: str) -> str:
