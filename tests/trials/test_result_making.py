@@ -59,6 +59,30 @@ def test_a_method_that_calls_itself_unhealthy_diverges_as_one_that_yields_nan(
     assert not any(np.isnan(result.curves["fitness"]).any() for result in unhealthy)
 
 
+@dataclass(frozen=True)
+class Doubter(Walker):
+    """Reports a success of NaN where a walker's fitness would be NaN."""
+
+    name: ClassVar[str] = "doubter"
+
+    def step(self, key: Any, task: Any, level: Any, state: Any) -> tuple[Any, Any]:
+        state, progress = super().step(key, task, level, state)
+        lost = jnp.isnan(progress.fitness)
+        success = jnp.where(lost, jnp.nan, progress.success)
+        return state, replace(progress, fitness=jnp.where(lost, 0.0, progress.fitness), success=success)
+
+
+def test_a_success_of_nan_diverges_as_a_fitness_of_nan(
+    results: list[TrialResult], tmp_path: Path, cpus: list[Any]
+) -> None:
+    condition = walk(chance=0.35, hazard=0.1)
+    doubter = replace(condition, method=Doubter(0.35, 0.1))
+    found = run(doubter, SEEDS, Store(tmp_path), cpus)
+    assert {result.status for result in found} == {"done", "diverged"}
+    assert all(np.isfinite(result.curves["success"]).all() for result in found if result.status == "done")
+    assert all(np.isnan(result.curves["success"][-1]) for result in found if result.status == "diverged")
+
+
 def test_a_level_is_counted_as_solved_only_by_a_healthy_step(results: list[TrialResult]) -> None:
     """The toy reports success together with its NaN."""
     for diverged in _of(results, "diverged"):

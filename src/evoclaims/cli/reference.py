@@ -66,7 +66,11 @@ def main(options: argparse.Namespace) -> int:
         gone = len(there) - len(committed)
         print(
             f"wrote {path}: {size} trials"
-            + (f", in place of {gone} of another condition (its settings, budget or revision were others)" if gone else "")
+            + (
+                f", in place of {gone} of another condition (its settings, budget or revision were others)"
+                if gone
+                else ""
+            )
             + (f", made with other versions than are installed: {upgraded}" if upgraded else "")
         )
     if not (written or (used and shared == len(used))):

@@ -113,7 +113,7 @@ class Program:
             key = jax.random.fold_in(training_key, trial.steps)
             state, progress = method.step(key, task, trial.ascent.level, trial.method)
             steps = trial.steps + 1
-            healthy = progress.healthy & jnp.isfinite(progress.fitness)
+            healthy = progress.healthy & jnp.isfinite(progress.fitness) & jnp.isfinite(progress.success)
             return replace(
                 trial,
                 method=strong(state),
