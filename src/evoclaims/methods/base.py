@@ -38,8 +38,8 @@ class Progress:
         fitness: of the best candidate of this step, on the current level.
         success: its success on the current level, in the task's examination or training episode; exactly 1 moves
             the trial up a level.
-        healthy: False if a relevant number is not finite; the trial then ends as diverged, as where fitness or success is
-            not finite.
+        healthy: False if a relevant number is not finite; the trial then ends as diverged, as it does for such a
+            fitness or success.
         metrics: more scalars for the training curve; the same names at every step.
     """
 
