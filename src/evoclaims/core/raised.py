@@ -9,7 +9,11 @@ from typing import Final
 from evoclaims.core.errors import UserError
 
 _OWN: Final = Path(__file__).resolve().parents[1]
-_INSTALLED: Final = {"site-packages", "dist-packages"}
+PACKAGE_FOLDERS: Final = frozenset({"site-packages", "dist-packages"})
+"""Names of folders of installed packages."""
+
+_READ_MORE: Final = "See https://"
+"""How the last line of jax's longer messages begins: it leads to a page with what to write instead."""
 
 
 def in_one_line(error: BaseException, root: Path) -> str:
@@ -49,10 +53,13 @@ def _place(error: BaseException, root: Path) -> str:
 
 
 def _text(error: BaseException) -> str:
-    """Return the first line of an exception's message."""
+    """Return the first line of an exception's message, and where the last one says to read more."""
     try:
         words = error.msg if isinstance(error, SyntaxError) else str(error)
-        return next(iter(words.strip().splitlines()), "")
+        first, *others = words.strip().splitlines() or [""]
+        if others and others[-1].startswith(_READ_MORE):
+            return f"{first.removesuffix('.')}; s{others[-1][1:]}"
+        return first
     except Exception:  # an exception that cannot be printed must still be reported
         return ""
 
@@ -60,7 +67,9 @@ def _text(error: BaseException) -> str:
 def _is_of(file: Path, root: Path) -> bool:
     """Whether a file is the project's own: in its folder, but not in evoclaims or an installed package."""
     file = file.resolve()
-    return file.is_relative_to(root.resolve()) and not file.is_relative_to(_OWN) and _INSTALLED.isdisjoint(file.parts)
+    return (
+        file.is_relative_to(root.resolve()) and not file.is_relative_to(_OWN) and PACKAGE_FOLDERS.isdisjoint(file.parts)
+    )
 
 
 def _line(file: Path, line: int | None, root: Path) -> str:

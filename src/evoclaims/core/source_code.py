@@ -15,6 +15,7 @@ from types import ModuleType
 from typing import Any, Final
 
 from evoclaims.core.canonical import content_hash, is_own
+from evoclaims.core.raised import PACKAGE_FOLDERS
 
 CODE: Final = "code_hashes"
 """Key under which a trial's provenance has these hashes."""
@@ -27,9 +28,6 @@ _IN_THE_ID: Final = ("name", "revision", "packages")
 
 _SAYS_NOTHING: Final = ("ctx", "kind", "type_comment")
 """Fields of a syntax tree that its place, or nothing that computes, decides."""
-
-_OF_PACKAGES: Final = ("site-packages", "dist-packages")
-"""Names of folders of installed packages."""
 
 
 def code_of(*components: Any) -> dict[str, str]:
@@ -75,7 +73,7 @@ def _holds_packages(folder: str) -> bool:
 
 def _is_installed(file: Path) -> bool:
     """Whether a file is Python's, or an installed package's, wherever that is: also another user's, or a system's."""
-    if not {*_OF_PACKAGES}.isdisjoint(file.parts) or any(map(file.is_relative_to, _of_python())):
+    if not PACKAGE_FOLDERS.isdisjoint(file.parts) or any(map(file.is_relative_to, _of_python())):
         return True
     roots = [folder for folder in sys.path if folder and file.is_relative_to(folder)]
     return bool(roots) and _holds_packages(max(roots, key=len))
