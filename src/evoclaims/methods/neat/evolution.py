@@ -13,6 +13,7 @@ from jaxtyping import Array, Float, Int, PRNGKeyArray
 from evoclaims.core.keys import streams
 from evoclaims.core.pytree import pytree, select
 from evoclaims.envs.base import Episode, Task
+from evoclaims.kernels.take_rows import take_rows
 from evoclaims.methods.base import Policy, Progress
 from evoclaims.methods.champion import no_episode
 from evoclaims.methods.neat.capacity import capacities, in_capacity
@@ -88,7 +89,7 @@ class GenomeMethod(ABC):
         fitness = jnp.where(jnp.isnan(episodes.fitness), -jnp.inf, episodes.fitness)
         # The newest of equals, as everywhere in NEAT.
         best = settings.population - 1 - jnp.argmax(fitness[::-1])
-        champion, episode = jax.tree.map(lambda leaf: leaf[best], (population.genomes, episodes))
+        champion, episode = take_rows((population.genomes, episodes), best)
         following = next_population(reproduction_key, settings, population, fitness, network.inputs, network.outputs)
         genomes = population.genomes
         metrics = {

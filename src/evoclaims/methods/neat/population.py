@@ -11,6 +11,7 @@ from jaxtyping import Array, Float, Int, PRNGKeyArray
 
 from evoclaims.core.keys import streams
 from evoclaims.core.pytree import pytree, select
+from evoclaims.kernels.take_rows import take_rows
 from evoclaims.methods.neat.capacity import capacities, in_capacity
 from evoclaims.methods.neat.crossover import crossover
 from evoclaims.methods.neat.reproduction import Parents, choose_parents, survive
@@ -132,11 +133,11 @@ def _resized(population: Population, nodes: int, connections: int) -> Population
 def _crossed(key: PRNGKeyArray, genomes: Genome, parents: Parents) -> Genome:
     """Return the children before mutation."""
     keys = jax.random.split(key, parents.fitter.shape[0])
-    fitter = jax.tree.map(lambda leaf: leaf[parents.fitter], genomes)
+    fitter = take_rows(genomes, parents.fitter)
     # With the paper's survival threshold most species have a single parent: no crossover is needed.
     children: Genome = jax.lax.cond(
         jnp.any(parents.fitter != parents.other),
-        lambda: jax.vmap(crossover)(keys, fitter, jax.tree.map(lambda leaf: leaf[parents.other], genomes)),
+        lambda: jax.vmap(crossover)(keys, fitter, take_rows(genomes, parents.other)),
         lambda: fitter,
     )
     return children

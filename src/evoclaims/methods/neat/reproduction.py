@@ -8,6 +8,7 @@ from jaxtyping import Array, Bool, Float, Int, PRNGKeyArray
 
 from evoclaims.core.keys import streams
 from evoclaims.core.pytree import pytree
+from evoclaims.kernels.take_rows import take_rows
 from evoclaims.methods.neat.settings import Species
 from evoclaims.methods.neat.species import SpeciesState
 
@@ -45,7 +46,7 @@ def survive(
     order = jnp.lexsort((-places, -top, ~alive))
     new_place = jnp.zeros_like(places).at[order].set(places)
     return SpeciesState(
-        centres=jax.tree.map(lambda leaf: leaf[order], species.centres),
+        centres=take_rows(species.centres, order),
         count=jnp.sum(alive, dtype=jnp.int32),
         best=jnp.where(improved, top, species.best)[order],
         improved_at=jnp.where(improved, generation, species.improved_at)[order],

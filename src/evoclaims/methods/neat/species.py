@@ -13,6 +13,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int
 
 from evoclaims.core.pytree import pytree
+from evoclaims.kernels.take_rows import take_rows
 from evoclaims.methods.neat.distance import distance
 from evoclaims.methods.neat.settings import Species
 from evoclaims.networks.genome import Genome
@@ -125,8 +126,7 @@ def speciate(settings: Species, species: SpeciesState, population: Genome, gener
 
 def _at(genomes: Genome, place: Any) -> Genome:
     """Return the genome or genomes at `place`."""
-    chosen: Genome = jax.tree.map(lambda leaf: leaf[place], genomes)
-    return chosen
+    return take_rows(genomes, place)
 
 
 def _join(grouping: _Grouping, place: Int[Array, ""], chosen: Int[Array, ""]) -> _Grouping:
