@@ -130,3 +130,10 @@ def test_a_figure_under_a_variant_shows_its_trials_in_a_folder_of_its_own(evocla
     assert (status, err) == (0, "")
     assert out.splitlines()[0] == "fig1: wrote figures/smoke-traded/fig1.png, .svg and .csv"
     assert "under traded" in Path("figures/smoke-traded/fig1.svg").read_text()
+
+
+def test_a_figure_that_a_variant_does_not_change_says_so(evoclaims: Evoclaims, stored: Store) -> None:
+    said = "  traded changes none of its trials: it is the same as without --variant"
+    told = {name: evoclaims("reproduce", name, "--variant", "traded")[1] for name in ("fig1", "fig2")}
+    assert [said in out.splitlines() for out in told.values()] == [False, True]
+    assert said not in evoclaims("reproduce", "fig2")[1]

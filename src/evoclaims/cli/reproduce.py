@@ -11,6 +11,8 @@ from pathlib import Path
 from evoclaims.cli.output_files import FIGURES, write
 from evoclaims.cli.project import open_project
 from evoclaims.figures import catalogue, files
+from evoclaims.figures.figure import Drawing
+from evoclaims.paper.variant import Conditions
 
 ALL = "all"
 
@@ -31,6 +33,8 @@ def main(options: argparse.Namespace) -> int:
         for ending, data in files.contents(drawing).items():
             write(folder / f"{figure.name}.{ending}", data, "folder", ours=options.out is None)
         print(f"{figure.name}: wrote {folder / figure.name}.png, .svg and .csv")
+        if options.variant and not _changed(drawing, reproduction.changed_by(options.variant, options.tier)):
+            print(f"  {options.variant} changes none of its trials: it is the same as without --variant")
         for sentence in drawing.missing:
             print(f"  {sentence}")
         shown += drawing.shown
@@ -40,3 +44,11 @@ def main(options: argparse.Namespace) -> int:
             f"`evoclaims run --tier {options.tier}` runs them."
         )
     return int(not shown)
+
+
+def _changed(drawing: Drawing, changes: Conditions) -> bool:
+    """Whether a drawing shows trials that a variant changes; True for one that does not tell whose numbers it has."""
+    table = drawing.table
+    if not {"method", "task"} <= set(table.columns):
+        return True
+    return any(names in changes for names in zip(table["method"], table["task"], strict=True))
