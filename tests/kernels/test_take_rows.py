@@ -96,3 +96,13 @@ def test_one_kernel_takes_all_arrays() -> None:
     program = taken.lower(_tree(4, 3)["pair"], jnp.array([3, 0])).compile().as_text()
     assert program.count("custom-call(") == 1
     assert " gather(" not in program
+
+
+@pytest.mark.parametrize("batched", [False, True])
+def test_gpus_index(batched: bool) -> None:
+    tree, places = _tree(4, 3)["pair"], jnp.array([3, 0])
+    many = jax.jit(jax.vmap(take_rows, (None, 0)) if batched else take_rows)
+    given = jnp.stack([places, places]) if batched else places
+    text = many.trace(tree, given).lower(lowering_platforms=("cuda",)).as_text()
+    assert "custom_call" not in text
+    assert text.count('"stablehlo.gather"(') == 2
