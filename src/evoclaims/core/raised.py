@@ -32,7 +32,7 @@ def in_one_line(error: BaseException, root: Path) -> str:
 def is_of_project(error: BaseException, root: Path) -> bool:
     """Whether an exception has passed through the user's own files in the project `root`."""
     frames = (Path(frame.f_code.co_filename) for frame, _ in traceback.walk_tb(error.__traceback__))
-    return any(_is_of(file, root) for file in frames if not str(file).startswith("<"))
+    return any(is_in_project(file, root) for file in frames if not str(file).startswith("<"))
 
 
 def _place(error: BaseException, root: Path) -> str:
@@ -47,7 +47,7 @@ def _place(error: BaseException, root: Path) -> str:
         for frame, line in traceback.walk_tb(error.__traceback__)
         if not frame.f_code.co_filename.startswith("<")  # Python's import machinery, and code compiled from strings
     ]
-    theirs = [(file, line) for file, line in frames if _is_of(file, root)]
+    theirs = [(file, line) for file, line in frames if is_in_project(file, root)]
     shown = theirs if isinstance(error, UserError) else theirs or frames
     return _line(*shown[-1], root) if shown else ""
 
@@ -64,7 +64,7 @@ def _text(error: BaseException) -> str:
         return ""
 
 
-def _is_of(file: Path, root: Path) -> bool:
+def is_in_project(file: Path, root: Path) -> bool:
     """Whether a file is the project's own: in its folder, but not in evoclaims or an installed package."""
     file = file.resolve()
     return (

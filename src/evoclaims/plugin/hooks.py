@@ -25,6 +25,7 @@ from evoclaims.plugin.own_gpu import pytest_xdist_auto_num_workers as pytest_xdi
 from evoclaims.plugin.progress import QUIET, ProgressLine, progress_of
 from evoclaims.plugin.run_session import import_from_root, make_session
 from evoclaims.plugin.summary import ATTRIBUTE, KNOWN, TROUBLE, Summary
+from evoclaims.plugin.tracebacks import shortened
 from evoclaims.trials.allowance import end_without
 from evoclaims.trials.stopping import interrupted_by
 
@@ -233,6 +234,8 @@ def pytest_runtest_makereport(
     if expected_failure:
         said = f"{claimed.name} ({claimed.tier}) is {claimed.outcome}: {claimed.reason}"
         report.longrepr = shown(said) if failed else None
+    elif call.excinfo:
+        report.longrepr = shortened(call.excinfo, item) or report.longrepr
     properties: list[tuple[str, object]] = [
         ("claim", claimed.claim),
         ("tier", claimed.tier),
