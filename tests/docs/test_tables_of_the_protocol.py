@@ -127,6 +127,17 @@ def test_no_genome_among_obstacles_earns_what_would_end_the_published_run() -> N
     assert f"more than {most:,.0f} in one" in " ".join(PROTOCOL.split())
 
 
+def test_comparisons_among_obstacles_with_all_published_settings_are_those_of_the_trials() -> None:
+    of = REPRODUCTION.references_of("published")
+    trials = {method: committed(of, "full", method, "obstacles") for method in ("neat", "cma_es", "ppo")}
+    rewards = {method: [_examined(trial) for trial in those] for method, those in trials.items()}
+    text = " ".join(PROTOCOL.split())
+    assert f"(NEAT above PPO: A12 {a12(rewards['neat'], rewards['ppo']):.2f})" in text
+    assert f"not above CMA-ES either (A12 {a12(rewards['neat'], rewards['cma_es']):.2f};" in text
+    ppo, neat = (statistics.mean(float(trial.metrics["effort"]) for trial in trials[name]) for name in ("ppo", "neat"))
+    assert f"{ppo:,.0f} and {neat:,.0f} an episode" in text
+
+
 @pytest.mark.parametrize("method", NAMES)
 def test_training_lengths_are_those_of_the_conditions(method: str) -> None:
     cells = [NAMES[method]]
