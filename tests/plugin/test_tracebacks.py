@@ -31,3 +31,16 @@ def test_all_of_an_error_that_may_be_of_evoclaims_is_shown(project: Any, monkeyp
     monkeypatch.setattr("evoclaims.trials.runner._finish_all", fail)
     project.write(a="undecided")
     project.run(own_store=True).stdout.fnmatch_lines([ENGINE, "*RuntimeError: the engine stumbles"])
+
+
+def test_what_caused_an_error_is_shown_too(project: Any) -> None:
+    paper = project.path / "tiny_paper.py"
+    cause = (
+        'try:\n            len(3)\n        except TypeError as error:\n            raise RuntimeError("out") from error'
+    )
+    paper.write_text(paper.read_text().replace('raise RuntimeError("out of order")', cause))
+    project.write(a="error")
+    result = project.run()
+    result.stdout.fnmatch_lines([">*len(3)", "E*TypeError*", "tiny_paper.py:*: TypeError", "*direct cause*"])
+    result.stdout.fnmatch_lines(["E*RuntimeError: out", "tiny_paper.py:*: RuntimeError"])
+    result.stdout.no_fnmatch_line(ENGINE)

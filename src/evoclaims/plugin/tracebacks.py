@@ -16,14 +16,18 @@ def shortened(excinfo: pytest.ExceptionInfo[BaseException], item: pytest.Item) -
     None where only one of the project's files, the claim's, is among the frames: the error may be of evoclaims, and all
     that pytest shows stays. So it does with --full-trace.
     """
-    root, entries = item.config.rootpath, list(excinfo.traceback)
-    of_project = [place for place, entry in enumerate(entries) if is_in_project(Path(entry.path), root)]
-    if item.config.getoption("fulltrace") or len({entries[place].path for place in of_project}) < 2:
+    root, style = item.config.rootpath, item.config.getoption("tbstyle")
+    files = {entry.path for entry in excinfo.traceback if is_in_project(Path(entry.path), root)}
+    if item.config.getoption("fulltrace") or len(files) < 2:
         return None
-    kept = {id(entries[place]) for place in of_project} | set(map(id, entries[of_project[-1] :]))
-    style = item.config.getoption("tbstyle")
-    return excinfo.getrepr(
-        style="long" if style == "auto" else style,
-        showlocals=item.config.getoption("showlocals"),
-        tbfilter=lambda info: info.traceback.filter(lambda entry: id(entry) in kept),
-    )
+
+    def kept(info: pytest.ExceptionInfo[BaseException]) -> Any:
+        """Return the frames to show, also of an exception that caused this one."""
+        entries = list(info.traceback)
+        of_project = [place for place, entry in enumerate(entries) if is_in_project(Path(entry.path), root)]
+        last = of_project[-1] if of_project else 0
+        shown = {id(entry) for place, entry in enumerate(entries) if place in of_project or place >= last}
+        return info.traceback.filter(lambda entry: id(entry) in shown)
+
+    showlocals = item.config.getoption("showlocals")
+    return excinfo.getrepr(style="long" if style == "auto" else style, showlocals=showlocals, tbfilter=kept)
