@@ -27,6 +27,11 @@ def _reports(where: str, *outcomes: Outcome) -> list[ClaimReport]:
             "controls, which test the benchmark itself, 1 **supported** and 1 **error**.",
         ),
         ((), (), "Of 0 cases of the paper's sentences, none."),
+        (
+            (),
+            (Outcome.SUPPORTED,),
+            "Of 1 case of controls, which test the benchmark itself, 1 **supported**.",
+        ),
     ],
 )
 def test_every_outcome_is_counted_once_and_controls_apart(

@@ -13,12 +13,13 @@ def tally(reports: Sequence[ClaimReport]) -> str:
     """Return the sentences, such as "Of 3 cases of the paper's sentences, 2 **supported** and 1 **refuted**."."""
     controls = [report for report in reports if report.is_control]
     papers = [report for report in reports if not report.is_control]
-    said = f"Of {plural(len(papers), 'case')} of the paper's sentences, {_counted(papers)}."
+    said = []
+    if papers or not controls:
+        said.append(f"Of {plural(len(papers), 'case')} of the paper's sentences, {_counted(papers)}.")
     if controls:
-        said += (
-            f" Of {plural(len(controls), 'case')} of controls, which test the benchmark itself, {_counted(controls)}."
-        )
-    return said
+        tested = "which test the benchmark itself"
+        said.append(f"Of {plural(len(controls), 'case')} of controls, {tested}, {_counted(controls)}.")
+    return " ".join(said)
 
 
 def _counted(reports: Sequence[ClaimReport]) -> str:
