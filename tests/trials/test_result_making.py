@@ -72,9 +72,7 @@ class Doubter(Walker):
         return state, replace(progress, fitness=jnp.where(lost, 0.0, progress.fitness), success=success)
 
 
-def test_a_success_of_nan_diverges_as_a_fitness_of_nan(
-    results: list[TrialResult], tmp_path: Path, cpus: list[Any]
-) -> None:
+def test_a_success_of_nan_diverges_as_a_fitness_of_nan(tmp_path: Path, cpus: list[Any]) -> None:
     condition = walk(chance=0.35, hazard=0.1)
     doubter = replace(condition, method=Doubter(0.35, 0.1))
     found = run(doubter, SEEDS, Store(tmp_path), cpus)

@@ -33,11 +33,6 @@ def take_rows(tree: T, places: Int[Array, "*shape"]) -> T:
     """
     leaves, structure = jax.tree.flatten(tree)
     places = jnp.asarray(places, jnp.int32)
-    try:
-        machine_code.lanes()
-    except Unsupported:
-        indexed: T = jax.tree.unflatten(structure, [leaf[places] for leaf in leaves])
-        return indexed
     copied = [leaf for leaf in leaves if _is_copied(leaf)]
     shapes = tuple(jax.ShapeDtypeStruct(leaf.shape, leaf.dtype) for leaf in copied)
     taken = iter(calls.CALL.bind(places, *copied, kernel=_Taking(places.shape, shapes)) if copied else ())
@@ -47,7 +42,11 @@ def take_rows(tree: T, places: Int[Array, "*shape"]) -> T:
 
 
 def _is_copied(leaf: Array) -> bool:
-    """Whether the kernel copies rows of an array."""
+    """Whether a kernel copies rows of an array: where there are kernels."""
+    try:
+        machine_code.lanes()
+    except Unsupported:
+        return False
     return getattr(leaf.dtype, "kind", None) in COPIED
 
 
