@@ -14,8 +14,10 @@ def shortened(excinfo: pytest.ExceptionInfo[BaseException], item: pytest.Item) -
     """Return how pytest shows an exception, without the frames of other files before the project's last one.
 
     None where only one of the project's files, the claim's, is among the frames: the error may be of evoclaims, and all
-    that pytest shows stays. So it does with --full-trace.
+    that pytest shows stays. So it does with --full-trace, and without pytest's terminal, which defines how it is shown.
     """
+    if not item.config.pluginmanager.has_plugin("terminal"):
+        return None
     root, style = item.config.rootpath, item.config.getoption("tbstyle")
     files = {entry.path for entry in excinfo.traceback if is_in_project(Path(entry.path), root)}
     if item.config.getoption("fulltrace") or len(files) < 2:
