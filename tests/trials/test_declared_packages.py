@@ -89,7 +89,8 @@ def _computing(condition: Condition) -> tuple[set[str], set[str]]:
     """Trace a condition's programs; return the files whose lines made equations, and those whose functions ran."""
     ran, programs, shapes = set(), [], None
     jax.clear_caches()  # a function traced before keeps the lines that called it then
-    robot_task._kernel.cache_clear()
+    robot_task._start_kernel.cache_clear()
+    robot_task._step_kernel.cache_clear()
     machine_code.lanes.cache_clear()
 
     def note(frame: Any, event: str, argument: Any) -> None:

@@ -41,9 +41,9 @@ def gliding() -> Iterator[None]:
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(physics, "act", glide)
-        robot_task._kernel.cache_clear()
+        robot_task._step_kernel.cache_clear()
         yield
-    robot_task._kernel.cache_clear()  # or tests of other files would get steps that glide
+    robot_task._step_kernel.cache_clear()  # or tests of other files would get steps that glide
 
 
 def _changed(state: TaskState, **changes: Any) -> TaskState:

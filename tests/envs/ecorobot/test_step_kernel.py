@@ -1,4 +1,4 @@
-"""A robot's step as one kernel against the same step as XLA compiles it, along whole episodes."""
+"""A robot's start and step as one kernel each, against the same as XLA compiles them, along whole episodes."""
 
 from __future__ import annotations
 
@@ -11,6 +11,8 @@ import numpy as np
 import pytest
 from plain_mujoco import quickly_compiled
 
+from evoclaims.envs.base import TaskState
+from evoclaims.envs.ecorobot import robot_task
 from evoclaims.envs.ecorobot.obstacles import Obstacles
 from evoclaims.envs.ecorobot.robot_task import RobotTask
 from evoclaims.envs.ecorobot.robots import ANT
@@ -28,6 +30,26 @@ TASKS: dict[str, RobotTask] = {
 # rounding error earlier or later, and velocities are up to 10.
 NEARLY_ALL = {"stones": 1e-5, "obstacles": 1e-3, "ant": 1e-3}
 ANY = {"stones": 1e-4, "obstacles": 1.0, "ant": 1.0}
+
+
+@pytest.mark.parametrize("name", TASKS)
+def test_a_start_in_one_kernel_is_the_start(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    task = TASKS[name]
+
+    keys = jax.random.split(jax.random.key(0), ROBOTS)
+
+    def starts() -> TaskState:
+        drawn: TaskState = quickly_compiled(jax.vmap(lambda key: task.reset(key, jnp.int32(0))))(keys)
+        return drawn
+
+    made = starts()
+    monkeypatch.setattr(robot_task, "_start_kernel", lambda task: lambda *drawn: task.plain_start(*drawn[:2]))
+    expected = starts()
+    assert jax.tree.structure(made) == jax.tree.structure(expected)
+    for a, b in zip(jax.tree.leaves(made), jax.tree.leaves(expected), strict=True):
+        assert (a.shape, a.dtype) == (b.shape, b.dtype)
+        np.testing.assert_allclose(a, b, rtol=1e-5, atol=1e-6)
+    assert len(np.unique(made.observation, axis=0)) == ROBOTS
 
 
 @pytest.mark.parametrize("name", TASKS)

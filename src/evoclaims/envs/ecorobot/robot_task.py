@@ -34,7 +34,8 @@ ROBOT_PACKAGES: Final = ("llvmlite", "mujoco", "mujoco-mjx")
 class RobotTask(ABC):
     """A task with one level. A subclass defines name, boxes and `rule`, and if needed `memory` and `measures`.
 
-    Fields must be hashable, and the fields that `rule` reads must be compared: equal tasks share one kernel.
+    Fields must be hashable, and the fields that `rule`, `memory` and `shown` read must be compared: equal tasks share
+    their kernels.
 
     Attributes:
         robot: who acts.
@@ -136,7 +137,10 @@ class RobotTask(ABC):
         return moved
 
     def reset(self, key: PRNGKeyArray, level: Int[Array, ""]) -> TaskState:
-        """Put the robot at the start, as Brax does: with a little noise on positions and velocities."""
+        """Put the robot at the start, as Brax does: with a little noise on positions and velocities.
+
+        What follows from these, `plain_start`, is one kernel (`one_kernel`).
+        """
         position_key, velocity_key = streams(key, "position", "velocity")
         robot, start = self.robot, jnp.asarray(self.scene.start)
         position = start + jax.random.uniform(
@@ -146,6 +150,10 @@ class RobotTask(ABC):
             position = position.at[:2].set(jnp.asarray(self.start, jnp.float32))
         draw = jax.random.normal if robot.normal_velocity else partial(jax.random.uniform, minval=-1.0, maxval=1.0)
         velocity = robot.velocity_noise * draw(velocity_key, (int(self.scene.model.nv),))
+        return _start_kernel(self.with_numbers(None))(position, velocity, self.numbers)
+
+    def plain_start(self, position: Float[Array, " nq"], velocity: Float[Array, " nv"]) -> TaskState:
+        """Return the state at the start of an episode."""
         pose = torso(self.scene, position)
         outing = strong(
             Outing(
@@ -165,7 +173,7 @@ class RobotTask(ABC):
     def step(self, state: TaskState, action: Float[Array, " action"]) -> TaskState:
         """Act for `robot.frames` simulation steps: `plain_step` as one kernel (`one_kernel`)."""
         action = fitting(self, action)
-        return _kernel(self.with_numbers(None))(state, action, self.numbers)
+        return _step_kernel(self.with_numbers(None))(state, action, self.numbers)
 
     def plain_step(self, state: TaskState, action: Float[Array, " action"]) -> TaskState:
         """Act for `robot.frames` simulation steps.
@@ -251,7 +259,16 @@ class RobotTask(ABC):
 
 
 @lru_cache(maxsize=64)
-def _kernel(task: RobotTask) -> Callable[[TaskState, Array, Places], TaskState]:
+def _start_kernel(task: RobotTask) -> Callable[[Array, Array, Places], TaskState]:
+    """Return a task's start, with its boxes' places as an argument."""
+    return one_kernel(
+        lambda position, velocity, places: task.with_numbers(places).plain_start(position, velocity),
+        f"A start of {task.name}",
+    )
+
+
+@lru_cache(maxsize=64)
+def _step_kernel(task: RobotTask) -> Callable[[TaskState, Array, Places], TaskState]:
     """Return a task's step, with its boxes' places as an argument."""
     return one_kernel(
         lambda state, action, places: task.with_numbers(places).plain_step(state, action), f"A step of {task.name}"
