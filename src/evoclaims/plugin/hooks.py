@@ -1,4 +1,4 @@
-"""The pytest plugin: claims as tests, tiers as markers, verdicts as outcomes.
+"""The pytest plugin: claims as tests, and tiers as markers; verdicts become outcomes in `outcomes`.
 
 Nothing heavy is imported here at the top: pytest loads this file in every run of an environment that has evoclaims.
 """
@@ -7,25 +7,26 @@ from __future__ import annotations
 
 import signal
 from collections.abc import Callable, Generator
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
 
 from evoclaims.core.errors import UserError
-from evoclaims.core.printable import shown
-from evoclaims.core.raised import in_one_line
 from evoclaims.core.tiers import TIERS
 from evoclaims.plugin import options
 from evoclaims.plugin.distribution import Distribution, prepare
 from evoclaims.plugin.options import pytest_addoption as pytest_addoption
+from evoclaims.plugin.outcomes import VERDICTS
+from evoclaims.plugin.outcomes import pytest_report_teststatus as pytest_report_teststatus
+from evoclaims.plugin.outcomes import pytest_runtest_call as pytest_runtest_call
+from evoclaims.plugin.outcomes import pytest_runtest_makereport as pytest_runtest_makereport
+from evoclaims.plugin.outcomes import pytest_runtest_setup as pytest_runtest_setup
 from evoclaims.plugin.overlooked import pytest_pycollect_makeitem as pytest_pycollect_makeitem
 from evoclaims.plugin.own_gpu import pytest_load_initial_conftests as pytest_load_initial_conftests
 from evoclaims.plugin.own_gpu import pytest_xdist_auto_num_workers as pytest_xdist_auto_num_workers
 from evoclaims.plugin.progress import QUIET, ProgressLine, progress_of
 from evoclaims.plugin.run_session import import_from_root, make_session
-from evoclaims.plugin.summary import ATTRIBUTE, KNOWN, TROUBLE, Summary
-from evoclaims.plugin.tracebacks import shortened
+from evoclaims.plugin.summary import KNOWN, TROUBLE, Summary
 from evoclaims.trials.allowance import end_without
 from evoclaims.trials.stopping import interrupted_by
 
@@ -35,8 +36,6 @@ if TYPE_CHECKING:
     from evoclaims.paper.trial_group import TrialGroup
     from evoclaims.verdicts.claim_report import ClaimReport
 
-_verdicts: pytest.StashKey[Verdicts] = pytest.StashKey()
-_reported: pytest.StashKey[bool] = pytest.StashKey()
 _ended: pytest.StashKey[pytest.Session] = pytest.StashKey()
 
 
@@ -149,24 +148,6 @@ def pytest_unconfigure(config: pytest.Config) -> None:
         end_without(int(config.stash[_ended].exitstatus))
 
 
-@pytest.hookimpl(tryfirst=True)
-def pytest_runtest_setup(item: pytest.Item) -> None:
-    """Skip a claim that has no test at its tier."""
-    because = _gap(item)
-    if because:
-        pytest.skip(because)
-
-
-def _gap(item: pytest.Item) -> str:
-    """Return why a claim has no test at its tier; empty if it has one, or is no claim."""
-    if item.get_closest_marker("claim_without_smoke") is None:
-        return ""
-    from evoclaims.claims.claim import gap_of
-    from evoclaims.claims.collected import ClaimTest
-
-    return gap_of(item, ClaimTest.of(item).tier)
-
-
 @pytest.fixture
 def claim_tier() -> str:
     """The tier that a claim is judged at; parametrized for every claim."""
@@ -206,93 +187,5 @@ def verdict(request: pytest.FixtureRequest, claim_tier: str) -> Verdicts:
             if line is not None:
                 line.close()
 
-    verdicts = request.node.stash[_verdicts] = Verdicts(settle)
+    verdicts = request.node.stash[VERDICTS] = Verdicts(settle)
     return verdicts
-
-
-@pytest.hookimpl(wrapper=True)
-def pytest_runtest_makereport(
-    item: pytest.Item, call: pytest.CallInfo[None]
-) -> Generator[None, pytest.TestReport, pytest.TestReport]:
-    """Turn a claim's report into the test's outcome, without a traceback."""
-    report = yield
-    if item.get_closest_marker("claim") is None or (report.when != "call" and report.passed):
-        return report
-    if call.excinfo and call.excinfo.errisinstance(KeyboardInterrupt):
-        return report
-    if report.when == "teardown" and (report.skipped or _reported in item.stash):  # one verdict a claim
-        return report
-    claimed = _claim_report(item, call, report)
-    setattr(report, ATTRIBUTE, claimed.to_json())
-    item.stash[_reported] = True
-    if report.skipped:
-        return report
-    undecided = claimed.outcome == "inconclusive" and item.config.getoption("claims_undecided") == "fail"
-    failed = claimed.failed or (undecided and not claimed.as_expected)
-    report.outcome = "failed" if failed else "passed"
-    expected_failure = call.excinfo is None or call.excinfo.errisinstance(UserError)
-    if expected_failure:
-        said = f"{claimed.name} ({claimed.tier}) is {claimed.outcome}: {claimed.reason}"
-        report.longrepr = shown(said) if failed else None
-    elif call.excinfo:
-        report.longrepr = shortened(call.excinfo, item) or report.longrepr
-    properties: list[tuple[str, object]] = [
-        ("claim", claimed.claim),
-        ("tier", claimed.tier),
-        ("verdict", str(claimed.outcome)),
-        ("reason", claimed.reason),
-        ("n", claimed.n),
-        ("p", claimed.p),
-        ("evidence", claimed.evidence),
-    ]
-    item.user_properties += properties  # JUnit's file takes them from the report of the teardown
-    report.user_properties += properties
-    return report
-
-
-def _claim_report(item: pytest.Item, call: pytest.CallInfo[None], report: pytest.TestReport) -> ClaimReport:
-    """Return the report of a claim test: its verdict, the error that prevented one, or why it was skipped."""
-    from evoclaims.claims.claim import expectation_of
-    from evoclaims.claims.collected import ClaimTest
-    from evoclaims.claims.reporting import unjudged
-    from evoclaims.judging.verdict import Outcome
-
-    test, verdicts = ClaimTest.of(item), item.stash.get(_verdicts, None)
-    if because := _gap(item):
-        return unjudged(test, Outcome.NOT_RUN, f"it has no {test.tier} test: {because}", has_test=False)
-    if report.skipped:  # or failed as an xfail mark expects
-        said = report.longrepr[2] if isinstance(report.longrepr, tuple) else f"xfail: {getattr(report, 'wasxfail', '')}"
-        why = said.removeprefix("Skipped: ") or "no reason given"
-        return unjudged(test, Outcome.NOT_RUN, f"its test was skipped ({why})")
-    if call.excinfo is not None:
-        claimed = unjudged(test, Outcome.ERROR, _sentence(call.excinfo, item.config.rootpath))
-    elif verdicts is None or verdicts.report is None:
-        claimed = unjudged(test, Outcome.ERROR, "the test ended without calling verdict(...), so it judged nothing")
-    else:
-        claimed = verdicts.report
-    return make_session(item.config).complete(claimed, expectation_of(item, test.tier))
-
-
-def _sentence(excinfo: pytest.ExceptionInfo[BaseException], root: Path) -> str:
-    """Return an exception as one line, with its place in the project `root` if it is none of evoclaims' own."""
-    if isinstance(excinfo.value, pytest.FixtureLookupError) and excinfo.value.argname:
-        return f"There is no fixture named {excinfo.value.argname!r}: a claim takes trials and verdict."
-    text = str(excinfo.value).strip().splitlines()
-    return text[0] if text and excinfo.errisinstance(UserError) else in_one_line(excinfo.value, root)
-
-
-def pytest_report_teststatus(
-    report: pytest.CollectReport | pytest.TestReport, config: pytest.Config
-) -> tuple[str, str, str | tuple[str, dict[str, bool]]] | None:
-    """Show a claim's verdict in place of passed and failed."""
-    plain = getattr(report, ATTRIBUTE, None)
-    if plain is None or report.skipped:
-        return None
-    from evoclaims.judging.verdict import Outcome
-    from evoclaims.verdicts.claim_report import ClaimReport
-
-    claimed = ClaimReport.from_json(plain)
-    outcome = claimed.outcome
-    words = f"{outcome} (accepted)" if claimed.as_expected else str(outcome)
-    colour = {"red": True} if report.failed else {"green": True} if outcome == Outcome.SUPPORTED else {"yellow": True}
-    return words, outcome.symbol, (words.upper(), colour)

@@ -1,0 +1,172 @@
+"""A claim's verdict as its test's outcome: one report for each claim, in the place of passed and failed.
+
+Nothing heavy is imported here at the top: pytest loads this file in every run of an environment that has evoclaims.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pytest
+
+from evoclaims.core.errors import UserError
+from evoclaims.core.printable import shown
+from evoclaims.core.raised import in_one_line
+from evoclaims.plugin.run_session import make_session
+from evoclaims.plugin.summary import ATTRIBUTE
+from evoclaims.plugin.tracebacks import shortened
+
+if TYPE_CHECKING:
+    from evoclaims.claims.session import Verdicts
+    from evoclaims.verdicts.claim_report import ClaimReport
+
+VERDICTS: pytest.StashKey[Verdicts] = pytest.StashKey()
+"""Under which a claim's test keeps what its fixture `verdict` has judged."""
+
+
+@dataclass
+class _State:
+    """How far a claim's test is.
+
+    Attributes:
+        called: whether the test's function has ended.
+        reported: whether the claim has its report.
+    """
+
+    called: bool = False
+    reported: bool = False
+
+
+_state: pytest.StashKey[_State] = pytest.StashKey()
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    """Skip a claim that has no test at its tier; a claim may be run several times."""
+    item.stash[_state] = _State()
+    because = _gap(item)
+    if because:
+        pytest.skip(because)
+
+
+def _gap(item: pytest.Item) -> str:
+    """Return why a claim has no test at its tier; empty if it has one, or is no claim."""
+    if item.get_closest_marker("claim_without_smoke") is None:
+        return ""
+    from evoclaims.claims.claim import gap_of
+    from evoclaims.claims.collected import ClaimTest
+
+    return gap_of(item, ClaimTest.of(item).tier)
+
+
+@pytest.hookimpl(wrapper=True, tryfirst=True)
+def pytest_runtest_call(item: pytest.Item) -> Generator[None, None, None]:
+    """Note that a claim's test has ended: what is reported before is of a part of it."""
+    try:
+        return (yield)
+    finally:
+        item.stash.setdefault(_state, _State()).called = True
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(
+    item: pytest.Item, call: pytest.CallInfo[None]
+) -> Generator[None, pytest.TestReport, pytest.TestReport]:
+    """Turn a claim's report into the test's outcome, without a traceback."""
+    report = yield
+    if item.get_closest_marker("claim") is None or (report.when != "call" and report.passed):
+        return report
+    if call.excinfo and call.excinfo.errisinstance(KeyboardInterrupt):
+        return report
+    state = item.stash.setdefault(_state, _State())  # another plugin may have kept it from being set up
+    if report.when == "call" and not state.called:  # of a part of the test, by pytest's fixture subtests
+        return report
+    if report.when == "teardown" and (report.skipped or state.reported):  # one verdict a claim
+        return report
+    claimed = _claim_report(item, call, report)
+    setattr(report, ATTRIBUTE, claimed.to_json())
+    state.reported = True
+    if report.skipped:
+        return report
+    vars(report).pop("wasxfail", None)  # only expect=... accepts a verdict, and no mark of pytest's
+    said = f"{claimed.name} ({claimed.tier}) is {claimed.outcome}: {claimed.reason}"
+    undecided = claimed.outcome == "inconclusive" and item.config.getoption("claims_undecided") == "fail"
+    failed = claimed.failed or (undecided and not claimed.as_expected)
+    if report.failed and not (
+        call.excinfo or failed
+    ):  # by pytest: what xfail(strict=True) expects to fail, or a part did
+        pass
+    elif report.when == "setup" and not failed:  # or the test would be called without its fixtures
+        report.outcome, report.longrepr = "skipped", (item.location[0], item.location[1] or 0, said)
+    else:
+        report.outcome = "failed" if failed else "passed"
+        if call.excinfo is None or call.excinfo.errisinstance(UserError):
+            report.longrepr = shown(said) if failed else None
+        else:
+            report.longrepr = shortened(call.excinfo, item) or report.longrepr
+    properties: list[tuple[str, object]] = [
+        ("claim", claimed.claim),
+        ("tier", claimed.tier),
+        ("verdict", str(claimed.outcome)),
+        ("reason", claimed.reason),
+        ("n", claimed.n),
+        ("p", claimed.p),
+        ("evidence", claimed.evidence),
+    ]
+    item.user_properties += properties  # JUnit's file takes them from the report of the teardown
+    report.user_properties += properties
+    return report
+
+
+def _claim_report(item: pytest.Item, call: pytest.CallInfo[None], report: pytest.TestReport) -> ClaimReport:
+    """Return the report of a claim test: its verdict, the error that prevented one, or why it was skipped."""
+    from evoclaims.claims.claim import expectation_of
+    from evoclaims.claims.collected import ClaimTest
+    from evoclaims.claims.reporting import unjudged
+    from evoclaims.judging.verdict import Outcome
+
+    test, verdicts = ClaimTest.of(item), item.stash.get(VERDICTS, None)
+    if because := _gap(item):
+        return unjudged(test, Outcome.NOT_RUN, f"it has no {test.tier} test: {because}", has_test=False)
+    if report.skipped:  # or failed as an xfail mark expects
+        said = report.longrepr[2] if isinstance(report.longrepr, tuple) else f"xfail: {getattr(report, 'wasxfail', '')}"
+        why = said.removeprefix("Skipped: ") or "no reason given"
+        return unjudged(test, Outcome.NOT_RUN, f"its test was skipped ({why})")
+    if call.excinfo is not None:
+        claimed = unjudged(test, Outcome.ERROR, _sentence(call.excinfo, item.config.rootpath))
+    elif verdicts is None or verdicts.report is None:
+        claimed = unjudged(test, Outcome.ERROR, "the test ended without calling verdict(...), so it judged nothing")
+    else:
+        claimed = verdicts.report
+    return make_session(item.config).complete(claimed, expectation_of(item, test.tier))
+
+
+def _sentence(excinfo: pytest.ExceptionInfo[BaseException], root: Path) -> str:
+    """Return an exception as one line, with its place in the project `root` if it is none of evoclaims' own."""
+    if isinstance(excinfo.value, pytest.FixtureLookupError) and excinfo.value.argname:
+        return f"There is no fixture named {excinfo.value.argname!r}: a claim takes trials and verdict."
+    text = str(excinfo.value).strip().splitlines()
+    return text[0] if text and excinfo.errisinstance(UserError) else in_one_line(excinfo.value, root)
+
+
+def pytest_report_teststatus(
+    report: pytest.CollectReport | pytest.TestReport, config: pytest.Config
+) -> tuple[str, str, str | tuple[str, dict[str, bool]]] | None:
+    """Show a claim's verdict in place of passed and failed."""
+    plain = getattr(report, ATTRIBUTE, None)
+    if plain is None:
+        return None
+    from evoclaims.judging.verdict import Outcome
+    from evoclaims.verdicts.claim_report import ClaimReport
+
+    claimed = ClaimReport.from_json(plain)
+    outcome = claimed.outcome
+    of_pytest = report.failed and (claimed.as_expected or outcome == Outcome.SUPPORTED)
+    if outcome == Outcome.NOT_RUN or of_pytest:  # skipped, or failed by pytest itself: in its own words
+        return None
+    words = f"{outcome} (accepted)" if claimed.as_expected else str(outcome)
+    colour = {"red": True} if report.failed else {"green": True} if outcome == Outcome.SUPPORTED else {"yellow": True}
+    return words, outcome.symbol, (words.upper(), colour)
