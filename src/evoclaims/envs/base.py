@@ -43,7 +43,8 @@ class Episode:
     Attributes:
         fitness: the episode's reward as evolution maximizes it.
         success: share of the level solved, in [0, 1]; the level is solved at exactly 1.
-        metrics: other scalars measured by the task; the same names in all its episodes.
+        metrics: other scalars measured by the task; the same names in all its training episodes, and in all its
+            examinations, which may have more.
     """
 
     fitness: Float[Array, ""]

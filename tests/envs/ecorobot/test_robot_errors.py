@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import replace
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +16,7 @@ from evoclaims.envs.ecorobot.boxes import Box, Surface
 from evoclaims.envs.ecorobot.deceptive import DeceptiveMaze
 from evoclaims.envs.ecorobot.locomotion import Locomotion
 from evoclaims.envs.ecorobot.obstacles import Obstacles
-from evoclaims.envs.ecorobot.robots import SIMPLE_ROB
+from evoclaims.envs.ecorobot.robots import SIMPLE_ROB, Robot
 from evoclaims.envs.ecorobot.scene import Scene
 from evoclaims.envs.ecorobot.sensors import PieSlices, Rangefinders
 from evoclaims.envs.ecorobot.stones import SteppingStones
@@ -87,10 +88,58 @@ def test_a_robot_without_a_file_says_so() -> None:
         _ = Scene(nowhere).model
 
 
-def test_a_robot_whose_file_is_no_model_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    (tmp_path / "broken_robots").mkdir()
-    (tmp_path / "broken_robots/__init__.py").touch()
-    (tmp_path / "broken_robots/broken.xml").write_text("<mujoco><worldbody><body></worldbody></mujoco>")
+@pytest.fixture
+def of_text(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[str], Robot]:
+    """A function that returns a robot whose model is a text."""
+    folder = tmp_path / tmp_path.name  # a package of its own, since packages and models are cached
+    folder.mkdir()
+    numbers = count(1)
+    (folder / "__init__.py").touch()
     monkeypatch.syspath_prepend(tmp_path)
-    with pytest.raises(UserError, match="The model of the robot broken cannot be read"):
-        _ = Scene(replace(SIMPLE_ROB, name="broken", xml="broken_robots:broken.xml")).model
+
+    def robot(text: str) -> Robot:
+        name = f"rob{next(numbers)}"
+        (folder / f"{name}.xml").write_text(text)
+        return replace(SIMPLE_ROB, name=name, xml=f"{folder.name}:{name}.xml")
+
+    return robot
+
+
+def test_a_robot_whose_file_is_no_model_says_so(of_text: Callable[[str], Robot]) -> None:
+    with pytest.raises(UserError, match="The model of the robot rob1 cannot be read"):
+        _ = Scene(of_text("<mujoco><worldbody><body></worldbody></mujoco>")).model
+
+
+ROB = """
+<mujoco>
+  <option integrator="Euler" cone="pyramidal"/>
+  <worldbody>
+    <geom type="plane" size="9 9 1" group="0"/>
+    <body><joint name="x" type="slide"/><joint name="y" type="slide" axis="0 1 0"/><geom size="0.2"/></body>
+  </worldbody>
+  <actuator><general joint="x"/></actuator>
+  <!-- more -->
+</mujoco>
+"""
+BEYOND = {
+    ('axis="0 1 0"', 'axis="0 1 0" frictionloss="0.1"'): "friction loss in joints",
+    ("<general ", '<general dyntype="filter" '): "actuators with a state",
+    ("pyramidal", "elliptic"): "elliptic friction cones",
+    ('"Euler"', '"RK4"'): "another integrator than Euler",
+    ("<!-- more -->", '<equality><joint joint1="x" joint2="y"/></equality>'): "equality constraints",
+    ("<!-- more -->", '<tendon><fixed><joint joint="x" coef="1"/></fixed></tendon>'): "tendons",
+}
+
+
+@pytest.mark.parametrize(("change", "name"), BEYOND.items(), ids=BEYOND.values())
+def test_a_robot_with_what_is_not_simulated_says_so(
+    change: tuple[str, str], name: str, of_text: Callable[[str], Robot]
+) -> None:
+    assert Scene(of_text(ROB)).model.nq == 2
+    with pytest.raises(UserError, match=f"The model of the robot rob2 has {name}, which is not simulated here"):
+        _ = Scene(of_text(ROB.replace(*change))).model
+
+
+def test_a_robot_whose_floor_would_count_as_a_box_says_so(of_text: Callable[[str], Robot]) -> None:
+    with pytest.raises(UserError, match="has a geom of the world in group 1, which is that of a task's boxes"):
+        _ = Scene(of_text(ROB.replace('group="0"', 'group="1"'))).model

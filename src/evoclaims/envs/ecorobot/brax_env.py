@@ -21,8 +21,8 @@ class BraxEnv(Env):  # type: ignore[misc]
     """A task in Brax's API: pure `reset` and `step`, one environment; vmap it, or use Brax's wrappers.
 
     `State.pipeline_state` is the task's own state. `done` says that the task has ended; Brax's `EpisodeWrapper`, with
-    `episode_length` set to `task.horizon`, truncates episodes. On an NVIDIA GPU a step is one kernel, which cannot be
-    differentiated; `task.plain_step` can.
+    `episode_length` set to `task.horizon`, truncates episodes. Derivatives are those of `task.plain_step`,
+    computed without its kernel.
     """
 
     def __init__(self, task: RobotTask) -> None:

@@ -116,11 +116,20 @@ def box_geoms(model: mujoco.MjModel) -> NDArray[np.int64]:
 
 @lru_cache(maxsize=64)
 def _compiled(robot: Robot, boxes: tuple[Box, ...]) -> mujoco.MjModel:
-    """Build the model from the robot's own file, so that its defaults and total mass are unchanged."""
+    """Build the model from the robot's own file, so that its defaults and total mass are unchanged.
+
+    Raises:
+        UserError: when there is no such model, or it has what `physics.act` does not simulate.
+    """
     try:
         spec = mujoco.MjSpec.from_file(robot.file)
     except (ValueError, FileNotFoundError) as error:
         raise UserError(f"The model of the robot {robot.name} cannot be read: {error}") from error
+    if any(geom.group == WORLD_GROUP for geom in spec.worldbody.geoms):
+        raise UserError(
+            f"The robot {robot.name} has a geom of the world in group {WORLD_GROUP}, which is that of a task's boxes: "
+            "give its floor another group."
+        )
     option = spec.option
     option.solver, option.iterations, option.ls_iterations = mujoco.mjtSolver.mjSOL_NEWTON, 1, 4
     option.disableflags |= mujoco.mjtDisableBit.mjDSBL_EULERDAMP
@@ -151,7 +160,26 @@ def _compiled(robot: Robot, boxes: tuple[Box, ...]) -> mujoco.MjModel:
     if total > 0:
         mujoco.mj_setTotalmass(model, total)
         mujoco.mj_setConst(model, mujoco.MjData(model))
+    if beyond := _not_simulated(model):
+        raise UserError(
+            f"The model of the robot {robot.name} has {', '.join(beyond)}, which is not simulated here: a step knows "
+            "joints with limits, springs and damping, motors without a state of their own, and contacts with pyramidal "
+            "friction cones, and integrates as MuJoCo's Euler does."
+        )
     return model
+
+
+def _not_simulated(model: mujoco.MjModel) -> list[str]:
+    """Return what a model has that `physics.act` leaves out."""
+    found = {
+        "equality constraints": model.neq > 0,
+        "tendons": model.ntendon > 0,
+        "actuators with a state": model.na > 0,
+        "friction loss in joints": bool((model.dof_frictionloss > 0).any()),
+        "elliptic friction cones": model.opt.cone != mujoco.mjtCone.mjCONE_PYRAMIDAL,
+        "another integrator than Euler": model.opt.integrator != mujoco.mjtIntegrator.mjINT_EULER,
+    }
+    return [name for name, there in found.items() if there]
 
 
 def on_device(tree: Any) -> Any:

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from evoclaims.core.errors import UserError, require_at_least
 from evoclaims.core.foreign import implicit_promotions
 from evoclaims.core.keys import EVALUATION, streams, trial_key
-from evoclaims.core.pytree import pytree, strong
+from evoclaims.core.pytree import pytree, select, strong
 from evoclaims.envs.base import Episode, PolicyFn, TaskState, averaged, fitting, played
 from evoclaims.envs.foreign.actions import Choice, Range
 from evoclaims.envs.foreign.scoring import ForeignTask, Scored
@@ -161,7 +161,11 @@ class JaxTask(ForeignTask):
             moment = self.advance(step_key, inner.state, self.actions.chosen(fitting(self, action)))
         observation = _flat(moment.observation)
         sound = jnp.all(jnp.isfinite(observation)) & jnp.isfinite(moment.reward)
-        reached = strong(Inner(state=moment.state, key=jax.random.key_data(later_key), time=inner.time + 1))
+        reached = strong(
+            Inner(
+                state=select(sound, moment.state, inner.state), key=jax.random.key_data(later_key), time=inner.time + 1
+            )
+        )
         terminated = moment.terminated | ~sound
         return TaskState(
             observation=jnp.where(sound, observation, state.observation),
