@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import json
+import sys
 from importlib.metadata import version
 from pathlib import Path
 
 import pytest
 from hand_made_verdicts import report
-from tiny_project import Evoclaims
+from tiny_project import Evoclaims, Project
 
 from evoclaims.cli.elsewhere import Elsewhere
 from evoclaims.core.environments import Environment, Recipe
+from evoclaims.trials.store import Store
 from evoclaims.verdicts.across import Judged
 
 RELEASES = [f"1.{minor}" for minor in range(1, 8)]
@@ -187,3 +189,13 @@ def test_an_environment_whose_python_is_gone_has_no_verdicts_and_stops_no_other(
     assert status == 2
     assert out.count(": pytest cannot be run there (") == 2
     assert "No claim was judged in any of these environments" in err
+
+
+def test_no_claim_is_left_out_elsewhere_whatever_the_environment_says_of_pytest(
+    project: Project, stored: Store, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    project.write(a="refuted", b="supported")
+    monkeypatch.setenv("PYTEST_ADDOPTS", "-x")
+    monkeypatch.setattr(Environment, "python", Path(sys.executable))
+    elsewhere = Elsewhere(project.path, project.path / "claims", stored, "smoke", None, "cpu")
+    assert [one.outcome for one in elsewhere._run(Environment(project.path, {}), stored)] == ["refuted", "supported"]

@@ -68,6 +68,11 @@ def test_all_figures_go_into_the_folder_that_is_named(half: Evoclaims) -> None:
     assert not Path("figures").exists()
 
 
+def test_where_a_variant_has_no_trial_its_own_are_named(half: Evoclaims) -> None:
+    _, out, _ = half("reproduce", "fig2", "--tier", "full", "--variant", "traded")
+    assert out.splitlines()[-1].endswith("`evoclaims run --tier full --variant traded` runs them.")
+
+
 def test_a_figure_without_any_trial_is_written_and_ends_with_1(half: Evoclaims) -> None:
     status, out, _ = half("reproduce", "fig2", "--tier", "full")
     assert status == 1

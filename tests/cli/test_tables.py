@@ -112,6 +112,11 @@ def test_published_numbers_are_a_table_too(committed: Evoclaims) -> None:
         (PAGE.replace("verdicts", "tally"), "is of one tier, not of full, smoke, smoke:traded: write one for each."),
         (PAGE.replace("verdicts full smoke smoke:traded", "details full smoke"), "is of one tier, not of full, smoke:"),
         (PAGE.replace("verdicts full smoke smoke:traded", "tally ful"), "There is no tier named 'ful'."),
+        (
+            f"<!-- evoclaims: tally smoke -->\n\nProse.\n\n{PAGE}",
+            "tally smoke --> has no <!-- evoclaims: end --> before",
+        ),
+        (f"{PAGE}\n<!-- evoclaims: tally smoke -->\n", "tally smoke --> has no <!-- evoclaims: end --> before"),
         (None, "Cannot read page.md: No such file or directory."),
     ],
 )
@@ -119,3 +124,4 @@ def test_a_mistake_is_a_sentence(committed: Evoclaims, text: str | None, said: s
     Path("page.md").unlink() if text is None else Path("page.md").write_text(text)
     status, _, err = committed("tables", "page.md")
     assert (status, said in " ".join(err.split())) == (2, True), err
+    assert text is None or Path("page.md").read_text() == text

@@ -212,3 +212,24 @@ def test_a_case_whose_parameters_have_a_comma_is_selected_by_its_name(project: A
     )
     chosen = project.run("--collect-only", "-q", "--claims-only=a[x,y]")
     assert [line for line in chosen.outlines if "::" in line] == ["claims/test_claims.py::test_a[x,y-a-smoke]"]
+
+
+CLASS = """
+class Stones:
+    @says("a")
+    def test_a(self, trials, verdict):
+        verdict(trials("right", on="parity").solves_every_level.in_most_trials())
+"""
+
+
+def test_a_claim_in_a_class_that_is_none_of_tests_is_refused(project: Any, sentence: Any) -> None:
+    project.write(CLASS)
+    result = project.run()
+    assert result.ret == pytest.ExitCode.INTERRUPTED
+    sentence(result, "the class Stones has a function with @claim(...), and pytest takes none of this name for one of")
+
+
+@pytest.mark.parametrize("more", ["    __test__ = False\n", "\nclass TestStones(Stones):\n    pass\n"])
+def test_a_class_that_is_left_out_on_purpose_or_has_an_heir_is_not_refused(project: Any, more: str) -> None:
+    project.write(CLASS + more)
+    assert project.run().ret in (pytest.ExitCode.OK, pytest.ExitCode.NO_TESTS_COLLECTED)

@@ -45,6 +45,17 @@ def test_a_stopped_run_goes_on_to_the_same_bits(
     assert not list(store.checkpoints.iterdir())
 
 
+def test_a_run_whose_method_was_edited_since_it_was_stopped_begins_anew(
+    store: Store, cpus: list[Any], uninterrupted: list[TrialResult], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with pytest.raises(StoppedError):
+        run_climbers(store, cpus, stopping(2))
+    monkeypatch.setitem(vars(CLIMBING), "code", {**CLIMBING.code, "trial_toys.Walker": "0" * 16})
+    log = Log()
+    assert digests(run_climbers(store, cpus, log)) == digests(uninterrupted)
+    assert "resuming" not in log.phases()
+
+
 def test_a_run_stopped_again_and_again_goes_on_to_the_same_bits(
     store: Store, cpus: list[Any], uninterrupted: list[TrialResult], puts: Counter[int]
 ) -> None:

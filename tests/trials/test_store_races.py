@@ -6,6 +6,7 @@ import os
 import threading
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from itertools import permutations
 from pathlib import Path
 from typing import Any
@@ -140,6 +141,24 @@ def test_a_crashed_trial_that_another_process_ran_again_meanwhile_keeps_a_matchi
     assert store.put(make_result(), {"w": np.ones(1)}) == "stored"
     assert store.put(make_result(metrics={"mean_success": 0.0}), {"w": np.full(1, 2.0)}) == "differs"
     assert store.champion_of(store.get(make_result().id))["w"].tolist() == [1.0]
+
+
+def test_a_trial_that_ended_in_another_process_meanwhile_is_not_replaced_by_one_out_of_time(
+    store: Store, make_result: Make, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    late = make_result(status="timeout")
+    store.put(replace(late, timing={**late.timing, "limit": 1.0}), {})
+    mark = stores.mark
+
+    def in_between(root: Path) -> None:
+        monkeypatch.setattr(stores, "mark", mark)
+        assert store.put(make_result(), {}) == "stored"
+        mark(root)
+
+    monkeypatch.setattr(stores, "mark", in_between)
+    assert store.put(replace(late, timing={**late.timing, "limit": 2.0}), {}) == "differs"
+    (kept,) = store.records(late.id)
+    assert kept.status == "done"
 
 
 @pytest.fixture(params=["links", "no links"])

@@ -22,6 +22,7 @@ from evoclaims.judging.sample import UnreadableTrialError, checked
 from evoclaims.methods.training_loop import TrainingLoop
 from evoclaims.trials import crashes
 from evoclaims.trials.budget import Budget
+from evoclaims.trials.loop_process import Reporter
 from evoclaims.trials.progress import RunProgress
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.runner import run
@@ -131,6 +132,13 @@ def test_a_success_that_is_no_share_is_a_crash_that_says_so(store: Store, cpus: 
     for fine in (1.0, 1.0 + 1e-7, 0.0):
         (good,) = run(condition(toy_loops.in_points, **{name: fine, "return": 3.0}), range(1), store, cpus)
         assert (good.status, good.metrics[name], good.metrics["return"]) == ("done", fine, 3.0)
+
+
+def test_a_report_is_checked_however_soon_it_comes_after_another() -> None:
+    report = Reporter(100, lambda answer: None)
+    report(0, success=0.5)
+    with pytest.raises(UserError, match="A training loop reports a success of 7"):
+        report(1, success=7)
 
 
 def test_threads_of_a_loop_report_without_mixing_their_lines(store: Store, cpus: list[Any]) -> None:

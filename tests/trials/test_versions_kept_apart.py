@@ -19,7 +19,7 @@ from evoclaims.trials import checkpoint
 from evoclaims.trials.arrays import unpack
 from evoclaims.trials.batches import StoredTrials, drop_finished_checkpoints
 from evoclaims.trials.integrity import verify
-from evoclaims.trials.result import TrialResult
+from evoclaims.trials.result import TrialResult, digest
 from evoclaims.trials.runner import run
 from evoclaims.trials.spec import TrialSpec
 from evoclaims.trials.store import DamagedFileError, Store
@@ -173,6 +173,40 @@ def test_with_any_version_a_stored_trial_is_taken_as_it_is(
     upgraded()
     assert run(CLIMBING, SEEDS, store, cpus, any_version=True) == before
     assert set(puts.values()) == {1}
+
+
+def test_with_any_version_a_trial_that_ended_elsewhere_comes_before_one_out_of_time_here(
+    store: Store, cpus: list[Any], upgraded: Callable[[], None]
+) -> None:
+    ended = next(result for result in run_climbers(store, cpus) if result.status == "done")
+    upgraded()
+    late = replace(
+        ended,
+        status="timeout",
+        metrics={},
+        levels={},
+        champion="",
+        digest=digest("timeout", {}, {}, ended.curves, b""),
+        timing={**ended.timing, "limit": 1.0, "ended": "2999-01-01"},
+        provenance={**ended.provenance, "versions": {**ended.provenance["versions"], "numpy": "99"}},
+    )
+    assert store.put(late, {}) == "stored"
+    here = StoredTrials(store, CLIMBING).get(ended.seed)
+    assert here is not None
+    assert here.status == "timeout"
+    assert StoredTrials(store, CLIMBING, any_version=True).get(ended.seed) == ended
+
+
+def test_a_checkpoint_stays_where_trials_of_other_versions_stand_for_its_own(
+    store: Store, cpus: list[Any], upgraded: Callable[[], None]
+) -> None:
+    run_climbers(store, cpus)
+    upgraded()
+    with pytest.raises(StoppedError):
+        run_climbers(store, cpus, stopping(2))
+    (path,) = store.checkpoints.iterdir()
+    run(CLIMBING, SEEDS, store, cpus, any_version=True)
+    assert path.exists()
 
 
 def test_a_checkpoint_of_other_versions_is_neither_gone_on_with_nor_dropped(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
@@ -83,7 +84,7 @@ class RunMissing:
     def _is_outdated(self, spec: TrialSpec) -> bool:
         """Whether every record of a trial was made with versions other than this environment's."""
         versions = spec.condition.versions
-        if self.store.record_path(spec.id, versions).exists():  # without reading it: the usual case
+        if os.path.exists(self.store.record_path(spec.id, versions)):  # without reading it: the usual case
             return False
         return bool(self.store.others(spec.id, versions)) and self.store.made_with(spec.id, versions) is None
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import chain
@@ -103,16 +104,16 @@ def _place(project: Project, name: str) -> GitRevision | Store:
         try:
             revision = find_revision(name, project.reproduction.folder)
         except UserError:
-            if not path.is_dir():  # without a repository, the name can still be a folder
+            if not os.path.isdir(path):  # without a repository, the name can still be a folder
                 raise
-    if revision is not None and path.is_dir():
+    if revision is not None and os.path.isdir(path):
         raise UserError(
             f"{name} is both a folder and a git revision: write ./{name} for the folder, or "
             f"the revision's hash, {revision.sha[:12]}."
         )
     if revision is not None:
         return revision
-    if not path.is_dir():
+    if not os.path.isdir(path):
         raise UserError(f"There is neither a git revision nor a folder called {name}.")
     return open_store(name)
 

@@ -28,7 +28,7 @@ def write(path: Path, data: bytes, name: str = "file", *, ours: bool = False) ->
     Raises:
         UserError: when it cannot be written there.
     """
-    if path.is_dir():
+    if os.path.isdir(path):  # unlike `Path.is_dir`, also of what may not be looked at
         raise UserError(f"{path} is a folder; name a file in it with --out.")
     if ours and not os.path.lexists(path.parts[0]):
         write_once(Path(path.parts[0], ".gitignore"), b"*\n", f"Name another {name} with --out.")

@@ -41,7 +41,7 @@ def main(options: argparse.Namespace) -> int:
     if not shown:
         print(
             f"Nothing could be drawn: of {', '.join(names)} no trial of the {options.tier} tier is at hand. "
-            f"`evoclaims run --tier {options.tier}` runs them."
+            f"`evoclaims run --tier {options.tier}{f' --variant {options.variant}' * bool(options.variant)}` runs them."
         )
     return int(not shown)
 

@@ -33,9 +33,12 @@ from evoclaims.report.verdict_overview import overview
 from evoclaims.verdicts.robustness import matrix
 
 _TABLE: Final = re.compile(
-    r"(?P<begin>^<!-- evoclaims: (?P<kind>\w+) (?P<words>[^>]*?) ?-->\n).*?(?P<end>^<!-- evoclaims: end -->$)",
-    re.MULTILINE | re.DOTALL,
+    r"(?P<begin>^<!-- evoclaims: (?P<kind>\w+) (?P<words>[^>]*?) ?-->\n)"
+    r"(?:(?!<!-- evoclaims: ).*\n)*?"
+    r"(?P<end>^<!-- evoclaims: end -->$)",
+    re.MULTILINE,
 )
+_MARK: Final = re.compile(r"^<!-- evoclaims: .*-->$", re.MULTILINE)
 
 
 def main(options: argparse.Namespace) -> int:
@@ -61,13 +64,22 @@ def filled(text: str, project: Project) -> str:
     """Return a Markdown text with its tables written anew.
 
     Raises:
-        UserError: when it has none, or one of an unknown kind or of more than its kind can show.
+        UserError: when it has none, one without its end, or one of an unknown kind or of more than its kind can show.
     """
-    if not _TABLE.search(text):
+    whole = {found.start() for found in _TABLE.finditer(text)}
+    alone = [mark for mark in _MARK.finditer(text) if mark.start() not in whole and not _is_end(mark[0])]
+    if whole and alone:
+        raise UserError(f"{alone[0][0]} has no <!-- evoclaims: end --> before the next table: write one.")
+    if not whole:
         raise UserError(
             "There is no table to write: put <!-- evoclaims: verdicts full --> and <!-- evoclaims: end -->."
         )
     return _TABLE.sub(lambda found: f"{found['begin']}\n{_made(found, project)}\n\n{found['end']}", text)
+
+
+def _is_end(mark: str) -> bool:
+    """Whether a comment ends a table."""
+    return mark == "<!-- evoclaims: end -->"
 
 
 def _made(found: re.Match[str], project: Project) -> str:

@@ -6,18 +6,45 @@ Nothing heavy is imported here at the top: pytest loads this file in every run o
 from __future__ import annotations
 
 import inspect
+import unittest
 
 import pytest
 
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_pycollect_makeitem(collector: pytest.Module | pytest.Class, name: str, obj: object) -> None:
-    """Refuse a claim on a function whose name is none of a test, by the settings of the run."""
+    """Refuse a claim on a function, or in a class, whose name is none of a test, by the settings of the run."""
+    if inspect.isclass(obj):
+        if _is_left_out(collector, name, obj) and any(map(_is_claim, vars(obj).values())):
+            begun = " or ".join(collector.config.getini("python_classes"))
+            raise collector.CollectError(
+                f"{collector.nodeid}: the class {name} has a function with @claim(...), and pytest takes none of this "
+                f"name for one of tests, so that its claim would never be judged: begin its name with {begun}."
+            )
+        return
     if not inspect.isfunction(obj) or collector.funcnamefilter(name):
         return
-    if any(mark.name == "claim" for mark in getattr(obj, "pytestmark", ())):
+    if _is_claim(obj):
         begun = " or ".join(collector.config.getini("python_functions"))
         raise collector.CollectError(
             f"{collector.nodeid}: the function {name} has @claim(...), and pytest takes none of this name for a test, "
             f"so that its claim would never be judged: begin its name with {begun}."
         )
+
+
+def _is_claim(obj: object) -> bool:
+    """Whether something in a module or a class is a function with @claim(...)."""
+    return inspect.isfunction(obj) and any(mark.name == "claim" for mark in getattr(obj, "pytestmark", ()))
+
+
+def _is_left_out(collector: pytest.Module | pytest.Class, name: str, one: type) -> bool:
+    """Whether pytest collects no tests from a class that was written here: neither its own nor as those of an heir."""
+    here = collector.obj
+    heirs = (other for other in vars(here).values() if inspect.isclass(other) and other is not one)
+    return (
+        one.__module__ == getattr(here, "__module__", getattr(here, "__name__", ""))
+        and getattr(one, "__test__", True)
+        and not collector.classnamefilter(name)
+        and not issubclass(one, unittest.TestCase)
+        and not any(issubclass(heir, one) for heir in heirs)
+    )

@@ -22,7 +22,7 @@ from evoclaims.trials.progress import RunProgress, Watcher
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.result_making import provenance
 from evoclaims.trials.spec import Condition, TrialSpec
-from evoclaims.trials.store import DamagedFileError, Store
+from evoclaims.trials.store import DamagedFileError, Store, newest
 from evoclaims.trials.time_limit import answers, is_final
 
 
@@ -44,8 +44,12 @@ class StoredTrials:
 
     def get(self, seed: int) -> TrialResult | None:
         """Return the stored trial of a seed, or None; raise a `DamagedFileError` if it cannot be read."""
-        look = self.store.get if self.any_version else self.store.made_with
-        return look(TrialSpec(self.condition, seed).id, self.condition.versions)
+        trial = TrialSpec(self.condition, seed).id
+        here = self.store.made_with(trial, self.condition.versions)
+        if not self.any_version or is_final(here):
+            return here
+        there = self.store.records(trial)  # one that came to its end comes before one that did not, here or elsewhere
+        return newest(filter(is_final, there)) or here or newest(there)
 
     def has(self, seed: int) -> bool:
         """Whether the trial of a seed has come to its end."""
@@ -154,10 +158,11 @@ def drop_finished_checkpoints(stored: StoredTrials) -> None:
 
     def is_stored(seed: int) -> bool:
         try:
-            return stored.has(seed)
+            return of_these_versions.has(seed)
         except DamagedFileError:
             return False
 
+    of_these_versions = replace(stored, any_version=False)
     folder, here = stored.store.checkpoints, short_hash(stored.condition.versions)
     for header in checkpoint.sound_ones(folder, stored.condition.id):
         if header.versions in ("", here) and all(map(is_stored, header.seeds)):
@@ -225,6 +230,11 @@ def _started(run: Run, header: Header) -> Batch:
 
 
 def _platform(lanes: Lanes) -> str:
-    """Hash what determines a computation's bits; in the layout "vector", also the number of devices."""
+    """Hash what determines a computation's bits; in the layout "vector", also the number of devices.
+
+    So does the code of the project's own methods and tasks: a trial is not begun by one and ended by another.
+    """
     devices = len(lanes.devices) if lanes.layout == "vector" else None
-    return content_hash([what_fixes_bits(provenance(lanes.devices, lanes.condition)), lanes.layout, devices])
+    fixed = [what_fixes_bits(provenance(lanes.devices, lanes.condition)), lanes.layout, devices]
+    code = dict(lanes.condition.code)
+    return content_hash([*fixed, code] if code else fixed)

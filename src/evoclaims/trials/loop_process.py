@@ -60,14 +60,14 @@ class Reporter:
         self.last = step = int(step)
         if not 0 <= step <= MOST_STEPS:
             raise UserError(f"A training function reports a number of steps, and not {step}.")
+        told = numbers(values)
+        check_success("A training loop", told.get("success", 0.0), solves=False, advice="report such a share")
         kept = step >= self._next
         if not kept and time.monotonic() - self._told < TOLD_SECONDS:
             return
         if kept:
             self._next = (step // self._every + 1) * self._every
         self._told = time.monotonic()
-        told = numbers(values)
-        check_success("A training loop", told.get("success", 0.0), solves=False, advice="report such a share")
         self._answer(LoopReport(step, told, kept))
 
 

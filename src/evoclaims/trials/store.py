@@ -193,6 +193,9 @@ class Store(StoreFiles):
         if present is None and first is not None:  # another process was faster
             self._remove_champion_beside(first, sealed)
             return self.put_packed(result, packed)
+        if first is not None and not _gives_way(first, result):  # another process has ended the trial meanwhile
+            self._remove_champion_beside(first, sealed)
+            return self.put_packed(result, packed)
         write_atomically(path, record, ELSEWHERE)
         return "stored"
 

@@ -6,6 +6,7 @@ import contextlib
 import importlib.util
 import io
 import math
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -98,6 +99,28 @@ def test_a_policy_of_a_training_loop_acts_as_the_environment_wants_it() -> None:
 
 
 @with_gymnax
+@pytest.mark.parametrize("episode_steps", [5, 9])
+def test_the_limit_of_an_environment_of_gymnax_truncates_an_episode_and_its_end_terminates_it(
+    episode_steps: int,
+) -> None:
+    def last(limit: int, action: float) -> Any:
+        cart = GymnaxTask(
+            "CartPole-v1", {"max_steps_in_episode": limit}, episode_steps=50 if limit > 9 else episode_steps
+        )
+        step = jax.jit(cart.step)
+        state = cart.reset(jax.random.key(0), jnp.int32(0))
+        for turn in range(cart.episode_steps):
+            state = step(state, jnp.array([1.0, 0.0])[:: 1 if turn % 2 and action else -1])
+            if state.terminated | state.truncated:
+                break
+        return int(state.inner.time), bool(state.terminated), bool(state.truncated)
+
+    assert last(5, 1.0) == (5, False, True)  # steered to and fro
+    steps, terminated, truncated = last(500, 0.0)  # always to one side: it falls
+    assert (5 < steps < 20, terminated, truncated) == (True, True, False)
+
+
+@with_gymnax
 @pytest.mark.slow
 def test_our_actions_choose_those_of_the_environment() -> None:
     pendulum = GymnaxTask("Pendulum-v1", episode_steps=3)
@@ -143,7 +166,7 @@ def test_a_number_that_is_not_finite_ends_the_episode() -> None:
     class Breaking(BraxTask):
         def advance(self, key: Any, state: Any, action: Any) -> Any:
             moment = super().advance(key, state, action)
-            return type(moment)(moment.state, moment.observation * jnp.nan, moment.reward, moment.terminated)
+            return replace(moment, observation=moment.observation * jnp.nan)
 
     task = Breaking("fast", episode_steps=12)
     start = task.reset(jax.random.key(0), jnp.int32(0))
@@ -151,6 +174,8 @@ def test_a_number_that_is_not_finite_ends_the_episode() -> None:
     assert broken.terminated
     assert broken.reward == 0.0
     assert (broken.observation == start.observation).all()
+    for before, after in zip(*map(jax.tree.leaves, (start.inner.state, broken.inner.state)), strict=True):
+        assert np.array_equal(before, after, equal_nan=True)
 
 
 def test_wrong_names_and_what_map_elites_needs_are_sentences() -> None:

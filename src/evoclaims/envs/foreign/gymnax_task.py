@@ -17,14 +17,14 @@ from evoclaims.envs.foreign.jax_task import JaxTask, Moment
 
 @dataclass(frozen=True, kw_only=True)
 class GymnaxTask(JaxTask):
-    """An environment of gymnax (1.0 or newer), such as `GymnaxTask("CartPole-v1", episode_steps=500)`.
+    """An environment of gymnax, such as `GymnaxTask("CartPole-v1", episode_steps=500)`.
 
     Attributes:
         environment_id: as `gymnax.make` takes it.
         parameters: fields of the environment's parameters that differ from the default.
     """
 
-    revision: ClassVar[int] = 1
+    revision: ClassVar[int] = 2
     packages: ClassVar[tuple[str, ...]] = ("gymnax",)
 
     parameters: Mapping[str, Any] = field(default_factory=dict, hash=False, kw_only=False)
@@ -61,12 +61,18 @@ class GymnaxTask(JaxTask):
         return Moment(state=state, observation=observation, reward=jnp.zeros(()), terminated=no)
 
     def advance(self, key: PRNGKeyArray, state: Any, action: Array) -> Moment:
-        """Act once; the environment's own limit of steps, if lower than `episode_steps`, ends the episode too."""
+        """Act once; the environment's own limit of steps truncates the episode, too."""
         environment, parameters = self._made
-        observation, state, reward, terminated, _ = environment.step_env(key, state, action, parameters)
+        observation, state, reward, done, _ = environment.step_env(key, state, action, parameters)
+        done, truncated = jnp.asarray(done, bool), jnp.zeros((), bool)
+        limit = getattr(parameters, "max_steps_in_episode", None)
+        if limit is not None and hasattr(state, "time"):  # gymnax does not say which of both has ended an episode
+            longer = parameters.replace(max_steps_in_episode=limit + 1)
+            truncated = done & (state.time >= limit) & ~jnp.asarray(environment.is_terminal(state, longer), bool)
         return Moment(
             state=state,
             observation=observation,
             reward=jnp.asarray(reward, jnp.float32),
-            terminated=jnp.asarray(terminated, bool),
+            terminated=done & ~truncated,
+            truncated=truncated,
         )

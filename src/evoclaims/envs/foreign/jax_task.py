@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from abc import abstractmethod
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
@@ -33,12 +33,14 @@ class Moment:
         observation: its own, of any shape.
         reward: of the step.
         terminated: whether it has ended the episode.
+        truncated: whether the episode is over without an end, by a limit of its own.
     """
 
     state: Any
     observation: Array
     reward: Float[Array, ""]
     terminated: Bool[Array, ""]
+    truncated: Bool[Array, ""] = field(default_factory=lambda: jnp.zeros((), bool))
 
 
 @pytree
@@ -171,7 +173,7 @@ class JaxTask(ForeignTask):
             observation=jnp.where(sound, observation, state.observation),
             reward=jnp.where(sound, moment.reward, 0.0),
             terminated=terminated,
-            truncated=(reached.time >= self.episode_steps) & ~terminated,
+            truncated=(moment.truncated | (reached.time >= self.episode_steps)) & ~terminated,
             inner=reached,
         )
 
