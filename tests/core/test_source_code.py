@@ -92,9 +92,11 @@ def found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Found]:
         for name in names:
             sys.modules.pop(name, None)
 
-    def find(old: str = "", new: str = "", make: Callable[[Any], Any] = lambda module: module.Own()) -> dict[str, str]:
-        assert old in METHOD + HELPERS
-        for name, text in zip(names, (METHOD, HELPERS), strict=True):
+    def find(
+        old: str = "", new: str = "", make: Callable[[Any], Any] = lambda module: module.Own(), method: str = METHOD
+    ) -> dict[str, str]:
+        assert old in method + HELPERS
+        for name, text in zip(names, (method, HELPERS), strict=True):
             (tmp_path / f"{name}.py").write_text(text.replace(old, new) if old else text, encoding="utf-8")
         forget()
         importlib.invalidate_caches()
@@ -123,6 +125,21 @@ def test_what_computes_changes_the_hash_of_the_method(found: Found, old: str, ne
     assert before.keys() == after.keys() == {"its_method.Own", "its_helpers.Part"}
     assert before["its_method.Own"] != after["its_method.Own"]
     assert before["its_helpers.Part"] == after["its_helpers.Part"]
+
+
+CHAIN = ("import its_helpers\n", "import sys\nimport its_helpers\nhere = sys.modules[__name__]\n")
+CHAINED = METHOD.replace(*CHAIN).replace("x + its_helpers.shift", "x + here.its_helpers.shift")
+
+
+def test_what_is_named_through_several_modules_is_part_of_it(found: Found) -> None:
+    before, after = found(METHOD, CHAINED), found("return far + 1", "return far + 2", method=CHAINED)
+    assert before["its_method.Own"] != after["its_method.Own"]
+
+
+@pytest.mark.parametrize("table", ["[0.5, {0}]", "{{'rate': {0}}}", "(None, [{0}])"])
+def test_lists_and_tables_of_constants_are_part_of_it(found: Found, table: str) -> None:
+    one, other = (found("RATE = 0.5", f"RATE = {table.format(value)}") for value in (1, 2))
+    assert one["its_method.Own"] != other["its_method.Own"]
 
 
 def test_the_base_of_a_part_is_part_of_it(found: Found) -> None:

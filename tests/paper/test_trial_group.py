@@ -128,6 +128,14 @@ def test_measures_and_events_have_names_of_their_own_since_fingerprints_hash_the
     assert len(set(names)) == len(names)
 
 
+def test_events_of_two_numbers_have_two_names_however_alike_the_numbers_are(group: Any) -> None:
+    made = group(lambda seed: 1.0)
+    near, fifth, half = (made.last_success_is(value).describe() for value in (0.833333, 5 / 6, 0.5))
+    assert near != fifth
+    assert half.endswith("success on the last level is 0.5")
+    assert made.success_everywhere_is(0.833333).describe() != made.success_everywhere_is(5 / 6).describe()
+
+
 def test_a_measure_made_on_the_spot_reads_what_it_is_told_to(group: Any) -> None:
     made = group(lambda seed: seed / 2)
     spent = made.measure("steps spent", lambda trial: trial.metrics["environment_steps"], "lower")

@@ -123,8 +123,12 @@ def _bare(one: Any) -> Any:
 
 
 def _is_constant(value: Any) -> bool:
-    """Whether a value is a number, a word, or a tuple of these."""
-    return all(map(_is_constant, value)) if isinstance(value, tuple) else isinstance(value, bool | int | float | str)
+    """Whether a value is None, a number, a word, or a tuple, list or table of these."""
+    if isinstance(value, dict):
+        return all(map(_is_constant, (*value, *value.values())))
+    if isinstance(value, tuple | list):
+        return all(map(_is_constant, value))
+    return value is None or isinstance(value, bool | int | float | str)
 
 
 def _tree(one: Any) -> ast.Module:
@@ -165,9 +169,17 @@ def _is_in_the_id(statement: ast.AnnAssign) -> bool:
 def _named(tree: ast.Module, there: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
     """Yield what a module has of the names that code uses, and what modules have that it names as "module.name"."""
     for node in ast.walk(tree):
-        if isinstance(node, ast.Name) and node.id in there:
-            yield node.id, there[node.id]
-        elif isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name):
-            holder = there.get(node.value.id)
-            if isinstance(holder, ModuleType) and hasattr(holder, node.attr):
-                yield f"{node.value.id}.{node.attr}", getattr(holder, node.attr)
+        words: list[str] = []
+        held: Any = node
+        while isinstance(held, ast.Attribute):
+            words.insert(0, held.attr)
+            held = held.value
+        if not isinstance(held, ast.Name) or held.id not in there:
+            continue
+        name, value = held.id, there[held.id]
+        for word in words:
+            if not isinstance(value, ModuleType) or not hasattr(value, word):
+                break
+            name, value = f"{name}.{word}", getattr(value, word)
+        else:
+            yield name, value

@@ -176,9 +176,15 @@ class TrialGroup:
 
     def last_success_is(self, value: float) -> Event:
         """The final policy's success on the last level is exactly `value`."""
-        return self.event(f"success on the last level is {value:g}", lambda t: t.metrics["last_success"] == value)
+        return self.event(f"success on the last level is {_exact(value)}", lambda t: t.metrics["last_success"] == value)
 
     def success_everywhere_is(self, value: float) -> Event:
         """The final policy's success is exactly `value` on every level."""
-        name = "solves every level" if value == 1.0 else f"success is {value:g} on every level"
+        name = "solves every level" if value == 1.0 else f"success is {_exact(value)} on every level"
         return self.event(name, lambda t: all(x == value for x in t.levels["success"]))
+
+
+def _exact(value: float) -> str:
+    """Return a number as briefly as it stays what it is: an event's name stands for it in fingerprints."""
+    brief = f"{value:g}"
+    return brief if float(brief) == value else repr(float(value))
