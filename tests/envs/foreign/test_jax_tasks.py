@@ -166,7 +166,8 @@ def test_a_number_that_is_not_finite_ends_the_episode() -> None:
     class Breaking(BraxTask):
         def advance(self, key: Any, state: Any, action: Any) -> Any:
             moment = super().advance(key, state, action)
-            return replace(moment, observation=moment.observation * jnp.nan)
+            moved = jax.tree.map(lambda leaf: leaf + jnp.ones_like(leaf), moment.state)
+            return replace(moment, state=moved, observation=moment.observation * jnp.nan)
 
     task = Breaking("fast", episode_steps=12)
     start = task.reset(jax.random.key(0), jnp.int32(0))
