@@ -9,9 +9,12 @@ import pytest
 ENGINE = "*trials?runner.py:*"
 
 
-def test_of_an_error_in_a_method_the_projects_lines_are_shown_and_not_the_engines(project: Any) -> None:
+@pytest.mark.parametrize("workers", [(), ("-n1",)])
+def test_of_an_error_in_a_method_the_projects_lines_are_shown_and_not_the_engines(
+    project: Any, workers: tuple[str, ...]
+) -> None:
     project.write(a="error")
-    result = project.run()
+    result = project.run(*workers)
     result.stdout.fnmatch_lines(
         ['>*raise RuntimeError("out of order")', "E*RuntimeError: out of order", "tiny_paper.py:*: RuntimeError"]
     )

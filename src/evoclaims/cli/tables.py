@@ -38,7 +38,7 @@ _TABLE: Final = re.compile(
     r"(?P<end>^<!-- evoclaims: end -->$)",
     re.MULTILINE,
 )
-_MARK: Final = re.compile(r"^<!-- evoclaims: .*-->$", re.MULTILINE)
+_BEGIN: Final = re.compile(r"^<!-- evoclaims: (?!end -->).*-->$", re.MULTILINE)
 
 
 def main(options: argparse.Namespace) -> int:
@@ -67,19 +67,14 @@ def filled(text: str, project: Project) -> str:
         UserError: when it has none, one without its end, or one of an unknown kind or of more than its kind can show.
     """
     whole = {found.start() for found in _TABLE.finditer(text)}
-    alone = [mark for mark in _MARK.finditer(text) if mark.start() not in whole and not _is_end(mark[0])]
+    alone = [begin[0] for begin in _BEGIN.finditer(text) if begin.start() not in whole]
     if whole and alone:
-        raise UserError(f"{alone[0][0]} has no <!-- evoclaims: end --> before the next table: write one.")
+        raise UserError(f"{alone[0]} has no <!-- evoclaims: end --> before the next table: write one.")
     if not whole:
         raise UserError(
             "There is no table to write: put <!-- evoclaims: verdicts full --> and <!-- evoclaims: end -->."
         )
     return _TABLE.sub(lambda found: f"{found['begin']}\n{_made(found, project)}\n\n{found['end']}", text)
-
-
-def _is_end(mark: str) -> bool:
-    """Whether a comment ends a table."""
-    return mark == "<!-- evoclaims: end -->"
 
 
 def _made(found: re.Match[str], project: Project) -> str:

@@ -95,13 +95,11 @@ def pytest_runtest_makereport(
     said = f"{claimed.name} ({claimed.tier}) is {claimed.outcome}: {claimed.reason}"
     undecided = claimed.outcome == "inconclusive" and item.config.getoption("claims_undecided") == "fail"
     failed = claimed.failed or (undecided and not claimed.as_expected)
-    if report.failed and not (
-        call.excinfo or failed
-    ):  # by pytest: what xfail(strict=True) expects to fail, or a part did
-        pass
-    elif report.when == "setup" and not failed:  # or the test would be called without its fixtures
+    # By pytest itself: what xfail(strict=True) expects to fail has not, or a part of the test has.
+    failed_by_pytest = report.failed and not (call.excinfo or failed)
+    if report.when == "setup" and not failed:  # or the test would be called without its fixtures
         report.outcome, report.longrepr = "skipped", (item.location[0], item.location[1] or 0, said)
-    else:
+    elif not failed_by_pytest:
         report.outcome = "failed" if failed else "passed"
         if call.excinfo is None or call.excinfo.errisinstance(UserError):
             report.longrepr = shown(said) if failed else None
@@ -164,8 +162,8 @@ def pytest_report_teststatus(
 
     claimed = ClaimReport.from_json(plain)
     outcome = claimed.outcome
-    of_pytest = report.failed and (claimed.as_expected or outcome == Outcome.SUPPORTED)
-    if outcome == Outcome.NOT_RUN or of_pytest:  # skipped, or failed by pytest itself: in its own words
+    failed_by_pytest = report.failed and (claimed.as_expected or outcome == Outcome.SUPPORTED)
+    if outcome == Outcome.NOT_RUN or failed_by_pytest:  # in pytest's own words
         return None
     words = f"{outcome} (accepted)" if claimed.as_expected else str(outcome)
     colour = {"red": True} if report.failed else {"green": True} if outcome == Outcome.SUPPORTED else {"yellow": True}

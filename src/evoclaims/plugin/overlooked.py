@@ -15,7 +15,7 @@ import pytest
 def pytest_pycollect_makeitem(collector: pytest.Module | pytest.Class, name: str, obj: object) -> None:
     """Refuse a claim on a function, or in a class, whose name is none of a test, by the settings of the run."""
     if inspect.isclass(obj):
-        if _is_left_out(collector, name, obj) and any(map(_is_claim, vars(obj).values())):
+        if any(map(_is_claim, vars(obj).values())) and _is_left_out(collector, name, obj):
             begun = " or ".join(collector.config.getini("python_classes"))
             raise collector.CollectError(
                 f"{collector.nodeid}: the class {name} has a function with @claim(...), and pytest takes none of this "
@@ -39,12 +39,10 @@ def _is_claim(obj: object) -> bool:
 
 def _is_left_out(collector: pytest.Module | pytest.Class, name: str, one: type) -> bool:
     """Whether pytest collects no tests from a class that was written here: neither its own nor as those of an heir."""
-    here = collector.obj
-    heirs = (other for other in vars(here).values() if inspect.isclass(other) and other is not one)
     return (
-        one.__module__ == getattr(here, "__module__", getattr(here, "__name__", ""))
+        one.__module__ == collector.module.__name__
         and getattr(one, "__test__", True)
         and not collector.classnamefilter(name)
         and not issubclass(one, unittest.TestCase)
-        and not any(issubclass(heir, one) for heir in heirs)
+        and not one.__subclasses__()
     )

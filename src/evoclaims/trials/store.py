@@ -190,10 +190,7 @@ class Store(StoreFiles):
         if present is None and write_once(path, record, ELSEWHERE):
             return "stored"
         first = self.present(result)
-        if present is None and first is not None:  # another process was faster
-            self._remove_champion_beside(first, sealed)
-            return self.put_packed(result, packed)
-        if first is not None and not _gives_way(first, result):  # another process has ended the trial meanwhile
+        if first is not None and (present is None or not _gives_way(first, result)):  # another process was faster
             self._remove_champion_beside(first, sealed)
             return self.put_packed(result, packed)
         write_atomically(path, record, ELSEWHERE)
