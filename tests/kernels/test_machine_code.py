@@ -16,14 +16,14 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from evoclaims.kernels import machine_code
-from evoclaims.kernels.one_kernel import one_kernel
+from evoclaims.kernels.call.one_kernel import one_kernel
+from evoclaims.kernels.emit import machine_code
 
 TEXT = "define i32 @seven(i32 %x) {\n%y = mul i32 %x, 7\nret i32 %y\n}\n"
 NEW_LINKER = machine_code._linker.__wrapped__
 PROCESS = """
 import sys, time, jax
-from evoclaims.kernels import machine_code
+from evoclaims.kernels.emit import machine_code
 
 def slowly(text, compiled=machine_code.compiled):
     print("compiles", flush=True)

@@ -19,7 +19,7 @@ from evoclaims.core.errors import UserError
 from evoclaims.core.keys import TRAINING, trial_key
 from evoclaims.core.pytree import strong
 from evoclaims.envs.base import Episode, MisfitError, Task, TaskState, fitting
-from evoclaims.kernels.random_bits import fast
+from evoclaims.kernels import kernel_prng
 from evoclaims.methods.base import Method, Policy, Progress
 from evoclaims.trials.success import SHARES
 
@@ -160,7 +160,7 @@ def check_scores(task: Task, final: Episode) -> None:
 
 def _key(seed: Int[Array, ""]) -> Array:
     """Return a key for tracing."""
-    return fast(trial_key(seed, TRAINING))
+    return kernel_prng(trial_key(seed, TRAINING))
 
 
 def _check_task_state(task: Task, function: str, state: TaskState) -> None:

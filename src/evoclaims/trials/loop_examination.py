@@ -12,7 +12,7 @@ from jaxtyping import Array, Int
 
 from evoclaims.core.keys import EVALUATION, trial_key
 from evoclaims.envs.base import Episode, Task
-from evoclaims.kernels.random_bits import fast
+from evoclaims.kernels import kernel_prng
 from evoclaims.trials.devices import MATMUL_PRECISION
 from evoclaims.trials.loop_messages import Scores
 from evoclaims.trials.rollout import score_every_level
@@ -26,7 +26,7 @@ def examined(task: Task, policy: Callable[[Any], Any], seed: int) -> Scores:
     fitted = _fitted(task, policy)
 
     def score(number: Int[Array, ""]) -> Episode:
-        return score_every_level(task, fitted, fast(trial_key(number, EVALUATION)))
+        return score_every_level(task, fitted, kernel_prng(trial_key(number, EVALUATION)))
 
     with jax.default_matmul_precision(MATMUL_PRECISION):
         final: Episode = jax.device_get(jax.jit(score)(np.int32(seed)))

@@ -11,9 +11,8 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int
 
 from evoclaims.core.pytree import pytree
-from evoclaims.kernels.grouped import GroupKernel
-from evoclaims.kernels.one_kernel import one_kernel
-from evoclaims.methods.neat.homology_kernel import write_look_up, write_search
+from evoclaims.kernels import GroupKernel, one_kernel
+from evoclaims.kernels.genomes.homology import write_look_up, write_search
 from evoclaims.networks.genome import Connections, Genome, Nodes
 
 Weights = Callable[[Genome, Array, Array], Array]

@@ -14,9 +14,9 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int, PRNGKeyArray
 
 from evoclaims.core.pytree import select
-from evoclaims.kernels.grouped import GroupKernel
+from evoclaims.kernels import GroupKernel
+from evoclaims.kernels.genomes.structure import PASSED_OVER, ordering_kernel, removal_kernel
 from evoclaims.methods.neat.settings import Mutation
-from evoclaims.methods.neat.structure_kernels import PASSED_OVER, ordering_kernel, removal_kernel
 from evoclaims.networks.genome import EMPTY, Connections, Genome, Nodes
 
 
