@@ -307,4 +307,4 @@ def test_before_the_first_accept_there_is_nothing_to_compare_with(evoclaims: Evo
     for arguments in ((), ("--timeline",)):
         status, _, err = evoclaims("compare", *arguments)
         assert status == 2
-        assert "No verdict has been accepted yet: `evoclaims accept` accepts those of now." in err
+        assert "No verdict has been accepted yet: run `evoclaims accept` to accept the current ones." in err

@@ -111,7 +111,7 @@ def test_a_project_with_a_training_loop_comes_to_a_verdict_and_all_commands_know
     assert cli.main(["run", "--tier=full", "--trials=1"]) == 1
     told = capsys.readouterr().out
     assert "seed 0: crashed after 0 environment steps: ZeroDivisionError: division by zero" in told
-    assert "what seed 0 said last:\n" in told
+    assert "what seed 0 printed last:\n" in told
     assert 'numpy_loops.py", line 2, in hill_climbing\n' in told
 
 

@@ -74,7 +74,7 @@ class Asserted:
 
 @dataclass(frozen=True)
 class ClaimPower:
-    """A claim's power and the outcome that it should have; or, as its `trouble`, why the power cannot be told."""
+    """A claim's power and the outcome that it should have; or, as its `trouble`, why the power cannot be computed."""
 
     name: str
     expected: Outcome

@@ -35,7 +35,7 @@ def judged(
 
 
 def unjudged(test: ClaimTest, outcome: Outcome, reason: str, *, has_test: bool = True) -> ClaimReport:
-    """Build the report of a claim without a verdict: its test broke or was skipped, or there is none at this tier."""
+    """Build the report of a claim without a verdict: its test broke or was skipped, or this tier has no test."""
     return ClaimReport(
         claim=test.claim.id,
         case=test.case,

@@ -83,7 +83,7 @@ def workload(session: Session, tests: Mapping[pytest.Item, ClaimTest]) -> Worklo
     claims, works = dict[str, tuple[str, ...]](), dict[str, Work]()
     for item, test in tests.items():
         claims[item.nodeid] = ()
-        with suppress(Exception):  # what is wrong with a method or a task is told when the claim is judged
+        with suppress(Exception):  # an error of a method or a task is reported when the claim is judged
             groups = {group.fingerprint: group for group in _needed(session, item, test)}
             for condition_id in groups.keys() - works.keys():
                 works[condition_id] = _work(session, session.fetch, test.tier, groups[condition_id], platform)
@@ -94,7 +94,7 @@ def workload(session: Session, tests: Mapping[pytest.Item, ClaimTest]) -> Worklo
 def weights(works: Iterable[Work]) -> dict[Work, float]:
     """Return about how many seconds each condition takes, as far as it can be guessed, to tell long from short ones.
 
-    Where no trial tells, its environment steps do, at the middle pace of the others.
+    Without a timing, its environment steps are used, at the middle pace of the others.
     """
     works = list(works)
     scale = scale_of((work.here, work.elsewhere) for work in works) or 1.0
@@ -128,8 +128,8 @@ def seconds_of(here: float | None, elsewhere: float | None, scale: float | None)
 def _needed(session: Session, item: pytest.Item, test: ClaimTest) -> Sequence[TrialGroup]:
     """Return the trials that a claim needs: its test is called once, as far as it gets without trials.
 
-    Nothing is known of a test with fixtures of its own, which are for the run itself. What a test raises is told when
-    it is run.
+    Nothing is known of a test with fixtures of its own, which are for the run itself. What a test raises is reported
+    when it is run.
     """
     found: list[TrialGroup] = []
     judged: list[Assertion] = []
@@ -170,7 +170,7 @@ def _work(session: Session, fetch: RunMissing, tier: str, group: TrialGroup, pla
     timed = len(missing) or len(seeds)
     steps = condition.environment_steps * len(missing)
     here, elsewhere, slow = took(_made_here(session.store, condition, seeds), platform), None, None
-    with suppress(UserError):  # what is wrong with the reference trials is told at the end of the run
+    with suppress(UserError):  # errors of the reference trials are reported at the end of the run
         folder = session.reproduction.references
         elsewhere = took(references.of_condition(folder, tier, group.method, group.task, condition.id), platform)
         if platform == "cpu" and steps >= LONG:

@@ -197,14 +197,16 @@ def _keeping(add: _Add) -> None:
     reference = add("reference", "write the stored trials of a tier as the committed reference trials")
     reference.add_argument("--variant", metavar="NAME", default="", help="those that only this variant has")
 
-    add("accept", "write the verdicts of now into verdicts.toml, as accepted; exit status 1 when that changed the file")
+    add(
+        "accept", "write the current verdicts into verdicts.toml, as accepted; exit status 1 when that changed the file"
+    )
 
 
 def _comparing(add: _Add) -> None:
     """Add what compares verdicts, of dates or of environments."""
     compare = add(
         "compare",
-        "show what changed: verdicts of now against the accepted ones; or a git revision against the working tree; or "
+        "show what changed: current verdicts against the accepted ones; or a git revision against the working tree; or "
         "a store (OLD) against --storage; or two revisions, or two stores, against each other; run nothing",
     )
     compare.add_argument("places", nargs="*", metavar="OLD [NEW]", help="a git revision or a folder of trials")

@@ -31,7 +31,7 @@ KEPT = "environments"
 """Folder of the environments, in the store."""
 
 LOG = "pytest.log"
-"""What the last run in an environment has said, in its folder."""
+"""The output of the last run in an environment, in its folder."""
 
 
 class NotJudgedError(Exception):
@@ -87,14 +87,14 @@ class Elsewhere:
             with tempfile.TemporaryDirectory() as folder:  # another command may use the environment at the same time
                 verdicts = Path(folder) / "verdicts.json"
                 command = self._command(environment, store, verdicts)
-                status, said = _watched(command, self.root, environment.folder / LOG)
+                status, output = _watched(command, self.root, environment.folder / LOG)
                 reports = _reports(verdicts)
         except BrokenPipeError:  # nobody reads what this command prints
             raise
         except OSError as error:  # a full disk
             raise NotJudgedError(f"pytest cannot be run there ({error})") from error
         if not reports or status not in (0, 1, 5):  # pytest's: all well, failures, and nothing measured
-            raise NotJudgedError(f"pytest ended with {status}: {printable(reason(said))}")
+            raise NotJudgedError(f"pytest ended with {status}: {printable(reason(output))}")
         return reports
 
     def _command(self, environment: Environment, store: Store, verdicts: Path) -> list[str]:
@@ -123,7 +123,7 @@ def _watched(command: list[str], folder: Path, log: Path) -> tuple[int, str]:
     """Run a command, write what it says to a file, and show the newest line on a terminal.
 
     Returns:
-        Its status and all that it said.
+        Its exit status and its output.
     """
     write, columns = terminal()
     line_shown = LiveLine(write if columns else lambda _: None, columns)

@@ -131,8 +131,8 @@ def _numbers(project: Project, words: list[str]) -> str:
     variants = ("", *project.reproduction.variants) if rest else ("",)
     found = replications(project.archive, project.reproduction, tier, variants)
     (papers,) = project.judge_sessions([(project.as_published(tier), tier)])
-    said = [*replication_cells.totals(found), *replication_cells.put_to_the_paper(papers)]
-    return "\n\n".join((numbers(found), "\n".join(f"* {literal(line)}" for line in said)))
+    lines = [*replication_cells.totals(found), *replication_cells.put_to_the_paper(papers)]
+    return "\n\n".join((numbers(found), "\n".join(f"* {literal(line)}" for line in lines)))
 
 
 _KINDS: Final[Mapping[str, Callable[[Project, list[str]], str]]] = {

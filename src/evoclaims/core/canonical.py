@@ -19,7 +19,7 @@ WHOLE: Final = re.compile(r"int|tuple\[int(, (int|\.\.\.))*\]")
 def as_plain(value: Any) -> Any:
     """Turn frozen dataclasses, tuples and scalars into plain JSON values.
 
-    A dataclass becomes its fields, and the name of its class if that is none of this package's, where no two with the
+    A dataclass becomes its fields, and the name of its class if that is not of this package, where no two with the
     same fields mean different things. Fields whose metadata holds `canonical=False` are left out. NaN and the
     infinities become the strings "nan", "inf", "-inf", since JSON cannot express them.
 

@@ -157,7 +157,7 @@ def checked(version: str) -> str:
     """Return a version as it was written.
 
     Raises:
-        UserError: when it is none.
+        UserError: when it is invalid.
     """
     try:
         Version(version)
@@ -170,7 +170,7 @@ def checked_name(package: str) -> str:
     """Return the normalized name of a package.
 
     Raises:
-        UserError: when it is none; an installer might take it for an option, or for nothing to install.
+        UserError: when it is invalid; an installer might take it for an option, or for nothing to install.
     """
     try:
         return canonicalize_name(package, validate=True)
@@ -264,7 +264,7 @@ def _run(command: Sequence[str]) -> str:
     """Run a command and return what it printed.
 
     Raises:
-        NotInstallableError: with the last thing that it said, when it fails.
+        NotInstallableError: with the last line of its output, when it fails.
     """
     environment = {name: value for name, value in os.environ.items() if name != "PYTHONHOME"}
     done = subprocess.run(command, capture_output=True, text=True, errors="replace", env=environment, check=False)
@@ -273,9 +273,9 @@ def _run(command: Sequence[str]) -> str:
     return done.stdout
 
 
-def reason(said: str) -> str:
+def reason(output: str) -> str:
     """Return in a line why a command has failed: its last error with what belongs to it, or else its last line."""
-    lines = [line.rstrip() for line in said.splitlines() if line.strip(" =\t")]
+    lines = [line.rstrip() for line in output.splitlines() if line.strip(" =\t")]
     errors = [index for index, line in enumerate(lines) if _ERROR.match(line)]
     first = errors[-1] if errors else len(lines) - 1
     more = itertools.takewhile(lambda line: line.startswith((" ", "╰", "│")), lines[first + 1 :])

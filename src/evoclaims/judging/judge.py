@@ -145,7 +145,7 @@ def _shortage(assertion: Assertion, look: Look, design: Design) -> str:
     for source in assertion.sources():
         existing = source.existing if isinstance(source, Limited) else None
         if existing is not None and design.seeds(look.n)[-1] >= existing:
-            few = f"there are {existing}" if existing > 1 else "there is 1" if existing else "there is none"
+            few = f"there are {existing}" if existing > 1 else "there is 1" if existing else "there are none"
             return f"underpowered: needs n = {design.seeds(look.n)[-1] + 1} trials of {source.label}, and {few}"
     return ""
 
@@ -158,7 +158,7 @@ def _crashed(assertion: Assertion, trials: Trials) -> str:
         for trial in trials[source.fingerprint]
         if trial.status == "crashed"
     ]
-    reason = next((f"; the first: {said}" for _, said in crashed if said), "")
+    reason = next((f"; the first: {why}" for _, why in crashed if why), "")
     return f"trials crashed: {', '.join(name for name, _ in crashed)}{reason}" if crashed else ""
 
 
@@ -167,8 +167,8 @@ def _copied(assertion: Assertion, trials: Trials) -> str:
 
     Ten copies of a trial say as much as one, and a test would take them for ten draws. What may be the same by chance
     (a success, a network of few bits) is not enough: champions and whole training curves are, and of a training loop,
-    which keeps no champion, all that it has told, if that is more than whole numbers. A method may say that it draws
-    nothing.
+    which keeps no champion, all that it has reported, if that is more than whole numbers. A method may declare that it
+    draws nothing.
     """
     for source in assertion.drawn():
         first, *others = trials[source.fingerprint]
@@ -177,8 +177,8 @@ def _copied(assertion: Assertion, trials: Trials) -> str:
         if first.champion:
             alike, same = all((a.champion, a.curves) == (first.champion, first.curves) for a in others), "champion"
         else:
-            told = bool(first.digest) and _is_telling(first)  # a pilot keeps no digest
-            alike, same = told and all(a.digest == first.digest for a in others), "metrics"
+            reported = bool(first.digest) and _is_telling(first)  # a pilot keeps no digest
+            alike, same = reported and all(a.digest == first.digest for a in others), "metrics"
         if alike:
             return (
                 f"all {1 + len(others)} trials of {source.label} are copies of one: the same {same} and training "
@@ -190,9 +190,9 @@ def _copied(assertion: Assertion, trials: Trials) -> str:
 
 
 def _is_telling(trial: TrialResult) -> bool:
-    """Whether a training loop has told a number that two of its trials hardly share by chance."""
-    told = (*trial.metrics.values(), *itertools.chain.from_iterable(trial.curves.values()))
-    return TRAINED_BY in trial.provenance and not all(float(x).is_integer() for x in told if math.isfinite(x))
+    """Whether a training loop reported a number that two of its trials hardly share by chance."""
+    reported = (*trial.metrics.values(), *itertools.chain.from_iterable(trial.curves.values()))
+    return TRAINED_BY in trial.provenance and not all(float(x).is_integer() for x in reported if math.isfinite(x))
 
 
 def _without_result(assertion: Assertion, trials: Trials) -> str:

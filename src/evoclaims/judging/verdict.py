@@ -58,7 +58,7 @@ class PValues:
     refuted: float
 
     def __post_init__(self) -> None:
-        """Reject what is no probability, such as that of a kind of one's own."""
+        """Reject an invalid probability, for example from a custom kind."""
         if not (0.0 <= self.supported <= 1.0 and 0.0 <= self.refuted <= 1.0):
             raise UserError(f"A p value lies between 0 and 1, unlike {self.supported} or {self.refuted}.")
 

@@ -20,10 +20,10 @@ class TrainingLoop:
     It is called as `function(task, seed, budget, **settings)`, with `report=` too if it has a parameter of that name,
     and returns its metrics (a table of numbers by name) or `(metrics, policy)`. See docs/foreign.md.
 
-    * `task` is the condition's: one of ours, or another library's environment, which `task.make()` returns.
+    * `task` is the condition's: a built-in task, or another library's environment, which `task.make()` returns.
     * `seed` is the trial's; the function derives all randomness from it.
     * `budget` is the condition's `Budget`, such as `Budget(environment_steps=100_000)`.
-    * `report(step, **numbers)` tells how far training is; the numbers become curves, about `budget.reports` points.
+    * `report(step, **numbers)` reports how far training is; the numbers become curves, about `budget.reports` points.
     * `policy` maps an observation to an action, deterministically. It is examined on the task as every method's is.
       Without one, the metrics are what the function says, and the trial's provenance says so.
 
@@ -80,7 +80,7 @@ class TrainingLoop:
 
 
 def _is_plain(value: Any) -> bool:
-    """Whether the canonical JSON of a value tells it from all others."""
+    """Whether the canonical JSON of a value identifies it."""
     if isinstance(value, dict):
         return all(isinstance(name, str) and _is_plain(item) for name, item in value.items())
     if isinstance(value, list | tuple):
@@ -99,9 +99,9 @@ def check_arguments(function: Callable[..., Any], settings: Mapping[str, Any]) -
     Raises:
         UserError: when it does not.
     """
-    told = {"report": None} if wants_report(function) else {}
+    optional = {"report": None} if wants_report(function) else {}
     try:
-        inspect.signature(function).bind(None, 0, None, **{**settings, **told})
+        inspect.signature(function).bind(None, 0, None, **{**settings, **optional})
     except TypeError as error:
         raise UserError(
             f"The training function {function.__qualname__} does not take (task, seed, budget) and the settings "

@@ -31,7 +31,7 @@ class Graph:
     """A network in matrix form, its nodes in topological order.
 
     Attributes:
-        weights: weights[i, j] of the connection from j to i; 0 where there is none.
+        weights: weights[i, j] of the connection from j to i; 0 without one.
         linked: whether there is a connection from j to i; strictly lower triangular.
         bias, response: of each node.
         activation: of each node, index into the network's activation functions; identity for outputs.

@@ -48,7 +48,7 @@ def find_root(start: Path) -> Path:
     """Return the nearest folder at or above `start` whose pyproject.toml has `[tool.evoclaims]`.
 
     Raises:
-        UserError: when there is none.
+        UserError: when it does not exist.
     """
     for folder in (start, *start.parents):
         if "evoclaims" in _tool_tables(folder / "pyproject.toml"):

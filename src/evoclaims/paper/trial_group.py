@@ -168,7 +168,7 @@ class TrialGroup:
         """Reject a level about which an event would always hold, or never."""
         if not first <= level <= last:
             raise UserError(
-                f"{self.label} has {self.condition.task.levels} levels, counted from 0: what is said of {level} holds "
+                f"{self.label} has {self.condition.task.levels} levels, counted from 0: an event at {level} holds "
                 f"always, or never. From {first} to {last} it says something."
                 if first <= last
                 else f"{self.label} has a single level, which is 0, and so none beyond it."

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from evoclaims.claims.workload import Workload
 
 FILE: Final = "claims_workload"
-"""Name under which the controller tells its workers the file."""
+"""Name under which the controller sends its workers the file."""
 
 _OTHER_ORDERS: Final = ("failedfirst", "newfirst", "stepwise")
 """Options that ask for an order of tests, or depend on it."""

@@ -54,7 +54,7 @@ def last(stores: Iterable[Path]) -> AcrossShown | None:
 
 
 def _read(path: Path) -> AcrossShown | None:
-    """Return what is kept in a file; None if there is none."""
+    """Return what is kept in a file; None without the file."""
     try:
         return msgspec.json.decode(read_file(path), type=AcrossShown)
     except (FileNotFoundError, NotADirectoryError):

@@ -162,7 +162,7 @@ class _Gathering:
 
 
 def _parts(report: ClaimReport, read: Mapping[str, Sequence[TrialSummary]]) -> tuple[Part, ...]:
-    """Return the evidence; if there is none, only the trials."""
+    """Return the evidence; without it, only the trials."""
     if report.verdict is not None and report.verdict.evidence:
         return judged_parts(report.verdict)
     return tuple(unjudged_part(label, trials) for label, trials in read.items() if trials)
@@ -170,8 +170,8 @@ def _parts(report: ClaimReport, read: Mapping[str, Sequence[TrialSummary]]) -> t
 
 def _edited(report: ClaimReport) -> list[str]:
     """Return a sentence for each method or task that was edited after trials of a claim had run."""
-    said = [clean(edited_code.said(name)) for name in edited_code.edited(report)]
-    return [f"{words[0].upper()}{words[1:]}." for words in said]
+    lines = [clean(edited_code.summary(name)) for name in edited_code.edited(report)]
+    return [f"{words[0].upper()}{words[1:]}." for words in lines]
 
 
 def _change(entries: Sequence[AcceptedVerdict], report: ClaimReport) -> str:

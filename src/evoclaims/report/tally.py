@@ -13,16 +13,16 @@ def tally(reports: Sequence[ClaimReport]) -> str:
     """Return the sentences, such as "Of 3 cases of the paper's sentences, 2 **supported** and 1 **refuted**."."""
     controls = [report for report in reports if report.is_control]
     papers = [report for report in reports if not report.is_control]
-    said = []
+    sentences = []
     if papers or not controls:
-        said.append(f"Of {plural(len(papers), 'case')} of the paper's sentences, {_counted(papers)}.")
+        sentences.append(f"Of {plural(len(papers), 'case')} of the paper's sentences, {_counted(papers)}.")
     if controls:
         tested = "which test the benchmark itself"
-        said.append(f"Of {plural(len(controls), 'case')} of controls, {tested}, {_counted(controls)}.")
-    return " ".join(said)
+        sentences.append(f"Of {plural(len(controls), 'case')} of controls, {tested}, {_counted(controls)}.")
+    return " ".join(sentences)
 
 
 def _counted(reports: Sequence[ClaimReport]) -> str:
     """Return how many count as what, such as "17 **supported** and 3 **not run**"."""
-    told = [f"{count} **{ended}**" for ended, count in table_cells.counts(reports).items()]
-    return " and ".join(filter(None, (", ".join(told[:-1]), told[-1]))) if told else "none"
+    counted = [f"{count} **{ended}**" for ended, count in table_cells.counts(reports).items()]
+    return " and ".join(filter(None, (", ".join(counted[:-1]), counted[-1]))) if counted else "none"

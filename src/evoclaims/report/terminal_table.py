@@ -59,8 +59,8 @@ def verdict_table(reports: Sequence[ClaimReport], width: int, colour: bool) -> s
     heading, *rows = zip(names, sentences, verdicts, *columns, strict=True)
     lines = [Text(_GAP.join(heading), style="bold")]
     for report, (name, sentence, verdict, *rest) in zip(ordered, rows, strict=True):
-        said = (verdict, _COLOURS[report.outcome])
-        lines.append(Text.assemble(name + _GAP + sentence + _GAP, said, *(_GAP + cell for cell in rest)))
+        styled = (verdict, _COLOURS[report.outcome])
+        lines.append(Text.assemble(name + _GAP + sentence + _GAP, styled, *(_GAP + cell for cell in rest)))
     folders = sorted({os.path.relpath(Path(report.evidence).parent) for report in reports if report.evidence})
     captions = [f"evidence: {printable(folder)}/<claim>.json" for folder in folders]
     if any(report.as_expected for report in reports):

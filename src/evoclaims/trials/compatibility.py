@@ -85,12 +85,12 @@ def traced_progress(method: Method[Any], task: Task) -> Progress:
         _check_unchanged(f"{task.name!r} changes its state by a step", shown.inner, following.inner)
 
         def step(seed: Int[Array, ""], level: Int[Array, ""], state: Any) -> tuple[Any, Progress]:
-            told: object = method.step(_key(seed), task, level, state)
-            if not (isinstance(told, tuple) and len(told) == 2):
+            returned: object = method.step(_key(seed), task, level, state)
+            if not (isinstance(returned, tuple) and len(returned) == 2):
                 raise MisfitError(
-                    f"a step of {method.name!r} returns {_kind(told)}, not two values: state, Progress(...)"
+                    f"a step of {method.name!r} returns {_kind(returned)}, not two values: state, Progress(...)"
                 )
-            after, progress = told
+            after, progress = returned
             return strong(after), progress
 
         try:
@@ -223,7 +223,7 @@ def _check_unchanged(what: str, before: Any, after: Any) -> None:
 
 
 def _is_array(leaf: object) -> bool:
-    """Whether there is one array, or the shape of one; a list of arrays is none."""
+    """Whether there is one array, or the shape of one; a list of arrays is not one."""
     return hasattr(leaf, "shape") and hasattr(leaf, "dtype")
 
 

@@ -19,7 +19,7 @@ from evoclaims.trials.rollout import score_every_level
 
 
 def examined(task: Task, policy: Callable[[Any], Any], seed: int) -> Scores:
-    """Return the scores of a policy on a task of ours (metrics of the last level), with keys unknown to training.
+    """Return the scores of a policy on a built-in task (metrics of the last level), with keys unknown to training.
 
     It is examined as all methods' policies are: observations [observation_size] in, actions [action_size] out.
     """

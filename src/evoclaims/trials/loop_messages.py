@@ -81,6 +81,6 @@ def decode(line: bytes) -> Answer:
 
 
 def last_lines(text: str) -> str:
-    """Return how much of a traceback, or of what a process said last, is kept as the reason of a crash."""
+    """Return how much of a traceback, or of a process's last output, is kept as the reason of a crash."""
     lines = [line.rstrip() for line in text.splitlines() if line.strip()]
     return "\n".join(printable(line)[:_LONGEST_LINE] for line in lines[-_LAST_LINES:])

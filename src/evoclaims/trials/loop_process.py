@@ -40,7 +40,7 @@ class Reporter:
     """The function `report` of a trial.
 
     Attributes:
-        last: step of the last report, told or not; None before the first.
+        last: step of the last report, passed on or not; None before the first.
     """
 
     def __init__(self, every: int, answer: Callable[[Answer], None]) -> None:
@@ -55,27 +55,27 @@ class Reporter:
         """Tell how far training is, in the budget's unit, and numbers such as `fitness=12.5`.
 
         Raises:
-            UserError: when the step is no count, a number is none, or the success is no share.
+            UserError: when the step is not a count, a value is not a number, or the success is not a share.
         """
         self.last = step = int(step)
         if not 0 <= step <= MOST_STEPS:
             raise UserError(f"A training function reports a number of steps, and not {step}.")
-        told = numbers(values)
-        check_success("A training loop", told.get("success", 0.0), solves=False, advice="report such a share")
+        given = numbers(values)
+        check_success("A training loop", given.get("success", 0.0), solves=False, advice="report such a share")
         kept = step >= self._next
         if not kept and time.monotonic() - self._told < TOLD_SECONDS:
             return
         if kept:
             self._next = (step // self._every + 1) * self._every
         self._told = time.monotonic()
-        self._answer(LoopReport(step, told, kept))
+        self._answer(LoopReport(step, given, kept))
 
 
 def numbers(values: Mapping[str, Any]) -> dict[str, Any]:
     """Return a training loop's numbers as floats.
 
     Raises:
-        UserError: when one is no number, or a count that is none.
+        UserError: when one is not a number, or not a count.
     """
     if not isinstance(values, Mapping):
         raise UserError(f"A training function returns a table of numbers by name, or (table, policy), not {values!r}.")
@@ -102,8 +102,8 @@ def train(request: LoopRequest, answer: Callable[[Answer], None]) -> Trained:
     """Call the function, and examine its policy."""
     function, task, budget = resolve(request.function), from_plain(request.task), from_plain(request.budget)
     report = Reporter(budget.chunk(1), answer)
-    told = {"report": report} if wants_report(function) else {}
-    returned = function(task, request.seed, budget, **from_plain(request.settings), **told)
+    given = {"report": report} if wants_report(function) else {}
+    returned = function(task, request.seed, budget, **from_plain(request.settings), **given)
     metrics, policy = returned if isinstance(returned, tuple) and len(returned) == 2 else (returned, None)
     told_metrics = numbers(metrics)
     if policy is not None and not callable(policy):

@@ -36,7 +36,7 @@ class TrialResult:
             a timed-out trial also "limit", the seconds that its batch was allowed; on a processor "processor", the
             seconds of its cores that running took.
         provenance: versions, device, flags and git revision (see `core.provenance`).
-        champion: SHA-256 of the stored champion's file, filled in by `Store.put`; empty while there is none.
+        champion: SHA-256 of the stored champion's file, filled in by `Store.put`; empty until then.
     """
 
     id: str

@@ -103,8 +103,8 @@ def make_unfinished(
     metrics = {"steps": last.get("steps", 0.0), "environment_steps": last.get("environment_steps", 0.0)}
     if "level" in last:
         metrics["furthest_reached"] = last["level"]
-    said = {"crash": reason} if reason else {}
-    return make_record(spec, status, metrics, {}, curves, reason.encode(), timing, devices, said)
+    notes = {"crash": reason} if reason else {}
+    return make_record(spec, status, metrics, {}, curves, reason.encode(), timing, devices, notes)
 
 
 def make_record(

@@ -1,4 +1,4 @@
-"""What a running batch tells other processes: its progress, in a file beside its notice.
+"""The progress of a running batch, for other processes: in a file beside its notice.
 
 These files are hints, as notices are: one that cannot be written or read costs a line of progress, and nothing else.
 """
@@ -40,7 +40,7 @@ class Running:
 
 @contextlib.contextmanager
 def shared(store_root: Path, condition_id: str, watch: Watcher) -> Iterator[Watcher]:
-    """Give a watcher that passes on to `watch`, and tells other processes until the `with` block ends."""
+    """Give a watcher that passes on to `watch`, and shares the progress until the `with` block ends."""
     path, since = progress_path(store_root, condition_id), time.time()
     written, phase = -WRITE_SECONDS, ""
 

@@ -71,14 +71,14 @@ def _described(component: Any, kind_of: Literal["method", "task", ""]) -> dict[s
         )
     require_whole_numbers(component)
     inherited = not is_own(type(component)) and not _has_own_name(component)
-    told = {"class": kind} if inherited else {}  # it computes something else than the class whose name it has
+    named = {"class": kind} if inherited else {}  # it computes something else than the class whose name it has
     try:
         parameters = fields_of(component)
     except TypeError as error:
         raise UserError(
-            f"A field of {kind} tells its trials apart and is no number, word, tuple or frozen dataclass: {error}."
+            f"A field of {kind} identifies its trials and is not a number, word, tuple or frozen dataclass: {error}."
         ) from error
-    return {"name": component.name, "revision": component.revision, "parameters": parameters, **told}
+    return {"name": component.name, "revision": component.revision, "parameters": parameters, **named}
 
 
 def _has_own_name(component: Any) -> bool:

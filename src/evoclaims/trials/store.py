@@ -101,7 +101,7 @@ class Store(StoreFiles):
         return next((result for result in rest if agree(result.provenance, versions)), None)
 
     def get(self, trial_id: str, versions: Versions | None = None) -> TrialResult | None:
-        """Return the record of a trial, made with any versions, or None when there is none.
+        """Return the record of a trial, made with any versions, or None without one.
 
         For judging or viewing stored trials. Of several records, the one made with `versions` comes first, then the
         newest.
@@ -285,7 +285,7 @@ def _versions(result: TrialResult) -> Versions | None:
 
 
 def newest(results: Iterable[TrialResult]) -> TrialResult | None:
-    """Return the newest record; None if there is none. Records without a time count as oldest."""
+    """Return the newest record; None without any. Records without a time count as oldest."""
     return max(results, key=lambda result: str(result.timing.get("ended", "")), default=None)
 
 

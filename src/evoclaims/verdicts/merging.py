@@ -35,8 +35,8 @@ def merge_evidence(source: Store, into: Store, dry_run: bool = False) -> Iterato
             if there is None or replace(there, evidence="") == replace(report, evidence=""):
                 yield Merged(path, "there")
             else:
-                said = f"{report.outcome}, and {there.outcome} in {target}, which stays until claims are judged again"
-                yield Merged(path, "differs", said)
+                note = f"{report.outcome}, and {there.outcome} in {target}, which stays until claims are judged again"
+                yield Merged(path, "differs", note)
             continue
         if not dry_run:
             saved = save(report, into.root)

@@ -48,7 +48,7 @@ Standings = Mapping[tuple[str, str], Standing]
 
 @dataclass(frozen=True)
 class Transition:
-    """One claim's old and new verdict at one tier; None where there is none."""
+    """One claim's old and new verdict at one tier; None without one."""
 
     tier: str
     claim: str
@@ -140,11 +140,11 @@ def counts(transitions: Sequence[Transition]) -> str:
 
 def describe(transition: Transition) -> str:
     """Return a transition in one line, without terminal control characters."""
-    said = _said(transition.old, transition.new, transition.kind)
-    return f"{printable(transition.claim)} ({printable(transition.tier)}): {said}"
+    change = _change(transition.old, transition.new, transition.kind)
+    return f"{printable(transition.claim)} ({printable(transition.tier)}): {change}"
 
 
-def _said(old: Standing | None, new: Standing | None, kind: Kind) -> str:
+def _change(old: Standing | None, new: Standing | None, kind: Kind) -> str:
     """Describe how a verdict changed."""
     if old is None or new is None:
         return f"{new.outcome}, new" if new else f"gone; it was {old.outcome}" if old else "no verdict"

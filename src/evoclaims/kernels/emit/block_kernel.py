@@ -25,7 +25,7 @@ from evoclaims.kernels.trace.expressions import (
 from evoclaims.kernels.trace.interpreter import Numbers
 
 SHARED = "@numbers = external addrspace(3) global [0 x i32], align 16\n"
-"""The block's shared memory; its size is said at the launch. A slot is a word of each lane."""
+"""The block's shared memory; its size is given at the launch. A slot is a word of each lane."""
 
 
 def text(

@@ -77,6 +77,6 @@ def chosen(results: Sequence[Numbers], elements: int) -> BlockShape | None:
 
 
 def _of_device(name: str, usual: int) -> int:
-    """Return a property of the GPU; a program may be lowered where there is none."""
+    """Return a property of the GPU; a program may be lowered without a GPU."""
     value: Any = getattr(jax.devices()[0], name, None)
     return int(value) if value else usual

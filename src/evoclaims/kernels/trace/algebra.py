@@ -203,4 +203,4 @@ RULES: Final[dict[str, Rule]] = {
     "shift_right_logical": _shift,
     "sub": _sub,
 }
-"""Simplifications by operation: each returns a simpler number, or None if there is none."""
+"""Simplifications by operation: each returns a simpler number, or None without one."""

@@ -32,7 +32,7 @@ class Counterparts:
     Attributes:
         nodes: the other's node genes; arbitrary where there is no counterpart.
         has_node: whether a node has a counterpart.
-        weight: the weight of the other's connection; NaN where there is none.
+        weight: the weight of the other's connection; NaN without one.
     """
 
     nodes: Nodes
