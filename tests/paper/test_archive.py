@@ -75,5 +75,5 @@ def test_a_torn_file_of_reference_trials_is_said(
     path = references.path_of(tmp_path, "smoke", "better", "small")
     references.write(path, [made(condition, 0, 1.0)])
     path.write_bytes(path.read_bytes()[:-20])
-    with pytest.raises(UserError, match="is no reference trial"):
+    with pytest.raises(UserError, match="is not a reference trial"):
         Archive(store, tmp_path).trials(condition, [0])

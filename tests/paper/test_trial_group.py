@@ -188,7 +188,7 @@ def test_what_breaks_in_a_measure_is_not_taken_for_a_misspelled_one(reproduction
 
 
 def test_trials_that_are_none_are_refused(reproduction: Reproduction) -> None:
-    with pytest.raises(UserError, match="The reproduction 'tiny' says trials=.*: name a subclass of TrialGroup"):
+    with pytest.raises(UserError, match="The reproduction 'tiny' has trials=.* Name a subclass of TrialGroup"):
         replace(reproduction, trials={"stones": len})  # type: ignore[arg-type]
 
 

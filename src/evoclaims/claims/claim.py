@@ -70,7 +70,9 @@ def claim(
     """
     for word, text in {"id": claim_id, "says": says, "where": where, "smoke": smoke}.items():
         if not (isinstance(text, str) or (text is None and word == "smoke")):
-            raise UserError(f"The claim {claim_id!r} has {text!r} as its {word}, which is no text: write it in quotes.")
+            raise UserError(
+                f"The claim {claim_id!r} has {text!r} as its {word}, which is not text. Write it in quotes."
+            )
         if text is not None and not text.strip():
             raise UserError(f"The claim {claim_id or '(without id)'} lacks its {word}.")
     if smoke is None and expect is not None:
@@ -99,9 +101,9 @@ def expected(outcome: Outcome | str, *, because: str, tier: str | None = None) -
         UserError: for an unknown outcome or tier, or without a reason.
     """
     if outcome not in set(Outcome):
-        raise UserError(f"There is no outcome {outcome!r}; known: {', '.join(Outcome)}.")
+        raise UserError(f"The outcome {outcome!r} does not exist. Use one of {', '.join(Outcome)}.")
     if not because.strip():
-        raise UserError(f"An accepted {outcome} verdict says because=...: what is known about why.")
+        raise UserError(f"An accepted {outcome} verdict needs because=...: what is known about the reason.")
     if tier is not None:
         require_known("tier", tier, TIERS)
     return pytest.mark.claim_expect(Expectation(Outcome(outcome), because, tier))
@@ -114,7 +116,7 @@ def without_smoke(*, because: str) -> pytest.MarkDecorator:
         UserError: without a reason.
     """
     if not because.strip():
-        raise UserError("What has no smoke test says because=...: why no small instance can show it.")
+        raise UserError("A claim without a smoke test needs because=...: why no small instance can show it.")
     return pytest.mark.claim_without_smoke(because)
 
 

@@ -207,7 +207,7 @@ class Verdicts:
                 raise UserError(f"verdict(...) was given the function {name} itself: call it, as in {name}().")
             raise UserError(
                 f"verdict(...) takes an assertion about trials, such as verdict(a.mean_success > b.mean_success), "
-                f"not {f'{assertion.name!r} alone: say what holds of it' if alone else repr(assertion)}."
+                f"not {f'{assertion.name!r} alone: compare it with something' if alone else repr(assertion)}."
             )
         if self.report is not None:
             raise UserError("A claim has one verdict: join several assertions with & (and) or | (or).")

@@ -162,7 +162,7 @@ def checked(version: str) -> str:
     try:
         Version(version)
     except InvalidVersion as error:
-        raise UserError(f"{version!r} is no version of a package: write such as 0.3.2.") from error
+        raise UserError(f"{version!r} is not a version of a package. Write one such as 0.3.2.") from error
     return version
 
 
@@ -175,7 +175,7 @@ def checked_name(package: str) -> str:
     try:
         return canonicalize_name(package, validate=True)
     except InvalidName as error:
-        raise UserError(f"{package!r} is no name of a package: write such as jax.") from error
+        raise UserError(f"{package!r} is not the name of a package. Write one such as jax.") from error
 
 
 def installed_here() -> dict[str, str]:

@@ -38,7 +38,7 @@ def packages_of(component: Any) -> tuple[str, ...]:
     declared = getattr(component, "packages", UNDECLARED)
     if not isinstance(declared, tuple) or not all(isinstance(name, str) for name in declared):
         raise UserError(
-            f"The packages of {getattr(component, 'name', component)} are {declared!r}; write a tuple of their names, "
+            f"The packages of {getattr(component, 'name', component)} are {declared!r}. Write a tuple of their names, "
             'such as packages = ("optax",), or () when it needs nothing beyond jax and numpy.'
         )
     return tuple(sorted({*declared, *(name for part in _parts(component) for name in packages_of(part))}))

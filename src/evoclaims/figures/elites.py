@@ -88,7 +88,7 @@ def _task(scope: Scope, ground: Ground) -> Maze:
     """Return the maze of a panel."""
     task = scope.tier.condition(ground.method, ground.task).task
     if not isinstance(task, Maze):
-        raise UserError(f"A map of elites lies over the area of a maze, which {ground.task!r} is not.")
+        raise UserError(f"A map of elites needs the area of a maze; {ground.task!r} is not a maze.")
     return task
 
 

@@ -72,8 +72,8 @@ class TrainingLoop:
     def init(self, *_: Any, **__: Any) -> NoReturn:
         """Raise a `UserError`: the function trains, not steps that the engine compiles."""
         raise UserError(
-            f"{self.name!r} is a training loop of its own: it is run whole, and its policies are examined where they "
-            "are trained and are not kept, so there is no champion."
+            f"{self.name!r} is a training loop. Its policies are examined where they are trained and are not kept, so "
+            "it has no champion."
         )
 
     step = best = init

@@ -46,7 +46,8 @@ class Tier:
         """Reject a number of trials in the place of the design."""
         if not isinstance(self.design, Design):
             raise UserError(
-                f"A tier has a design, unlike {self.design!r}: Tier(conditions, Design.fixed(10)) looks at ten trials."
+                f"A tier's design is a Design, not {self.design!r}. Write Tier(conditions, Design.fixed(10)) for "
+                "ten trials."
             )
 
     def condition(self, method: str, task: str) -> Condition:
@@ -104,12 +105,12 @@ class Reproduction:
         """Check the folder and the class of the trials, and say where imported ones are."""
         if not isinstance(self.folder, Path):
             raise UserError(
-                f"The reproduction {self.name!r} says folder={self.folder!r}: write Path(__file__).parent, "
+                f"The reproduction {self.name!r} has folder={self.folder!r}. Write Path(__file__).parent, "
                 "a pathlib.Path."
             )
         if not (isinstance(self.trials, type) and issubclass(self.trials, TrialGroup)):
             raise UserError(
-                f"The reproduction {self.name!r} says trials={self.trials!r}: name a subclass of TrialGroup whose "
+                f"The reproduction {self.name!r} has trials={self.trials!r}. Name a subclass of TrialGroup whose "
                 "properties are the paper's own measures, or leave it out."
             )
         has = {name: tuple(tier.conditions) for name, tier in self.tiers.items()}

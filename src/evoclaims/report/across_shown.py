@@ -60,4 +60,4 @@ def _read(path: Path) -> AcrossShown | None:
     except (FileNotFoundError, NotADirectoryError):
         return None
     except (OSError, ValueError) as error:
-        raise UserError(f"{path} holds nothing that `evoclaims across` has found ({error}): delete it.") from error
+        raise UserError(f"{path} is not a file of `evoclaims across` ({error}). Delete it.") from error

@@ -64,7 +64,7 @@ def find_revision(name: str, folder: Path) -> GitRevision | None:
     inside = run_git(folder, "rev-parse", "--is-inside-work-tree")
     if inside.returncode or inside.stdout.strip() != b"true":
         raise UserError(
-            f"{folder} lies in no git repository, so that no revision can be compared with. Compare two "
+            f"{folder} is not in a git repository, so there is no revision to compare with. Compare two "
             "stores instead, or `evoclaims compare` alone: current verdicts with accepted ones."
         )
     if not name or "\0" in name:

@@ -83,7 +83,7 @@ def parse_patterns(text: str) -> tuple[Pattern, ...]:
         sides = [side.strip() for side in part.split(ARROW)]
         if len(sides) != 2:
             raise UserError(
-                f"{part!r} is no change of a verdict: write OLD{ARROW}NEW, such as 'supported{ARROW}refuted' or "
+                f"{part!r} is not a change of a verdict. Write OLD{ARROW}NEW, such as 'supported{ARROW}refuted' or "
                 f"'{ANY}{ARROW}refuted', and commas between several."
             )
         for side in sides:
@@ -94,7 +94,7 @@ def parse_patterns(text: str) -> tuple[Pattern, ...]:
             raise UserError(f"{part!r} never happens: a verdict that stays {old} has not changed.")
         patterns.append(Pattern(old, new))
     if not patterns:
-        raise UserError(f"No change of a verdict is named: write such as 'supported{ARROW}refuted'.")
+        raise UserError(f"No change of a verdict is named. Write one such as 'supported{ARROW}refuted'.")
     return tuple(patterns)
 
 
