@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import io
 import json
 import os
 import secrets
@@ -62,6 +63,16 @@ def read_json(path: Path) -> Any:
         raise ValueError("it is nested too deeply") from error
 
 
+def read_text(path: Path) -> str:
+    """Return a UTF-8 text, with each end of a line as a line feed.
+
+    Raises:
+        OSError: as `read_file` does.
+        ValueError: when it is not UTF-8.
+    """
+    return io.StringIO(read_file(path).decode(), newline=None).read()
+
+
 def write_atomically(path: Path, data: bytes, elsewhere: str = ELSEWHERE, mode: int = 0o666) -> None:
     """Write `data` to `path`; a reader always sees the whole old file or the whole new one, even after a kill.
 
@@ -93,6 +104,11 @@ def write_once(path: Path, data: bytes, elsewhere: str = ELSEWHERE) -> bool:
     return True
 
 
+def at_once(path: str, flags: int) -> int:
+    """Open a file for writing: an `opener` of `open`, by which a pipe that nobody reads is an error and no wait."""
+    return os.open(path, flags | getattr(os, "O_NONBLOCK", 0), 0o666)
+
+
 def write_where_named(path: Path, data: bytes, elsewhere: str = ELSEWHERE) -> None:
     """Write `data` to what a user has named: through a link, or straight into a device or pipe such as /dev/stdout.
 
@@ -108,10 +124,10 @@ def write_where_named(path: Path, data: bytes, elsewhere: str = ELSEWHERE) -> No
     if is_file:
         write_atomically(Path(os.path.realpath(path)) if os.path.islink(path) else path, data, elsewhere)
         return
-    at_once = getattr(os, "O_NONBLOCK", 0)
+    unblocked = getattr(os, "O_NONBLOCK", 0)
     try:
-        with open(os.open(path, os.O_WRONLY | at_once), "wb") as file:
-            if at_once:
+        with open(os.open(path, os.O_WRONLY | unblocked), "wb") as file:
+            if unblocked:
                 os.set_blocking(file.fileno(), True)
             file.write(data)
     except OSError as error:
