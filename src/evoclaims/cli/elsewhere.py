@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 import os
 import subprocess
 import tempfile
@@ -18,6 +17,7 @@ from evoclaims.cli.store_folder import open_store
 from evoclaims.cli.terminal import terminal
 from evoclaims.core.environments import Environment, NotInstallableError, Recipe, make, reason
 from evoclaims.core.errors import UnknownNameError, UserError
+from evoclaims.core.files import at_once, read_json
 from evoclaims.core.printable import printable
 from evoclaims.core.tiers import TIERS
 from evoclaims.paper.config import find_root, load_config
@@ -114,7 +114,7 @@ class Elsewhere:
 def _reports(verdicts: Path) -> list[ClaimReport]:
     """Return the reports that a run has written; none if there is no such file, or it is another evoclaims'."""
     try:
-        return [ClaimReport.from_json(plain) for plain in json.loads(verdicts.read_bytes())["claims"]]
+        return [ClaimReport.from_json(plain) for plain in read_json(verdicts)["claims"]]
     except (OSError, ValueError, KeyError, TypeError):
         return []
 
@@ -140,7 +140,7 @@ def _watched(command: list[str], folder: Path, log: Path) -> tuple[int, str]:
         errors="replace",
     ) as process:
         try:
-            with open(log, "w", encoding="utf-8", errors="backslashreplace") as file:
+            with open(log, "w", encoding="utf-8", errors="backslashreplace", opener=at_once) as file:
                 for line in process.stdout or ():
                     lines.append(line)
                     file.write(line)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,6 +13,7 @@ from evoclaims.cli.cluster.job_states import GONE, Seen, State, states
 from evoclaims.cli.cluster.submissions import Submission, SubmittedBatch, SubmittedJob, load_all, log_of
 from evoclaims.cli.project import Project, open_project
 from evoclaims.core.errors import UserError
+from evoclaims.core.files import open_file
 from evoclaims.trials.batches import StoredTrials
 from evoclaims.trials.notice import is_announced
 
@@ -114,8 +116,8 @@ def _state_and_reason(project: Project, place: Place, seen: Seen, log: Path) -> 
 def last_words(log: Path) -> str:
     """Return evoclaims' last sentence in a job's output, else its last line; empty without any."""
     try:
-        with open(log, "rb") as file:
-            file.seek(max(0, log.stat().st_size - TAIL))
+        with open_file(log) as file:
+            file.seek(max(0, file.seek(0, os.SEEK_END) - TAIL))
             lines = file.read().decode(errors="replace").splitlines()
     except OSError:
         return ""

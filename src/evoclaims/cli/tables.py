@@ -23,6 +23,7 @@ from typing import Final
 from evoclaims.cli.output_files import write
 from evoclaims.cli.project import Project, open_project
 from evoclaims.core.errors import UnknownNameError, UserError
+from evoclaims.core.files import read_text
 from evoclaims.figures.replication import replications
 from evoclaims.report import replication_cells, vocabulary
 from evoclaims.report.markdown import numbers, robustness
@@ -49,7 +50,7 @@ def main(options: argparse.Namespace) -> int:
         for name in options.files:
             path = Path(name)
             try:
-                before = path.read_text(encoding="utf-8")
+                before = read_text(path)
             except (OSError, UnicodeError) as error:
                 raise UserError(f"Cannot read {path}: {getattr(error, 'strerror', None) or error}.") from error
             after = filled(before, project)

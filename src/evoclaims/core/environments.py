@@ -32,7 +32,7 @@ from packaging.version import InvalidVersion, Version
 from evoclaims.core.canonical import content_hash
 from evoclaims.core.errors import UserError
 from evoclaims.core.file_names import file_name
-from evoclaims.core.files import write_atomically
+from evoclaims.core.files import read_json, read_text, write_atomically
 from evoclaims.core.pins import without, without_hashes
 
 PROGRAM: Final = "evoclaims"
@@ -140,7 +140,7 @@ def make(recipe: Recipe, kept: Path, project: Path, begins: Callable[[], None]) 
     folder.parent.mkdir(parents=True, exist_ok=True)
     with FileLock(f"{folder}.lock"):
         try:
-            return Environment(folder, json.loads((folder / COMPLETE).read_bytes()))
+            return Environment(folder, read_json(folder / COMPLETE))
         except (OSError, ValueError):
             shutil.rmtree(folder, ignore_errors=True)
         begins()
@@ -230,8 +230,8 @@ def _begin_apart(recipe: Recipe, empty: Environment) -> tuple[list[str], bool]:
 def _requirements(project: Path) -> list[str]:
     """Return what an environment apart from this one needs: this program, and the project where it can be installed."""
     try:
-        described = tomllib.loads((project / "pyproject.toml").read_text(encoding="utf-8")).get("project", {})
-    except (OSError, ValueError):
+        described = tomllib.loads(read_text(project / "pyproject.toml")).get("project", {})
+    except (OSError, ValueError, RecursionError):
         described = {}
     own = [] if described.get("name") == PROGRAM else _this_program()
     return [*own, "--editable", str(project.resolve())] if described else own
@@ -254,7 +254,7 @@ def _pins(recipe: Recipe) -> str:
     if recipe.constraints is None:
         return ""
     try:
-        pins = recipe.constraints.read_text(encoding="utf-8")
+        pins = read_text(recipe.constraints)
     except (OSError, UnicodeError) as error:
         raise UserError(f"Cannot read the constraints {recipe.constraints}: {error}.") from error
     return without(pins, recipe.package)

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, Final, TypeGuard
 
 from evoclaims.core.errors import UserError, require_known
+from evoclaims.core.files import read_text
 
 FILE: Final = "reported.toml"
 """Name of the file in a reproduction's folder."""
@@ -76,8 +77,8 @@ def load_published(path: Path) -> Published:
         UserError: when it is missing, damaged, or a number lacks its place, or something has the place of a number.
     """
     try:
-        plain = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
+        plain = tomllib.loads(read_text(path))
+    except (OSError, ValueError, RecursionError) as error:
         raise UserError(f"Cannot read the published numbers in {path}: {error}.") from error
     if wrong := [*_wrong_plots(plain.get("plots", {})), *_wrong_tables(plain.get("tables", {})), *_wrong_rest(plain)]:
         raise UserError(

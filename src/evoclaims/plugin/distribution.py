@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any, Final
 import pytest
 
 from evoclaims.core.errors import UserError
+from evoclaims.core.files import read_file
 from evoclaims.plugin.progress import progress_of
 
 if TYPE_CHECKING:
@@ -109,7 +110,7 @@ class Distribution:
         if LOAD in self._config.stash:
             return
 
-        load = self._config.stash[LOAD] = msgspec.json.decode(file.read_bytes(), type=Workload)
+        load = self._config.stash[LOAD] = msgspec.json.decode(read_file(file), type=Workload)
         line = progress_of(self._config)
         if line is not None:
             line.begin(load, workers=len(node.nodemanager.specs), tick=True)

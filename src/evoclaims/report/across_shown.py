@@ -59,5 +59,5 @@ def _read(path: Path) -> AcrossShown | None:
         return msgspec.json.decode(read_file(path), type=AcrossShown)
     except (FileNotFoundError, NotADirectoryError):
         return None
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, RecursionError) as error:
         raise UserError(f"{path} is not a file of `evoclaims across` ({error}). Delete it.") from error

@@ -15,7 +15,7 @@ from typing import Final
 import msgspec
 
 from evoclaims.core.errors import UserError
-from evoclaims.core.files import read_file
+from evoclaims.core.files import at_once, read_file
 from evoclaims.trials.notice import is_announced, progress_path
 from evoclaims.trials.progress import RunProgress, Watcher
 
@@ -48,8 +48,8 @@ def shared(store_root: Path, condition_id: str, watch: Watcher) -> Iterator[Watc
         nonlocal written, phase
         if progress.phase != phase or time.monotonic() - written >= WRITE_SECONDS:
             written, phase = time.monotonic(), progress.phase
-            with contextlib.suppress(OSError):
-                path.write_bytes(msgspec.json.encode(Running(condition_id, since, progress)))
+            with contextlib.suppress(OSError), open(path, "wb", opener=at_once) as file:
+                file.write(msgspec.json.encode(Running(condition_id, since, progress)))
         watch(progress)
 
     try:

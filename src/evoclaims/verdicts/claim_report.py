@@ -13,7 +13,7 @@ from msgspec import convert
 from evoclaims.core.canonical import as_plain
 from evoclaims.core.errors import UserError
 from evoclaims.core.file_names import file_name
-from evoclaims.core.files import write_atomically
+from evoclaims.core.files import read_json, write_atomically
 from evoclaims.judging.verdict import Outcome, Verdict
 from evoclaims.verdicts.sensitivity import Tally, Tried
 from evoclaims.verdicts.source_trials import SourceTrials, versions_of
@@ -166,7 +166,7 @@ def save(report: ClaimReport, root: Path) -> ClaimReport:
 def succeeding(report: ClaimReport, root: Path) -> ClaimReport:
     """Return the report with the claim's previous verdict, read from the file that this report will replace."""
     try:
-        last = ClaimReport.from_json(json.loads(evidence_path(report, root).read_bytes()))
+        last = ClaimReport.from_json(read_json(evidence_path(report, root)))
     except (OSError, ValueError):
         return report  # no file, or one written by another release: nothing is judged from it
     before = LastVerdict(last.outcome, last.fingerprint or None, versions_of(last.sources))

@@ -13,7 +13,8 @@ import jax
 from filelock import FileLock
 
 from evoclaims.core.errors import UserError
-from evoclaims.core.files import read_file, write_atomically
+from evoclaims.core.files import write_atomically
+from evoclaims.core.private_files import ForeignFileError, doubt, make_private, read_private, say_refused
 from evoclaims.kernels.unsupported import Unsupported
 
 try:
@@ -27,6 +28,8 @@ OPTIMIZATION: Final = 2
 VECTORS: Final = {"avx512f": 16, "avx2": 8}
 """Numbers in a vector register, by the processor's feature that brings it; others have 4."""
 CHECKSUM: Final = hashlib.sha256().digest_size
+PATIENCE: Final = 60.0
+"""Seconds to wait for another process that compiles the same text: it may be stopped, or hang."""
 
 _libraries: dict[str, Any] = {}
 """Machine code in memory by its key, for ever: XLA's programs call it."""
@@ -88,7 +91,7 @@ def _machine_code(key: str, text: str) -> bytes:
     """Return a text's machine code from the cache on disk, where jax's configuration names one, or compile it."""
     config: Any = jax.config  # defines its attributes at run time
     folder = config.jax_compilation_cache_dir
-    if folder is None:
+    if folder is None or not _is_private(Path(folder) / "kernels"):
         return compiled(text)
     path = Path(folder) / "kernels" / f"{key}.o"
     kept = _kept(path)
@@ -97,14 +100,28 @@ def _machine_code(key: str, text: str) -> bytes:
     with _alone(path):
         code = _kept(path) or compiled(text)  # another process may have compiled it meanwhile
         with contextlib.suppress(UserError):  # a full or read-only disk costs time alone
-            write_atomically(path, hashlib.sha256(code).digest() + code)
+            write_atomically(path, hashlib.sha256(code).digest() + code, mode=0o600)
     return code
 
 
-def _kept(path: Path) -> bytes | None:
-    """Return the machine code in a file, or None if it is missing or damaged."""
+def _is_private(folder: Path) -> bool:
+    """Whether only this user can put machine code into a folder, which is made where it is missing."""
     try:
-        data = read_file(path)
+        make_private(folder)
+        if why := doubt(folder.parent) or doubt(folder):
+            say_refused(folder, why)
+        return not why
+    except OSError:  # a read-only disk, or a file in its place
+        return False
+
+
+def _kept(path: Path) -> bytes | None:
+    """Return the machine code in a file, or None if it is missing, damaged, or another user may have written it."""
+    try:
+        data = read_private(path)
+    except ForeignFileError as error:
+        say_refused(path, str(error))
+        return None
     except OSError:
         return None
     code = data[CHECKSUM:]
@@ -113,15 +130,9 @@ def _kept(path: Path) -> bytes | None:
 
 @contextlib.contextmanager
 def _alone(path: Path) -> Iterator[None]:
-    """Let one process at a time compile what `path` will hold; where no lock can be had, all do."""
-    lock = FileLock(path.with_suffix(".lock"))
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        lock.acquire()
-    except OSError:
+    """Let one process at a time compile what `path` will hold; where no lock can be had in time, all do."""
+    lock = FileLock(path.with_suffix(".lock"), timeout=PATIENCE)
+    with contextlib.ExitStack() as stack:
+        with contextlib.suppress(OSError):  # filelock's Timeout is one: its owner may be stopped, or hang
+            stack.enter_context(lock)
         yield
-        return
-    try:
-        yield
-    finally:
-        lock.release()
