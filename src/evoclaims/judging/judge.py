@@ -12,6 +12,7 @@ from evoclaims.judging.counting import MAX_TRIALS
 from evoclaims.judging.design import Design, Look
 from evoclaims.judging.fingerprint import fingerprint
 from evoclaims.judging.sample import Limited, Source, Trials, UnreadableTrialError
+from evoclaims.judging.spending import overspent
 from evoclaims.judging.verdict import Outcome, PValues, Verdict
 from evoclaims.trials.crashes import why
 from evoclaims.trials.result import TrialResult
@@ -27,6 +28,7 @@ class Ending:
         trials: what was looked at.
         finding: what they say; None where trials crashed or cannot be read.
         note: why judging ended without a decision or before it, if it did; without a finding, the reason.
+        copies: which trials are copies of each other.
     """
 
     outcome: Outcome
@@ -34,6 +36,7 @@ class Ending:
     trials: Trials
     finding: Finding | None
     note: str = ""
+    copies: str = ""
 
 
 def judge(assertion: Assertion, design: Design, *, claim: str = "", tier: str = "") -> Verdict:
@@ -63,6 +66,8 @@ def judge(assertion: Assertion, design: Design, *, claim: str = "", tier: str = 
         attainable_p_refuted=finding.attainable.refuted if tested else None,
         evidence=finding.evidence,
         without_result=_without_result(assertion, ending.trials),
+        overspent=overspent(assertion, ending.trials)[0],
+        copies=ending.copies,
         deciding=finding.deciding(outcome.direction),
     )
 
@@ -103,6 +108,8 @@ def decide(
         crashed = _crashed(assertion, trials)
         if crashed:
             return Ending(Outcome.ERROR, look, trials, None, crashed)
+        if refusal := overspent(assertion, trials)[1]:
+            return Ending(Outcome.ERROR, look, trials, None, refusal)
         found = copies(assertion, trials)
         if found.alone:
             return Ending(Outcome.INCONCLUSIVE, look, trials, None, _all_copies(found.alone, look.n))
@@ -189,14 +196,14 @@ def _counted_once(assertion: Assertion, design: Design, look: Look, trials: Tria
     what = f"{found.sentence}, which count once: n = {found.kept} instead of {look.n}; "
     if not _decidable(assertion.attainable(counted.n, design), counted.alpha):
         note = f"{what}underpowered: {_needs(assertion, design)}"
-        return Ending(Outcome.INCONCLUSIVE, counted, found.trials, None, note)
+        return Ending(Outcome.INCONCLUSIVE, counted, found.trials, None, note, found.sentence)
     of_all = assertion.find(trials, design, look.alpha).p.outcome(look.alpha)
     finding = assertion.find(found.trials, design, counted.alpha)
     outcome = finding.p.outcome(counted.alpha)
     if outcome is not of_all and outcome is not Outcome.INCONCLUSIVE:
         what += f"with all {look.n} trials it would be {of_all}, and decided is what both show; "
     agreed = outcome if outcome is of_all else Outcome.INCONCLUSIVE
-    return Ending(agreed, counted, found.trials, finding, what)
+    return Ending(agreed, counted, found.trials, finding, what, found.sentence)
 
 
 def _without_result(assertion: Assertion, trials: Trials) -> str:
