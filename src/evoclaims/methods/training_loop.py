@@ -35,6 +35,9 @@ class TrainingLoop:
         name: of the method; the function's if empty.
         revision: raise it when the function computes something else.
         deterministic: whether its trials have no chance in them, so that they may be copies of each other.
+        overspend: by which share of its budget a trial may exceed it, for loops that cannot stop in time: with 0.5 a
+            claim is an error where one spends more than 1.5 times its budget. Claims name what is overspent by more
+            than 2% in any case. It is part of the trial's id where it is set.
     """
 
     function: Callable[..., Any] | str
@@ -43,10 +46,17 @@ class TrainingLoop:
     name: str = field(default="", kw_only=True, metadata=_NOT_HASHED)
     revision: int = field(default=1, kw_only=True, metadata=_NOT_HASHED)
     deterministic: bool = field(default=False, kw_only=True, metadata=_NOT_HASHED)
+    overspend: float = field(default=1.0, kw_only=True, metadata={"canonical": "if set"})
 
     def __post_init__(self) -> None:
         """Replace the function by its place, after checking that it takes the settings."""
         object.__setattr__(self, "settings", dict(self.settings))
+        if isinstance(self.overspend, bool) or not (isinstance(self.overspend, int | float) and self.overspend >= 0):
+            raise UserError(
+                f"overspend={self.overspend!r} of a training loop is a share of its budget, 0 or above: write 0.5 "
+                "where it may spend 1.5 times its budget."
+            )
+        object.__setattr__(self, "overspend", float(self.overspend))  # 1 and 1.0 are one id
         for name, value in self.settings.items():
             if not _is_plain(value):
                 raise UserError(

@@ -134,7 +134,13 @@ class _Gathering:
             parts=_parts(report, read),
             conditions=tuple(self._condition(report.tier, source) for source in report.sources if source.trials),
             made=made,
-            warnings=(*_broken(every), *origin.warnings(made), *_edited(report), *filter(None, [failing])),
+            warnings=(
+                *_broken(every),
+                *origin.warnings(made),
+                *_edited(report),
+                *_overspent(report),
+                *filter(None, [failing]),
+            ),
             history=eras(entries),
             change=_change(entries, report),
             faults=described(self.mutants, report) if report.n else "",
@@ -166,6 +172,12 @@ def _parts(report: ClaimReport, read: Mapping[str, Sequence[TrialSummary]]) -> t
     if report.verdict is not None and report.verdict.evidence:
         return judged_parts(report.verdict)
     return tuple(unjudged_part(label, trials) for label, trials in read.items() if trials)
+
+
+def _overspent(report: ClaimReport) -> tuple[str, ...]:
+    """Return a warning about trials that spent more than their budgets, if there is one."""
+    over = report.verdict.overspent if report.verdict else ""
+    return (f"Over budget: {over}.",) if over else ()
 
 
 def _edited(report: ClaimReport) -> list[str]:

@@ -13,6 +13,7 @@ from rich.cells import cell_len, set_cell_size
 from rich.text import Text
 
 from evoclaims.core.printable import printable
+from evoclaims.core.provenance import changing_flags
 from evoclaims.judging.drift import DriftReport
 from evoclaims.judging.verdict import Outcome
 from evoclaims.report import table_cells
@@ -109,17 +110,19 @@ def _shortened(text: str, room: int) -> str:
 
 
 def explanations(reports: Sequence[ClaimReport], width: int, colour: bool) -> str:
-    """Return a line for every verdict that is not plainly supported: why, what was accepted, which trials broke."""
+    """Return a line for every verdict that is not plainly supported: why, what was accepted, what its trials did."""
     lines = []
     for report in reports:
         broken = report.verdict.without_result if report.verdict else ""
-        if report.outcome == Outcome.SUPPORTED and report.expected in (None, report.outcome) and not broken:
+        over = report.verdict.overspent if report.verdict else ""
+        plain = report.outcome == Outcome.SUPPORTED and report.expected in (None, report.outcome)
+        if plain and not (broken or over or (report.verdict and report.verdict.copies)):
             continue
         note = ""
         if report.expected is not None and report.outcome != Outcome.NOT_RUN:
             kept = "accepted" if report.as_expected else f"no longer {report.expected}, which was accepted"
             note = f" [{kept}: {report.because}]"
-        worst = f" [worst rank: {broken}]" if broken else ""
+        worst = (f" [worst rank: {broken}]" if broken else "") + (f" [over budget: {over}]" if over else "")
         lines.append(f"{report.outcome.symbol} {report.name}: {report.reason}{worst}{note}")
     return _rendered("\n".join(" ".join(line.split()) for line in lines), width, colour) if lines else ""
 
@@ -131,10 +134,16 @@ def drift_lines(drift: DriftReport, changed: Sequence[str], compared: int) -> st
         f"reference trials: {drift.tested} comparisons, {drifted} drifted (exact rank tests, Holm, α = {drift.alpha:g})"
     )
     where = ": " * bool(changed) + ", ".join(f"{label} ({count})" for label, count in Counter(changed).items())
+    flags = changing_flags()
+    because = (
+        f"since XLA_FLAGS here change bits ({flags}), and none has a reference of the same flags, machine and versions"
+        if flags
+        else "since none has a reference of the same machine and versions"
+    )
     bits = (
         f"to the bit: {compared} trials compared with the same machine and versions, {len(changed)} changed{where}"
         if compared
-        else "to the bit: no trial could be compared, since none has a reference of the same machine and versions"
+        else f"to the bit: no trial could be compared, {because}"
     )
     return "\n".join([head, *drift.lines, bits])
 

@@ -9,6 +9,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Int
+from numpy.typing import NDArray
 
 from evoclaims.core.keys import EVALUATION, trial_key
 from evoclaims.envs.base import Episode, Task
@@ -35,6 +36,11 @@ def examined(task: Task, policy: Callable[[Any], Any], seed: int) -> Scores:
         fitness=tuple(map(float, final.fitness)),
         metrics={name: float(values[-1]) for name, values in final.metrics.items()},
     )
+
+
+def fixed_observations(task: Task, count: int) -> NDArray[np.float32]:
+    """Return observations that are the same for every policy, shape [count, observation_size]."""
+    return np.random.default_rng(0).normal(size=(count, task.observation_size)).astype(np.float32)
 
 
 def _fitted(task: Task, policy: Callable[[Any], Any]) -> Callable[[Array], Array]:

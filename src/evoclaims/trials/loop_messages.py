@@ -53,11 +53,15 @@ class Trained(msgspec.Struct, frozen=True, tag=True):
         metrics: as the function returned them.
         scores: None if it returned no policy.
         step: of its last report; None if it reported nothing.
+        actions: hash of the policy's actions on fixed starts; empty without a policy.
+        graded: whether one of these is no whole number.
     """
 
     metrics: dict[str, float]
     scores: Scores | None
     step: int | None
+    actions: str = ""
+    graded: bool = False
 
 
 class Failed(msgspec.Struct, frozen=True, tag=True):

@@ -19,6 +19,7 @@ from typing import Any, Final
 
 import msgspec
 
+from evoclaims.core.canonical import as_plain, content_hash
 from evoclaims.core.errors import UserError
 from evoclaims.core.portable import from_plain, resolve
 from evoclaims.envs.foreign.scoring import ForeignTask
@@ -31,6 +32,12 @@ COUNTS: Final = ("steps", "environment_steps")
 
 TOLD_SECONDS: Final = 0.2
 """Least time between two reports that are passed on, but for the points of the curve."""
+
+WATCHED: Final = 64
+"""Most actions by which policies are told from each other."""
+
+FIXED_START: Final = 2**31 - 1
+"""The seed of the starts from which these are watched, the same for every trial."""
 
 MOST_STEPS: Final = 2**53
 """What a count may be at most, as in records: a float holds it exactly."""
@@ -111,9 +118,54 @@ def train(request: LoopRequest, answer: Callable[[Answer], None]) -> Trained:
     if policy is None:
         check_shares("A training loop", told_metrics, "return such a share, or give the metric another name")
         return Trained(told_metrics, None, report.last)
+    actions, graded = actions_of(task, policy)  # before the examination, which may change what a policy draws from
     scores = examined(task, policy, request.seed)
     check_success("The examination of a training loop's policy", *scores.success, advice="make the task's such a share")
-    return Trained(told_metrics, scores, report.last)
+    return Trained(told_metrics, scores, report.last, actions, graded)
+
+
+def actions_of(task: Any, policy: Callable[[Any], Any]) -> tuple[str, bool]:
+    """Return the hash of a policy's actions on fixed starts, and whether some number in them is not whole.
+
+    Policies with other parameters nearly always differ here, and copies of one never do, whatever their seeds.
+    """
+    seen: list[Any] = []
+
+    def watched(observation: Any) -> Any:
+        if len(seen) == WATCHED:
+            raise _EnoughError
+        action = policy(observation)
+        seen.append(_plain_action(action))
+        return action
+
+    try:
+        if isinstance(task, ForeignTask):
+            task.examine_natively(watched, FIXED_START)
+        else:
+            from evoclaims.trials import loop_examination
+
+            for observation in loop_examination.fixed_observations(task, WATCHED):
+                watched(observation)
+    except _EnoughError:
+        pass
+    except Exception as error:  # a policy may be a table without these observations
+        seen.append(type(error).__name__)
+    graded = any(isinstance(x, float) and math.isfinite(x) and x % 1 != 0 for one in seen for x in one)
+    return content_hash(as_plain(seen)), graded
+
+
+class _EnoughError(Exception):
+    """As many actions as are needed have been seen."""
+
+
+def _plain_action(action: Any) -> list[float] | str:
+    """Return an action's numbers; of an action that is no array, its text."""
+    import numpy as np
+
+    try:
+        return [float(number) for number in np.ravel(np.asarray(action))]
+    except (TypeError, ValueError):
+        return repr(action)
 
 
 def examined(task: Any, policy: Callable[[Any], Any], seed: int) -> Scores:

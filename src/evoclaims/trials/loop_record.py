@@ -8,9 +8,10 @@ from typing import Any, Final
 
 import jax
 
+from evoclaims.core.canonical import content_hash
 from evoclaims.methods.training_loop import TrainingLoop
 from evoclaims.trials.loop_messages import Trained
-from evoclaims.trials.result import TRAINED_BY, Status, TrialResult
+from evoclaims.trials.result import RETURNED, TRAINED_BY, Status, TrialResult
 from evoclaims.trials.result_making import make_record
 from evoclaims.trials.spec import TrialSpec
 
@@ -62,5 +63,10 @@ def trained_record(
     origin = {
         TRAINED_BY: spec.condition.method.place,
         SCORED_BY: "training function" if scores is None else "examination",
+        RETURNED: {
+            "metrics": content_hash(dict(returned)),
+            "actions": trained.actions,
+            "graded": trained.graded,
+        },
     }
     return make_record(spec, status, metrics, levels, curves, b"", timing, devices, origin)

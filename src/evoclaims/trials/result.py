@@ -14,6 +14,9 @@ COMPLETE: tuple[str, ...] = ("done", "diverged")
 SCHEMA = 1
 TRAINED_BY: Final = "trained_by"
 """Key of the provenance of a training loop's trial: the place of its function, "module:name"."""
+RETURNED: Final = "returned"
+"""Key of the same: hashes of the "metrics" that its function returned and of its policy's "actions" on fixed starts
+(empty without a policy), and whether some action is "graded", no whole number."""
 
 
 @dataclass(frozen=True)

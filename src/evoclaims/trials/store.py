@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from evoclaims.core.errors import StorageError
 from evoclaims.core.files import read_file, write_atomically, write_once
-from evoclaims.core.packages import Versions, agree, depends_on, recorded
+from evoclaims.core.packages import Versions, agree, depends_on, recorded, without_flags
 from evoclaims.trials.arrays import pack, unpack
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.result_codec import dump, parse
@@ -141,7 +141,9 @@ class Store(StoreFiles):
             raise DamagedFileError(path, error.reason) from error
         if result.id != trial_id:
             raise DamagedFileError(path, f"it holds another trial, {result.id}")
-        if path.name not in (f"{trial_id}.json", self.home(result).name):
+        versions = _versions(result)
+        plain = f"{trial_id}.json" if versions is None else self.record_path(trial_id, without_flags(versions)).name
+        if path.name not in (f"{trial_id}.json", plain, self.home(result).name):  # once, no name had flags
             raise DamagedFileError(path, "its name is not that of the versions that it was made with")
         return result
 
