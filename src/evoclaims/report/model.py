@@ -19,7 +19,7 @@ from evoclaims.report.verdict_chart import VerdictChart
 from evoclaims.verdicts.claim_report import ClaimReport
 from evoclaims.verdicts.history import AcceptedVerdict
 from evoclaims.verdicts.robustness import Robustness
-from evoclaims.verdicts.sensitivity import Tally
+from evoclaims.verdicts.sensitivity import APART, Tally
 
 
 @dataclass(frozen=True)
@@ -110,7 +110,7 @@ class Board:
     def counts(self) -> Mapping[Tally, int]:
         """The number of the paper's claims by what they count as; of outcomes that no claim has, too."""
         found = table_cells.counts(section.report for section in self.papers)
-        return {tally: found.get(tally, 0) for tally in Tally if tally in found or tally is not Tally.INSENSITIVE}
+        return {tally: found.get(tally, 0) for tally in Tally if tally in found or tally not in APART}
 
     @property
     def accepted(self) -> int:
