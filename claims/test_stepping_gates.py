@@ -393,14 +393,28 @@ def test_neat_s_networks_stay_small_in_the_maze(trials, verdict, claim_tier, tas
     smoke=None,
     because="it compares tasks at their own sizes: smoke's have two levels each",
 )
-@pytest.mark.parametrize("method", ["cma_es", "neat", "hyperneat", "ppo"])
+@pytest.mark.parametrize(
+    "method",
+    [
+        "cma_es",
+        pytest.param(
+            "neat",
+            marks=expected(
+                Outcome.REFUTED,
+                tier="full",
+                because="NEAT ends N-parity with half of the rows, as a guess does: see G2",
+            ),
+        ),
+        "hyperneat",
+        "ppo",
+    ],
+)
 def test_the_alu_is_harder_than_parity(trials, verdict, method):
     parity, alu = trials(method, on="n_parity"), trials(method, on="simple_alu")
     verdict.reading(
         "fewer rows right at the last level",
         parity.last_success > alu.last_success,
-        because="the paper's measure; but a circuit with one answer is right on half of N-parity's rows, and fewer of the "
-        "ALU's",
+        because="the paper's measure; a constant answer is right on more of N-parity's rows than of the ALU's",
         since=AUDIT,
     )
     verdict(parity.success_beyond_guessing > alu.success_beyond_guessing)

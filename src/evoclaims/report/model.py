@@ -67,6 +67,9 @@ class Section:
         history: accepted verdicts, oldest first; a new tuple begins where what is judged has changed.
         change: what differs from the last accepted verdict; empty when nothing does.
         faults: which planted faults change the verdict.
+        nulls: which null agents satisfy the assertion.
+        read: whether the verdict depends on the reading.
+        power: of a verdict that is inconclusive.
     """
 
     report: ClaimReport
@@ -82,6 +85,9 @@ class Section:
     history: tuple[tuple[AcceptedVerdict, ...], ...] = ()
     change: str = ""
     faults: str = ""
+    nulls: str = ""
+    read: str = ""
+    power: str = ""
 
     @property
     def devices(self) -> str:
