@@ -15,7 +15,7 @@ import pytest
 from evoclaims.claims.claim import gap_of
 from evoclaims.claims.collected import TIER, ClaimTest
 from evoclaims.claims.fetching import NotStoredError, RunMissing
-from evoclaims.claims.session import Session
+from evoclaims.claims.session import Session, Verdicts
 from evoclaims.core.errors import UserError
 from evoclaims.core.provenance import machine_class
 from evoclaims.judging.assertion import Assertion
@@ -134,12 +134,16 @@ def _needed(session: Session, item: pytest.Item, test: ClaimTest) -> Sequence[Tr
     found: list[TrialGroup] = []
     judged: list[Assertion] = []
 
+    def keep(assertion: Assertion, readings: object) -> Assertion:
+        judged.append(assertion)
+        return assertion
+
     def trials(method: str, *, on: str) -> TrialGroup:
         found.append(replace(session.group(method, on, test.tier), get=_never))
         return found[-1]
 
     function: Callable[..., Any] = item.obj  # type: ignore[attr-defined]
-    given = {**item.callspec.params, TIER: test.tier, "trials": trials, "verdict": judged.append}  # type: ignore[attr-defined]
+    given = {**item.callspec.params, TIER: test.tier, "trials": trials, "verdict": Verdicts(keep)}  # type: ignore[attr-defined]
     names = inspect.signature(function).parameters
     if gap_of(item, test.tier) or not set(names) <= set(given):
         return ()
@@ -153,7 +157,11 @@ def _needed(session: Session, item: pytest.Item, test: ClaimTest) -> Sequence[Tr
     if isinstance(item.parent, pytest.Class):  # the run needs a new object of its class
         vars(item).pop("_instance", None)
         vars(item).pop("_obj", None)
-    return () if judged and session.leaves(test.tier, judged[0]) else found
+    if not judged:
+        return found
+    # A condition that only another reading of the sentence asks for is not run.
+    needed = {source.fingerprint for source in judged[0].sources()}
+    return () if session.leaves(test.tier, judged[0]) else [one for one in found if one.fingerprint in needed]
 
 
 def _never(condition: Condition, seeds: Sequence[int]) -> Sequence[TrialResult]:

@@ -8,6 +8,7 @@ from typing import Protocol
 
 _WITHOUT_TIER = {"jobs", "verify", "merge", "tables"}
 _TIERS = {
+    "audit": ("full", "full (default: the paper's own sentences) or smoke"),
     **dict.fromkeys(("report", "accept", "compare", "export"), ("all", "smoke, full or all (default)")),
     "replicate": ("full", "full (default: the paper's size) or smoke"),
 }
@@ -134,6 +135,12 @@ def _reading(add: _Add) -> None:
         "--why", action="store_true", help="also say why verdicts are accepted, inconclusive or not run"
     )
     status.add_argument("--as", dest="form", metavar="FORM", help="print csv, json or markdown instead of a table")
+
+    add(
+        "audit",
+        "show what verdicts rest on: null agents, readings, duplicates, chance, power, and sentences without a claim; "
+        "run nothing; exit status 1 when a supported verdict is vacuous or a claim names no line and date",
+    )
 
     report = add("report", "write a web page and a Markdown file about all claims from the trials at hand; run nothing")
     report.add_argument(

@@ -3,9 +3,11 @@
 A table is between two comments, the first of which says what it shows:
 
     <!-- evoclaims: verdicts full full:published smoke -->    verdicts by tier, or by tier and variant of the protocol
-    <!-- evoclaims: tally full -->                            how many verdicts of a tier ended how, in a sentence
+    <!-- evoclaims: tally full -->                            how many sentences and cases of a tier ended how
     <!-- evoclaims: numbers full all -->                      published numbers and ours, under all variants
     <!-- evoclaims: details full -->                          verdicts that variants of the protocol may change
+    <!-- evoclaims: readings full -->                         the readings of each sentence of the paper, and their verdicts
+    <!-- evoclaims: uncovered -->                             the paper's sentences that no claim judges, and why not
     <!-- evoclaims: measures -->                              what claims can read from trials
     <!-- evoclaims: assertions -->                            what they can say of it, and how it is judged
     <!-- evoclaims: end -->
@@ -25,7 +27,8 @@ from evoclaims.cli.project import Project, open_project
 from evoclaims.core.errors import UnknownNameError, UserError
 from evoclaims.core.files import read_text
 from evoclaims.figures.replication import replications
-from evoclaims.report import replication_cells, vocabulary
+from evoclaims.paper.uncovered import uncovered
+from evoclaims.report import readings_table, replication_cells, vocabulary
 from evoclaims.report.markdown import numbers, robustness
 from evoclaims.report.markdown_text import literal
 from evoclaims.report.tally import tally
@@ -105,6 +108,12 @@ def _tally(project: Project, words: list[str]) -> str:
     return tally(reports)
 
 
+def _readings(project: Project, words: list[str]) -> str:
+    """Return the readings of each sentence that a tier judges."""
+    (reports,) = project.judge_variants([(_tier(project, words), "")])
+    return readings_table.readings(reports)
+
+
 def _details(project: Project, words: list[str]) -> str:
     """Return the verdicts of a tier under the protocol and under each variant, of the claims that a variant touches."""
     tier = _tier(project, words)
@@ -141,6 +150,8 @@ _KINDS: Final[Mapping[str, Callable[[Project, list[str]], str]]] = {
     "tally": _tally,
     "details": _details,
     "numbers": _numbers,
+    "readings": _readings,
+    "uncovered": lambda project, _: readings_table.without_claims(uncovered(project.reproduction.folder)),
     "measures": lambda project, _: vocabulary.measures(project.reproduction.trials),
     "assertions": lambda *_: vocabulary.assertions(),
 }

@@ -9,6 +9,7 @@ from pathlib import Path
 from evoclaims.core.errors import UnknownNameError, UserError, require_known
 from evoclaims.core.tiers import TIERS
 from evoclaims.judging.design import Design
+from evoclaims.paper.null_agent import NullAgent
 from evoclaims.paper.reported import FILE, Published, load_published
 from evoclaims.paper.trial_group import TrialGroup
 from evoclaims.paper.variant import Conditions, Names, Variant
@@ -85,6 +86,7 @@ class Reproduction:
         trials: class that `trials(...)` returns: `TrialGroup`, or a subclass with the paper's own measures.
         mutants: module with the paper's own planted faults; it holds MUTANTS, `evoclaims.mutants.Mutant` by name, and
             is imported only when they are tried.
+        null_agents: by name, what has learnt nothing: an assertion that one of them satisfies is vacuous.
 
     Tables of imported trials are looked for in `folder`.
 
@@ -100,6 +102,7 @@ class Reproduction:
     variants: Mapping[str, Variant] = field(default_factory=dict)
     trials: type[TrialGroup] = TrialGroup
     mutants: str = ""
+    null_agents: Mapping[str, NullAgent] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         """Check the folder and the class of the trials, and say where imported ones are."""

@@ -13,7 +13,7 @@ from evoclaims.judging.design import Design
 from evoclaims.judging.verdict import Outcome
 from evoclaims.paper.archive import Archive
 from evoclaims.paper.reproduction import Reproduction
-from evoclaims.report import origin, replication_cells, table_cells, training_curves
+from evoclaims.report import audit, origin, replication_cells, table_cells, training_curves
 from evoclaims.report.champion import Draw, champion_of, network
 from evoclaims.report.charts_of_verdicts import timeline_chart
 from evoclaims.report.evidence import Part, judged_parts, unjudged_part
@@ -26,6 +26,7 @@ from evoclaims.verdicts import edited_code
 from evoclaims.verdicts.claim_report import ClaimReport
 from evoclaims.verdicts.history import AcceptedVerdict, History, eras, key_of
 from evoclaims.verdicts.mutation_matrix import Matrix, described
+from evoclaims.verdicts.readings import by_reading
 from evoclaims.verdicts.source_trials import SourceTrials
 
 Verdicts = Mapping[str, Sequence[ClaimReport]]
@@ -144,6 +145,9 @@ class _Gathering:
             history=eras(entries),
             change=_change(entries, report),
             faults=described(self.mutants, report) if report.n else "",
+            nulls=audit.nulls(report, self.reproduction.null_agents),
+            read=by_reading(report.readings),
+            power=table_cells.power(report),
         )
 
     def _condition(self, tier: str, source: SourceTrials) -> str:

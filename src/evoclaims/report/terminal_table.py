@@ -68,6 +68,10 @@ def verdict_table(reports: Sequence[ClaimReport], width: int, colour: bool) -> s
         captions.append("* looked into and accepted")
     if any(report.tried is Tried.INSENSITIVE for report in reports):
         captions.append("insensitive: no fault planted in the claim's methods changes its verdict, so it is no support")
+    if any(report.is_vacuous for report in reports):
+        captions.append("vacuous: a null agent, which has learnt nothing, is supported as well, so it is no support")
+    if any(report.depends_on_the_reading for report in reports):
+        captions.append("by reading: another reading of the sentence ends otherwise (evoclaims audit)")
     captions += mixed_versions.lines(reports) + edited_code.lines(reports)
     return "\n".join([*(_rendered(line, width, colour).rstrip() for line in lines), *captions])
 
