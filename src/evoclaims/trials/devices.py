@@ -12,6 +12,7 @@ import jax
 from threadpoolctl import threadpool_limits
 
 from evoclaims.core.errors import UserError, require_known
+from evoclaims.core.forked import refuse_forked
 
 DEVICE_NAMES: Final = ("auto", "cpu", "gpu")
 MATMUL_PRECISION: Final = "highest"
@@ -65,9 +66,11 @@ def choose(name: str) -> list[jax.Device]:
     """Return the devices called `name`: "auto" takes GPUs if there are any.
 
     Raises:
-        UserError: when a GPU is requested, here or by JAX_PLATFORMS, and jax sees none.
+        UserError: when a GPU is requested, here or by JAX_PLATFORMS, and jax sees none, or in a forked process where
+            jax cannot compute.
     """
     require_known("device", name, DEVICE_NAMES)
+    refuse_forked()
     try:
         return list(jax.devices(None if name == "auto" else name))
     except (RuntimeError, AssertionError) as error:  # jax asserts that a platform in JAX_PLATFORMS has a plugin

@@ -49,6 +49,20 @@ class LastVerdict:
 
 
 @dataclass(frozen=True)
+class EarlierRun:
+    """How a claim's test ended before it ran again in the same run of pytest: it no longer counts.
+
+    Attributes:
+        outcome, reason: the verdict in short.
+        p: of the whole assertion; None if nothing was tested.
+    """
+
+    outcome: Outcome
+    reason: str
+    p: float | None
+
+
+@dataclass(frozen=True)
 class ClaimReport:
     """One claim, at one tier, with one set of parameters.
 
@@ -69,6 +83,7 @@ class ClaimReport:
         before: the verdict that the store held before this run, if any.
         tried: whether planted faults change the verdict, according to the committed matrix of mutants.
         has_test: whether the claim has a test at this tier.
+        earlier: how its test ended before a plugin ran it again, oldest first; the last run counts.
     """
 
     claim: str
@@ -89,6 +104,7 @@ class ClaimReport:
     before: LastVerdict | None = None
     tried: Tried = Tried.NOT_TRIED
     has_test: bool = True
+    earlier: tuple[EarlierRun, ...] = ()
 
     @property
     def name(self) -> str:
