@@ -96,7 +96,6 @@ def pytest_runtest_protocol(item, nextitem):
 """
 
 
-
 @pytest.mark.parametrize(
     "plugin",
     [
@@ -141,8 +140,7 @@ def _runs(project: Any, plugin: str) -> dict[str, list[str]]:
     named = [claim["claim"] + (claim["case"] and f"[{claim['case']}]") for claim in claims]
     assert named == ["a", "b", "c[one]", "c[two]"]
     return {
-        name: [run["outcome"] for run in [*claim["earlier"], claim]]
-        for name, claim in zip(named, claims, strict=True)
+        name: [run["outcome"] for run in [*claim["earlier"], claim]] for name, claim in zip(named, claims, strict=True)
     }
 
 

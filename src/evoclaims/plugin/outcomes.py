@@ -105,9 +105,7 @@ def pytest_runtest_makereport(
     return report
 
 
-def _add_to_teardown(
-    item: pytest.Item, call: pytest.CallInfo[None], report: pytest.TestReport, state: _State
-) -> None:
+def _add_to_teardown(item: pytest.Item, call: pytest.CallInfo[None], report: pytest.TestReport, state: _State) -> None:
     """Let the last report of a run carry the claim's report, too: plugins that run tests again hide other reports.
 
     `flaky` does not log the report of a failed call. pytest-retry calls a test again and makes no report of that.

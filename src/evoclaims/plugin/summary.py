@@ -108,10 +108,11 @@ class Summary:
         """Return one report for each claim: of its last run, whatever ran it again."""
         from evoclaims.verdicts.repeated_runs import last_runs
 
-        last = last_runs(self.reports)
-        with self._telling():  # runs in several processes know nothing of each other
-            again = [one.earlier and one not in self.reports for one in last]
-            last = [make_session(self._config).save(one) if it else one for one, it in zip(last, again, strict=True)]
+        known, last = self.reports, last_runs(self.reports)
+        for at, report in enumerate(last):
+            if report.earlier and report not in known:  # runs in several processes know nothing of each other
+                with self._telling():
+                    last[at] = make_session(self._config).save(report)
         return last
 
     @contextmanager
