@@ -166,7 +166,8 @@ class Summary:
         width, colour = writer.fullwidth, writer.hasmarkup
         terminalreporter.section("claims")
         room = terminal_table.columns(width, terminalreporter.isatty)
-        terminalreporter.write_line(self._drawn(terminal_table.verdict_table(self.reports, room, colour)))
+        table = terminal_table.verdict_table(self.reports, room, colour, self._encoding)
+        terminalreporter.write_line(self._drawn(table))
         terminalreporter.write_line("")
         explained = terminal_table.explanations(self.reports, width, colour)
         if explained:
@@ -216,8 +217,13 @@ class Summary:
 
     def _drawn(self, text: str) -> str:
         """Return rich's output in characters that the terminal has."""
+        return spelled(text, self._encoding)
+
+    @property
+    def _encoding(self) -> str | None:
+        """The terminal's encoding, if it is known."""
         file: Any = getattr(self._config.get_terminal_writer(), "_file", None)
-        return spelled(text, getattr(file, "encoding", None))
+        return getattr(file, "encoding", None)
 
     def _notes(self) -> list[str]:
         """Return lines on what comparisons found: with reference trials, trials of other versions, and verdicts."""

@@ -53,11 +53,13 @@ class Trained(msgspec.Struct, frozen=True, tag=True):
         metrics: as the function returned them.
         scores: None if it returned no policy.
         step: of its last report; None if it reported nothing.
+        finite: whether all reported numbers were finite, also those that are no point of the curve.
     """
 
     metrics: dict[str, float]
     scores: Scores | None
     step: int | None
+    finite: bool = True
 
 
 class Failed(msgspec.Struct, frozen=True, tag=True):

@@ -135,7 +135,10 @@ def _json(data: bytes) -> Columns:
     return _of_rows(plain)
 
 
-_HOW_JSON: Final = "a table in JSON is a list of objects, one object a line, or what DataFrame.to_json() writes with the columns' names"
+_HOW_JSON: Final = (
+    "a table in JSON is a list of objects, one object a line, or what DataFrame.to_json() writes with the columns' "
+    "names"
+)
 
 
 class _Pairs(list[tuple[str, Any]]):
