@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import io
 import re
+import sys
 from dataclasses import replace
 
 import pytest
@@ -13,6 +15,7 @@ from rich.cells import cell_len
 
 from evoclaims.judging.drift import DriftReport, DriftRow
 from evoclaims.judging.verdict import Outcome
+from evoclaims.report.console import PlainSpokenConsole, plain_table
 from evoclaims.report.table_cells import totals
 from evoclaims.report.terminal_table import drift_lines, explanations, verdict_table
 
@@ -188,3 +191,27 @@ def test_trials_without_a_result_are_told_of_whatever_the_verdict() -> None:
         told = explanations([report(outcome=outcome, verdict=broken)], 160, False)
         assert told.endswith("G1: for a reason [worst rank: 2 of 10 trials of a ran out of time (seeds 0, 3)]")
     assert explanations([report()], 160, False) == ""
+
+
+@pytest.mark.parametrize("encoding", ["ascii", "latin-1", "koi8-r", None])
+@pytest.mark.parametrize("width", [70, 100, 1000])
+def test_columns_stay_aligned_on_terminals_without_some_characters(encoding: str | None, width: int) -> None:
+    """Each row's verdict begins where the heading's does, whatever its sentence is spelled with."""
+    sentences = ["plain", "≤ 5 € or more", "α … β", "§§§", "a sentence that is long enough to be cut: " + "é" * 60]
+    reports = [report(f"G{at}", statement=text, where=f"§{at}") for at, text in enumerate(sentences)]
+    heading, *rows = verdict_table(reports, width, False, encoding).splitlines()
+    begin = heading.index("verdict")
+    mark = "+" if encoding else "✓"
+    for row in rows[: len(reports)]:
+        assert row.encode(encoding or "utf-8")
+        assert cell_len(row[: row.index(f"{mark} supported")]) == begin
+
+
+def test_columns_of_other_tables_stay_aligned_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    terminal = io.TextIOWrapper(io.BytesIO(), encoding="ascii")
+    monkeypatch.setattr(sys, "stdout", terminal)
+    rows = [("§1 α", "1"), ("plain", "2")]
+    PlainSpokenConsole(file=terminal, width=60).print_whole(plain_table(("claim …", "n"), rows))
+    terminal.flush()
+    lines = terminal.buffer.getvalue().decode("ascii").splitlines()
+    assert [line.rstrip() for line in lines] == ["claim ...     n", "sec. 1 alpha  1", "plain         2"]

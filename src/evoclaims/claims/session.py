@@ -10,7 +10,7 @@ from typing import Any
 from evoclaims.claims.as_published import AsPublished
 from evoclaims.claims.claim import Expectation
 from evoclaims.claims.collected import ClaimTest
-from evoclaims.claims.fetching import NotStoredError, StoredOnly
+from evoclaims.claims.fetching import NotStoredError, RunMissing, StoredOnly
 from evoclaims.claims.null_agents import satisfied_by
 from evoclaims.claims.reporting import expecting, judged
 from evoclaims.core.errors import UserError
@@ -32,8 +32,10 @@ from evoclaims.trials.spec import Condition, TrialSpec
 from evoclaims.trials.store import Store
 from evoclaims.verdicts import mutation_matrix
 from evoclaims.verdicts.claim_report import CONTROL, ClaimReport, located, named, save, succeeding
+from evoclaims.verdicts.history import key_of
 from evoclaims.verdicts.mutation_matrix import Matrix
 from evoclaims.verdicts.readings import ReadAs, moment
+from evoclaims.verdicts.repeated_runs import following
 from evoclaims.verdicts.upgrade import Succession, Upgrade, predecessors, upgrade
 
 
@@ -70,6 +72,7 @@ class Session:
         trials: a fixed number of trials in place of the tier's looks; None keeps the tier's design.
         variant: name of a variant of the protocol; empty for the protocol itself.
         again: seeds that were run again, since stored trials were made with other versions, by the condition's id.
+        runs: the newest report of each claim, by tier and name: a plugin may run its test again.
     """
 
     reproduction: Reproduction
@@ -78,6 +81,7 @@ class Session:
     trials: int | None = None
     variant: str = ""
     again: Mapping[str, Collection[int]] = field(default_factory=dict)
+    runs: dict[tuple[str, str], ClaimReport] = field(default_factory=dict, compare=False)
 
     @cached_property
     def mutants(self) -> Matrix:
@@ -177,9 +181,18 @@ class Session:
         complete, root = expecting(replace(report, variant=self.variant), expectation), self.store.root
         if not self.variant:  # mutants are tried on the protocol itself
             complete = replace(complete, tried=mutation_matrix.tried(self.mutants, complete))
-        if isinstance(self.fetch, StoredOnly):
-            return located(complete, root)
-        return save(succeeding(complete, root), root)
+        last, reads = self.runs.get(key_of(complete)), isinstance(self.fetch, StoredOnly)
+        if last is not None:
+            complete = following(complete, last)
+        elif not reads:
+            complete = succeeding(complete, root)
+        complete = located(complete, root) if reads else save(complete, root)
+        self.runs[key_of(complete)] = complete
+        return complete
+
+    def save(self, report: ClaimReport) -> ClaimReport:
+        """Write a report's file again, with runs of other processes; only a session that runs trials does."""
+        return save(report, self.store.root) if report.evidence and isinstance(self.fetch, RunMissing) else report
 
     def leaves(self, tier: str, assertion: Assertion) -> bool:
         """Whether there is a variant, and the protocol itself has all conditions that an assertion is about."""

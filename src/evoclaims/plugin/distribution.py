@@ -69,14 +69,15 @@ def in_order(items: list[pytest.Item], load: Workload) -> list[pytest.Item]:
     """Return tests in the order for one process: the claims change places among themselves, all others stay."""
     from evoclaims.claims.order import Order
 
-    order, claims = Order[str](load, 1), {item.nodeid: item for item in items if item.nodeid in load.claims}
+    order, claims = Order[str](load, 1), dict[str, pytest.Item]()
+    first = {id(claims.setdefault(item.nodeid, item)) for item in items if item.nodeid in load.claims}
     ordered = []
     for item in items:
-        if order.knows(item.nodeid):
+        if id(item) in first:
             chosen = order.next("", list(claims))
             order.ended(chosen)
             ordered.append(claims.pop(chosen))
-        else:
+        else:  # a plugin's repetition of a claim, too
             ordered.append(item)
     return ordered
 

@@ -12,7 +12,9 @@ import jax
 from threadpoolctl import threadpool_limits
 
 from evoclaims.core.errors import UserError, require_known
+from evoclaims.core.forked import refuse_forked
 from evoclaims.core.private_files import doubt, make_private, say_refused
+from evoclaims.trials.jax_options import refuse_changed
 
 DEVICE_NAMES: Final = ("auto", "cpu", "gpu")
 MATMUL_PRECISION: Final = "highest"
@@ -81,9 +83,12 @@ def choose(name: str) -> list[jax.Device]:
     """Return the devices called `name`: "auto" takes GPUs if there are any.
 
     Raises:
-        UserError: when a GPU is requested, here or by JAX_PLATFORMS, and jax sees none.
+        UserError: when a GPU is requested, here or by JAX_PLATFORMS, and jax sees none, in a forked process where
+            jax cannot compute, and where an option of jax would change trials (see `jax_options`).
     """
     require_known("device", name, DEVICE_NAMES)
+    refuse_forked()
+    refuse_changed()
     try:
         return list(jax.devices(None if name == "auto" else name))
     except (RuntimeError, AssertionError) as error:  # jax asserts that a platform in JAX_PLATFORMS has a plugin

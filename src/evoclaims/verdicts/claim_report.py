@@ -50,6 +50,20 @@ class LastVerdict:
 
 
 @dataclass(frozen=True)
+class EarlierRun:
+    """How a claim's test ended before it ran again in the same run of pytest: it no longer counts.
+
+    Attributes:
+        outcome, reason: the verdict in short.
+        p: of the whole assertion; None if nothing was tested.
+    """
+
+    outcome: Outcome
+    reason: str
+    p: float | None
+
+
+@dataclass(frozen=True)
 class ClaimReport:
     """One claim, at one tier, with one set of parameters.
 
@@ -74,6 +88,7 @@ class ClaimReport:
         asserts: hash of the assertion alone, which two claims with one assertion share; empty where none was judged.
         readings: of the sentence, the judged one first; empty where only that one was judged.
         satisfied_by: names of the null agents that satisfy the assertion.
+        earlier: how its test ended before a plugin ran it again, oldest first; the last run counts.
     """
 
     claim: str
@@ -98,6 +113,7 @@ class ClaimReport:
     asserts: str = ""
     readings: tuple[ReadAs, ...] = ()
     satisfied_by: tuple[str, ...] = ()
+    earlier: tuple[EarlierRun, ...] = ()
 
     @property
     def name(self) -> str:
