@@ -20,7 +20,8 @@ def as_plain(value: Any) -> Any:
     """Turn frozen dataclasses, tuples and scalars into plain JSON values.
 
     A dataclass becomes its fields, and the name of its class if that is none of this package's, where no two with the
-    same fields mean different things. Fields whose metadata holds `canonical=False` are left out. NaN and the
+    same fields mean different things. Fields whose metadata holds `canonical=False` are left out, and those with
+    `canonical="if any"` where they are None. NaN and the
     infinities become the strings "nan", "inf", "-inf", since JSON cannot express them.
 
     Raises:
@@ -48,7 +49,8 @@ def fields_of(value: Any) -> dict[str, Any]:
     return {
         field.name: as_plain(getattr(value, field.name))
         for field in dataclasses.fields(value)
-        if field.metadata.get("canonical", True)
+        if (counts := field.metadata.get("canonical", True))
+        and (counts != "if any" or getattr(value, field.name) is not None)
     }
 
 
