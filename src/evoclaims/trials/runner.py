@@ -14,6 +14,7 @@ import numpy as np
 
 from evoclaims.core.errors import UserError
 from evoclaims.core.packages import absent
+from evoclaims.core.waiting import working_time
 from evoclaims.methods.training_loop import TrainingLoop
 from evoclaims.trials import checkpoint
 from evoclaims.trials.allowance import Allowance, OutOfTimeError
@@ -189,10 +190,10 @@ def _advance(run: Run, batch: Batch, allowance: Allowance, strides: Strides) -> 
     cost = run.condition.cost
     end = min((batch.header.chunks + 1) * run.condition.budget.chunk(cost), run.condition.steps)
     until = strides.after(batch.steps, end)
-    began, used, compiled = time.perf_counter(), time.process_time(), run.lanes.seconds
+    began, used, compiled = working_time(), time.process_time(), run.lanes.seconds
     state, report = allowance.spend(lambda: run.lanes.advance(batch.state, until, len(batch.header.lanes)))
     compiling = run.lanes.seconds - compiled
-    seconds, processor = time.perf_counter() - began - compiling, max(time.process_time() - used - compiling, 0.0)
+    seconds, processor = working_time() - began - compiling, max(time.process_time() - used - compiling, 0.0)
     strides.took(until - batch.steps, seconds)
     header = replace(
         batch.header,
