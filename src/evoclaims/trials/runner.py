@@ -25,6 +25,7 @@ from evoclaims.trials.halving import halved, is_exhausted
 from evoclaims.trials.imported import into_store
 from evoclaims.trials.lanes import Lanes, picked
 from evoclaims.trials.loop_trials import LoopTrials
+from evoclaims.trials.memory import give_back
 from evoclaims.trials.notice import announced
 from evoclaims.trials.pacing import Rhythm, Strides
 from evoclaims.trials.program import Report
@@ -109,8 +110,11 @@ def _maker(stored: StoredTrials, devices: Sequence[jax.Device], checkpoint_secon
         """Run batches until all trials are stored, or one turns out too large for the device's memory."""
         nonlocal most
         one = Run(Lanes(stored.condition, devices), stored, tell, checkpoint_seconds, most)
-        with single_threaded_linear_algebra():
-            too_large = _finish_all(one, owed)
+        try:
+            with single_threaded_linear_algebra():
+                too_large = _finish_all(one, owed)
+        finally:
+            give_back()
         if too_large is not None:
             most = halved(one, too_large)
 
