@@ -19,16 +19,17 @@ from evoclaims.judging.drift import DriftReport
 from evoclaims.judging.fingerprint import fingerprint
 from evoclaims.judging.judge import judge
 from evoclaims.judging.measure import Event, Measure, Profile
+from evoclaims.judging.power import Draws
 from evoclaims.judging.tripwire import DigestCheck
 from evoclaims.judging.verdict import Outcome, Verdict
-from evoclaims.paper import references
+from evoclaims.paper import pilots, references
 from evoclaims.paper.archive import Archive
 from evoclaims.paper.reproduction import Reproduction
 from evoclaims.paper.trial_group import Fetch, TrialGroup
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.spec import Condition, TrialSpec
 from evoclaims.trials.store import Store
-from evoclaims.verdicts import mutation_matrix
+from evoclaims.verdicts import history, mutation_matrix
 from evoclaims.verdicts.claim_report import ClaimReport, located, named, save, succeeding
 from evoclaims.verdicts.mutation_matrix import Matrix
 from evoclaims.verdicts.upgrade import Succession, Upgrade, predecessors, upgrade
@@ -44,6 +45,7 @@ class _Used:
     condition: Condition
     ids: set[str] = field(default_factory=set)
     again: set[int] = field(default_factory=set)
+    reads: set[str] = field(default_factory=set)
 
 
 @dataclass(frozen=True)
@@ -103,7 +105,30 @@ class Session:
             mark = fingerprint(assertion, design, claim=name, tier=tier)
             of = next((f"{one.label}: " for one in assertion.sources() if one.fingerprint == error.condition), "")
             verdict = Verdict(Outcome.NOT_RUN, f"{of}{error}", assertion.describe(), mark)
-        return judged(test, assertion, design, verdict, self.again)
+        report = judged(test, assertion, design, verdict, self.again)
+        return replace(report, chance=self._chance(report, assertion, design))
+
+    def _chance(self, report: ClaimReport, assertion: Assertion, design: Design) -> float | None:
+        """Return how often an inconclusive claim ends so in draws from its pilots, if it was accepted as supported."""
+        if report.outcome is not Outcome.INCONCLUSIVE or self.variant or self.trials is not None:
+            return None
+        found: dict[str, tuple[TrialResult, ...]] = {}
+        try:
+            accepted = history.load(self.reproduction.folder / history.FILE).get(history.key_of(report), ())
+            if not accepted or accepted[-1].outcome is not Outcome.SUPPORTED:
+                return None
+            for group in assertion.sources():
+                if not isinstance(group, TrialGroup):
+                    return None
+                path = pilots.path_of(self.reproduction.folder, report.tier, group.method, group.task)
+                readings = [one for one in assertion.readings() if one.source.fingerprint == group.fingerprint]
+                found[group.fingerprint] = pilots.load(path)
+                if pilots.unfit(found[group.fingerprint], group.condition, design, readings):
+                    return None
+        except UserError:  # whoever compares with the damaged file says so
+            return None
+        outcomes = list(Draws(found).outcomes(assertion, design))
+        return outcomes.count(Outcome.INCONCLUSIVE) / len(outcomes)
 
     def complete(self, report: ClaimReport, expectation: Expectation | None) -> ClaimReport:
         """Return a report with the variant, an accepted outcome, what mutants showed, and the file that holds it.
@@ -131,7 +156,14 @@ class Session:
     def drift(self, reports: Sequence[ClaimReport]) -> tuple[DriftReport, DigestCheck]:
         """Compare the trials behind `reports` with the committed reference trials of their tiers."""
         cases = [
-            references.paired(f"{used.method} on {used.task} ({used.tier})", trials, self._reference(used))
+            references.paired(
+                f"{used.method} on {used.task} ({used.tier})",
+                trials,
+                self._reference(used),
+                method=f"{used.method} ({used.tier})",
+                reads=used.reads,
+                pilot=self._pilot(used),
+            )
             for used in self._used(reports)
             if (trials := self._trials(used))
         ]
@@ -154,7 +186,8 @@ class Session:
             if now and before and len(now) == len(trials):
                 old = recorded(before[0].provenance, condition.packages)
                 label = f"{used.method} on {used.task} ({used.tier})"
-                successions.append(Succession(label, old, here, before, now, len(used.again)))
+                method, reads = f"{used.method} ({used.tier})", tuple(sorted(used.reads))
+                successions.append(Succession(label, old, here, before, now, len(used.again), method, reads))
         return upgrade(successions)
 
     def _used(self, reports: Sequence[ClaimReport]) -> list[_Used]:
@@ -170,6 +203,7 @@ class Session:
                     found[names] = _Used(*names, tier.condition(*names[1:]))
                 found[names].ids.update(source.trials)
                 found[names].again.update(source.again)
+                found[names].reads.update(source.reads)
         return [used for _, used in sorted(found.items())]
 
     def _reference(self, used: _Used) -> tuple[TrialResult, ...]:
@@ -179,6 +213,11 @@ class Session:
         if any(trial.condition == used.condition.id for trial in own):
             return own
         return references.of_condition(self.reproduction.references, *names, used.condition.id) or own
+
+    def _pilot(self, used: _Used) -> tuple[TrialResult, ...]:
+        """Return the committed pilot of a condition; empty if there is none."""
+        found = pilots.load(pilots.path_of(self.reproduction.folder, used.tier, used.method, used.task))
+        return found if found and found[0].condition == used.condition.id else ()
 
     def _trials(self, used: _Used) -> list[TrialResult]:
         """Return the stored trials that a condition's claims were judged from."""

@@ -69,6 +69,8 @@ class ClaimReport:
         before: the verdict that the store held before this run, if any.
         tried: whether planted faults change the verdict, according to the committed matrix of mutants.
         has_test: whether the claim has a test at this tier.
+        chance: of a claim that is inconclusive and was accepted as supported, how often draws from its pilots end so;
+            None where that is not known.
     """
 
     claim: str
@@ -89,6 +91,7 @@ class ClaimReport:
     before: LastVerdict | None = None
     tried: Tried = Tried.NOT_TRIED
     has_test: bool = True
+    chance: float | None = None
 
     @property
     def name(self) -> str:
