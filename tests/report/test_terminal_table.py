@@ -131,17 +131,47 @@ def test_the_comparison_with_the_references_says_what_drifted_and_what_it_did_no
     changed = ["a on b", "c on d", "a on b"]
     lines = drift_lines(DriftReport(rows, 0.01), changed, compared=4).splitlines()
     assert lines == [
-        "reference trials: 2 comparisons, 1 drifted (exact rank tests, Holm, α = 0.01)",
+        "reference trials: 2 comparisons, 1 drifted (by method, permutation tests, Holm, α = 0.01)",
         "DRIFT in a on b: steps is lower now: median 40.5 -> 30, A12 = 0.12, p = 0.0004 (Holm)",
         "not checked: c on d: 0 reference trials, 10 needed",
         "to the bit: 4 trials compared with the same machine and versions, 3 changed: a on b (2), c on d (1)",
     ]
 
 
-def test_where_nothing_could_be_compared_to_the_bit_nothing_is_said_to_be_unchanged() -> None:
-    assert drift_lines(DriftReport((), 0.01), changed=[], compared=0).splitlines()[-1] == (
-        "to the bit: no trial could be compared, since none has a reference of the same machine and versions"
+@pytest.mark.parametrize(
+    ("flags", "because"),
+    [
+        (None, "since none has a reference of the same machine and versions"),
+        (
+            "--xla_level=0",
+            "since XLA_FLAGS here change bits (--xla_level=0), and none has a reference of the same flags, machine and "
+            "versions",
+        ),
+    ],
+)
+def test_where_nothing_could_be_compared_to_the_bit_the_reason_is_said(
+    monkeypatch: pytest.MonkeyPatch, flags: str | None, because: str
+) -> None:
+    monkeypatch.setattr("evoclaims.report.terminal_table.changing_flags", lambda: flags)
+    last = drift_lines(DriftReport((), 0.01), changed=[], compared=0).splitlines()[-1]
+    assert last == f"to the bit: no trial could be compared, {because}"
+
+
+def test_without_drift_the_nearest_comparison_and_what_was_detectable_are_shown() -> None:
+    near = DriftRow("a on b", "steps", 10, 60, "no drift", 0.02, 0.2, a12=0.7, median_new=3.0, median_ref=2.0)
+    report = DriftReport((near,), 0.01, detectable={"b": 1.84, "a": 0.8, "c": 0.81})
+    assert drift_lines(report, [], compared=3).splitlines()[1] == (
+        "no drift shown; nearest: a on b: steps is higher now: median 2 -> 3, A12 = 0.70, p = 0.2 (Holm); found would "
+        "have been with probability 0.95 a shift of all conditions by 0.8 SD in a, c, 1.8 SD in b"
     )
+
+
+def test_what_trials_overspent_is_shown_also_where_a_claim_is_supported() -> None:
+    for field in ("overspent", "copies"):
+        shown = replace(report(), verdict=verdict(Outcome.SUPPORTED, **{field: "3 of 10 trials of a"}))
+        assert explanations([shown], 200, colour=False).startswith("✓ ")
+    over = replace(report(), verdict=verdict(Outcome.SUPPORTED, overspent="3 of 10 trials of a spent up to 9 of 5"))
+    assert "[over budget: 3 of 10 trials of a spent up to 9 of 5]" in explanations([over], 200, colour=False)
 
 
 def test_eighty_columns_leave_out_the_files_and_nothing_else() -> None:

@@ -21,16 +21,17 @@ from evoclaims.judging.drift import DriftReport
 from evoclaims.judging.fingerprint import fingerprint
 from evoclaims.judging.judge import judge
 from evoclaims.judging.measure import Event, Measure, Profile
+from evoclaims.judging.power import Draws
 from evoclaims.judging.tripwire import DigestCheck
 from evoclaims.judging.verdict import Outcome, Verdict
-from evoclaims.paper import references
+from evoclaims.paper import pilots, references
 from evoclaims.paper.archive import Archive
 from evoclaims.paper.reproduction import Reproduction
 from evoclaims.paper.trial_group import Fetch, TrialGroup
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.spec import Condition, TrialSpec
 from evoclaims.trials.store import Store
-from evoclaims.verdicts import mutation_matrix
+from evoclaims.verdicts import history, mutation_matrix
 from evoclaims.verdicts.claim_report import CONTROL, ClaimReport, located, named, save, succeeding
 from evoclaims.verdicts.history import key_of
 from evoclaims.verdicts.mutation_matrix import Matrix
@@ -49,6 +50,7 @@ class _Used:
     condition: Condition
     ids: set[str] = field(default_factory=set)
     again: set[int] = field(default_factory=set)
+    reads: set[str] = field(default_factory=set)
 
 
 @dataclass(frozen=True)
@@ -116,7 +118,8 @@ class Session:
         """
         verdict = self._verdict(test, assertion)
         report = judged(test, assertion, self.design(test.tier), verdict, self.again)
-        report = replace(report, satisfied_by=self._satisfied_by(test, assertion, verdict))
+        by, chance = self._satisfied_by(test, assertion, verdict), self._chance(report, assertion)
+        report = replace(report, satisfied_by=by, chance=chance)
         if self.variant or not isinstance(self.fetch, StoredOnly) or not test.claim.is_read_at(test.tier):
             return report
         first = Reading(test.claim.read, assertion, "the test's own assertion", test.claim.since)
@@ -170,6 +173,29 @@ class Session:
 
         return satisfied_by(agents, assertion, look, design, others if reads else None)
 
+    def _chance(self, report: ClaimReport, assertion: Assertion) -> float | None:
+        """Return how often an inconclusive claim ends so in draws from its pilots, if it was accepted as supported."""
+        design = self.design(report.tier)
+        if report.outcome is not Outcome.INCONCLUSIVE or self.variant or self.trials is not None:
+            return None
+        found: dict[str, tuple[TrialResult, ...]] = {}
+        try:
+            accepted = history.load(self.reproduction.folder / history.FILE).get(history.key_of(report), ())
+            if not accepted or accepted[-1].outcome is not Outcome.SUPPORTED:
+                return None
+            for group in assertion.sources():
+                if not isinstance(group, TrialGroup):
+                    return None
+                path = pilots.path_of(self.reproduction.folder, report.tier, group.method, group.task)
+                readings = [one for one in assertion.readings() if one.source.fingerprint == group.fingerprint]
+                found[group.fingerprint] = pilots.load(path)
+                if pilots.unfit(found[group.fingerprint], group.condition, design, readings):
+                    return None
+        except UserError:  # whoever compares with the damaged file says so
+            return None
+        outcomes = list(Draws(found).outcomes(assertion, design))
+        return outcomes.count(Outcome.INCONCLUSIVE) / len(outcomes)
+
     def complete(self, report: ClaimReport, expectation: Expectation | None) -> ClaimReport:
         """Return a report with the variant, an accepted outcome, what mutants showed, and the file that holds it.
 
@@ -205,7 +231,14 @@ class Session:
     def drift(self, reports: Sequence[ClaimReport]) -> tuple[DriftReport, DigestCheck]:
         """Compare the trials behind `reports` with the committed reference trials of their tiers."""
         cases = [
-            references.paired(f"{used.method} on {used.task} ({used.tier})", trials, self._reference(used))
+            references.paired(
+                f"{used.method} on {used.task} ({used.tier})",
+                trials,
+                self._reference(used),
+                method=f"{used.method} ({used.tier})",
+                reads=used.reads,
+                pilot=self._pilot(used),
+            )
             for used in self._used(reports)
             if (trials := self._trials(used))
         ]
@@ -228,7 +261,8 @@ class Session:
             if now and before and len(now) == len(trials):
                 old = recorded(before[0].provenance, condition.packages)
                 label = f"{used.method} on {used.task} ({used.tier})"
-                successions.append(Succession(label, old, here, before, now, len(used.again)))
+                method, reads = f"{used.method} ({used.tier})", tuple(sorted(used.reads))
+                successions.append(Succession(label, old, here, before, now, len(used.again), method, reads))
         return upgrade(successions)
 
     def _used(self, reports: Sequence[ClaimReport]) -> list[_Used]:
@@ -244,6 +278,7 @@ class Session:
                     found[names] = _Used(*names, tier.condition(*names[1:]))
                 found[names].ids.update(source.trials)
                 found[names].again.update(source.again)
+                found[names].reads.update(source.reads)
         return [used for _, used in sorted(found.items())]
 
     def _reference(self, used: _Used) -> tuple[TrialResult, ...]:
@@ -253,6 +288,11 @@ class Session:
         if any(trial.condition == used.condition.id for trial in own):
             return own
         return references.of_condition(self.reproduction.references, *names, used.condition.id) or own
+
+    def _pilot(self, used: _Used) -> tuple[TrialResult, ...]:
+        """Return the committed pilot of a condition; empty if there is none."""
+        found = pilots.load(pilots.path_of(self.reproduction.folder, used.tier, used.method, used.task))
+        return found if found and found[0].condition == used.condition.id else ()
 
     def _trials(self, used: _Used) -> list[TrialResult]:
         """Return the stored trials that a condition's claims were judged from."""

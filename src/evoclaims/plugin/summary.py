@@ -253,8 +253,9 @@ class Summary:
 
         judged_from = make_session(self._config).judged_from
         judged = {key_of(report): report for report in self.reports if report.n}
+        upgraded = self._upgrade.drift if self._upgrade else None
         return {
-            key: reason(judged[key], old, entry_of(judged[key], judged_from, ""), *self._drift)
+            key: reason(judged[key], old, entry_of(judged[key], judged_from, ""), *self._drift, upgraded)
             for key, old in changed.items()
             if key in judged
         }

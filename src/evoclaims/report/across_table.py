@@ -21,7 +21,7 @@ COLUMN: Final = 22
 
 LEGEND: Final = (
     "Against the first environment: A12 is the chance that a trial is higher than there, and p the drift check's "
-    "(exact rank test, Holm), both of the metric that differs most; then how many trials differ in a bit."
+    "(of the method, Holm), with the measure that differs most; then how many trials differ in a bit."
 )
 
 

@@ -139,10 +139,8 @@ def explanations(reports: Sequence[ClaimReport], width: int, colour: bool) -> st
 
 def drift_lines(drift: DriftReport, changed: Sequence[str], compared: int) -> str:
     """Return what the comparison with the committed reference trials found; `changed` has a label for each trial."""
-    drifted = sum(row.drifted for row in drift.rows)
-    head = (
-        f"reference trials: {drift.tested} comparisons, {drifted} drifted (exact rank tests, Holm, α = {drift.alpha:g})"
-    )
+    head = f"reference trials: {drift.counts}"
+    undecided = [drift.undecided] if drift.nearest is not None and not drift.drifted else []
     where = ": " * bool(changed) + ", ".join(f"{label} ({count})" for label, count in Counter(changed).items())
     flags = changing_flags()
     because = (
@@ -155,7 +153,7 @@ def drift_lines(drift: DriftReport, changed: Sequence[str], compared: int) -> st
         if compared
         else f"to the bit: no trial could be compared, {because}"
     )
-    return "\n".join([head, *drift.lines, bits])
+    return "\n".join([head, *drift.lines, *undecided, bits])
 
 
 def _rendered(content: Text | str, width: int, colour: bool) -> str:

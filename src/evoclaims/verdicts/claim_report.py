@@ -89,6 +89,8 @@ class ClaimReport:
         readings: of the sentence, the judged one first; empty where only that one was judged.
         satisfied_by: names of the null agents that satisfy the assertion.
         earlier: how its test ended before a plugin ran it again, oldest first; the last run counts.
+        chance: of a claim that is inconclusive and was accepted as supported, how often draws from its pilots end so;
+            None where that is not known.
     """
 
     claim: str
@@ -114,6 +116,7 @@ class ClaimReport:
     readings: tuple[ReadAs, ...] = ()
     satisfied_by: tuple[str, ...] = ()
     earlier: tuple[EarlierRun, ...] = ()
+    chance: float | None = None
 
     @property
     def name(self) -> str:

@@ -94,4 +94,3 @@ def _to_box(
     out = jnp.stack([(nearest == 2 * axis) * 1.0 - (nearest == 2 * axis + 1) * 1.0 for axis in range(3)], axis=1)
     way = jnp.where(within[:, None], out, to / jnp.maximum(outside, TINY)[:, None])
     return jnp.where(within, -depth, outside), jnp.sum(turn * way[:, None, :], axis=2)
-

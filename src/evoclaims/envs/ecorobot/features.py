@@ -72,15 +72,56 @@ COUNTS: Final = {
 """What a model has none of, by MuJoCo's counts."""
 
 OPTIONS: Final = frozenset(
-    "timestep gravity wind density viscosity magnetic impratio iterations ls_iterations tolerance ls_tolerance jacobian "
-    "noslip_tolerance ccd_iterations ccd_tolerance sdf_initpoints sdf_iterations sleep_tolerance disableflags enableflags "
-    "o_margin o_solref o_solimp o_friction".split()
+    [
+        "timestep",
+        "gravity",
+        "wind",
+        "density",
+        "viscosity",
+        "magnetic",
+        "impratio",
+        "iterations",
+        "ls_iterations",
+        "tolerance",
+        "ls_tolerance",
+        "jacobian",
+        "noslip_tolerance",
+        "ccd_iterations",
+        "ccd_tolerance",
+        "sdf_initpoints",
+        "sdf_iterations",
+        "sleep_tolerance",
+        "disableflags",
+        "enableflags",
+        "o_margin",
+        "o_solref",
+        "o_solimp",
+        "o_friction",
+    ]
 )
 """MuJoCo's options that may have any value: a step uses them, or they change nothing in it; flags are looked at below."""
 FLAGS: Final = {
-    "disable": "CONSTRAINT LIMIT CONTACT GRAVITY CLAMPCTRL WARMSTART FILTERPARENT ACTUATION REFSAFE SENSOR MIDPHASE "
-    "EULERDAMP AUTORESET NATIVECCD ISLAND MULTICCD FRICTIONLOSS EQUALITY".split(),
-    "enable": "ENERGY FWDINV INVDISCRETE".split(),
+    "disable": [
+        "CONSTRAINT",
+        "LIMIT",
+        "CONTACT",
+        "GRAVITY",
+        "CLAMPCTRL",
+        "WARMSTART",
+        "FILTERPARENT",
+        "ACTUATION",
+        "REFSAFE",
+        "SENSOR",
+        "MIDPHASE",
+        "EULERDAMP",
+        "AUTORESET",
+        "NATIVECCD",
+        "ISLAND",
+        "MULTICCD",
+        "FRICTIONLOSS",
+        "EQUALITY",
+    ],
+    "enable": ["ENERGY", "FWDINV", "INVDISCRETE"],
 }
 """Flags that may be set."""
 TRANSMISSIONS: Final = ("JOINT", "JOINTINPARENT", "SITE")
@@ -123,7 +164,9 @@ def _beyond(model: mujoco.MjModel) -> Iterator[str]:
             yield said
     bits = {"disable": mujoco.mjtDisableBit, "enable": mujoco.mjtEnableBit}
     for kind, kinds in bits.items():
-        allowed = sum(int(getattr(kinds, f"mj{'DSBL' if kind == 'disable' else 'ENBL'}_{flag}", 0)) for flag in FLAGS[kind])
+        allowed = sum(
+            int(getattr(kinds, f"mj{'DSBL' if kind == 'disable' else 'ENBL'}_{flag}", 0)) for flag in FLAGS[kind]
+        )
         set_ = int(getattr(model.opt, f"{kind}flags"))
         for flag in kinds.__members__.values():
             if int(flag) & set_ & ~allowed and int(flag).bit_count() == 1:

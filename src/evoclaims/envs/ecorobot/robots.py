@@ -88,17 +88,24 @@ class Robot:
         Raises:
             UserError: naming the number.
         """
-        sizes = {"free_coordinates": (self.free_coordinates, model.nq), "seen_velocities": (self.seen_velocities, model.nv)}
+        sizes = {
+            "free_coordinates": (self.free_coordinates, model.nq),
+            "seen_velocities": (self.seen_velocities, model.nv),
+        }
         for name, (given, most) in sizes.items():
             if given is not None and given > most:
-                raise UserError(f"The robot {self.name} has {name}={given}, and its model has {most}: write at most {most}.")
+                raise UserError(
+                    f"The robot {self.name} has {name}={given}, and its model has {most}: write at most {most}."
+                )
         if self.start is not None:
             if len(self.start) != model.nq:
                 raise UserError(
                     f"The robot {self.name} starts at {len(self.start)} positions, and its model has {model.nq}: write "
                     f"{model.nq} numbers as its start."
                 )
-            for joint in np.flatnonzero(np.isin(model.jnt_type, (mujoco.mjtJoint.mjJNT_FREE, mujoco.mjtJoint.mjJNT_BALL))):
+            for joint in np.flatnonzero(
+                np.isin(model.jnt_type, (mujoco.mjtJoint.mjJNT_FREE, mujoco.mjtJoint.mjJNT_BALL))
+            ):
                 at = model.jnt_qposadr[joint] + 3 * (model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_FREE)
                 if not any(self.start[at : at + 4]):
                     raise UserError(
@@ -125,11 +132,20 @@ class Robot:
             if given is None and name == "seen_velocities":
                 continue
             if not isinstance(given, int) or isinstance(given, bool) or given < lowest:
-                raise UserError(f"The robot {self.name} has {name}={given!r}: write a whole number of at least {lowest}.")
+                raise UserError(
+                    f"The robot {self.name} has {name}={given!r}: write a whole number of at least {lowest}."
+                )
         for name in ("normal_velocity", "scales_actions"):
             if not isinstance(getattr(self, name), bool):
                 raise UserError(f"The robot {self.name} has {name}={getattr(self, name)!r}: write True or False.")
-        for name in ("torso_radius", "forward_reward", "control_cost", "healthy_reward", "position_noise", "velocity_noise"):
+        for name in (
+            "torso_radius",
+            "forward_reward",
+            "control_cost",
+            "healthy_reward",
+            "position_noise",
+            "velocity_noise",
+        ):
             given = getattr(self, name)
             signed = name in ("forward_reward", "control_cost", "healthy_reward")
             if not _is_number(given) or math.isinf(given) or (given < 0 and not signed):
