@@ -55,7 +55,7 @@ def power(report: ClaimReport) -> str:
         return ", ".join(f"{event_power(looks, p0, rate):.2f}" for rate in RATES)
 
     return "; ".join(
-        f"“{part.describe}” would be supported with probability {at_rates(part.bounds[0].value)} at true rates of {rates}"
+        f"“{part.describe}” is supported with probability {at_rates(part.bounds[0].value)} at true rates of {rates}"
         for part in open_
     )
 
