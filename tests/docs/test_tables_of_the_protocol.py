@@ -1,4 +1,4 @@
-"""Hand-written tables of docs/protocol.md and docs/readings.md are what the committed trials and the conditions give."""
+"""Hand-written tables in docs/protocol.md and readings.md are what the committed trials and conditions give."""
 
 from __future__ import annotations
 
