@@ -24,8 +24,8 @@ from evoclaims.verdicts.sensitivity import Tried
 SENTENCE: Final = 16
 """Columns of the terminal that other columns leave to the sentence, if they can."""
 
-WHOLE: Final = 1000
-"""Columns in which every line has room."""
+PIPE: Final = 100
+"""Columns of a file or another program."""
 
 _CLAIMED: Final = "what is claimed"
 _GAP: Final = "  "
@@ -40,8 +40,8 @@ _COLOURS = {
 
 
 def columns(width: int, is_terminal: bool) -> int:
-    """Return how wide the table may be: a file or another program gets whole sentences, unless COLUMNS says it."""
-    return width if is_terminal or os.environ.get("COLUMNS") else WHOLE
+    """Return how wide lines may be: as wide as the terminal, or COLUMNS; else, as in a log, `PIPE`."""
+    return width if is_terminal or os.environ.get("COLUMNS") else PIPE
 
 
 def verdict_table(reports: Sequence[ClaimReport], width: int, colour: bool) -> str:
@@ -72,7 +72,8 @@ def verdict_table(reports: Sequence[ClaimReport], width: int, colour: bool) -> s
     if any(report.depends_on_the_reading for report in reports):
         captions.append("by reading: another reading of the sentence ends otherwise (evoclaims audit)")
     captions += mixed_versions.lines(reports) + edited_code.lines(reports)
-    return "\n".join([*(_rendered(line, width, colour).rstrip() for line in lines), *captions])
+    below = _rendered("\n".join(captions), width, colour).splitlines() if captions else []
+    return "\n".join([*(_rendered(line, width, colour).rstrip() for line in lines), *map(str.rstrip, below)])
 
 
 def _column(heading: str, cells: Sequence[str], *, right: bool = False, most: int = 10_000) -> list[str]:
