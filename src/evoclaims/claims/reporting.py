@@ -29,7 +29,8 @@ def judged(
         verdict=verdict,
         sources=tuple(_source(group, seeds, again.get(group.fingerprint, ())) for group in groups),
         attainable=tuple(
-            Attainable(look.n, look.alpha, p.supported, p.refuted) for look, p in attainability(assertion, design)
+            Attainable(look.n, look.alpha, p.supported, p.refuted, p.smaller)
+            for look, p in attainability(assertion, design)
         ),
     )
 

@@ -21,6 +21,7 @@ class Tally(StrEnum):
     SUPPORTED = "supported"
     INSENSITIVE = "supported but insensitive"
     REFUTED = "refuted"
+    SMALLER = "smaller than claimed"
     INCONCLUSIVE = "inconclusive"
     ERROR = "error"
     NOT_RUN = "not run"
