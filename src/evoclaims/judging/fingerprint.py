@@ -9,8 +9,8 @@ from evoclaims.judging.design import Design
 JUDGING_REVISION = 2
 """Raised when what a kind's tests are about changes, so that old verdicts do not count as new ones.
 
-Not for another test of the same hypotheses, α and margin: changed verdicts are then entered under their fingerprint, such as
-those of 2026-11-26, when pairs of seeds gave way to all pairs (docs/judging.md lists them).
+Not for another test of the same hypotheses, α and margin: changed verdicts are then entered under their fingerprint,
+such as those of 2026-11-26, when pairs of seeds gave way to all pairs (docs/judging.md lists them).
 """
 
 
