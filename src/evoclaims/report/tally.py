@@ -42,6 +42,7 @@ def by_sentence(found: Sequence[Sentence]) -> str:
 _SENTENCE = {
     Tally.SUPPORTED: "supported in every case",
     Tally.REFUTED: "refuted in some case",
+    Tally.SMALLER: "smaller than claimed in some case",
     Tally.INCONCLUSIVE: "undecided",
 }
 """What is said of a sentence, where it is not what is said of a case."""

@@ -33,6 +33,7 @@ _GAP: Final = "  "
 _COLOURS = {
     Outcome.SUPPORTED: "green",
     Outcome.REFUTED: "red",
+    Outcome.SMALLER: "magenta",
     Outcome.INCONCLUSIVE: "yellow",
     Outcome.ERROR: "bold red",
     Outcome.NOT_RUN: "dim",
