@@ -44,7 +44,7 @@ LEARNED = [
     pytest.param(
         "goal_ppo",
         marks=expected(
-            Outcome.REFUTED,
+            Outcome.INCONCLUSIVE,
             tier="full",
             because="shown the next stone, PPO crosses 0 to 6.6 stones (mean 3.7), and in three trials of ten reaches "
             "the target in most episodes; in the published code no stone pays (docs/protocol.md)",

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import errno
-import json
 import os
 import re
 import subprocess
@@ -35,19 +34,6 @@ def _run(folder: Path, *command: str, site: Path | None = None) -> subprocess.Co
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(path), "COLUMNS": "160"}
     command = (sys.executable, *command)
     return subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, check=False)
-
-
-def test_the_skeleton_is_a_project_whose_smoke_tier_is_green(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    status, said, _ = _new(capsys, str(tmp_path / "mine"))
-    assert status == 0
-    assert f"wrote 6 files to {tmp_path / 'mine'}; next:" in said
-    assert "pytest -m smoke " in said
-    ran = _run(tmp_path / "mine", "-m", "pytest", "-m", "smoke", "--strict-markers", "-W", "error", "--claims-json=o")
-    assert ran.returncode == 0, ran.stdout + ran.stderr
-    claims = json.loads((tmp_path / "mine" / "o").read_text())["claims"]
-    assert [(claim["claim"], claim["outcome"]) for claim in claims] == [("H1", "supported"), ("H2", "supported")]
 
 
 def test_a_paper_is_unpacked_whole(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

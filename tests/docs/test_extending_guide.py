@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import importlib
 import json
 import re
 import shlex
+import shutil
 import sys
 from pathlib import Path
 
 import pytest
 
 from evoclaims.cli import main
+from evoclaims.core.errors import UserError
+from evoclaims.envs import Robot
+from evoclaims.envs.ecorobot.robots import SIMPLE_ROB
 
 GUIDE = (Path(__file__).parents[2] / "docs" / "extending.md").read_text(encoding="utf-8")
 FILES: dict[str, str] = dict(re.findall(r"`([\w/.]+)`:\n\n```\w+\n(.*?)```", GUIDE, flags=re.DOTALL))
@@ -99,3 +104,31 @@ def test_a_method_beside_those_of_the_paper_is_judged_with_the_papers_reference_
     assert result.outlines[-1] == "[0, 0]"
     assert len(list((folder / ".evoclaims" / "trials").rglob("*.json"))) == 10  # and none of CMA-ES
     result.stdout.re_match_lines([r"H5 +It does for 3-parity \(here\) +✓ supported†? +10 "])
+
+
+def test_the_robot_and_the_task_that_are_shown_are_made(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    section = GUIDE.partition("## A robot's task\n")[2].partition("\n## ")[0]
+    package = tmp_path / "my_package"
+    package.mkdir()
+    (package / "__init__.py").write_text("")
+    shutil.copy(SIMPLE_ROB.file, package / "rover.xml")
+    monkeypatch.syspath_prepend(tmp_path)
+    (tmp_path / "slalom.py").write_text("\n".join(re.findall(r"```python\n(.*?)```", section, re.DOTALL)))
+    slalom = importlib.import_module("slalom").slalom
+    assert slalom.robot.file == str(package / "rover.xml")
+    assert slalom.scene.model.nu == slalom.action_size > 0
+
+
+@pytest.mark.parametrize(
+    ("xml", "said"),
+    [
+        ("my_robots:rover.xml", "there is no package 'my_robots': write PACKAGE:PATH"),
+        ("rover.xml", "there is no package 'rover.xml': write PACKAGE:PATH"),
+        (":rover.xml", "there is no package '': write PACKAGE:PATH"),
+        ("evoclaims:rover.xml", "there is no file "),
+    ],
+)
+def test_a_model_that_is_not_there_is_a_sentence(xml: str, said: str) -> None:
+    with pytest.raises(UserError, match="The robot 'rover' has its model in ") as error:
+        _ = Robot("rover", xml).file
+    assert said in str(error.value)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
@@ -11,8 +12,10 @@ import pytest
 from chromium import NAMES, Chromium, found
 from laboratory import Laboratory, better_solves, better_wins
 
+from evoclaims.judging.verdict import Outcome
 from evoclaims.report.html import html
 from evoclaims.report.model import PaperFigure
+from evoclaims.verdicts.robustness import Robustness
 
 PLATE = (
     b'<svg xmlns="http://www.w3.org/2000/svg" width="40" height="30" viewBox="0 0 40 30">'
@@ -71,6 +74,8 @@ def address(tmp_path_factory: pytest.TempPathFactory) -> str:
     reports.append(empty.judge(better_solves, id="C1", where="control"))
     sentences = {report.name: report.statement for report in reports if report.tier == "full"}
     page = lab.page(*reports, figures=[PaperFigure("Fig. 3", "says", PLATE)], sentences=sentences)
+    row = Robustness("G1", "full", Outcome.SUPPORTED, {"network": Outcome.REFUTED})
+    page = replace(page, robustness=(row,), variants={"network": "another network"})
     path = folder / "index.html"
     path.write_text(html(page), encoding="utf-8")
     return path.as_uri()
@@ -209,10 +214,13 @@ def test_the_address_sets_the_filters(browser: Chromium, address: str, query: st
 
 def test_filters_work_by_keyboard_and_are_kept_in_the_address(browser: Chromium, address: str) -> None:
     browser.open(address)
-    for _ in range(40):
-        browser.press("Tab", "Tab", 9)
-        if browser.evaluate("document.activeElement.value") == "refuted":
-            break
+    for wanted in ("document.activeElement.matches('.choose > summary')", "document.activeElement.value === 'refuted'"):
+        for _ in range(40):
+            browser.press("Tab", "Tab", 9)
+            if browser.evaluate(wanted):
+                break
+        if "summary" in wanted:
+            browser.press("Enter", "Enter", 13, "\r")
     browser.press(" ", "Space", 32, " ")
     assert _visible(browser) == ["G2-full", "G2-smoke"]
     assert browser.evaluate("location.hash") == "#?verdict=refuted"
@@ -225,6 +233,26 @@ def test_filters_work_by_keyboard_and_are_kept_in_the_address(browser: Chromium,
     browser.press("Enter", "Enter", 13, "\r")
     assert browser.evaluate("new Promise(done => setTimeout(() => done(location.hash), 50))") == ""
     assert _visible(browser) == ALL
+
+
+def test_sentences_are_whole_at_1280_pixels_and_variants_are_shown_on_demand(browser: Chromium, address: str) -> None:
+    browser.open(address, width=1280)
+    cut = "[...document.querySelectorAll('.entry .sentence')].filter(one => one.scrollWidth > one.clientWidth).length"
+    assert browser.evaluate(cut) == 0
+    assert browser.evaluate("document.querySelector('.entry .sentence').getBoundingClientRect().width") > 400
+    seen = "[...document.querySelectorAll('.columns .variant')].filter(one => one.checkVisibility()).length"
+    assert browser.evaluate(seen) == 0
+    browser.evaluate("document.querySelector('.choose').open = true; document.getElementById('variants').click()")
+    assert browser.evaluate(seen) == 1
+
+
+def test_each_row_of_verdicts_is_labelled_at_400_pixels(browser: Chromium, address: str) -> None:
+    browser.open(address, width=400)
+    labels = browser.evaluate(
+        "[...document.querySelectorAll('.entry .verdicts')].filter(one => one.checkVisibility())"
+        ".map(one => getComputedStyle(one, '::before').content)"
+    )
+    assert labels == [*['"full"', '"smoke"'] * 4, '"full"']
 
 
 def test_a_link_to_a_claim_shows_it_whatever_the_filters_say(browser: Chromium, address: str) -> None:

@@ -10,8 +10,9 @@ from laboratory import Laboratory, better_solves, better_wins
 
 from evoclaims.judging.verdict import Bound, Outcome
 from evoclaims.report.evidence import Dot, Part, Strip
-from evoclaims.report.opening_lines import opening_lines
+from evoclaims.report.opening_lines import findings, opening_lines
 from evoclaims.report.spark import MOST_DOTS, WIDTH, spark_svg
+from evoclaims.verdicts.claim_report import ClaimReport
 from evoclaims.verdicts.robustness import Robustness
 
 
@@ -49,6 +50,32 @@ def test_a_line_tells_what_came_of_each_case_under_each_variant(filled: Laborato
     first, second = opening_lines(replace(page, robustness=(row,), variants={"network": "x", "rows": "y", "z": "z"}))
     assert first.variants == {"network": (row,), "rows": (row,)}
     assert second.variants == {"network": (), "rows": ()}
+
+
+def test_findings_count_sentences_whose_cases_end_alike_at_the_papers_tier(filled: Laboratory) -> None:
+    def one(name: str, *outcomes: Outcome, tier: str = "full", where: str = "§1.2") -> list[ClaimReport]:
+        judged = filled.judge(better_wins, tier=tier, id=name, says=f"Sentence {name}", where=where)
+        return [replace(judged, case=str(case), outcome=outcome) for case, outcome in enumerate(outcomes)]
+
+    good, bad, unrun = Outcome.SUPPORTED, Outcome.REFUTED, Outcome.NOT_RUN
+    reports = [
+        *one("T1", good, good),
+        *one("T2", good, unrun),
+        *one("T3", good, bad),
+        *one("T4", bad),
+        *one("T5", unrun),
+    ]
+    page = filled.page(*reports, *one("C1", good, where="control"), *one("T5", good, tier="smoke"))
+    found = findings(page, opening_lines(page))
+    assert [(one.says, [line.claim for line in one.lines]) for one in found] == [
+        ("2 of 4 sentences (full): supported in every case", ["T1", "T2"]),
+        ("1 of 4 sentences (full): refuted in every case", ["T4"]),
+        ("1 of 4 sentences (full): cases end differently", ["T3"]),
+    ]
+    only = filled.page(*one("T5", good, tier="smoke"))
+    (finding,) = findings(only, opening_lines(only))
+    assert finding.says == "1 of 1 sentence (smoke): supported in every case"
+    assert findings(filled.page(), []) == []
 
 
 def test_the_trials_of_the_part_that_decided_are_a_row_of_dots_each() -> None:

@@ -32,7 +32,8 @@ def judged(
         asserts=content_hash(assertion.plain()),
         sources=tuple(_source(group, seeds, again.get(group.fingerprint, ()), assertion) for group in groups),
         attainable=tuple(
-            Attainable(look.n, look.alpha, p.supported, p.refuted) for look, p in attainability(assertion, design)
+            Attainable(look.n, look.alpha, p.supported, p.refuted, p.smaller)
+            for look, p in attainability(assertion, design)
         ),
     )
 

@@ -19,7 +19,7 @@ from evoclaims.judging.assertion import Assertion
 from evoclaims.judging.design import Design, Look
 from evoclaims.judging.drift import DriftReport
 from evoclaims.judging.fingerprint import fingerprint
-from evoclaims.judging.judge import judge
+from evoclaims.judging.judge import decide, judge
 from evoclaims.judging.measure import Event, Measure, Profile
 from evoclaims.judging.power import Draws
 from evoclaims.judging.tripwire import DigestCheck
@@ -122,12 +122,10 @@ class Session:
         report = replace(report, satisfied_by=by, chance=chance)
         if self.variant or not isinstance(self.fetch, StoredOnly) or not test.claim.is_read_at(test.tier):
             return report
-        first = Reading(test.claim.read, assertion, "the test's own assertion", test.claim.since)
-        read = [
-            self._read(test.tier, first, verdict),
-            *(self._read(test.tier, one, self._verdict(test, one.assertion)) for one in others),
-        ]
-        return replace(report, readings=tuple(read))
+        design, claim = self.design(test.tier), test.claim
+        first = Reading(claim.read, assertion, "the assertion that the claim judges", claim.since)
+        read = (_judged(first, design, verdict.outcome), *(_judged(one, design) for one in others))
+        return replace(report, readings=read)
 
     def _verdict(self, test: ClaimTest, assertion: Assertion) -> Verdict:
         """Return the verdict on an assertion; "not run" where trials may not be run."""
@@ -140,21 +138,6 @@ class Session:
             mark = fingerprint(assertion, design, claim=name, tier=tier)
             of = next((f"{one.label}: " for one in assertion.sources() if one.fingerprint == error.condition), "")
             return Verdict(Outcome.NOT_RUN, f"{of}{error}", assertion.describe(), mark)
-
-    def _read(self, tier: str, reading: Reading, verdict: Verdict) -> ReadAs:
-        """Return a reading with its verdict, and when the first of its trials started."""
-        seeds = self.design(tier).seeds(verdict.n)
-        trials = [trial for source in reading.assertion.sources() for trial in source.fetch(seeds)] if seeds else []
-        started = min((str(trial.timing["started"]) for trial in trials if "started" in trial.timing), default="")
-        return ReadAs(
-            reading.name,
-            reading.because,
-            reading.since,
-            verdict.describe,
-            verdict.outcome,
-            verdict.reason,
-            started,
-        )
 
     def _satisfied_by(self, test: ClaimTest, assertion: Assertion, verdict: Verdict) -> tuple[str, ...]:
         """Return the null agents that satisfy a claim of the paper; controls are about such agents themselves.
@@ -299,6 +282,21 @@ class Session:
         get = self.fetch.archive.stored if isinstance(self.fetch, StoredOnly) else self.store.get
         stored = (get(trial, used.condition.versions) for trial in sorted(used.ids))
         return [trial for trial in stored if trial is not None]
+
+
+def _judged(reading: Reading, design: Design, outcome: Outcome | None = None) -> ReadAs:
+    """Judge a reading by the trials at hand; its outcome is given if it has been judged already."""
+    started: list[str] = []
+    try:
+        ending = decide(reading.assertion, design)
+        if ending is not None:
+            trials = [trial for several in ending.trials.values() for trial in several]
+            started = [str(trial.timing["started"]) for trial in trials if "started" in trial.timing]
+        found = Outcome.INCONCLUSIVE if ending is None else ending.outcome
+    except NotStoredError:
+        found = Outcome.NOT_RUN
+    asserts, since = reading.assertion.describe(), min(started, default="")
+    return ReadAs(reading.name, reading.because, reading.since, asserts, outcome or found, since)
 
 
 @dataclass

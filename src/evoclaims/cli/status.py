@@ -94,10 +94,7 @@ def _changes(
 
 
 def _print(reports: Sequence[ClaimReport], tier: str, why: bool) -> None:
-    """Print the table, and why claims have failed; why every claim is not plainly supported where that is asked for.
-
-    A file or another program gets whole sentences, unless COLUMNS says how wide lines may be.
-    """
+    """Print the table, and why claims have failed; why every claim is not plainly supported where that is asked for."""
     explained = [report for report in reports if why or report.failed]
     accepted = any(report.as_expected and report.outcome is not Outcome.SUPPORTED for report in reports)
     unexplained = accepted or any(report.outcome in (Outcome.INCONCLUSIVE, Outcome.NOT_RUN) for report in reports)

@@ -3,13 +3,16 @@
 A table is between two comments, the first of which says what it shows:
 
     <!-- evoclaims: verdicts full full:published smoke -->    verdicts by tier, or by tier and variant of the protocol
+    <!-- evoclaims: marks text=full smoke -->                verdicts as marks; sentences in the file stay
     <!-- evoclaims: tally full -->                            how many sentences and cases of a tier ended how
     <!-- evoclaims: numbers full all -->                      published numbers and ours, under all variants
     <!-- evoclaims: details full -->                          verdicts that variants of the protocol may change
-    <!-- evoclaims: readings full -->                         the readings of each sentence of the paper, and their verdicts
+    <!-- evoclaims: refutations full -->                     which refuted claims end otherwise under a variant
+    <!-- evoclaims: readings full -->                         the readings of each sentence, and their verdicts
     <!-- evoclaims: uncovered -->                             the paper's sentences that no claim judges, and why not
     <!-- evoclaims: measures -->                              what claims can read from trials
     <!-- evoclaims: assertions -->                            what they can say of it, and how it is judged
+    <!-- evoclaims: commands -->                             the commands of evoclaims and their options
     <!-- evoclaims: end -->
 """
 
@@ -18,38 +21,60 @@ from __future__ import annotations
 import argparse
 import re
 import tempfile
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from functools import cached_property
 from pathlib import Path
 from typing import Final
 
+from evoclaims.cli import commands
 from evoclaims.cli.output_files import write
 from evoclaims.cli.project import Project, open_project
 from evoclaims.core.errors import UnknownNameError, UserError
 from evoclaims.core.files import read_text
 from evoclaims.figures.replication import replications
+from evoclaims.judging.verdict import Outcome
 from evoclaims.paper.uncovered import uncovered
 from evoclaims.report import readings_table, replication_cells, vocabulary
+from evoclaims.report.formatting import plural
 from evoclaims.report.markdown import numbers, robustness
-from evoclaims.report.markdown_text import literal
+from evoclaims.report.markdown_text import literal, table
+from evoclaims.report.table_cells import NONE
 from evoclaims.report.tally import tally
 from evoclaims.report.trial_summary import Reader
+from evoclaims.report.verdict_marks import marks, short_sentences
 from evoclaims.report.verdict_overview import overview
-from evoclaims.verdicts.robustness import matrix
+from evoclaims.verdicts.claim_report import ClaimReport
+from evoclaims.verdicts.robustness import Robustness, matrix
 
 _TABLE: Final = re.compile(
     r"(?P<begin>^<!-- evoclaims: (?P<kind>\w+) (?P<words>[^>]*?) ?-->\n)"
-    r"(?:(?!<!-- evoclaims: ).*\n)*?"
+    r"(?P<before>(?:(?!<!-- evoclaims: ).*\n)*?)"
     r"(?P<end>^<!-- evoclaims: end -->$)",
     re.MULTILINE,
 )
 _BEGIN: Final = re.compile(r"^<!-- evoclaims: (?!end -->).*-->$", re.MULTILINE)
 
 
+class _JudgedOnce(Project):
+    """A project whose verdicts are made once for all tables: nothing runs in between."""
+
+    @cached_property
+    def _known(self) -> dict[tuple[str, str], list[ClaimReport]]:
+        return {}
+
+    def judge_variants(self, asked: Sequence[tuple[str, str]]) -> list[list[ClaimReport]]:
+        """Judge what no table before has asked for; as `Project.judge_variants` does."""
+        missing = [one for one in dict.fromkeys(asked) if one not in self._known]
+        self._known.update(zip(missing, super().judge_variants(missing) if missing else (), strict=True))
+        return [self._known[one] for one in asked]
+
+
 def main(options: argparse.Namespace) -> int:
     """Write the tables of each file anew; 1 when that changed one."""
     changed = 0
     with tempfile.TemporaryDirectory() as folder:
-        project = open_project(str(Path(folder) / "no-store"))
+        opened = open_project(str(Path(folder) / "no-store"))
+        project = _JudgedOnce(opened.config, opened.reproduction, opened.storage)
         for name in options.files:
             path = Path(name)
             try:
@@ -86,44 +111,77 @@ def _made(found: re.Match[str], project: Project) -> str:
     kind, words = found["kind"], found["words"].split()
     if kind not in _KINDS:
         raise UnknownNameError("kind of table", kind, _KINDS)
-    return _KINDS[kind](project, words)
+    return _KINDS[kind](project, words, found["before"])
 
 
-def _verdicts(project: Project, words: list[str]) -> str:
-    """Return the verdicts; each word is a tier, or a tier and a variant: full:published."""
+def _verdicts(project: Project, words: list[str], *_: str) -> str:
+    """Return the verdicts with what decided them."""
+    return overview(*_columns(project, words), Reader(project.archive))
+
+
+def _marks(project: Project, words: list[str], before: str) -> str:
+    """Return the verdicts as marks; a sentence that somebody shortened in the table `before` stays."""
+    return marks(*_columns(project, words), short_sentences(before))
+
+
+def _columns(project: Project, words: list[str]) -> tuple[dict[str, list[ClaimReport]], dict[str, str]]:
+    """Return reports by heading, and the paper's own sentences.
+
+    Each word is a tier, or a tier and a variant, with another heading or without: full, full:published, text=full.
+    """
     tiers = list(project.reproduction.tiers)[::-1]  # the paper's own sentences come first
-    asked = [(tier, variant) for tier, _, variant in (word.partition(":") for word in words or tiers)]
-    for column in asked:
-        project.reproduction.tier(*column)
-    every = list(dict.fromkeys((*asked, (tiers[0], ""))))
+    asked: dict[str, tuple[str, str]] = {}
+    for word in words or tiers:
+        heading, _, column = word.rpartition("=")
+        tier, _, variant = column.partition(":")
+        project.reproduction.tier(tier, variant)
+        asked[heading or ", ".join(filter(None, (tier, variant)))] = tier, variant
+    every = list(dict.fromkeys((*asked.values(), (tiers[0], ""))))
     judged = dict(zip(every, project.judge_variants(every), strict=True))
-    columns = {f"{tier}, {variant}" if variant else tier: judged[tier, variant] for tier, variant in asked}
     sentences = {report.name: report.statement for report in judged[tiers[0], ""]}
-    return overview(columns, sentences, Reader(project.archive))
+    return {heading: judged[column] for heading, column in asked.items()}, sentences
 
 
-def _tally(project: Project, words: list[str]) -> str:
+def _tally(project: Project, words: list[str], *_: str) -> str:
     """Return how many verdicts of a tier ended how."""
     (reports,) = project.judge_variants([(_tier(project, words), "")])
     return tally(reports)
 
 
-def _readings(project: Project, words: list[str]) -> str:
+def _readings(project: Project, words: list[str], *_: str) -> str:
     """Return the readings of each sentence that a tier judges."""
     (reports,) = project.judge_variants([(_tier(project, words), "")])
     return readings_table.readings(reports)
 
 
-def _details(project: Project, words: list[str]) -> str:
+def _details(project: Project, words: list[str], *_: str) -> str:
     """Return the verdicts of a tier under the protocol and under each variant, of the claims that a variant touches."""
-    tier = _tier(project, words)
-    asked = ["", *project.reproduction.variants]
-    plain, *varied = project.judge_variants([(tier, name) for name in asked])
-    rows = matrix(plain, dict(zip(asked[1:], varied, strict=True)))
-    tried = [name for name in asked[1:] if any(name in row.outcomes for row in rows)]
-    left = ", ".join(name for name in asked[1:] if name not in tried)
+    rows, variants = _under_variants(project, _tier(project, words))
+    tried = [name for name in variants if any(name in row.outcomes for row in rows)]
+    left = ", ".join(name for name in variants if name not in tried)
     unjudged = f"No claim's trials have all run under: {literal(left)}." if left else ""
     return "\n\n".join(filter(None, (robustness(rows, tried), unjudged)))
+
+
+def _refutations(project: Project, words: list[str], *_: str) -> str:
+    """Return which refuted claims of a tier have which other verdict under a variant."""
+    rows, variants = _under_variants(project, _tier(project, words))
+    refuted = [row for row in rows if row.plain is Outcome.REFUTED and row.hangs_on]
+    others = [one for one in Outcome if any(row.outcomes[name] is one for row in refuted for name in row.hangs_on)]
+    cells = {
+        name: [", ".join(row.claim for row in refuted if row.outcomes.get(name) is other) for other in others]
+        for name in variants
+    }
+    head = f"{plural(len(refuted), 'refuted case')} of the {_tier(project, words)} tier end otherwise under a variant:"
+    found = ((name, *(cell or NONE for cell in line)) for name, line in cells.items() if any(line))
+    return f"{head}\n\n{table(('variant', *others), (map(literal, line) for line in found))}"
+
+
+def _under_variants(project: Project, tier: str) -> tuple[tuple[Robustness, ...], list[str]]:
+    """Return a tier's verdicts under all variants, and the names of the variants."""
+    variants = list(project.reproduction.variants)
+    plain, *varied = project.judge_variants([(tier, name) for name in ("", *variants)])
+    return matrix(plain, dict(zip(variants, varied, strict=True))), variants
 
 
 def _tier(project: Project, words: list[str]) -> str:
@@ -135,7 +193,7 @@ def _tier(project: Project, words: list[str]) -> str:
     return tier
 
 
-def _numbers(project: Project, words: list[str]) -> str:
+def _numbers(project: Project, words: list[str], *_: str) -> str:
     """Return the published numbers beside ours; the words are a tier and, for the variants too, "all"."""
     tier, *rest = words or list(project.reproduction.tiers)[-1:]
     variants = ("", *project.reproduction.variants) if rest else ("",)
@@ -145,14 +203,17 @@ def _numbers(project: Project, words: list[str]) -> str:
     return "\n\n".join((numbers(found), "\n".join(f"* {literal(line)}" for line in lines)))
 
 
-_KINDS: Final[Mapping[str, Callable[[Project, list[str]], str]]] = {
+_KINDS: Final[Mapping[str, Callable[[Project, list[str], str], str]]] = {
     "verdicts": _verdicts,
+    "marks": _marks,
     "tally": _tally,
     "details": _details,
+    "refutations": _refutations,
     "numbers": _numbers,
     "readings": _readings,
-    "uncovered": lambda project, _: readings_table.without_claims(uncovered(project.reproduction.folder)),
-    "measures": lambda project, _: vocabulary.measures(project.reproduction.trials),
+    "uncovered": lambda project, *_: readings_table.without_claims(uncovered(project.reproduction.folder)),
+    "measures": lambda project, *_: vocabulary.measures(project.reproduction.trials),
     "assertions": lambda *_: vocabulary.assertions(),
+    "commands": lambda *_: commands.reference(),
 }
-"""What makes each kind of table."""
+"""What makes each kind of table, from the project, the words behind its name, and the table that was there before."""

@@ -161,6 +161,7 @@ class Summary:
                 terminalreporter.write_line(self._safe(self._choices()), yellow=True)
             return
         from evoclaims.report import table_cells, terminal_table
+        from evoclaims.report.closing_lines import without_smoke_test
 
         writer = self._config.get_terminal_writer()
         width, colour = writer.fullwidth, writer.hasmarkup
@@ -169,9 +170,10 @@ class Summary:
         table = terminal_table.verdict_table(self.reports, room, colour, self._encoding)
         terminalreporter.write_line(self._drawn(table))
         terminalreporter.write_line("")
-        explained = terminal_table.explanations(self.reports, width, colour)
-        if explained:
-            terminalreporter.write_line(self._drawn(explained))
+        with_test = [report for report in self.reports if report.has_test]
+        explained = terminal_table.explanations(with_test, width, colour)
+        for part in filter(None, (explained, without_smoke_test(self.reports))):
+            terminalreporter.write_line(self._drawn(part))
             terminalreporter.write_line("")
         notes = self._notes()
         for note in notes:
@@ -185,12 +187,23 @@ class Summary:
                 terminalreporter.write_line(self._safe(f"warning: {warning}"), yellow=True)
         if table_cells.faults(self.reports):
             terminalreporter.write_line(table_cells.faults(self.reports))
-        changed = len(self._regression.changed) if self._regression else 0
-        differ = f"; {changed} of them not as accepted, see above" if changed else ""
-        terminalreporter.write_line(f"claims: {table_cells.totals(self.reports)}{differ}", bold=True)
+        terminalreporter.write_line(f"claims: {table_cells.totals(self.reports)}", bold=True)
         if not any(report.n for report in self.reports):
             what = "No trial was looked at" if self._judged else "No claim was judged"
             terminalreporter.write_line(f"{what}: nothing was measured.", red=True)
+        elif not self._config.getoption("claims_variant"):  # whose verdicts nobody accepts
+            for line in self._closing_lines():
+                terminalreporter.write_line(self._said(line))
+
+    def _closing_lines(self) -> list[str]:
+        """Return what failed, what changed, and what to do next."""
+        from evoclaims.report.closing_lines import closing_lines
+
+        changed = None
+        if self._regression and self._regression.transitions:
+            changed = [f"{name} ({tier})" for tier, name in self._regression.changed]
+        drifted = dict.fromkeys(row.condition for row in self._drift[0].rows if row.drifted) if self._drift else ()
+        return closing_lines(self.reports, changed, list(drifted))
 
     def _choices(self) -> str:
         """Say how claims are selected, where none was."""

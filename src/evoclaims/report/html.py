@@ -20,7 +20,7 @@ from evoclaims.report import across_table, charts, formatting, replication_cells
 from evoclaims.report.charts_of_verdicts import timeline_chart
 from evoclaims.report.fault_grid import LEGEND
 from evoclaims.report.model import Page, Section
-from evoclaims.report.opening_lines import opening_lines
+from evoclaims.report.opening_lines import findings, opening_lines
 from evoclaims.report.spark import spark_svg
 from evoclaims.report.verdict_chart import VerdictChart
 from evoclaims.verdicts.history import key_of
@@ -40,12 +40,14 @@ _CHAPTERS: Final = (
 def html(page: Page) -> str:
     """Return the whole page."""
     style, script = _asset("report.css"), _asset("report.js")
+    lines = opening_lines(page)
     return (
         _environment()
         .get_template("page.html.j2")
         .render(
             page=page,
-            lines=opening_lines(page),
+            lines=lines,
+            findings=findings(page, lines),
             chapters=[one for one in _CHAPTERS if getattr(page, one[0]) or (one == _FIGURES and page.missing)],
             pieces=packed(dict(_pieces(page))),
             outcomes=list(Outcome),

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
+from evoclaims.judging.verdict import Outcome
+from evoclaims.report.formatting import plural
 from evoclaims.report.model import Page, Section
 from evoclaims.verdicts.robustness import Robustness
 
@@ -51,3 +53,44 @@ def _under_variants(page: Page, cases: list[Section]) -> dict[str, tuple[Robustn
     names = {(section.report.name, section.report.tier) for section in cases}
     rows = [row for row in page.robustness if (row.claim, row.tier) in names]
     return {variant: tuple(row for row in rows if variant in row.outcomes) for variant in page.tried}
+
+
+@dataclass(frozen=True)
+class Finding:
+    """Sentences of the paper that ended alike at a tier.
+
+    Attributes:
+        tier: where.
+        kind: the name of their outcome in styles; empty where their cases ended differently.
+        symbol: their outcome's; empty likewise.
+        says: how many there are, in words.
+        lines: the sentences.
+    """
+
+    tier: str
+    kind: str
+    symbol: str
+    says: str
+    lines: tuple[OpeningLine, ...]
+
+
+def findings(page: Page, lines: Sequence[OpeningLine]) -> list[Finding]:
+    """Return what came out, by sentence of the paper, at the first tier that has a verdict on one."""
+    papers = [line for line in lines if not line.cases[0].report.is_control]
+    for tier in (board.tier for board in page.boards):
+        ended = [(line, {section.report.outcome for section in line.at(tier)} - {Outcome.NOT_RUN}) for line in papers]
+        judged = [(line, outcomes) for line, outcomes in ended if outcomes]
+        if judged:
+            return list(_findings(tier, judged))
+    return []
+
+
+def _findings(tier: str, judged: Sequence[tuple[OpeningLine, set[Outcome]]]) -> Iterator[Finding]:
+    """Yield the sentences whose cases all have one outcome, by outcome, and then the others."""
+    of = f"of {plural(len(judged), 'sentence')} ({tier})"
+    for outcome in Outcome:
+        if alike := tuple(line for line, outcomes in judged if outcomes == {outcome}):
+            says = f"{len(alike)} {of}: {outcome} in every case"
+            yield Finding(tier, outcome.name.lower(), outcome.symbol, says, alike)
+    if others := tuple(line for line, outcomes in judged if len(outcomes) > 1):
+        yield Finding(tier, "", "", f"{len(others)} {of}: cases end differently", others)

@@ -26,8 +26,8 @@ from evoclaims.verdicts.sensitivity import Tried
 SENTENCE: Final = 16
 """Columns of the terminal that other columns leave to the sentence, if they can."""
 
-WHOLE: Final = 1000
-"""Columns in which every line has room."""
+PIPE: Final = 100
+"""Columns of a file or another program."""
 
 _CLAIMED: Final = "what is claimed"
 _GAP: Final = "  "
@@ -35,6 +35,7 @@ _GAP: Final = "  "
 _COLOURS = {
     Outcome.SUPPORTED: "green",
     Outcome.REFUTED: "red",
+    Outcome.SMALLER: "magenta",
     Outcome.INCONCLUSIVE: "yellow",
     Outcome.ERROR: "bold red",
     Outcome.NOT_RUN: "dim",
@@ -42,8 +43,8 @@ _COLOURS = {
 
 
 def columns(width: int, is_terminal: bool) -> int:
-    """Return how wide the table may be: a file or another program gets whole sentences, unless COLUMNS says it."""
-    return width if is_terminal or os.environ.get("COLUMNS") else WHOLE
+    """Return how wide lines may be: as wide as the terminal, or COLUMNS; else, as in a log, `PIPE`."""
+    return width if is_terminal or os.environ.get("COLUMNS") else PIPE
 
 
 def verdict_table(reports: Sequence[ClaimReport], width: int, colour: bool, encoding: str | None = None) -> str:
@@ -77,7 +78,8 @@ def verdict_table(reports: Sequence[ClaimReport], width: int, colour: bool, enco
     if any(report.depends_on_the_reading for report in reports):
         captions.append("by reading: another reading of the sentence ends otherwise (evoclaims audit)")
     captions += mixed_versions.lines(reports) + edited_code.lines(reports)
-    return "\n".join([*(_rendered(line, width, colour).rstrip() for line in lines), *captions])
+    below = _rendered("\n".join(captions), width, colour).splitlines() if captions else []
+    return "\n".join([*(_rendered(line, width, colour).rstrip() for line in lines), *map(str.rstrip, below)])
 
 
 def _padded(

@@ -26,12 +26,13 @@ CONTROL: Final = "control"
 
 @dataclass(frozen=True)
 class Attainable:
-    """One look at the data, and the smallest p that it can give for and against the claim."""
+    """One look at the data, and the smallest p that it can give for the claim, against it, and against its size."""
 
     n: int
     alpha: float
     supported: float
     refuted: float
+    smaller: float | None = None
 
 
 @dataclass(frozen=True)
@@ -153,9 +154,12 @@ class ClaimReport:
 
     @property
     def failed(self) -> bool:
-        """Whether this ends the run with status 1: refuted or broken, and not accepted; for a variant, only broken."""
-        failures = (Outcome.ERROR,) if self.variant else (Outcome.REFUTED, Outcome.ERROR)
-        return self.outcome in failures and not self.as_expected
+        """Whether this ends the run with status 1, if it is not accepted: something against it is shown, or it broke.
+
+        For a variant only if it broke.
+        """
+        failed = self.outcome is Outcome.ERROR or (self.outcome.is_against and not self.variant)
+        return failed and not self.as_expected
 
     @property
     def n(self) -> int:

@@ -100,6 +100,7 @@
   };
 
   const follow = () => {
+    form.closest("details").open ||= location.hash.startsWith("#?");
     if (location.hash.startsWith("#?")) return set(new URLSearchParams(location.hash.slice(2)));
     const found = target();
     if (found?.hidden || found?.closest("[hidden]")) set(new URLSearchParams()); // a link shows it, whatever the filters say
