@@ -102,7 +102,7 @@ def _print(reports: Sequence[ClaimReport], tier: str, why: bool) -> None:
     width = terminal_table.columns(console.width, console.is_terminal)
     for part in (
         terminal_table.verdict_table(reports, width, console.is_terminal, console.encoding),
-        terminal_table.explanations(explained, console.width, console.is_terminal),
+        terminal_table.explanations(explained, width, console.is_terminal),
         "--why says why verdicts are accepted, inconclusive or not run" if unexplained and not why else "",
         table_cells.faults(reports),
         f"claims ({tier}): {table_cells.totals(reports)}",
