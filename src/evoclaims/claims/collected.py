@@ -32,11 +32,13 @@ class ClaimTest:
         claim: the paper's sentence.
         tier: "smoke" or "full".
         case: the ids of its parameters other than the tier, such as "n_parity"; empty without any.
+        third_look: whether thirty trials decide what ten leave open.
     """
 
     claim: Claim
     tier: str
     case: str
+    third_look: bool = False
 
     @staticmethod
     def of(item: pytest.Item) -> ClaimTest:
@@ -54,7 +56,8 @@ class ClaimTest:
         if not isinstance(claim, Claim):
             raise UserError(f"{item.nodeid} has the mark pytest.mark.claim but no claim: use @claim(...) of evoclaims.")
         tier: str = callspec.params[TIER]
-        return ClaimTest(claim, tier, callspec.id.removesuffix(tier_id(claim, tier)).removesuffix("-"))
+        case = callspec.id.removesuffix(tier_id(claim, tier)).removesuffix("-")
+        return ClaimTest(claim, tier, case, item.get_closest_marker("claim_third_look") is not None)
 
     @property
     def key(self) -> tuple[str, str]:

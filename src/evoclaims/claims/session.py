@@ -85,16 +85,17 @@ class Session:
         condition = self.reproduction.tier(tier, self.variant).condition(method, on)
         return self.reproduction.trials(method, on, condition, self.fetch)
 
-    def design(self, tier: str) -> Design:
+    def design(self, tier: str, *, third_look: bool = False) -> Design:
         """Return a tier's design; with a fixed number of trials, it has one look with the whole α."""
         design = self.reproduction.tier(tier).design
         if self.trials is None:
-            return design
+            return design.with_third_look() if third_look else design
         return replace(design, looks=(Look(self.trials, design.alpha),))
 
     def settle(self, test: ClaimTest, assertion: Assertion) -> ClaimReport:
         """Judge an assertion; trials that may not be run make the verdict "not run"."""
-        design, name, tier = self.design(test.tier), named(test.claim.id, test.case), test.tier
+        name, tier = named(test.claim.id, test.case), test.tier
+        design = self.design(tier, third_look=test.third_look)
         try:
             if self.leaves(tier, assertion):
                 raise NotStoredError(f"the variant {self.variant} changes none of its trials")

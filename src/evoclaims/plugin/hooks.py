@@ -46,6 +46,7 @@ def pytest_configure(config: pytest.Config) -> None:
         "full: claims at the paper's budgets; only run when asked for",
         "claim(claim): the claim that a test checks (set by @claim)",
         "claim_expect(expectation): an accepted outcome (set by expected(...))",
+        "claim_third_look: judged by thirty trials where ten leave it open (third_look)",
         "claim_without_smoke(because): no smoke test (set by smoke=None and without_smoke(...))",
     ):
         config.addinivalue_line("markers", line)
