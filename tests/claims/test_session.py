@@ -14,6 +14,7 @@ from evoclaims.claims.collected import ClaimTest
 from evoclaims.claims.fetching import NotStoredError, RunMissing, StoredOnly
 from evoclaims.claims.session import Session, Verdicts
 from evoclaims.core.errors import UnknownNameError, UserError
+from evoclaims.judging.design import SEQUENTIAL
 from evoclaims.paper import references
 from evoclaims.paper.archive import Archive
 from evoclaims.paper.reproduction import Reproduction
