@@ -11,8 +11,9 @@ from typing import Any, Final
 
 from evoclaims import Budget, Condition
 from evoclaims.envs import ANT, RobotTask, SteppingStones
-from evoclaims.methods import CmaEs, HyperNeat, MapElites, Neat, RandomPolicy, SeldomDecomposedCmaEs
+from evoclaims.methods import CmaEs, HyperNeat, MapElites, Neat, Ppo, RandomPolicy, SeldomDecomposedCmaEs
 from reproductions.nisioti2025 import ecorobot
+from reproductions.nisioti2025.first_level_ppo import FirstLevelPpo
 from reproductions.nisioti2025.other_champions import (
     BestEverHyperNeat,
     BestEverNeat,
@@ -20,6 +21,7 @@ from reproductions.nisioti2025.other_champions import (
     OtherCmaEs,
     OtherSeldomDecomposedCmaEs,
 )
+from reproductions.nisioti2025.other_ppo import OtherFirstLevelPpo, OtherPpo
 from reproductions.nisioti2025.other_stones import MetreRanges, OtherStones
 from reproductions.nisioti2025.waypoints import Waypoints
 
@@ -153,3 +155,16 @@ def torso_only(method: str, task: str, condition: Condition) -> Condition | None
     if getattr(asked, "robot", None) != ANT:
         return None
     return other_stones(robot=replace(ANT, seen_velocities=2), seen_positions=3)(method, task, condition)
+
+
+def other_ppo(**settings: Any) -> Change:
+    """Return the change of PPO to `OtherPpo` with some settings; with `first_state` only with robots."""
+
+    def change(method: str, task: str, condition: Condition) -> Condition | None:
+        learner: Any = condition.method
+        if not isinstance(learner, Ppo) or ("first_state" in settings and not isinstance(condition.task, RobotTask)):
+            return None
+        kind = OtherFirstLevelPpo if isinstance(learner, FirstLevelPpo) else OtherPpo
+        return replace(condition, method=as_kind(kind, learner, **settings))
+
+    return change

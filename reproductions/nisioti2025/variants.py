@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import fields, replace
-from typing import Any
+from typing import Any, Literal
 
 from evoclaims import Condition, Variant, changed
 from evoclaims.envs import CumulativeParity, NParity, Obstacles, RobotTask, SimpleAlu
 from evoclaims.methods import CmaEs, HandBuilt, HyperNeat, LevelTest, Neat, Ppo, SeldomDecomposedCmaEs
 from evoclaims.networks import AllSkips, Mlp
-from reproductions.nisioti2025 import ecorobot, stepping_gates, stones_details
+from reproductions.nisioti2025 import ecorobot, stepping_gates, stones_details, submission
 from reproductions.nisioti2025.first_level_ppo import FirstLevelPpo
 from reproductions.nisioti2025.published_course import PublishedObstacles
 
@@ -185,6 +185,22 @@ def _published_rows_so_far(method: str, task: str, condition: Condition) -> Cond
     return _published(method, task, now) or (None if now is condition else now)
 
 
+def _submission(pays: Literal["each", "once"], within: float) -> stones_details.Change:
+    """Return the change to a member of `submission`; on the gates the members are one."""
+    robots = submission.robots(pays, within, (_published_course, _perceptron, _published_value_network))
+
+    def change(method: str, task: str, condition: Condition) -> Condition | None:
+        if isinstance(condition.task, RobotTask):
+            return robots(method, task, condition)
+        now = condition
+        for one in (_rows_so_far, _published_alu, _perceptron, _published_neat, submission.gates, _first_level):
+            now = one(method, task, now) or now
+        now = stones_details.other_ppo(frozen_noise=True)(method, task, now) or now
+        return None if now is condition else now
+
+    return change
+
+
 def _variant(says: str, change: Any) -> Variant:
     """Apply a change to both tiers."""
     sizes = {
@@ -305,4 +321,22 @@ VARIANTS = {
     ),
     "big_maze_ant": _variant("The ant crosses stones in a larger maze", stones_details.big_maze_ant),
     "torso_only": _variant("The ant among stones sees its torso's place, and no joint", stones_details.torso_only),
+    "first_state": _variant(
+        "Each of PPO's environments with robots returns to its own first state",
+        stones_details.other_ppo(first_state=True),
+    ),
+    "kept_counters": _variant(
+        "The same, and stones once crossed stay crossed when an episode ends",
+        stones_details.other_ppo(first_state=True, kept_counters=True),
+    ),
+    "frozen_noise": _variant(
+        "PPO is examined with noise, the same draw in every step", stones_details.other_ppo(frozen_noise=True)
+    ),
+    "submission": _variant(
+        "The protocol at the time of the paper; stones pay in every step and count from 0.32 m",
+        _submission("each", 0.32),
+    ),
+    "submission_once": _variant("The same; stones pay once, and count from 0.32 m", _submission("once", 0.32)),
+    "submission_0.5": _variant("The same; stones pay in every step, and count from 0.5 m", _submission("each", 0.5)),
+    "submission_once_0.5": _variant("The same; stones pay once, and count from 0.5 m", _submission("once", 0.5)),
 }
