@@ -19,7 +19,7 @@ import pytest
 from custom_robots import BASE, Texts
 
 from evoclaims.core.errors import UserError
-from evoclaims.envs.ecorobot import model_files, physics
+from evoclaims.envs.ecorobot import fidelity, model_files, physics
 from evoclaims.envs.ecorobot.fidelity import Frames
 from evoclaims.envs.ecorobot.physics import Body
 from evoclaims.envs.ecorobot.robots import Robot

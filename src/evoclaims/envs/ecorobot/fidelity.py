@@ -108,7 +108,8 @@ def _stepped(world: Scene, made: Frames) -> Body:
 
     def frame(position: jax.Array, velocity: jax.Array, acceleration: jax.Array, control: jax.Array) -> Body:
         body = Body(position=position, velocity=velocity, acceleration=acceleration)
-        return physics._frame(world, body, control, world.turns)
+        moved: Body = physics._frame(world, body, control, world.turns)
+        return moved
 
     states = [jnp.array(x.copy()) for x in (made.position, made.velocity, made.acceleration, made.control)]
     quick = {"xla_backend_optimization_level": 0}  # it runs once
