@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 from pathlib import Path
 from typing import Any
 
+import gymnasium
+import mujoco
 import pytest
 from custom_robots import BASE, Texts
 
@@ -195,3 +198,21 @@ def test_a_maze_starts_its_robot_where_it_says(change: tuple[str, str], there: b
             UserError, match=r"stepping_stones starts its robots at x -3 and y 1, and the first two positions"
         ):
             SteppingStones(robot=robot)
+
+
+ASSETS = sorted((Path(gymnasium.__file__).parent / "envs/mujoco/assets").glob("*.xml"))
+
+
+@pytest.mark.parametrize("file", ASSETS, ids=lambda file: file.stem)
+def test_gymnasium_s_robots_are_refused_for_what_they_have(file: Path) -> None:
+    make = partial(Robot, file.stem, f"gymnasium:envs/mujoco/assets/{file.name}", contacts=12)
+    if mujoco.MjSpec.from_file(str(file)).option.integrator != mujoco.mjtIntegrator.mjINT_EULER:
+        with pytest.raises(UserError, match=f"The model of the robot {file.stem} has .*another integrator than Euler"):
+            make()
+    elif file.stem.startswith("pusher"):
+        robot = make()
+        with pytest.raises(UserError, match=f"The robot {file.stem} has a capsule .* and a cylinder .* that can touch"):
+            _ = Scene(robot).model
+    else:
+        assert file.stem == "half_cheetah"
+        assert Scene(make()).damps_implicitly
