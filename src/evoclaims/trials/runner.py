@@ -21,6 +21,7 @@ from evoclaims.trials.allowance import Allowance, OutOfTimeError
 from evoclaims.trials.batches import Batch, Run, StoredTrials, batches, drop_finished_checkpoints
 from evoclaims.trials.checkpoint import Header
 from evoclaims.trials.devices import single_threaded_linear_algebra
+from evoclaims.trials.edited_bodies import warn_of_edited_bodies
 from evoclaims.trials.halving import halved, is_exhausted
 from evoclaims.trials.imported import into_store
 from evoclaims.trials.lanes import Lanes, picked
@@ -79,7 +80,9 @@ def run(
     wanted = list(dict.fromkeys(seeds))
     make: Maker | None = None  # it asks for all that running needs, which reading does not
     while not stored.answer(found := [stored.get(seed) for seed in wanted]):
-        make = make or _maker(stored, devices, checkpoint_seconds, len(wanted))
+        if make is None:
+            warn_of_edited_bodies(condition, store)
+            make = _maker(stored, devices, checkpoint_seconds, len(wanted))
         store.check_writable()
         with (
             announced(store.root, condition.id, lambda text: watch(RunProgress(condition.label, text, len(seeds)))),

@@ -13,14 +13,15 @@ TINY: Final = 1e-15
 
 
 def as_in_c(types: Array, model: Any, data: Any) -> Any:
-    """Return MJX's data with other contacts of capsules on planes, and of spheres on boxes and capsules.
+    """Return MJX's data with C's contacts of capsules on planes, and of spheres on boxes and capsules.
 
-    A steep capsule's friction acts along and across the capsule in C, and along the world's axes in MJX, which differ as
-    pyramids. A sphere's contacts are off by about 1e-6 in MJX.
+    The friction pyramid of a steep capsule lies along the capsule in C, and along the world's axes in MJX. A sphere's
+    contacts are off by about 1e-6 in MJX.
 
     Args:
         types: MuJoCo's types of all geoms.
-        model, data: MJX's, with contacts.
+        model: MJX's.
+        data: MJX's, with contacts.
     """
     contact = data._impl.contact
     if not contact.dist.shape[0]:

@@ -12,19 +12,30 @@ from evoclaims.core.errors import UserError
 from evoclaims.envs.ecorobot import model_files
 
 _ARRAYS: Final = {
-    "actuator_": "acc0 actadr actnum biasprm biastype ctrladr ctrllimited ctrlnum ctrlrange ctrlspec dynprm forcelimited "
-    "forcerange gainprm gaintype gear length0 lengthrange outadr outnum trnid trntype user",
-    "body_": "conaffinity contype dofadr dofnum geomadr geomnum gravcomp inertia invweight0 ipos iquat jntadr jntnum margin "
-    "mass parentid pos quat rootid sameframe simple subtreemass treeid user weldid",
+    "actuator_": (
+        "acc0 actadr actnum biasprm biastype ctrladr ctrllimited ctrlnum ctrlrange ctrlspec dynprm "
+        "forcelimited forcerange gainprm gaintype gear length0 lengthrange outadr outnum trnid trntype user"
+    ),
+    "body_": (
+        "conaffinity contype dofadr dofnum geomadr geomnum gravcomp inertia invweight0 ipos iquat jntadr "
+        "jntnum margin mass parentid pos quat rootid sameframe simple subtreemass treeid user weldid"
+    ),
     "dof_": "M0 Madr armature bodyid damping invweight0 jntid length parentid simplenum solimp solref treeid",
-    "geom_": "aabb bodyid conaffinity condim contype dataid friction gap margin pos priority quat rbound sameframe size "
-    "solimp solmix solref type user",
-    "jnt_": "actfrclimited actfrcrange actgravcomp actuatorid axis bodyid dofadr limited margin pos qposadr range solimp "
-    "solref stiffness type user",
+    "geom_": (
+        "aabb bodyid conaffinity condim contype dataid friction gap margin pos priority quat rbound sameframe "
+        "size solimp solmix solref type user"
+    ),
+    "jnt_": (
+        "actfrclimited actfrcrange actgravcomp actuatorid axis bodyid dofadr limited margin pos qposadr range "
+        "solimp solref stiffness type user"
+    ),
     "exclude_": "signature",
     "key_": "act ctrl mpos mquat qpos qvel time",
-    "mesh_": "face faceadr facenormal facenum graph graphadr normal normaladr normalnum polyadr polymap polymapadr polymapnum "
-    "polynormal polynum polyvert polyvertadr polyvertnum pos quat scale vert vertadr vertnum extrema",
+    "mesh_": (
+        "face faceadr facenormal facenum graph graphadr normal normaladr normalnum polyadr polymap polymapadr "
+        "polymapnum polynormal polynum polyvert polyvertadr polyvertnum pos quat scale vert vertadr vertnum "
+        "extrema"
+    ),
     "pair_": "dim friction gap geom1 geom2 margin signature solimp solref solreffriction",
     "qpos": "0 _spring",
     # Sensors are not read, and sites are only for them and for motors.
@@ -51,6 +62,7 @@ NAMES: Final = {
     "geom_fluid": "ellipsoids in a fluid (fluidshape)",
     "geom_adhesion": "adhesion",
     "geom_surfacevel": "moving surfaces",
+    "actuator_dyntype": "actuators with a state",
     "actuator_delay": "actuators with a delay",
     "actuator_history": "actuators with a delay",
     "actuator_armature": "actuators with an armature",
@@ -99,7 +111,7 @@ OPTIONS: Final = frozenset(
         "o_friction",
     ]
 )
-"""MuJoCo's options that may have any value: a step uses them, or they change nothing in it; flags are looked at below."""
+"""MuJoCo's options that may have any value: a step uses them, or they change nothing in it; flags are below."""
 FLAGS: Final = {
     "disable": [
         "CONSTRAINT",
@@ -124,6 +136,8 @@ FLAGS: Final = {
     "enable": ["ENERGY", "FWDINV", "INVDISCRETE"],
 }
 """Flags that may be set."""
+LARGEST_TOLERANCE: Final = 1e-8
+"""MuJoCo's own: with larger ones C stops before the minimum, which a step here reaches."""
 TRANSMISSIONS: Final = ("JOINT", "JOINTINPARENT", "SITE")
 
 
@@ -156,9 +170,10 @@ def _beyond(model: mujoco.MjModel) -> Iterator[str]:
     """Yield what a model has that a step does not simulate."""
     for name in dir(model):
         array = getattr(model, name)
-        if isinstance(array, np.ndarray) and name not in SIMULATED and not model_files.is_cosmetic(name):
-            if np.any((array != 0) & (array != -1)):
-                yield next((said for begin, said in NAMES.items() if name.startswith(begin)), f"{name} (of MuJoCo's)")
+        if not isinstance(array, np.ndarray) or name in SIMULATED or model_files.is_cosmetic(name):
+            continue
+        if np.any((array != 0) & (array != -1)):
+            yield next((said for begin, said in NAMES.items() if name.startswith(begin)), f"{name} (of MuJoCo's)")
     for count, said in COUNTS.items():
         if getattr(model, count, 0) > 0:
             yield said
@@ -169,7 +184,7 @@ def _beyond(model: mujoco.MjModel) -> Iterator[str]:
         )
         set_ = int(getattr(model.opt, f"{kind}flags"))
         for flag in kinds.__members__.values():
-            if int(flag) & set_ & ~allowed and int(flag).bit_count() == 1:
+            if int(flag) & set_ & ~allowed and not flag.name.startswith("mjN"):
                 yield f"the flag {flag.name.partition('_')[2].lower()}={kind}"
     usual = mujoco.MjOption()
     for option in dir(usual):
@@ -178,6 +193,8 @@ def _beyond(model: mujoco.MjModel) -> Iterator[str]:
             continue
         if np.any(given != getattr(usual, option)):
             yield _option(option, given)
+    if model.opt.tolerance > LARGEST_TOLERANCE:
+        yield f"a solver that stops early (tolerance={model.opt.tolerance:g}, {LARGEST_TOLERANCE:g} at most)"
     transmissions = {int(getattr(mujoco.mjtTrn, f"mjTRN_{kind}")) for kind in TRANSMISSIONS}
     if not set(model.actuator_trntype.tolist()) <= transmissions:
         yield "actuators that drive no joint"

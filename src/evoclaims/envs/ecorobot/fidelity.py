@@ -80,8 +80,8 @@ def require_fidelity(scene: Scene) -> None:
     raise UserError(
         f"The robot {robot.name} is not simulated here as its file says: in {np.sum(wrong)} of {len(wrong)} random "
         f"states a frame differs from MuJoCo's own by up to {off[worst]:.2g} of 1 plus the largest velocity "
-        f"({TOLERANCE:g} is allowed), with {made.contacts[worst]} contacts. Remove from the file what MJX computes in another "
-        "way, such as contacts of boxes, cylinders or meshes."
+        f"({TOLERANCE:g} is allowed), with {made.contacts[worst]} contacts. Remove from the file what MJX computes in "
+        "another way, such as contacts of meshes, or a solver that stops early (iterations, tolerance)."
     )
 
 
@@ -108,7 +108,8 @@ def _stepped(world: Scene, made: Frames) -> Body:
 
     def frame(position: jax.Array, velocity: jax.Array, acceleration: jax.Array, control: jax.Array) -> Body:
         body = Body(position=position, velocity=velocity, acceleration=acceleration)
-        return physics._frame(world, body, control, world.turns)
+        moved: Body = physics._frame(world, body, control, world.turns)
+        return moved
 
     states = [jnp.array(x.copy()) for x in (made.position, made.velocity, made.acceleration, made.control)]
     quick = {"xla_backend_optimization_level": 0}  # it runs once
@@ -143,6 +144,10 @@ def frames_of(scene: Scene) -> Frames:
                 # A step computes the pose before it integrates.
                 pose = np.concatenate([data.xpos[1], data.xmat[1]])
                 rows.append([*before, data.qpos.copy(), data.qvel.copy(), pose, touching])
+    if not rows:
+        raise UserError(
+            f"The robot {scene.robot.name} diverges in its first frame in MuJoCo itself: write a smaller timestep."
+        )
     return Frames(*(np.array(column) for column in zip(*rows, strict=True)))
 
 

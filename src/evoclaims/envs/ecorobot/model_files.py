@@ -157,8 +157,8 @@ def _rounded(array: NDArray[Any]) -> bytes:
     numbers = array.astype(np.float64)
     numbers[np.abs(numbers) < 1e-12 * np.max(np.abs(numbers))] = 0.0  # what is left of sums that cancel
     fraction, exponent = np.frexp(numbers)
-    # Adding 0.0 makes -0.0 zero.
-    return (np.ldexp(np.rint(np.ldexp(fraction, DIGITS)), exponent - DIGITS) + 0.0).astype("<f8").tobytes()
+    rounded: NDArray[np.float64] = np.ldexp(np.rint(np.ldexp(fraction, DIGITS)), exponent - DIGITS)
+    return (rounded + 0.0).astype("<f8").tobytes()  # adding 0.0 makes -0.0 zero
 
 
 def in_one_line(error: Exception) -> str:

@@ -84,9 +84,9 @@ class RobotTask(ABC):
         place = data.xpos[1][:2]
         if not np.allclose(place, self.start, atol=1e-5):
             raise UserError(
-                f"{self.name} starts its robots at x {self.start[0]:g} and y {self.start[1]:g}, and the first two positions "
-                f"of {robot.name} put it at x {place[0]:g} and y {place[1]:g}: its torso needs a free joint, or slides along "
-                "x and y as its first joints, at x 0 and y 0."
+                f"{self.name} starts its robots at x {self.start[0]:g} and y {self.start[1]:g}, and the first two "
+                f"positions of {robot.name} put it at x {place[0]:g} and y {place[1]:g}: its torso needs a free joint, "
+                "or slides along x and y as its first joints, at x 0 and y 0."
             )
 
     @property

@@ -40,11 +40,10 @@ class Robot:
         velocity_limit: shown velocities are clipped to it.
         contacts: most contacts kept, the nearest ones.
         touching: contacts of which seldom more touch at a time. Steps with more take longer; results are the same.
-        body: a hash of what it is made of, part of the ids of its trials; None for the built-in robots, whose files do not
-            change.
+        body: a hash of what it is made of, part of its trials' ids; None for the built-in robots, whose files stay.
 
-    A built-in robot's file is simulated as the paper's code does: with one iteration of the solver and explicit damping.
-    Any other is simulated as it says, or refused.
+    A built-in robot's file is simulated as the paper's code does: one iteration of the solver, explicit damping. Any
+    other is simulated as it says, or refused.
     """
 
     name: str
@@ -109,16 +108,16 @@ class Robot:
                 at = model.jnt_qposadr[joint] + 3 * (model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_FREE)
                 if not any(self.start[at : at + 4]):
                     raise UserError(
-                        f"The robot {self.name} starts with the orientation 0 0 0 0 (positions {at} to {at + 3}), which is "
-                        "none: write 1 0 0 0 for upright."
+                        f"The robot {self.name} starts with the orientation 0 0 0 0 (positions {at} to {at + 3}), "
+                        "which is none: write 1 0 0 0 for upright."
                     )
         low, high = model.actuator_ctrlrange.T
         if self.scales_actions and not np.all(low < high):
             motor = model.actuator(int(np.argmin(low < high)))
             raise UserError(
-                f"The robot {self.name} has scales_actions=True, and its actuator {motor.name or motor.id} has the ctrlrange "
-                f"{motor.ctrlrange[0]:g} {motor.ctrlrange[1]:g}, so that actions span nothing: write a ctrlrange whose "
-                "first number is below its second, or leave out scales_actions."
+                f"The robot {self.name} has scales_actions=True, and its actuator {motor.name or motor.id} has the "
+                f"ctrlrange {motor.ctrlrange[0]:g} {motor.ctrlrange[1]:g}, so that actions span nothing: "
+                "write a ctrlrange whose first number is below its second, or leave out scales_actions."
             )
 
     def _require_numbers(self) -> None:

@@ -31,7 +31,7 @@ with contextlib.redirect_stdout(io.StringIO()):
 WORLD_GROUP: Final = 1
 """The geom group of the scene's own geoms; sensors see it."""
 NEWTON_STEPS: Final = 8
-"""Most steps of the constraints' solver in a frame; it reaches the minimum, within rounding, in four or fewer mostly."""
+"""Most steps of the constraints' solver in a frame; it mostly reaches the minimum in four or fewer."""
 CONTACTS: Final = frozenset(
     {
         *(("plane", kind) for kind in ("sphere", "capsule", "ellipsoid", "cylinder", "box", "mesh")),
@@ -82,8 +82,12 @@ class Scene:
         """The model that is simulated, in MJX's form; its arrays are on the host, so that programs embed them."""
         explicit = copy(self.model)
         explicit.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_EULERDAMP  # `physics` integrates damping
-        with jax.ensure_compile_time_eval():
-            model = jax.device_get(mjx.put_model(explicit, impl="jax"))
+        explicit.opt.enableflags = 0  # those that `features` allows compute more, but move nothing
+        try:
+            with jax.ensure_compile_time_eval():
+                model = jax.device_get(mjx.put_model(explicit, impl="jax"))
+        except (NotImplementedError, ValueError, AssertionError) as error:
+            raise UserError(f"MJX cannot simulate the model of the robot {self.robot.name}: {error}") from error
         # Erase the boxes that happen to come first, or programs would depend on them.
         geoms = box_geoms(self.model)
         blank = {name: np.array(getattr(model, name)) for name in self.turns}
@@ -196,7 +200,11 @@ def _require_contacts(name: str, model: mujoco.MjModel) -> None:
     for one, other, _ in geom_pairs(model):
         pair = tuple(geoms[int(model.geom_type[geom])] for geom in (one, other))
         if pair not in CONTACTS:
-            names = [model.geom(int(geom)).name or "without a name" for geom in (one, other)]
+            boxes = set(box_geoms(model))
+            names = [
+                "of the task" if geom in boxes else model.geom(int(geom)).name or "without a name"
+                for geom in (one, other)
+            ]
             raise UserError(
                 f"The robot {name} has a {pair[0]} ({names[0]}) and a {pair[1]} ({names[1]}) that can touch, of which "
                 "MJX computes no contacts, or other ones than MuJoCo. Write another type of geom, such as spheres, or "

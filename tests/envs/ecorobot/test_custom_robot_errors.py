@@ -1,0 +1,218 @@
+"""Custom robots that cannot be simulated as they are written: a sentence when they, or their tasks, are made."""
+
+from __future__ import annotations
+
+import math
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import gymnasium
+import mujoco
+import pytest
+from custom_robots import BASE, Texts
+
+from evoclaims.core.errors import UserError
+from evoclaims.envs.ecorobot.boxes import Box
+from evoclaims.envs.ecorobot.locomotion import Locomotion
+from evoclaims.envs.ecorobot.obstacles import Obstacles
+from evoclaims.envs.ecorobot.robots import ANT, Robot
+from evoclaims.envs.ecorobot.scene import Scene, box_geoms
+from evoclaims.envs.ecorobot.stones import SteppingStones
+
+SLED = """
+<mujoco>
+  <option timestep="0.01"/>
+  <worldbody>
+    <geom type="plane" size="9 9 1"/>
+    <body name="sled" pos="0 0 0.3">
+      <joint name="x" type="slide" axis="1 0 0"/><joint name="y" type="slide" axis="0 1 0"/>
+      <geom name="hull" type="sphere" size="0.2"/>
+    </body>
+  </worldbody>
+  <actuator><motor name="push" joint="x" gear="10"/></actuator>
+</mujoco>
+"""
+
+
+@pytest.fixture
+def texts(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Texts:
+    return Texts(tmp_path, monkeypatch)
+
+
+@pytest.mark.parametrize(
+    "numbers",
+    [
+        *({"frames": wrong} for wrong in (0, -1, 2.5, True, "5", None)),
+        *({"contacts": wrong} for wrong in (0, -3, 1.5)),
+        *({"touching": wrong} for wrong in (-1, 0.5)),
+        *({"free_coordinates": wrong} for wrong in (-1, 3, 1.0)),
+        *({"seen_velocities": wrong} for wrong in (-1, 3, 1.0)),
+        *({"torso_radius": wrong} for wrong in (-0.1, math.nan, math.inf, "wide", None)),
+        *({"position_noise": wrong} for wrong in (-0.1, math.nan, math.inf)),
+        *({"velocity_noise": wrong} for wrong in (-0.1, math.nan, math.inf)),
+        *({"forward_reward": wrong} for wrong in (math.nan, math.inf, None)),
+        *({"control_cost": wrong} for wrong in (math.nan, -math.inf)),
+        {"healthy_reward": math.nan},
+        *({"healthy_height": wrong} for wrong in ((1.0, 0.2), (0.5, 0.5), (math.nan, 1.0), (0.2,), 0.2, [0.2, 1.0])),
+        *({"healthy_pitch": wrong} for wrong in (0.0, -1.0, math.nan)),
+        *({"velocity_limit": wrong} for wrong in (0.0, -1.0, math.nan)),
+        *(
+            {"start": wrong}
+            for wrong in ((0.0,), (0.0, math.nan), (0.0, math.inf), (0.0, 0.0, 0.0), (), [0.0, 0.0], "00")
+        ),
+        {"normal_velocity": "no"},
+        {"scales_actions": True},
+        {"scales_actions": 1},
+    ],
+    ids=str,
+)
+def test_numbers_that_do_not_fit_are_refused(numbers: dict[str, Any], texts: Texts) -> None:
+    texts.robot(SLED)
+    with pytest.raises(UserError, match=r"The robot rover (has|starts)") as error:
+        texts.robot(SLED, **numbers)
+    assert "write" in str(error.value)
+
+
+@pytest.mark.parametrize("name", ["", None, 3])
+def test_a_robot_has_a_name(name: Any) -> None:
+    with pytest.raises(UserError, match="A robot's name is a text that is not empty"):
+        Robot(name, "x:y.xml")
+
+
+def test_a_start_without_an_orientation_is_refused(texts: Texts) -> None:
+    with pytest.raises(UserError, match="the orientation 0 0 0 0"):
+        texts.robot(BASE, start=(0.0,) * 8)
+
+
+def test_a_built_in_robot_s_start_is_checked_with_its_task() -> None:
+    with pytest.raises(UserError, match="The robot ant starts at 2 positions, and its model has 15"):
+        Locomotion(robot=Robot("ant", ANT.xml, start=(0.0, 0.0)))
+
+
+@pytest.mark.parametrize(
+    ("change", "sentence"),
+    [
+        (("<mujoco>", "<mujoco"), "cannot be read: .*"),
+        (('type="slide"', 'type="sleigh"'), "cannot be read: .*sleigh"),
+        (('joint="x"', 'joint="z"'), "cannot be compiled: .*"),
+        (('axis="1 0 0"', 'axis="1 0 0" limited="true" range="2 1"'), "cannot be compiled: .*"),
+        (('gear="10"', 'gear="10" ctrllimited="true" ctrlrange="1 -1"'), "cannot be compiled: .*"),
+        (("<worldbody>", '<include file="no.xml"/><worldbody>'), "cannot be read: .*no.xml"),
+        (('type="sphere" size="0.2"', 'type="mesh" mesh="m"'), "cannot be compiled: .*"),
+        (
+            ("<body", '<body pos="0 0 3"><geom size="0.1"/></body><body'),
+            r"no torso: its first body \(without a name\) has no",
+        ),
+        (
+            ("<body", '<body name="lamp"><geom size="0.1"/></body><body'),
+            r"has no torso: its first body \(lamp\) has no joint",
+        ),
+        (
+            ("<body", '<body mocap="true"><geom size="0.1"/></body><body'),
+            "has motion-capture bodies, which is not simulated",
+        ),
+        (("<option", '<option integrator="implicit"'), "another integrator than Euler, which is not"),
+        (("<option", '<option solver="CG"'), "has another solver than Newton's, which is not"),
+        (("<option", '<option noslip_iterations="3"'), "has noslip_iterations=3, which is not"),
+        (
+            ('timestep="0.01"/>', 'timestep="0.01"><flag spring="disable"/></option>'),
+            "has the flag spring=disable, which",
+        ),
+        (
+            ('timestep="0.01"/>', 'timestep="0.01"><flag override="enable"/></option>'),
+            "has the flag override=enable, which",
+        ),
+        (('type="sphere" size', 'type="sphere" fluidshape="ellipsoid" size'), "ellipsoids in a fluid"),
+        (('gear="10"', 'gear="10" delay="0.1" nsample="20"'), "has actuators with a delay, which"),
+        (('name="y" type="slide"', 'name="y" type="slide" damping="0.1 0.5"'), "has damping that is not linear, which"),
+        (
+            ('name="y" type="slide"', 'name="y" type="slide" stiffness="0.1 0.5"'),
+            "has springs that are not linear, which",
+        ),
+    ],
+    ids=lambda part: part[1] if isinstance(part, tuple) else "",
+)
+def test_a_model_that_cannot_be_simulated_is_refused(change: tuple[str, str], sentence: str, texts: Texts) -> None:
+    with pytest.raises(UserError, match=f"The model of the robot rover .*{sentence}") as error:
+        texts.robot(SLED.replace(change[0], change[1], 1))
+    assert "\n" not in str(error.value)
+
+
+def test_a_model_without_a_body_is_refused(texts: Texts) -> None:
+    with pytest.raises(UserError, match="has no torso: it has no body"):
+        texts.robot('<mujoco><worldbody><geom type="plane" size="1 1 1"/></worldbody></mujoco>')
+
+
+@pytest.mark.parametrize("kind", ["capsule", "cylinder", "ellipsoid", "box"])
+def test_geoms_whose_contacts_with_boxes_differ_are_refused_with_their_task(kind: str, texts: Texts) -> None:
+    robot = texts.robot(SLED.replace('type="sphere" size="0.2"', f'type="{kind}" size="0.2 0.1 0.1"'))
+    Locomotion(robot=robot)
+    with pytest.raises(UserError, match=rf"The robot rover has a {kind} \(.*\) and a box \(.*\) that can touch, .*MJX"):
+        Obstacles(robot=robot)
+
+
+@pytest.mark.parametrize("bits", [(1, 1), (2, 2), (2, 0), (0, 4), (0, 1), (1, 0)], ids=str)
+def test_boxes_collide_with_whatever_collides(bits: tuple[int, int], texts: Texts) -> None:
+    text = SLED.replace('name="hull"', f'name="hull" contype="{bits[0]}" conaffinity="{bits[1]}"')
+    model = Scene(texts.robot(text), (Box((3.0, 0.0), (0.1, 2.0)),)).model
+    hull, box = model.geom("hull").id, box_geoms(model)[0]
+    both = (model.geom_contype[hull] & model.geom_conaffinity[box]) | (
+        model.geom_contype[box] & model.geom_conaffinity[hull]
+    )
+    assert both
+
+
+def test_a_geom_that_touches_nothing_may_have_any_type(texts: Texts) -> None:
+    text = SLED.replace('type="sphere" size="0.2"', 'type="cylinder" size="0.2 0.1" contype="0" conaffinity="0"')
+    assert Obstacles(robot=texts.robot(text)).action_size == 1
+
+
+def test_a_task_needs_motors_a_robot_and_a_sensor(texts: Texts) -> None:
+    still = texts.robot(SLED.replace('<motor name="push" joint="x" gear="10"/>', ""))
+    with pytest.raises(UserError, match="The model of the robot rover has no actuators"):
+        Locomotion(robot=still)
+    wrong: Any = "rover"
+    with pytest.raises(UserError, match="locomotion's robot must be a Robot"):
+        Locomotion(robot=wrong)
+    with pytest.raises(UserError, match="locomotion's sensor must be"):
+        Locomotion(sensor=wrong)
+
+
+@pytest.mark.parametrize(
+    ("change", "there"),
+    [
+        (("", ""), True),
+        (('pos="0 0 0.3"', 'pos="0.5 0 0.3"'), False),
+        (('axis="0 1 0"', 'axis="0 0 1"'), False),
+        (('axis="1 0 0"', 'axis="-1 0 0"'), False),
+    ],
+    ids=["x and y", "beside the origin", "x and z", "backwards"],
+)
+def test_a_maze_starts_its_robot_where_it_says(change: tuple[str, str], there: bool, texts: Texts) -> None:
+    robot = texts.robot(SLED.replace(*change, 1))
+    if there:
+        SteppingStones(robot=robot)
+    else:
+        with pytest.raises(
+            UserError, match=r"stepping_stones starts its robots at x -3 and y 1, and the first two positions"
+        ):
+            SteppingStones(robot=robot)
+
+
+ASSETS = sorted((Path(gymnasium.__file__).parent / "envs/mujoco/assets").glob("*.xml"))
+
+
+@pytest.mark.parametrize("file", ASSETS, ids=lambda file: file.stem)
+def test_gymnasium_s_robots_are_refused_for_what_they_have(file: Path) -> None:
+    make = partial(Robot, file.stem, f"gymnasium:envs/mujoco/assets/{file.name}", contacts=12)
+    if mujoco.MjSpec.from_file(str(file)).option.integrator != mujoco.mjtIntegrator.mjINT_EULER:
+        with pytest.raises(UserError, match=f"The model of the robot {file.stem} has .*another integrator than Euler"):
+            make()
+    elif file.stem.startswith("pusher"):
+        robot = make()
+        with pytest.raises(UserError, match=f"The robot {file.stem} has a capsule .* and a cylinder .* that can touch"):
+            _ = Scene(robot).model
+    else:
+        assert file.stem == "half_cheetah"
+        assert Scene(make()).damps_implicitly
