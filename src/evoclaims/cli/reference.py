@@ -80,8 +80,8 @@ def main(options: argparse.Namespace) -> int:
     if unknown:
         raise UserError(
             f"Trials of {', '.join(unknown)} ran code of unknown revision, so nobody could run it again: they were "
-            "made where there is no git repository, or before its first commit. Commit the project and run them anew in an "
-            "empty store, or keep them as they are with --unknown-revision."
+            "made where there is no git repository, or before its first commit. Commit the project and run them anew "
+            "in an empty store, or keep them as they are with --unknown-revision."
         )
     if not (written or (used and shared == len(used))):
         variant = options.variant

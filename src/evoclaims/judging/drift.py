@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 from evoclaims.core.canonical import as_plain
+from evoclaims.judging.changed_settings import changed_settings
 from evoclaims.judging.effect import a12, median
 from evoclaims.judging.exact import rank_attainable, rank_test
 from evoclaims.judging.multiplicity import holm
@@ -152,11 +153,12 @@ def _test(case: DriftCase, metric: str) -> DriftRow:
     if not new:
         return row("not run", "no new trial of this condition")
     if len(reference) < MIN_REFERENCES:
-        others = len(case.reference) - len(reference)
+        others = [trial for trial in case.reference if trial.condition != case.condition]
+        changed = changed_settings(others[-1].spec, new[-1].spec) if others else ""
         return row(
             "no reference",
             f"{len(reference)} reference trials of this condition, {MIN_REFERENCES} needed"
-            + (f" ({others} of another fingerprint left out)" if others else ""),
+            + (f" ({len(others)} of another fingerprint left out{': ' * bool(changed)}{changed})" if others else ""),
         )
     crashed = [trial.seed for trial in (*new, *reference) if trial.status == "crashed"]
     if crashed:

@@ -266,7 +266,7 @@ def _tied(finding: Finding) -> str:
             sizes, (value,), first = [len(sample.values) for sample in entry.samples], values, entry.samples[0]
             if value < math.inf or first.limit is None:
                 return f"all {' and '.join(map(str, sizes))} trials have the value {value:g}"
-            what, _, event = first.label.partition(": ")[2].partition(" until ")
+            what, _, event = first.label.partition(": ")[2].partition(", within ")[0].partition(" until ")
             reached = event.replace(" is ", " reaches ", 1) or "an end is seen"
             none = " and ".join(f"0 of {size}" for size in sizes)
             return f"in {none} trials {reached} within {first.limit:,.12g} {what}"
