@@ -64,7 +64,7 @@ def test_plan_of_a_variant_has_what_it_changes_and_the_claims_that_read_it(
     evoclaims: Evoclaims, project: Project, stored: Store
 ) -> None:
     """The variant's right network is the protocol's wrong one, whose trials are stored."""
-    assert evoclaims("reference")[0] == 0
+    assert evoclaims("reference", "--unknown-revision")[0] == 0
     status, out, _ = evoclaims("plan", "--variant", "traded")
     assert status == 0
     assert "Conditions of the smoke tier that traded changes, on " in out
@@ -80,7 +80,7 @@ def test_plan_of_a_variant_has_what_it_changes_and_the_claims_that_read_it(
 
 def test_plan_tells_what_the_reference_trials_have_cost(evoclaims: Evoclaims, stored: Store) -> None:
     assert "reference trials" not in evoclaims("plan")[1]
-    assert evoclaims("reference")[0] == 0
+    assert evoclaims("reference", "--unknown-revision")[0] == 0
     path = Path("reference/smoke/right-parity.jsonl")
     device = {"platform": "gpu", "kind": "NVIDIA Abacus", "count": 1}
     timing = {"run": 7000.0, "compile": 200.0, "batch": 10, "started": "2026-01-01T00:00:00+00:00"}
@@ -102,7 +102,7 @@ def test_plan_tells_what_the_reference_trials_have_cost(evoclaims: Evoclaims, st
 
 
 def test_plan_tells_the_hours_of_a_cpu_core(evoclaims: Evoclaims, stored: Store) -> None:
-    assert evoclaims("reference")[0] == 0
+    assert evoclaims("reference", "--unknown-revision")[0] == 0
     out = evoclaims("plan", "--tier", "full")[1]
     assert re.search(r" CPU\n.* core hours$", out, re.MULTILINE)
     assert "took on one" not in out

@@ -61,7 +61,7 @@ def test_a_direction_out_of_reach_is_named_in_the_reason(source) -> None:
 def test_ties_that_leave_no_direction_open_are_underpowered(source) -> None:
     verdict = judge(source("a", [1.0] * 10).score() > source("b", [1.0] * 10).score(), FIXED_10)
     assert verdict.outcome is Outcome.INCONCLUSIVE
-    assert verdict.reason.startswith("underpowered: with these ties")
+    assert verdict.reason == "all 10 and 10 trials have the value 1: nothing to compare"
     assert verdict.attainable_p == 1.0
 
 
@@ -163,7 +163,9 @@ def test_the_order_in_which_a_source_returns_trials_does_not_matter(source) -> N
 def test_a_crashed_trial_makes_the_verdict_an_error(source) -> None:
     verdict = judge(source("a", [*HIGH[:9], "crashed"]).score() > source("b", LOW).score(), FIXED_10)
     assert verdict.outcome is Outcome.ERROR
-    assert verdict.reason == "trials crashed: a (seed 9)"
+    assert verdict.reason == "1 of 10 trials of a crashed (seed 9)"
+    several = judge(source("a", ["crashed", 1.0] * 5).score() > source("b", LOW).score(), FIXED_10)
+    assert several.reason == "5 of 10 trials of a crashed (seeds 0, 2, 4, 6, 8)"
 
 
 def test_nan_in_a_finished_trial_makes_the_verdict_an_error(source) -> None:

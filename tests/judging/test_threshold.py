@@ -60,7 +60,7 @@ def test_the_evidence_says_which_trials_decide_nothing(source) -> None:
 
 def test_where_all_trials_are_at_the_number_nothing_was_attainable(source) -> None:
     verdict = judge(source("a", [90.0] * 10).score() > 90, FIXED_10)
-    assert verdict.reason == "underpowered: with these ties the smallest attainable p is 1 > alpha = 0.05 at n = 10"
+    assert verdict.reason == "all 10 trials have the value 90: nothing to compare"
 
 
 def test_too_few_trials_are_not_looked_at(source) -> None:

@@ -158,7 +158,11 @@ FAST, SLOW, NEVER = [1.0] * 4, [0.0, 0.0, 1.0, 1.0], [0.0] * 4
 def test_sample_efficiency_is_judged(group: Any, a: Any, b: Any, outcome: Outcome) -> None:
     left, right = group(*[a] * 6), group(*[b] * 6, method="worse")
     claim = left.steps_to("success", 0.9) < right.steps_to("success", 0.9)
-    assert judge(claim, Design.fixed(6)).outcome is outcome
+    verdict = judge(claim, Design.fixed(6))
+    assert verdict.outcome is outcome
+    if a == b == NEVER:
+        what = f"success reaches 0.9 on level {LAST} within {4 * COST:,} environment steps"
+        assert verdict.reason == f"in 0 of 6 and 0 of 6 trials {what}: nothing to compare"
 
 
 def test_budgets_of_two_lengths_are_compared_up_to_the_shorter(group: Any) -> None:

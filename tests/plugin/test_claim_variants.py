@@ -73,7 +73,7 @@ def test_the_command_runs_what_a_variant_changes_and_says_what_hangs_on_it(
     assert "traded: The right network is wrong" in shown
     assert "first: supported -> refuted" in shown
     assert "second" not in shown
-    assert main(["reference", "--variant", "traded"]) == 0
+    assert main(["reference", "--unknown-revision", "--variant", "traded"]) == 0
     written = project.path / "reference" / "variants" / "traded" / "smoke"
     assert [path.name for path in written.iterdir()] == ["right-parity.jsonl"]
     capsys.readouterr()
@@ -104,15 +104,17 @@ def test_a_condition_that_another_variant_has_committed_is_not_written_again(
     project.pytester.makepyfile(tiny_paper=twice)
     project.write(first="supported", second="refuted")
     shutil.copytree(project.store, ".evoclaims")
-    assert main(["reference", "--variant", "traded"]) == 0
+    assert main(["reference", "--unknown-revision", "--variant", "traded"]) == 0
     before = sorted(project.path.glob("reference/**/*.jsonl"))
     assert len(before) == 1
     capsys.readouterr()
-    assert main(["reference", "--variant", "swapped"]) == 0
+    assert main(["reference", "--unknown-revision", "--variant", "swapped"]) == 0
     said = "left alone: right on parity: the same condition as under traded, committed there\n"
     assert capsys.readouterr().out == said
     assert sorted(project.path.glob("reference/**/*.jsonl")) == before
-    assert main(["reference", "--variant", "traded"]) == 0  # under its own name it is written anew
+    assert (
+        main(["reference", "--unknown-revision", "--variant", "traded"]) == 0
+    )  # under its own name it is written anew
     assert "wrote " in capsys.readouterr().out
 
 
@@ -121,7 +123,7 @@ def test_a_variant_without_trials_says_how_they_are_run(
 ) -> None:
     monkeypatch.chdir(project.path)
     project.write(first="supported")
-    assert main(["reference", "--variant", "traded"]) == 2
+    assert main(["reference", "--unknown-revision", "--variant", "traded"]) == 2
     said = (
         "evoclaims: No condition of the smoke tier that traded changes has 10 stored trials; run them first with "
         "`evoclaims run --tier smoke --variant traded`.\n"

@@ -101,7 +101,7 @@ def test_xdists_workers_get_claims_in_an_order_of_their_own_and_the_controller_t
 def test_a_run_that_takes_processors_hours_is_told_of_beforehand(project: Any, stored: Any) -> None:
     """The right network solves every level at once, but its budget is long at the pace of the reference trials."""
     project.write(right="supported")
-    assert main(["reference", "--storage", str(stored.root)]) == 0
+    assert main(["reference", "--unknown-revision", "--storage", str(stored.root)]) == 0
     sys.modules.pop("tiny_paper")  # as this process has read it; monkeypatch would put it back for other tests
     paper = project.path / "tiny_paper.py"
     paper.write_text(paper.read_text().replace("Tier(conditions(2)", "Tier(conditions(10**9)"))

@@ -83,6 +83,10 @@ def test_a_crash_tells_the_last_words_of_its_process_safely(all_ends: Any) -> No
     _, (_, raised, killed, *_), told = all_ends
     assert crashes.why(raised) == "ValueError: the reactor is \\x1b[31mred"
     assert "in in_every_way" in raised.provenance["crash"]
+    lines = Path(str(toy_loops.__file__)).read_text().splitlines()
+    (line,) = (number for number, text in enumerate(lines, start=1) if "the reactor is" in text)
+    assert crashes.place([killed, raised]) == f" (toy_loops.py, line {line})"
+    assert crashes.place([killed]) == ""
     assert crashes.why(killed) == "its process ended with SIGSEGV"
     assert "what it prints is no answer" in killed.provenance["crash"]
     assert {one.phase for one in told if one.remark} == {

@@ -44,7 +44,7 @@ def note_repetitions(metafunc: pytest.Metafunc) -> list[str]:
             argvalues = [one._replace(id=f"run{at}of{len(sets)}") for at, one in enumerate(sets, start=1)]
         parametrize(argnames, argvalues, *rest, **options)
 
-    metafunc.parametrize = noting  # type: ignore[method-assign, assignment]
+    metafunc.parametrize = noting  # type: ignore[method-assign]
     return repeats
 
 

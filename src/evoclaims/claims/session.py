@@ -133,7 +133,9 @@ class Session:
         try:
             if self.leaves(tier, assertion):
                 raise NotStoredError(f"the variant {self.variant} changes none of its trials")
-            return judge(assertion, design, claim=name, tier=tier)
+            verdict = judge(assertion, design, claim=name, tier=tier)
+            shown = self._crash_shown_by(assertion, tier, verdict)
+            return replace(verdict, reason=f"{verdict.reason}; {shown} shows its last output") if shown else verdict
         except NotStoredError as error:
             mark = fingerprint(assertion, design, claim=name, tier=tier)
             of = next((f"{one.label}: " for one in assertion.sources() if one.fingerprint == error.condition), "")
@@ -177,6 +179,14 @@ class Session:
             return None
         outcomes = list(Draws(found).outcomes(assertion, design))
         return outcomes.count(Outcome.INCONCLUSIVE) / len(outcomes)
+
+    def _crash_shown_by(self, assertion: Assertion, tier: str, verdict: Verdict) -> str:
+        """Return the command that runs a verdict's crashed trials alone; empty where none crashed."""
+        if verdict.outcome is not Outcome.ERROR or self.variant:
+            return ""
+        groups = [source for source in assertion.sources() if isinstance(source, TrialGroup)]
+        names = [(one.method, one.task) for one in groups if f"trials of {one.label} crashed" in verdict.reason]
+        return f"`evoclaims run {names[0][0]} --on {names[0][1]} --tier {tier}`" if names else ""
 
     def complete(self, report: ClaimReport, expectation: Expectation | None) -> ClaimReport:
         """Return a report with the variant, an accepted outcome, what mutants showed, and the file that holds it.

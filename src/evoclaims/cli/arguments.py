@@ -203,6 +203,9 @@ def _keeping(add: _Add) -> None:
 
     reference = add("reference", "write the stored trials of a tier as the committed reference trials")
     reference.add_argument("--variant", metavar="NAME", default="", help="those that only this variant has")
+    reference.add_argument(
+        "--unknown-revision", action="store_true", help="also trials that ran code of unknown git revision"
+    )
 
     add(
         "accept", "write the current verdicts into verdicts.toml, as accepted; exit status 1 when that changed the file"

@@ -11,6 +11,7 @@ from evoclaims.core.printable import printable
 from evoclaims.judging.drift import MIN_REFERENCES
 from evoclaims.judging.verdict import Outcome
 from evoclaims.paper import references
+from evoclaims.trials.result import TrialResult
 from evoclaims.trials.spec import TrialSpec
 from evoclaims.trials.time_limit import is_final
 from evoclaims.verdicts.versions import change
@@ -40,7 +41,7 @@ def main(options: argparse.Namespace) -> int:
         for source in report.sources
         if report.attainable and report.attainable[-1].n > tier.design.last.n
     }
-    written, shared = 0, 0
+    written, shared, unknown = 0, 0, list[str]()
     for method, task in used:
         sizes = [*looks, max(tier.design.last.n, MIN_REFERENCES), *filter(None, [third.get((method, task))])]
         condition = tier.condition(method, task)
@@ -66,6 +67,9 @@ def main(options: argparse.Namespace) -> int:
                 "from the first seed and of one environment"
             )
             continue
+        if not options.unknown_revision and any(map(_is_of_unknown_revision, results[:size])):
+            unknown.append(f"{method} on {task}")
+            continue
         references.write(path, results[:size])
         written += 1
         upgraded = change(recorded(results[0].provenance, condition.packages), condition.versions)
@@ -79,6 +83,12 @@ def main(options: argparse.Namespace) -> int:
             )
             + (f", made with other versions than are installed: {upgraded}" if upgraded else "")
         )
+    if unknown:
+        raise UserError(
+            f"Trials of {', '.join(unknown)} ran code of unknown revision, so nobody could run it again: they were "
+            "made where there is no git repository, or before its first commit. Commit the project and run them anew "
+            "in an empty store, or keep them as they are with --unknown-revision."
+        )
     if not (written or (used and shared == len(used))):
         variant, smallest = options.variant, [*looks, max(tier.design.last.n, MIN_REFERENCES)][0]
         of, named = (f" that {variant} changes", f" --variant {variant}") if variant else ("", "")
@@ -87,3 +97,8 @@ def main(options: argparse.Namespace) -> int:
             f"them first with `evoclaims run --tier {options.tier}{named}`."
         )
     return 0
+
+
+def _is_of_unknown_revision(trial: TrialResult) -> bool:
+    """Whether a trial of the project's own does not record which commit made it."""
+    return "imported" not in trial.provenance and not (trial.provenance.get("git") or {}).get("sha")

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evoclaims.core.canonical import as_plain
+from evoclaims.judging.changed_settings import changed_settings
 from evoclaims.judging.effect import a12, median
 from evoclaims.judging.exact import rank_attainable, rank_test
 from evoclaims.judging.multiplicity import holm
@@ -282,8 +283,10 @@ def _prepared(case: DriftCase) -> tuple[list[_Columns], list[DriftRow]]:
     if not new:
         return [], every("not run", "no new trial of this condition")
     if len(reference) < MIN_REFERENCES:
-        others = len(case.reference) - len(reference)
-        left_out = f" ({others} of another fingerprint left out)" if others else ""
+        others = [trial for trial in case.reference if trial.condition != case.condition]
+        changed = changed_settings(others[-1].spec, new[-1].spec) if others else ""
+        why = f": {changed}" if changed else ""
+        left_out = f" ({len(others)} of another fingerprint left out{why})" if others else ""
         few = f"{len(reference)} reference trials of this condition, {MIN_REFERENCES} needed{left_out}"
         return [], every("no reference", few)
     crashed = [trial.seed for trial in (*new, *reference) if trial.status == "crashed"]

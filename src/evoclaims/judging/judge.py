@@ -14,7 +14,7 @@ from evoclaims.judging.fingerprint import fingerprint
 from evoclaims.judging.sample import Limited, Source, Trials, UnreadableTrialError
 from evoclaims.judging.spending import overspent
 from evoclaims.judging.verdict import Outcome, PValues, Verdict
-from evoclaims.trials.crashes import why
+from evoclaims.trials.crashes import place, why
 from evoclaims.trials.result import TrialResult
 
 
@@ -200,15 +200,19 @@ def _shortage(assertion: Assertion, look: Look, design: Design) -> str:
 
 
 def _crashed(assertion: Assertion, trials: Trials) -> str:
-    """Return a sentence that names the crashed trials, or nothing."""
-    crashed = [
-        (f"{source.label} (seed {trial.seed})", why(trial))
-        for source in assertion.sources()
-        for trial in trials[source.fingerprint]
-        if trial.status == "crashed"
-    ]
-    reason = next((f"; the first: {why}" for _, why in crashed if why), "")
-    return f"trials crashed: {', '.join(name for name, _ in crashed)}{reason}" if crashed else ""
+    """Return a sentence that names the crashed trials, or nothing; what several of a condition said stands once."""
+    sentences = []
+    for label, mark in {source.label: source.fingerprint for source in assertion.sources()}.items():
+        crashed = [trial for trial in trials[mark] if trial.status == "crashed"]
+        if crashed:
+            seeds = ", ".join(trial.seed_in_words for trial in crashed)
+            reasons = list(dict.fromkeys(filter(None, map(why, crashed))))
+            first = f": {'the first: ' * (len(reasons) > 1)}{reasons[0]}{place(crashed)}" if reasons else ""
+            plural = "s" * (len(crashed) > 1)
+            sentences.append(
+                f"{len(crashed)} of {len(trials[mark])} trials of {label} crashed (seed{plural} {seeds}){first}"
+            )
+    return "; ".join(sentences)
 
 
 def _all_copies(label: str, n: int) -> str:
@@ -299,6 +303,8 @@ def _reason(finding: Finding, look: Look, assertion: Assertion, design: Design) 
     if p.supported <= look.alpha:
         return f"the evidence contradicts itself: p = {p.supported:.3g} for and {p.refuted:.3g} against, {at}"
     if not _decidable(attainable, look.alpha):
+        if tied := _tied(finding):
+            return f"{tied}: nothing to compare"
         smallest = min(attainable.supported, attainable.size)
         return f"underpowered: with these ties the smallest attainable p is {smallest:.3g} > {at}"
     size = "" if p.smaller is None else f" ({p.size:.3g} against its size)"
@@ -308,6 +314,21 @@ def _reason(finding: Finding, look: Look, assertion: Assertion, design: Design) 
     if attainable.supported > look.alpha:
         return f"{evidence}; with these ties support is out of reach"
     return evidence
+
+
+def _tied(finding: Finding) -> str:
+    """Return a clause about samples in which all trials have one value, as where none gets there; else nothing."""
+    for entry in finding.evidence:
+        values = {value for sample in entry.samples for value in sample.values}
+        if len(values) == 1:
+            sizes, (value,), first = [len(sample.values) for sample in entry.samples], values, entry.samples[0]
+            if value < math.inf or first.limit is None:
+                return f"all {' and '.join(map(str, sizes))} trials have the value {value:g}"
+            what, _, event = first.label.partition(": ")[2].partition(", within ")[0].partition(" until ")
+            reached = event.replace(" is ", " reaches ", 1) or "an end is seen"
+            none = " and ".join(f"0 of {size}" for size in sizes)
+            return f"in {none} trials {reached} within {first.limit:,.12g} {what}"
+    return ""
 
 
 def _needs(assertion: Assertion, design: Design) -> str:

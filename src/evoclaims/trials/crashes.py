@@ -5,8 +5,12 @@ A crash is no outcome of a method: what was wrong has probably been mended befor
 
 from __future__ import annotations
 
+import re
+from collections.abc import Iterable
+from pathlib import Path
 from typing import Final
 
+from evoclaims.core.raised import PACKAGE_FOLDERS
 from evoclaims.trials.result import TrialResult
 
 _seen: Final = set[str]()
@@ -30,3 +34,17 @@ def why(result: TrialResult) -> str:
 def last_said(result: TrialResult) -> str:
     """Return the last output of a crashed trial's process, such as the end of a traceback; empty if not known."""
     return str(result.provenance.get("crash") or "")
+
+
+def place(results: Iterable[TrialResult]) -> str:
+    """Return where the first of some trials crashed, such as " (loops.py, line 10)"; empty if no traceback says so.
+
+    That is the innermost line outside of installed packages, if there is one.
+    """
+    for result in results:
+        lines = re.findall(r'File "([^"<]+)", line (\d+)', last_said(result))
+        own = [found for found in lines if PACKAGE_FOLDERS.isdisjoint(Path(found[0]).parts)]
+        if lines:
+            file, line = (own or lines)[-1]
+            return f" ({Path(file).name}, line {line})"
+    return ""

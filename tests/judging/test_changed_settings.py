@@ -1,0 +1,41 @@
+"""What differs between two conditions is named, setting by setting."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from evoclaims.judging.changed_settings import MOST, changed_settings
+
+LEAVES = st.one_of(st.none(), st.booleans(), st.integers(-3, 3), st.text(max_size=3))
+SPECS = st.dictionaries(
+    st.sampled_from("abc"),
+    st.recursive(LEAVES, lambda part: st.lists(part, max_size=2) | st.dictionaries(st.sampled_from("xy"), part)),
+)
+
+
+def test_each_changed_setting_is_named_with_both_values() -> None:
+    old = {"method": {"name": "es", "settings": {"sigma": 0.5, "lr": 1}}, "task": {"layers": [4, 4]}, "seed": 1}
+    new = {"method": {"name": "es", "settings": {"sigma": 0.3, "rank": True}}, "task": {"layers": [4, 8]}, "seed": 2}
+    assert changed_settings(old, new) == (
+        "method.settings.lr 1 -> none, method.settings.rank none -> True, method.settings.sigma 0.5 -> 0.3, "
+        "task.layers.1 4 -> 8"
+    )
+
+
+def test_many_changes_are_counted() -> None:
+    old, new = ({str(at): value for at in range(MOST + 3)} for value in (0, 1))
+    assert changed_settings(old, new).endswith(", and 3 more")
+
+
+@given(SPECS, SPECS)
+def test_nothing_is_named_exactly_where_nothing_differs(old: dict[str, Any], new: dict[str, Any]) -> None:
+    assert (changed_settings(old, new) == "") == (repr(_sorted(old)) == repr(_sorted(new)))
+
+
+def _sorted(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _sorted(value[key]) for key in sorted(value)}
+    return [_sorted(part) for part in value] if isinstance(value, list) else value
