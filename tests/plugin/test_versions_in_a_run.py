@@ -103,7 +103,7 @@ def test_bits_are_not_said_to_be_unchanged_where_versions_differ(project: Any, a
     trials = Store(project.path / ".evoclaims").results([])
     references.write(references.path_of(project.path / "reference", "smoke", "right", "parity"), trials)
     result = project.run(own_store=True)
-    sentence = "to the bit: no trial could be compared, since none has a reference of the same machine and versions"
+    sentence = "to the bit: no trial could be compared, since *none has a reference of the same *machine and versions"
     result.stdout.fnmatch_lines(["DRIFT in right on parity (smoke): mean_success is higher now*", sentence])
 
 

@@ -161,7 +161,7 @@ def test_without_drift_the_nearest_comparison_and_what_was_detectable_are_shown(
     near = DriftRow("a on b", "steps", 10, 60, "no drift", 0.02, 0.2, a12=0.7, median_new=3.0, median_ref=2.0)
     report = DriftReport((near,), 0.01, detectable={"b": 1.84, "a": 0.8, "c": 0.81})
     assert drift_lines(report, [], compared=3).splitlines()[1] == (
-        "no drift shown; nearest: a on b: steps is higher now: median 2 -> 3, A12 = 0.70, p = 0.2 (Holm); found would "
+        "no drift shown; nearest: a on b: steps: median 2 -> 3, A12 = 0.70, p = 0.2 (Holm); found would "
         "have been with probability 0.95 a shift of all conditions by 0.8 SD in a, c, 1.8 SD in b"
     )
 

@@ -81,19 +81,21 @@ def test_each_cell_tells_verdict_drift_and_bits_against_the_first_environment(fo
     }
     assert told["1"] == ("✓ supported",)
     assert told["2"] == ("✓ supported", "same to the bit")
-    assert told["3"] == ("✗ refuted, CHANGED", "A12 0.00, p 3.2e-05, DRIFT", "10 of 10 differ")
+    assert told["3"] == ("✗ refuted, CHANGED", "A12 0.00, p 5e-05, DRIFT", "10 of 10 differ")
     assert told["4"] == ("✓ supported", "A12 0.50, p 1", "10 of 10 differ")
     assert across_table.cell_lines(found.cells["plain", "jax 3"]) == ("- not run", "–")
     assert found.changed == {"jax 3": ["ours"]}
 
 
 def test_lines_say_why_one_has_no_verdicts_which_changed_and_what_drifted_how_far(found: Across) -> None:
-    numbers = "is lower now: median 0.545 -> 0.295, A12 = 0.00, p = 3.2e-05 (Holm)"
+    numbers = "is lower now: median 0.545 -> 0.295, A12 = 0.00, p = 5e-05 (Holm)"
     assert found.lines == [
         "jax 5: no verdicts: no such release",
         "jax 3: ours: supported -> refuted",
         f"jax 3: DRIFT in hand_built on parity: mean_success {numbers}",
         f"jax 3: DRIFT in hand_built on parity: last_fitness {numbers}",
+        "jax 4: no drift shown; nearest: hand_built on parity: mean_success: median 0.545 -> 0.545, A12 = 0.50, p = 1 "
+        "(Holm); found would have been with probability 0.95 a shift of all conditions by 2.1 SD in hand_built",
     ]
 
 
@@ -126,7 +128,7 @@ def test_the_text_of_an_issue_begins_with_what_changed_and_ends_with_the_command
     assert text.startswith(
         "# jax 3 changes ours; jax 5 has no verdicts.\n\n| claim | jax 1 | jax 2 | jax 5 | jax 3 | jax 4 |\n"
     )
-    assert "| ✗ refuted, CHANGED<br>A12 0.00, p 3.2e-05, DRIFT<br>10 of 10 differ |" in text
+    assert "| ✗ refuted, CHANGED<br>A12 0.00, p 5e-05, DRIFT<br>10 of 10 differ |" in text
     assert text.endswith("```sh\nevoclaims across --package jax 1 2\n```\n")
 
 
@@ -137,7 +139,7 @@ def test_the_chart_marks_each_cell_as_high_as_its_effect_and_drift_by_a_ring(fou
     }
     same, low = (
         marks["✓ supported; same to the bit"],
-        marks["✗ refuted, CHANGED; A12 0.00, p 3.2e-05, DRIFT; 10 of 10 differ"],
+        marks["✗ refuted, CHANGED; A12 0.00, p 5e-05, DRIFT; 10 of 10 differ"],
     )
     assert float(low.attrib["cy"]) > float(same.attrib["cy"]) == float(marks["✓ supported"].attrib["cy"])
     assert same.attrib["fill"] != low.attrib["fill"]

@@ -42,7 +42,7 @@ def _why(
 def test_other_draws_without_drift_come_with_the_nearest_comparison_and_what_was_detectable() -> None:
     assert _why() == (
         "its trials are other draws (jax 0.11.2 -> 0.10.2, device H200 -> cpu); no drift shown; nearest: "
-        "a on t (smoke): reward is higher now: median 1 -> 2, A12 = 0.60, p = 0.7 (Holm); found would have been "
+        "a on t (smoke): reward: median 1 -> 2, A12 = 0.60, p = 0.7 (Holm); found would have been "
         "with probability 0.95 a shift of all conditions by 1.8 SD in a (smoke). With 10 trials a side a verdict "
         "near its bound can fall either way by chance (p was 0.04, and is 0.06); `--claims-trials N` looks at more"
     )

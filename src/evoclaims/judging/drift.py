@@ -24,8 +24,8 @@ MIN_REFERENCES = 10
 RESOLUTION = 1e-6
 """Relative difference up to which two trials' numbers count as equal: eight times the precision of float32."""
 
-PERMUTATIONS: Final = 4999
-"""Of a joint test; its smallest p is 1 / 5000."""
+PERMUTATIONS: Final = 19_999
+"""Fewest of a joint test, whose p is at least about 3 / 20,000; with many methods there are more (see `_enough`)."""
 
 SEED: Final = 20251126
 """Fixed, so that the same trials always give the same p."""
@@ -111,7 +111,8 @@ class DriftRow:
             return f"{self.label}: {self.metric}: {self.detail or self.status}"
         way = "higher" if self.a12 > 0.5 else "lower" if self.a12 < 0.5 else "spread otherwise"
         return (
-            f"{self.label}: {self.metric} is {way} now: median {self.median_ref:.6g} -> {self.median_new:.6g}, "
+            f"{self.label}: {self.metric}{f' is {way} now' * self.drifted}: median {self.median_ref:.6g} -> "
+            f"{self.median_new:.6g}, "
             f"A12 = {self.a12:.2f}, p = {self.p_holm:.2g} (Holm)"
         )
 
@@ -213,8 +214,9 @@ def check_drift(cases: Sequence[DriftCase], alpha: float = ALPHA) -> DriftReport
         for case, (conditions, _) in zip(mine, prepared, strict=True):
             if conditions:
                 families.setdefault(case.method or case.label, []).extend(conditions)
-        adjusted = dict(zip(families, holm([_by_blocks(those) for those in families.values()]), strict=True))
-        places = {name: _places(those) for name, those in families.items() if adjusted[name] <= alpha}
+        count = _enough(len(families), alpha)
+        adjusted = dict(zip(families, holm([_by_blocks(those, count) for those in families.values()]), strict=True))
+        places = {name: _places(those, count) for name, those in families.items() if adjusted[name] <= alpha}
         for name, those in families.items():
             detectable[name] = max(detectable.get(name, 0.0), _detectable(those, alpha / len(families)))
         for case, (conditions, without) in zip(mine, prepared, strict=True):
@@ -352,17 +354,22 @@ def _number(trial: TrialResult, label: str, metric: str) -> float:
     return read_number(trial, f"{label}: {metric}", lambda one: measured(one, metric), -math.inf)
 
 
-def _by_blocks(conditions: Sequence[_Columns]) -> float:
+def _enough(families: int, alpha: float) -> int:
+    """Return a number of permutations with which p can be half of what Holm's correction and two blocks ask for."""
+    return max(PERMUTATIONS, math.ceil(2 * 3 * 2 * families / alpha))
+
+
+def _by_blocks(conditions: Sequence[_Columns], count: int) -> float:
     """Return the p that nothing changed: the smaller of two, doubled, where some measures alone are in pilots."""
     blocks = [those for wide in (True, False) if (those := [one for one in conditions if one.wide is wide])]
-    return min(1.0, len(blocks) * min(map(_joint, blocks)))
+    return min(1.0, len(blocks) * min(_joint(those, count) for those in blocks))
 
 
-def _joint(conditions: Sequence[_Columns]) -> float:
+def _joint(conditions: Sequence[_Columns], count: int) -> float:
     """Return the p of the hypothesis that nothing changed in some conditions.
 
     A single measure of a single condition has its exact p. Else new and earlier trials are exchanged at random, whole
-    trials within each condition, `PERMUTATIONS` times with a fixed seed. Three statistics of the measures' rank sums z
+    trials within each condition, `count` times with a fixed seed. Three statistics of the measures' rank sums z
     look for three kinds of change: the sum over conditions (all better, or all worse), the sum of squares (anything),
     and the largest (one alone). Their smallest p is itself compared with its distribution over the permutations, so
     that p is valid for any dependence of measures.
@@ -370,10 +377,10 @@ def _joint(conditions: Sequence[_Columns]) -> float:
     if len(conditions) == 1 and len(conditions[0].rows) == 1:
         return conditions[0].rows[0].p or 1.0
     rng = np.random.default_rng(SEED)
-    sums = np.zeros(PERMUTATIONS + 1)
+    sums = np.zeros(count + 1)
     squares, largest = np.zeros_like(sums), np.zeros_like(sums)
     for one in conditions:
-        chosen = np.argsort(rng.random((PERMUTATIONS, len(one.centred))), axis=1)[:, : one.n]
+        chosen = np.argpartition(rng.random((count, len(one.centred))), one.n, axis=1)[:, : one.n]
         observed = one.centred[: one.n].sum(axis=0)[None]
         z = np.concatenate([observed, one.centred[chosen].sum(axis=1)]) / one.spread
         together = z.sum(axis=1)
@@ -391,9 +398,9 @@ def _share_above(values: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.asarray(1 - np.searchsorted(order, values, side="left") / len(values))
 
 
-def _places(conditions: Sequence[_Columns]) -> set[tuple[str, str]]:
+def _places(conditions: Sequence[_Columns], count: int) -> set[tuple[str, str]]:
     """Return where a method's drift shows, by label and measure: what Holm's correction finds, at least one."""
-    joint = [_joint([one]) for one in conditions]
+    joint = [_joint([one], count) for one in conditions]
     found = [one for one, p in zip(conditions, holm(joint), strict=True) if p <= ALPHA]
     found = found or [conditions[int(np.argmin(joint))]]
     rows = [row for one in found for row in one.rows]

@@ -139,11 +139,12 @@ def paired(
     """
     condition = new[0].condition
     if "imported" not in new[0].spec:
-        metrics = measures(new, reads)
         mine = [trial for trial in reference if trial.condition == condition]
         moved = _moved(mine[0], new[0]) if mine else ""
         fits = bool(mine and pilot) and not _moved(mine[0], pilot[0])
-        case = DriftCase(label, condition, tuple(new), tuple(reference), metrics, method=method, group=moved)
+        case = DriftCase(
+            label, condition, tuple(new), tuple(reference), measures(new, reads), method=method, group=moved
+        )
         return replace(case, pilot=tuple(pilot)) if fits else case
     alike = [old for old in reference if _read_alike(old, new[0])]
     others = [old for old in reference if not _read_alike(old, new[0])]
