@@ -8,8 +8,8 @@ import hashlib
 import importlib
 import io
 import json
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
@@ -21,6 +21,10 @@ Columns = Mapping[str, Sequence[Any]]
 
 MOST_LISTED: Final = 30
 """Most values of a column that an error lists."""
+
+
+MOST_ROWS: Final = 5_000_000
+"""Of a Parquet file, which may hold any number of equal rows in a few bytes."""
 
 
 class NoTableError(Exception):
@@ -40,6 +44,9 @@ class TableFile:
     name: str
     sha256: str
     columns: Columns
+    _held: dict[str, dict[tuple[type, str], tuple[Any, list[int]]]] = field(
+        default_factory=dict, repr=False, compare=False
+    )
 
     def column(self, name: str, role: str) -> Sequence[Any]:
         """Return a column; `role` says in an error what it was wanted for.
@@ -56,35 +63,53 @@ class TableFile:
         Raises:
             UserError: when a column or a value in it is unknown, or no row has all.
         """
-        rows = list(range(len(next(iter(self.columns.values())))))
+        rows: Sequence[int] = range(len(next(iter(self.columns.values()))))
         for name, value in where.items():
-            cells = self.column(name, "a filter of where=")
-            if not any(_is(cell, value) for cell in cells):
-                held = {str(cell) for cell in cells}
-                known = guess(value, held) if len(held) <= MOST_LISTED else ""
+            held = self._rows_by_cell(name)
+            found = {row for cell, at in held.values() if _is(cell, value) for row in at}
+            if not found:
+                known = guess(value, {text for _, text in held}) if len(held) <= MOST_LISTED else ""
                 raise UserError(f"{self.name} has no row whose {name} is {value!r}.{known}")
-            rows = [row for row in rows if _is(cells[row], value)]
+            rows = sorted(found.intersection(rows))
         if not rows:
             said = " and ".join(f"{name} {value!r}" for name, value in where.items())
             raise UserError(f"{self.name} has no row with {said}." if where else f"{self.name} has no row.")
-        return rows
+        return list(rows)
 
-    def numbers(self, name: str, role: str, rows: Sequence[int]) -> list[float | None]:
+    def _rows_by_cell(self, name: str) -> Mapping[tuple[type, str], tuple[Any, list[int]]]:
+        """Return each different cell of a column with its rows: found once, as many conditions share a table."""
+        cells = self.column(name, "a filter of where=")
+        if name not in self._held:
+            held: dict[tuple[type, str], tuple[Any, list[int]]] = {}
+            for row, cell in enumerate(cells):
+                held.setdefault((type(cell), str(cell)), (cell, []))[1].append(row)
+            self._held[name] = held
+        return self._held[name]
+
+    def numbers(self, name: str, role: str, rows: Sequence[int], *, rounded: bool = False) -> list[float | None]:
         """Return the numbers of a column in some rows; None for an empty cell.
 
         Raises:
-            UserError: when there is no such column, or a cell holds something else than a number.
+            UserError: when there is no such column, a cell holds something else than a number, or a whole number that
+                no float holds, unless it may be `rounded`: numbers that differ would tie.
         """
         cells = self.column(name, role)
-        return [self._number(name, row, cells[row]) for row in rows]
+        return [self._number(name, row, cells[row], rounded) for row in rows]
 
-    def _number(self, name: str, row: int, cell: Any) -> float | None:
+    def _number(self, name: str, row: int, cell: Any, rounded: bool) -> float | None:
         """Return the number in a cell."""
         if cell is None or (isinstance(cell, str) and not cell.strip()):
             return None
         try:
             if not isinstance(cell, bool) and "_" not in str(cell):  # Python alone takes 1_0 for ten
-                return float(cell)
+                number = float(cell)
+                if not rounded and abs(number) >= 2**53 and not isinstance(cell, float) and _is_inexact(cell, number):
+                    raise UserError(
+                        f"{self.name} holds {cell} in row {row + 1} of the column {name!r}, a whole number beyond 2^53 "
+                        "that no float holds exactly: different values would count as equal. Subtract a constant, or "
+                        "divide the column by one."
+                    )
+                return number
         except (TypeError, ValueError, OverflowError):
             pass
         raise UserError(f"{self.name} holds {cell!r} in row {row + 1} of the column {name!r}, which is no number.")
@@ -127,6 +152,14 @@ def _is(cell: Any, value: object) -> bool:
     try:
         return isinstance(value, int | float) and float(cell) == value
     except (TypeError, ValueError):
+        return False
+
+
+def _is_inexact(cell: Any, number: float) -> bool:
+    """Whether a cell holds a whole number other than the float nearest to it."""
+    try:
+        return int(str(cell)) != number
+    except ValueError:  # 1e300, which is written as a float
         return False
 
 
@@ -193,10 +226,54 @@ def _parquet(data: bytes) -> Columns:
     try:
         file = parquet.ParquetFile(io.BytesIO(data))
         _unlike(file.schema_arrow.names)
-        columns: Columns = file.read().to_pydict()
+        if file.metadata.num_rows > MOST_ROWS:
+            raise NoTableError(
+                f"it has {file.metadata.num_rows:,} rows, and at most {MOST_ROWS:,} are read: keep those of the claims"
+            )
+        return _ParquetColumns(data, file.schema_arrow)
     except (arrow.ArrowException, OSError) as error:
         raise NoTableError("it is no Parquet file") from error
-    return columns
+
+
+class _ParquetColumns(Mapping[str, Sequence[Any]]):
+    """The columns of a Parquet file, each read when it is asked for: a few bytes may hold gigabytes."""
+
+    def __init__(self, data: bytes, schema: Any) -> None:
+        self._data = data
+        self._schema = schema
+        self._read: dict[str, list[Any]] = {}
+
+    def __getitem__(self, name: str) -> list[Any]:
+        if name not in self._read:
+            self._read[name] = self._column(name)
+        return self._read[name]
+
+    def _column(self, name: str) -> list[Any]:
+        """Read a column in batches."""
+        arrow: Any = importlib.import_module("pyarrow")
+        parquet: Any = importlib.import_module("pyarrow.parquet")
+        kind = self._schema.field(name).type  # raises a KeyError as a mapping does
+        texts = arrow.types.is_string(kind) or arrow.types.is_large_string(kind)
+        # Texts that repeat stay one text each.
+        file = parquet.ParquetFile(io.BytesIO(self._data), read_dictionary=[name] if texts else [])
+        cells: list[Any] = []
+        try:
+            for batch in file.iter_batches(columns=[name], batch_size=2**16):
+                column = batch.column(0)
+                if arrow.types.is_dictionary(column.type):
+                    held = column.dictionary.to_pylist()
+                    cells += [None if at is None else held[at] for at in column.indices.to_pylist()]
+                else:
+                    cells += column.to_pylist()
+        except (arrow.ArrowException, OSError) as error:
+            raise UserError(f"The column {name!r} of a Parquet file cannot be read: {error}.") from error
+        return cells
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._schema.names)
+
+    def __len__(self) -> int:
+        return len(self._schema.names)
 
 
 READERS: Final[Mapping[str, Callable[[bytes], Columns]]] = {
