@@ -8,7 +8,9 @@ import os
 import pkgutil
 import shutil
 import signal
+import sys
 import warnings
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Final
 
@@ -28,6 +30,8 @@ gc.set_threshold(100_000, 20, 20)
 
 _CACHE: Final = "JAX_COMPILATION_CACHE_DIR"
 _made = ""
+_MOST_RESIDENT: Final = 10**9
+"""Bytes from which on compiled programs are forgotten after a module."""
 
 # Before anything imports jax; environment variables, so that xdist workers and subprocesses see the same.
 os.environ.setdefault("JAX_PLATFORMS", "cpu")
@@ -59,6 +63,25 @@ def pytest_unconfigure(config: pytest.Config) -> None:
     if _made:
         shutil.rmtree(_made, ignore_errors=True)
         os.environ.pop(_CACHE, None)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def bounded_memory() -> Iterator[None]:
+    """Forget compiled programs after a module where they fill the memory: jax keeps all of them."""
+    yield
+    if "jax" in sys.modules and _resident() > _MOST_RESIDENT:
+        from evoclaims.trials.memory import give_back
+
+        sys.modules["jax"].clear_caches()
+        give_back()
+
+
+def _resident() -> int:
+    """Return the bytes of memory that this process takes; 0 where Linux does not tell."""
+    try:
+        return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
+    except OSError:
+        return 0
 
 
 @pytest.fixture(scope="session")

@@ -26,6 +26,7 @@ ELSEWHERE = {
     "core/provenance.py": ["Path('/proc/cpuinfo').read_text"],
     "cli/cluster/job_states.py": ["Path(f'/proc/{job}/cmdline').read_bytes"],
     "trials/notice.py": ["Path(f'/proc/{owner.pid}/stat').read_text"],
+    "trials/descendants.py": ["Path(f'/proc/{pid}/environ').read_bytes"],
     "core/environments.py": ["distribution.read_text"],
     # standard streams, and nothing
     "cli/main.py": ["os.open"],

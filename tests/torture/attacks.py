@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import clock_jumps
 import crowd
 import full_disk
+import hostile_files
 import killing
 import stopping_and_continuing
 import two_hosts
@@ -40,5 +41,9 @@ ATTACKS = {
     "hosts": Attack(two_hosts.attack, "hosts", "stores shared by two hosts, each with two workers", 6),
     "clocks": Attack(clock_jumps.attack, "clocks", "stores shared while clocks jump", 4),
     "disk": Attack(full_disk.attack_mounted, "disks", "disks that fill up", 5),
+    "compiler": Attack(hostile_files.attack_compiler, "compilers", "compilers that are stopped", 3),
+    "evidence": Attack(hostile_files.attack_evidence, "evidence", "stores with hostile files of evidence", 5),
+    "container": Attack(hostile_files.attack_container, "containers", "stores shared with a container", 3),
+    "cache": Attack(hostile_files.attack_full_cache, "caches", "caches on a disk that is full", 3),
     "limit": Attack(full_disk.attack_limited, "limits", "processes that may write no longer", 3),
 }

@@ -144,11 +144,28 @@ class Bench:
         code = "import sys; from evoclaims.cli import main; sys.exit(main())"
         return self._start(["-c", code, *arguments], **surroundings)
 
+    def python(self, code: str) -> Running:
+        """Start a program."""
+        return self._start(["-c", code])
+
+    def forget_events(self) -> None:
+        """Begin anew to read what processes say."""
+        self._events, self._read = [], 0
+
     def _start(
-        self, arguments: Sequence[str], host: str = "", clock: Path | None = None, json_file: Path | None = None
+        self,
+        arguments: Sequence[str],
+        host: str = "",
+        clock: Path | None = None,
+        json_file: Path | None = None,
+        wrapped: Sequence[str] = (),
+        cache: Path | None = None,
     ) -> Running:
-        """Start Python in the project; on a host of this name, and with a clock that is wrong by what a file says."""
-        command = [sys.executable, *arguments]
+        """Start Python in the project.
+
+        On a host of this name, with a clock that is wrong by what a file says, by another program, with another cache.
+        """
+        command = [*wrapped, sys.executable, *arguments]
         source = Path(evoclaims.__file__).parents[1]
         given = filter(None, os.environ.get("PYTHONPATH", "").split(os.pathsep))
         paths = [HERE / "shims", HERE, HERE.parent / "trials", source, *given]
@@ -161,6 +178,7 @@ class Bench:
             "TORTURE_LEASE": str(self.lease),
             "TORTURE_FURTHER": str(self.further),
             **({"TORTURE_CLOCK": str(clock)} if clock else {}),
+            **({"JAX_COMPILATION_CACHE_DIR": str(cache)} if cache else {}),
         }
         for name in ("PYTEST_ADDOPTS", "PYTEST_XDIST_WORKER", "PYTEST_CURRENT_TEST", "GITHUB_STEP_SUMMARY"):
             environment.pop(name, None)

@@ -23,6 +23,7 @@ from evoclaims.judging.sample import UnreadableTrialError, checked
 from evoclaims.methods.training_loop import TrainingLoop
 from evoclaims.trials import crashes
 from evoclaims.trials.budget import Budget
+from evoclaims.trials.loop_child import Child
 from evoclaims.trials.loop_process import Reporter, actions_of
 from evoclaims.trials.progress import RunProgress
 from evoclaims.trials.result import TrialResult
@@ -203,6 +204,21 @@ def test_a_loop_that_never_returns_is_out_of_time_with_its_curves_until_it_is_al
     assert again.timing["limit"] == 3.5
 
 
+def test_of_what_a_loop_prints_the_end_is_kept(store: Store, cpus: list[Any], monkeypatch: pytest.MonkeyPatch) -> None:
+    held: list[int] = []
+    close = Child.close
+
+    def noted(self: Child) -> str:
+        reason = close(self)
+        held.append(len(self._said))
+        return reason
+
+    monkeypatch.setattr(Child, "close", noted)
+    (trial,) = run(condition(toy_loops.loud), [0], store, cpus)
+    assert trial.provenance["crash"].endswith("the end\nits process ended with status 3")
+    assert held == [2**16]
+
+
 @pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="whether a process lives is read from /proc")
 def test_a_killed_parent_leaves_no_process_behind(tmp_path: Path) -> None:
     script = f"""
@@ -216,7 +232,7 @@ run(condition(toy_loops.never_returns, file={str(tmp_path / "pids")!r}), [0], St
     parent = subprocess.Popen([sys.executable, "-c", script], env={**os.environ, "PYTHONPATH": path})
     try:
         for _ in range(1200):
-            if (tmp_path / "pids").exists() and len((tmp_path / "pids").read_text().split()) == 2:
+            if (tmp_path / "pids").exists() and len((tmp_path / "pids").read_text().split()) == 3:
                 break
             assert parent.poll() is None
             time.sleep(0.1)

@@ -65,6 +65,14 @@ def with_processes(task: Any, seed: int, budget: Any, report: Callable[..., None
     return {}
 
 
+def loud(task: Any, seed: int, budget: Any) -> Mapping[str, float]:
+    """Print five megabytes, and die."""
+    for _ in range(50):
+        print("x" * 100_000)
+    print("the end")
+    os._exit(3)
+
+
 def in_odd_ways(task: Any, seed: int, budget: Any, report: Callable[..., None], clip: float = 0.0) -> Mapping[str, Any]:
     """Return scalars of another library, after steps that are no point of the curve (seed 0); fail in odd ways."""
     if seed == 0:
@@ -103,9 +111,9 @@ def notes(task: Any, seed: int, budget: Any, report: Callable[..., None], file: 
 
 
 def never_returns(task: Any, seed: int, budget: Any, report: Callable[..., None], file: str) -> Mapping[str, float]:
-    """Start another process, note both in a file, report once, and never return."""
-    started = subprocess.Popen(SLEEP)
-    Path(file).write_text(f"{os.getpid()} {started.pid}")
+    """Start processes, one in a session of its own, note all in a file, report once, and never return."""
+    started = [subprocess.Popen(SLEEP), subprocess.Popen(SLEEP, start_new_session=True)]
+    Path(file).write_text(" ".join(str(pid) for pid in (os.getpid(), *(one.pid for one in started))))
     report(20, fitness=3.0)
     time.sleep(600)
     return {}

@@ -17,7 +17,6 @@ import pytest
 
 from evoclaims.core.errors import UserError
 from evoclaims.core.files import read_file
-from evoclaims.core.temporary import temporary_folder
 from evoclaims.plugin.progress import progress_of
 
 if TYPE_CHECKING:
@@ -94,6 +93,8 @@ class Distribution:
     def pytest_configure_node(self, node: Any) -> None:
         """Tell a worker where to leave what the claims need."""
         if self._folder is None:
+            from evoclaims.core.temporary import temporary_folder
+
             self._folder = temporary_folder()
         node.workerinput[FILE] = str(self._folder / "workload.json")
 

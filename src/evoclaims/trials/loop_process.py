@@ -24,6 +24,7 @@ from evoclaims.core.errors import UserError
 from evoclaims.core.portable import from_plain, resolve
 from evoclaims.envs.foreign.scoring import ForeignTask
 from evoclaims.methods.training_loop import wants_report
+from evoclaims.trials.descendants import MARK, end_marked
 from evoclaims.trials.loop_messages import Answer, Failed, LoopReport, LoopRequest, Scores, Trained, encode, last_lines
 from evoclaims.trials.success import check_shares, check_success
 
@@ -216,6 +217,7 @@ def _end_with_parent(asked: io.RawIOBase) -> None:
     """Wait for the end of the requests, and end the processes of this group: this one, and what it has started."""
     while asked.read(1):
         pass
+    end_marked(os.environ.get(MARK, "none"))
     os.killpg(os.getpgrp(), signal.SIGKILL)
 
 

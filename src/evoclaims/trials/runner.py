@@ -100,6 +100,7 @@ Maker = Callable[[Sequence[int], Watcher], None]
 
 def _maker(stored: StoredTrials, devices: Sequence[jax.Device], checkpoint_seconds: float, most: int) -> Maker:
     """Return what makes a condition's trials: a process for each, or compiled programs, at first of `most` trials."""
+    _ = stored.condition.steps  # a budget that no counter holds is refused before training, not after it
     if isinstance(stored.condition.method, TrainingLoop):
         return LoopTrials(stored, devices).make
     for component in (stored.condition.method, stored.condition.task):

@@ -193,8 +193,20 @@ class Condition:
 
     @property
     def steps(self) -> int:
-        """Steps of the method in the whole budget."""
-        return self.budget.steps(self.cost)
+        """Steps of the method in the whole budget.
+
+        Raises:
+            UserError: when there are more than counters hold: 32-bit integers on devices, and floats in records.
+        """
+        steps = self.budget.steps(self.cost)
+        if steps >= 2**31 and not isinstance(self.method, TrainingLoop):
+            raise UserError(f"{self.label} has a budget of {steps} steps, and a trial takes at most {2**31 - 1}.")
+        if steps * self.cost > 2**53:
+            raise UserError(
+                f"{self.label} has a budget of {steps * self.cost} environment steps ({steps} steps of {self.cost}), "
+                f"and a trial takes at most 2^53 = {2**53}: make the budget or the cost of a step smaller."
+            )
+        return steps
 
     @property
     def environment_steps(self) -> int:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import hashlib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
@@ -30,6 +30,9 @@ class TableFile:
     name: str
     sha256: str
     columns: Columns
+    _held: dict[str, dict[tuple[type, str], tuple[Any, list[int]]]] = field(
+        default_factory=dict, repr=False, compare=False
+    )
 
     def column(self, name: str, role: str) -> Sequence[Any]:
         """Return a column; `role` says in an error what it was wanted for.
@@ -49,35 +52,53 @@ class TableFile:
         Raises:
             UserError: when a column or a value in it is unknown, or no row has all.
         """
-        rows = list(range(self.columns.rows))
+        rows: Sequence[int] = range(self.columns.rows)
         for name, value in where.items():
-            cells = self.column(name, "a filter of where=")
-            if not any(_is(cell, value) for cell in cells):
-                held = {str(cell) for cell in cells}
-                known = guess(value, held) if len(held) <= MOST_LISTED else ""
+            held = self._rows_by_cell(name)
+            found = {row for cell, at in held.values() if _is(cell, value) for row in at}
+            if not found:
+                known = guess(value, {text for _, text in held}) if len(held) <= MOST_LISTED else ""
                 raise UserError(f"{self.name} has no row whose {name} is {value!r}.{known}")
-            rows = [row for row in rows if _is(cells[row], value)]
+            rows = sorted(found.intersection(rows))
         if not rows:
             conditions = " and ".join(f"{name} {value!r}" for name, value in where.items())
             raise UserError(f"{self.name} has no row with {conditions}." if where else f"{self.name} has no row.")
-        return rows
+        return list(rows)
 
-    def numbers(self, name: str, role: str, rows: Sequence[int]) -> list[float | None]:
+    def _rows_by_cell(self, name: str) -> Mapping[tuple[type, str], tuple[Any, list[int]]]:
+        """Return each different cell of a column with its rows: found once, as many conditions share a table."""
+        cells = self.column(name, "a filter of where=")
+        if name not in self._held:
+            held: dict[tuple[type, str], tuple[Any, list[int]]] = {}
+            for row, cell in enumerate(cells):
+                held.setdefault((type(cell), str(cell)), (cell, []))[1].append(row)
+            self._held[name] = held
+        return self._held[name]
+
+    def numbers(self, name: str, role: str, rows: Sequence[int], *, rounded: bool = False) -> list[float | None]:
         """Return the numbers of a column in some rows; None for an empty cell.
 
         Raises:
-            UserError: when there is no such column, or a cell holds something else than a number.
+            UserError: when there is no such column, a cell holds something else than a number, or a whole number that
+                no float holds, unless it may be `rounded`: numbers that differ would tie.
         """
         cells = self.column(name, role)
-        return [self._number(name, row, cells[row]) for row in rows]
+        return [self._number(name, row, cells[row], rounded) for row in rows]
 
-    def _number(self, name: str, row: int, cell: Any) -> float | None:
+    def _number(self, name: str, row: int, cell: Any, rounded: bool) -> float | None:
         """Return the number in a cell."""
         if cell is None or (isinstance(cell, str) and not cell.strip()):
             return None
         try:
             if not isinstance(cell, bool) and "_" not in str(cell):  # Python alone takes 1_0 for ten
-                return float(cell)
+                number = float(cell)
+                if not rounded and abs(number) >= 2**53 and not isinstance(cell, float) and _is_inexact(cell, number):
+                    raise UserError(
+                        f"{self.name} holds {cell} in row {row + 1} of the column {name!r}, a whole number beyond 2^53 "
+                        "that no float holds exactly: different values would count as equal. Subtract a constant, or "
+                        "divide the column by one."
+                    )
+                return number
         except (TypeError, ValueError, OverflowError):
             pass
         raise UserError(f"{self.name} holds {cell!r} in row {row + 1} of the column {name!r}, which is no number.")
@@ -120,4 +141,12 @@ def _is(cell: Any, value: object) -> bool:
     try:
         return isinstance(value, int | float) and float(cell) == value
     except (TypeError, ValueError):
+        return False
+
+
+def _is_inexact(cell: Any, number: float) -> bool:
+    """Whether a cell holds a whole number other than the float nearest to it."""
+    try:
+        return int(str(cell)) != number
+    except ValueError:  # 1e300, which is written as a float
         return False

@@ -16,6 +16,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any, Final
 
+MOST_ROWS: Final = 5_000_000
+"""Of a Parquet file, which may hold any number of equal rows in a few bytes."""
 ENCODINGS: Final = {b"\xff\xfe": "UTF-16", b"\xfe\xff": "UTF-16"}
 """Encodings other than UTF-8 by a file's first bytes."""
 
@@ -233,18 +235,34 @@ def _parquet(data: bytes) -> Columns:
         raise NoTableError("pyarrow, which reads Parquet, is not installed: pip install evoclaims[parquet]") from error
     try:
         file = parquet.ParquetFile(io.BytesIO(data))
-        table = file.read()
+        schema, rows = file.schema_arrow, file.metadata.num_rows
     except (arrow.ArrowException, OSError) as error:
         raise NoTableError("it is no Parquet file") from error
+    if rows > MOST_ROWS:
+        raise NoTableError(f"it has {rows:,} rows, and at most {MOST_ROWS:,} are read: keep those of the claims")
 
+    @functools.cache
     def cells(place: int) -> Sequence[Any]:
+        """Read a column in batches when it is asked for: a few bytes may hold gigabytes."""
+        name = schema.names[place]
+        kind = schema.field(place).type
+        texts = arrow.types.is_string(kind) or arrow.types.is_large_string(kind)
+        read: list[Any] = []
         try:
-            read: list[Any] = table.column(place).to_pylist()
-        except (arrow.ArrowException, ValueError, OverflowError, ImportError) as error:
-            raise NoTableError(f"its column {table.column_names[place]!r} cannot be read ({error})") from error
+            # Texts that repeat stay one text each.
+            file = parquet.ParquetFile(io.BytesIO(data), read_dictionary=[name] if texts else [])
+            for batch in file.iter_batches(columns=[name], batch_size=2**16):
+                column = batch.column(0)
+                if arrow.types.is_dictionary(column.type):
+                    held = column.dictionary.to_pylist()
+                    read += [None if at is None else held[at] for at in column.indices.to_pylist()]
+                else:
+                    read += column.to_pylist()
+        except (arrow.ArrowException, ValueError, OverflowError, ImportError, OSError) as error:
+            raise NoTableError(f"its column {name!r} cannot be read ({error})") from error
         return read
 
-    return Columns(table.column_names, table.num_rows, cells)
+    return Columns(schema.names, rows, cells)
 
 
 READERS: Final[Mapping[str, Callable[[bytes], Columns]]] = {

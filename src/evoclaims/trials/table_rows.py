@@ -61,7 +61,7 @@ class TrialRows:
 
     def _seeds(self) -> list[int]:
         """Return the table's seeds in the rows that are read."""
-        found = self.table.numbers(self.seed, "the seeds", self.chosen)
+        found = self.table.numbers(self.seed, "the seeds", self.chosen, rounded=True)
         for row, seed in zip(self.chosen, found, strict=True):
             if seed is None or not seed.is_integer():
                 has = "no seed" if seed is None else f"the seed {seed!r}"

@@ -9,12 +9,17 @@ import subprocess
 import sys
 import threading
 from collections.abc import Callable, Mapping
-from typing import IO, Any
+from typing import IO, Any, Final
 
 import msgspec
 
 from evoclaims.cli.processes.job import Job
 from evoclaims.cli.processes.worker import Ended, Reply, Told, WorkOrder
+
+_START: Final = (
+    "import signal; signal.signal(signal.SIGINT, signal.SIG_IGN); "  # before seconds of imports, which it would break
+    "import runpy; runpy.run_module('evoclaims.cli.processes.worker', run_name='__main__', alter_sys=True)"
+)
 
 
 class Process:
@@ -23,7 +28,7 @@ class Process:
     def __init__(self, order: WorkOrder, environment: Mapping[str, str]) -> None:
         """Start it, with these environment variables besides the command's own."""
         self._process = subprocess.Popen(
-            [sys.executable, "-m", "evoclaims.cli.processes.worker"],
+            [sys.executable, "-c", _START],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
