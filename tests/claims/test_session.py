@@ -314,4 +314,4 @@ def test_a_third_look_follows_the_first_two_and_is_another_design(session: Sessi
     assert (three.outcome, three.n, three.reason) == (two.outcome, two.n, two.reason)
     assert three.fingerprint != two.fingerprint
     smoke = session.settle(ClaimTest(says, "smoke", "", True), _pair(session)[0].solves_every_level.in_most_trials())
-    assert [look.n for look in smoke.attainable] == [10]  # its α is spent
+    assert [look.n for look in smoke.attainable] == [6]  # its α is spent

@@ -10,7 +10,7 @@ from small_paper import CONDITIONS, Paper, made
 
 from evoclaims.core.errors import UnknownNameError
 from evoclaims.figures.replication import Replication, counts, replications
-from evoclaims.judging.repetition import Answer
+from evoclaims.judging.repetition import Agreement, Answer
 from evoclaims.paper.archive import Archive
 from evoclaims.paper.variant import Variant
 
@@ -66,10 +66,14 @@ def test_every_published_number_is_read_once_from_the_trials_that_it_is_about(re
     ]
     assert [one.level for one in found.values()] == [0, 1, 0, None]
     first, second, absent, reward = found.values()
-    assert (first.readings.mean, first.answer) == (pytest.approx(0.5), Answer.OUTSIDE)
-    assert (second.readings.mean, second.answer) == (pytest.approx(0.5), Answer.INSIDE)
-    assert (absent.readings.values, absent.answer, absent.repetition.reason) == ((), Answer.UNKNOWN, "not run")
-    assert (reward.readings.mean, reward.reported.error, reward.answer) == (9.0, 2.0, Answer.INSIDE)
+    assert (first.readings.mean, first.repetition.answer) == (pytest.approx(0.5), Answer.OUTSIDE)
+    assert (second.readings.mean, second.repetition.answer) == (pytest.approx(0.5), Answer.INSIDE)
+    assert (absent.readings.values, absent.repetition.answer, absent.repetition.reason) == (
+        (),
+        Answer.UNKNOWN,
+        "not run",
+    )
+    assert (reward.readings.mean, reward.reported.error, reward.repetition.answer) == (9.0, 2.0, Answer.INSIDE)
 
 
 def test_a_variant_has_the_numbers_that_it_changes_and_has_run(reporting: Paper) -> None:
@@ -82,8 +86,12 @@ def test_a_variant_has_the_numbers_that_it_changes_and_has_run(reporting: Paper)
     found = _found(reporting, "", "longer")
     assert [name for name, variant in found if variant] == [f"one on small: success at level {k}" for k in range(2)]
     level = "one on small: success at level 0"
-    assert (found[level, ""].answer, found[level, "longer"].answer) == (Answer.OUTSIDE, Answer.INSIDE)
-    assert counts([*found.values()])["longer"] == {Answer.INSIDE: 1, Answer.OUTSIDE: 1, Answer.UNKNOWN: 0}
+    assert (found[level, ""].repetition.answer, found[level, "longer"].repetition.answer) == (
+        Answer.OUTSIDE,
+        Answer.INSIDE,
+    )
+    longer = counts([*found.values()])["longer"]
+    assert (longer[Agreement.CONTRADICTED], longer[Agreement.OPEN], sum(longer.values())) == (1, 0, 2)
     with pytest.raises(UnknownNameError, match="no variant named 'longr'"):
         _found(reporting, "longr")
 
@@ -114,7 +122,7 @@ def test_a_misspelled_measure_lists_the_known_ones(reporting: Paper) -> None:
 def test_without_the_number_of_published_trials_nothing_can_be_said(reporting: Paper) -> None:
     path = reporting.reproduction.folder / "reported.toml"
     path.write_text(REPORTED.replace("trials = 10\n", ""))
-    assert {one.answer for one in _found(reporting).values()} == {Answer.UNKNOWN}
+    assert {one.repetition.answer for one in _found(reporting).values()} == {Answer.UNKNOWN}
 
 
 def test_a_row_has_every_number(reporting: Paper) -> None:

@@ -183,7 +183,7 @@ def test_the_trials_that_would_show_equivalence_just_do() -> None:
     assert needed is not None
     for n, enough in ((needed, True), (needed - 1, False)):
         half = student.ppf(0.95, 9) * math.sqrt(1 / 10 + 1 / n)
-        assert (0.1 + half <= detectable_shift(10)) is enough
+        assert bool(0.1 + half <= detectable_shift(10)) is enough
 
 
 @pytest.mark.parametrize(("there", "agreement"), [(10, "consistent"), (8, "uninformative"), (6, "contradicted")])

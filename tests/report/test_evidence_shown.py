@@ -71,10 +71,12 @@ def test_of_a_refuted_part_the_p_against_it_comes_first(filled: Laboratory) -> N
     assert names(filled.judge(lambda group: group("worse").mean_success > group("better").mean_success)) == [
         "p against",
         "p for",
+        "p against its size",
     ]
     assert names(filled.judge(lambda group: group("better").mean_success > group("worse").mean_success)) == [
         "p for",
         "p against",
+        "p against its size",
     ]
 
 

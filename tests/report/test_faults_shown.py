@@ -122,6 +122,7 @@ def test_a_scoreboard_counts_insensitive_support_apart(filled: Laboratory) -> No
         Tally.SUPPORTED: 2,
         Tally.INSENSITIVE: 1,
         Tally.REFUTED: 1,
+        Tally.SMALLER: 0,
         Tally.INCONCLUSIVE: 0,
         Tally.ERROR: 0,
         Tally.NOT_RUN: 0,
@@ -149,6 +150,6 @@ def test_a_scoreboard_counts_controls_of_the_benchmark_apart_from_the_papers_cla
     board = Board("smoke", sections)
     assert (len(board.papers), sum(board.counts.values()), board.controls) == (4, 4, "1 supported")
     shown = Page(title="A Paper", name="paper", boards=(board,))
-    assert "| smoke | 2 | 1 | 1 | 0 | 0 | 0 | 0 | 1 supported |" in markdown(shown)
+    assert "| smoke | 2 | 1 | 1 | 0 | 0 | 0 | 0 | 0 | 1 supported |" in markdown(shown)
     assert "<small>4 claims; controls: 1 supported</small>" in whole(shown)
     assert 'viewBox="0 0 4 1"' in whole(shown)

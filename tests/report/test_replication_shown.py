@@ -11,7 +11,7 @@ from rich.console import Console
 
 from evoclaims.figures.readings import Reading, Readings
 from evoclaims.figures.replication import Replication
-from evoclaims.judging.repetition import Answer, PublishedMean, repetition
+from evoclaims.judging.repetition import Agreement, PublishedMean, repetition
 from evoclaims.judging.verdict import Outcome
 from evoclaims.paper.reported import Reported
 from evoclaims.report import replication_blocks, replication_cells
@@ -136,4 +136,4 @@ def test_a_claim_that_the_papers_own_numbers_would_not_pass_says_so(filled: Labo
         assert any("the paper's own numbers would not pass this assertion" in line for line in first.warnings) is told
         assert not any("would not pass" in line for line in second.warnings)
         assert bool(page.put_to_the_paper) is bool(papers)
-    assert Answer.UNKNOWN not in {number.answer for number in NUMBERS[:2]}
+    assert Agreement.OPEN not in {number.agreement for number in NUMBERS[:2]}

@@ -20,7 +20,7 @@ def test_the_page_is_below_a_megabyte_and_lacks_no_evidence(tmp_path: Path, monk
     page = (tmp_path / "index.html").read_bytes()
     assert len(page) < 1_000_000
     text = page.decode()
-    judged = re.findall(r'<section class="claim [^>]*? id="([^"]+)"[^>]*? data-verdict="(?:supp|ref|inc)', text)
+    judged = re.findall(r'<section class="claim [^>]*? id="([^"]+)"[^>]*? data-verdict="(?:supp|ref|smaller|inc)', text)
     assert len(judged) == len(history.load(REPRODUCTION.folder / history.FILE))
     found = pieces(text)
     assert sum("<circle" in found[anchor] for anchor in judged) == len(judged)

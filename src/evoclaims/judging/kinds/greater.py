@@ -136,14 +136,14 @@ class Greater(Assertion):
 
     def highest(self, trials: Trials, n: int, design: Design) -> PValues:
         """Return the p of results of the missing trials that are all against it: beyond all others, without ties."""
-        above, below = self.above.sample(trials).values, self.below.sample(trials).values
-        place = {value: float(at) for at, value in enumerate(sorted({*above, *below}))}
-        a, b = [place[value] for value in above], [place[value] for value in below]
-        low = [-1.0 - at for at in range(2 * n)]
-        high = [len(place) + at for at in range(2 * n)]
+        a, b = self.above.sample(trials).values, self.below.sample(trials).values
+        place = {value: float(at) for at, value in enumerate(sorted({*a, *b}))}
+        of_a, of_b = [place[value] for value in a], [place[value] for value in b]
+        low = [-1.0 - at for at in range(n)]
+        high = [float(len(place) + at) for at in range(n)]
         more, less = n - len(a), n - len(b)
-        best = GreaterTests([*a, *high[:more]], [*b, *low[:less]], design.a12_margin)
-        worst = GreaterTests([*a, *low[:more]], [*b, *high[:less]], design.a12_margin)
+        best = GreaterTests([*of_a, *high[:more]], [*of_b, *low[:less]], design.a12_margin)
+        worst = GreaterTests([*of_a, *low[:more]], [*of_b, *high[:less]], design.a12_margin)
         equal = max(best.smaller.p, worst.reverse_smaller.p)
         return PValues(worst.above.p, min(best.below.p, equal), best.smaller.p)
 
