@@ -84,7 +84,7 @@ def test_the_new_project_runs_with_the_method_and_the_claim_that_are_added(
     folder = tmp_path / enter[1]
     monkeypatch.chdir(tmp_path)
     assert cli.main(new[1:]) == 0
-    assert f"wrote 6 files to {enter[1]}; next:" in capsys.readouterr().out
+    assert f"wrote 6 files to {folder}; next:" in capsys.readouterr().out
     (package,) = re.findall(r"`(reproductions/\S+\.py)`", README)
     (method,) = re.findall(r"`(METHODS\[.*?)`", README)
     text = (folder / package).read_text()
