@@ -26,8 +26,8 @@ import jax
 import jax.numpy as jnp
 from neat_against_tensorneat import TASK, random_genomes, sized, with_ours
 
-from evoclaims.kernels.grouped import GroupKernel
-from evoclaims.kernels.random_bits import fast
+from evoclaims.kernels.call.grouped import GroupKernel
+from evoclaims.kernels.call.random_bits import kernel_prng
 from evoclaims.methods.neat.crossover import crossover
 from evoclaims.methods.neat.neat import Neat
 from evoclaims.methods.neat.population import first_population
@@ -87,14 +87,18 @@ def parts_of_breeding(genomes: Genome) -> dict[str, tuple[Any, ...]]:
     state = replace(first, population=replace(first.population, species=grouped))
 
     def structure(key: Any, genome: Genome, new_key: Any) -> Genome:
-        return mutate_structure(fast(key), settings.mutation, genome, new_key, NETWORK.inputs, NETWORK.outputs)
+        return mutate_structure(kernel_prng(key), settings.mutation, genome, new_key, NETWORK.inputs, NETWORK.outputs)
 
     return {
-        "crossover": (jax.vmap(lambda key, *parents: crossover(fast(key), *parents)), keys, genomes, others),
+        "crossover": (jax.vmap(lambda key, *parents: crossover(kernel_prng(key), *parents)), keys, genomes, others),
         "species": (partial(speciate, settings.species), grouped, genomes, 1),
         "structure": (jax.vmap(structure), keys, genomes, new_keys),
-        "values": (jax.vmap(lambda key, genome: mutate_values(fast(key), settings.mutation, 1, genome)), keys, genomes),
-        "generation": (lambda key, state: method.step(fast(key), TASK, level, state), keys[0], state),
+        "values": (
+            jax.vmap(lambda key, genome: mutate_values(kernel_prng(key), settings.mutation, 1, genome)),
+            keys,
+            genomes,
+        ),
+        "generation": (lambda key, state: method.step(kernel_prng(key), TASK, level, state), keys[0], state),
     }
 
 

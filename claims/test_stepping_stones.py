@@ -3,9 +3,15 @@
 Smoke judges the same relations in a room with three stones, one before a wall and two behind it (docs/smoke.md).
 """
 
+from functools import reduce
+from operator import and_
+
 import pytest
 
 from evoclaims import Outcome, claim, expected
+
+FIRST, AUDIT = "2026-11-21 10:55", "2026-11-26"
+"""When claims were first committed, before their trials; and when an audit added readings, after all of them."""
 
 EVOLVED = [
     pytest.param(
@@ -25,6 +31,9 @@ EVOLVED = [
         ),
     ),
 ]
+A_LATER_SENTENCE = (
+    "it was made a claim after all trials had run; smoke has no instance that was chosen for it, and S4 to S7 have"
+)
 LUCKY = "NEAT's champions are those of one lucky episode: in others they collect less than half of that on average"
 LEARNED = [
     "ppo",
@@ -44,6 +53,9 @@ LEARNED = [
     "S1",
     says="NEAT accrues the highest rewards, reaching on average five out of seven stepping stones",
     where="§5.2.1, Fig. 5",
+    line=348,
+    read="four to six stones, final policy",
+    since=FIRST,
     smoke="NEAT reaches on average two out of three stepping stones",
 )
 @expected(
@@ -53,6 +65,12 @@ LEARNED = [
 )
 def test_neat_reaches_five_stones(trials, verdict, claim_tier):
     neat = trials("neat", on="stones")
+    verdict.reading(
+        "training's best episode, in stones by its reward",
+        neat.reward_in_training.between(4_000, 6_000),
+        because="Fig. 5 may show what evolution reports; a step with five stones crossed pays about five",
+        since=AUDIT,
+    )
     verdict({"full": neat.stones.between(4, 6), "smoke": neat.stones.between(1.25, 3)}[claim_tier])
 
 
@@ -60,12 +78,21 @@ def test_neat_reaches_five_stones(trials, verdict, claim_tier):
     "S2",
     says="HyperNEAT and CMA-ES manage to reach about three stepping stones",
     where="§5.2.1, Fig. 5",
+    line=349,
+    read="two to four stones, final policy",
+    since=FIRST,
     smoke="HyperNEAT and CMA-ES reach stepping stones, unlike a random policy, but fewer than NEAT",
 )
 @pytest.mark.parametrize("method", EVOLVED)
 def test_others_reach_three_stones(trials, verdict, claim_tier, method):
     evolved = trials(method, on="stones")
     if claim_tier == "full":
+        verdict.reading(
+            "training's best episode, in stones by its reward",
+            evolved.reward_in_training.between(2_000, 4_000),
+            because="Fig. 5 may show what evolution reports; a step with three stones crossed pays about three",
+            since=AUDIT,
+        )
         verdict(evolved.stones.between(2, 4))
         return
     neat, random_policy = trials("neat", on="stones"), trials("random_policy", on="stones")
@@ -76,13 +103,22 @@ def test_others_reach_three_stones(trials, verdict, claim_tier, method):
     "S3",
     says="Both RL methods get stuck at the first stepping stone",
     where="§5.2.1, Fig. 5",
+    line=350,
+    read="the first stone and no more",
+    since=AUDIT,
     smoke="PPO reaches, unlike a random policy, the first of three stepping stones, but not the others, unlike NEAT",
 )
 @pytest.mark.parametrize("method", LEARNED)
 def test_ppo_stays_at_the_first_stone(trials, verdict, claim_tier, method):
     ppo = trials(method, on="stones")
     if claim_tier == "full":
-        verdict(ppo.crosses_at_most(1).stays())
+        verdict.reading(
+            "at most one stone",
+            ppo.crosses_at_most(1).stays(),
+            because="stuck at the first stone may mean before it; a robot that takes no action satisfies this",
+            since=FIRST,
+        )
+        verdict(ppo.stones.between(0.5, 1.5))
         return
     neat, random_policy = trials("neat", on="stones"), trials("random_policy", on="stones")
     about_one = ppo.stones.between(0, 1.5) & (ppo.stones > random_policy.stones)
@@ -93,6 +129,9 @@ def test_ppo_stays_at_the_first_stone(trials, verdict, claim_tier, method):
     "S4",
     says="NEAT accrues the highest rewards",
     where="§5.2.1, Fig. 5",
+    line=348,
+    read="final policy's rewards",
+    since=FIRST,
     smoke="NEAT accrues the highest rewards in the room with three stones; the others' are above a random policy's",
 )
 @pytest.mark.parametrize(
@@ -109,6 +148,13 @@ def test_neat_collects_more_reward(trials, verdict, claim_tier, other):
     neat = trials("neat", on="stones")
     rest = trials(other, on="stones")
     says = neat.reward > rest.reward
+    if other in ("hyperneat", "cma_es", "map_elites"):
+        verdict.reading(
+            "rewards of training's best episodes",
+            neat.reward_in_training > rest.reward_in_training,
+            because="Fig. 5 may show what evolution reports",
+            since=AUDIT,
+        )
     if claim_tier == "smoke":
         says &= rest.reward > trials("random_policy", on="stones").reward
     verdict(says)
@@ -118,6 +164,9 @@ def test_neat_collects_more_reward(trials, verdict, claim_tier, other):
     "S5",
     says="MAP-Elites performs equally bad but exhibits a drastically different behavior",
     where="§5.2.1, Fig. 5",
+    line=351,
+    read="at most one stone, as PPO",
+    since=FIRST,
     smoke="MAP-Elites collects about as little reward as PPO: both more than a random policy, but far less than NEAT",
 )
 def test_map_elites_collects_few_stones(trials, verdict, claim_tier):
@@ -127,6 +176,13 @@ def test_map_elites_collects_few_stones(trials, verdict, claim_tier):
     """
     map_elites = trials("map_elites", on="stones")
     if claim_tier == "full":
+        for margin in (500, 1_000):
+            verdict.reading(
+                f"rewards within {margin:,} of PPO's",
+                map_elites.reward.equivalent_to(trials("ppo", on="stones").reward, margin=margin),
+                because="equally bad as PPO, whose rewards Fig. 5 shows",
+                since=AUDIT,
+            )
         verdict(map_elites.crosses_at_most(1).stays())
         return
     ppo, neat, random_policy = (trials(method, on="stones") for method in ("ppo", "neat", "random_policy"))
@@ -138,6 +194,9 @@ def test_map_elites_collects_few_stones(trials, verdict, claim_tier):
     "S6",
     says="The agent has explored the whole maze (in contrast to PPO that only reached the first stepping stone)",
     where="§5.2.1, Fig. 6",
+    line=351,
+    read="0.8 of the cells, more than PPO's path",
+    since=FIRST,
     smoke="The elites of MAP-Elites stand on a tenth of the room, more than PPO's way to the first stone leads through",
 )
 def test_map_elites_explores_the_maze(trials, verdict, claim_tier):
@@ -145,6 +204,18 @@ def test_map_elites_explores_the_maze(trials, verdict, claim_tier):
     ppo = trials("ppo", on="stones")
     more = map_elites.archive_coverage > ppo.path_coverage
     least = {"full": 0.8, "smoke": 0.1}[claim_tier]
+    verdict.reading(
+        "some elite ends at the target",
+        map_elites.has_found_the_target.in_most_trials() & (map_elites.target_found > ppo.share_of_targets),
+        because="the whole maze includes its end",
+        since=AUDIT,
+    )
+    verdict.reading(
+        "half of the cells",
+        more & map_elites.archive_coverage.between(0.5, 1.0),
+        because="0.8 is a number of ours for the whole maze, whose corners few policies end in",
+        since=AUDIT,
+    )
     says = more & map_elites.archive_coverage.between(least, 1.0)
     if claim_tier == "smoke":
         says &= ppo.stones > trials("random_policy", on="stones").stones
@@ -157,6 +228,9 @@ def test_map_elites_explores_the_maze(trials, verdict, claim_tier):
     "stones], the agent's extensive exploration leads to finding the optimal policy: reaching the target on the top "
     "left",
     where="§5.2.1, Fig. 6",
+    line=352,
+    read="finds the target, with the same coverage",
+    since=FIRST,
     smoke="Without stones MAP-Elites finds the target behind the wall; its elites, too, stand on a tenth of the room",
 )
 @expected(
@@ -167,6 +241,12 @@ def test_map_elites_explores_the_maze(trials, verdict, claim_tier):
 def test_map_elites_finds_the_target_without_stones(trials, verdict, claim_tier):
     plain = trials("map_elites", on="deceptive_maze_difficult")
     stones = trials("map_elites", on="stones")
+    verdict.reading(
+        "finds the target",
+        plain.has_found_the_target.in_most_trials(),
+        because="the same coverage is what another sentence says of the figure",
+        since=AUDIT,
+    )
     alike = {
         "full": plain.archive_coverage.equivalent_to(stones.archive_coverage, margin=0.1),
         "smoke": plain.archive_coverage.between(0.1, 1.0) & stones.archive_coverage.between(0.1, 1.0),
@@ -178,6 +258,9 @@ def test_map_elites_finds_the_target_without_stones(trials, verdict, claim_tier)
     "S8",
     says="A difference is that CMA-ES performs worse than NEAT",
     where="§5.2.1, Fig. 5",
+    line=403,
+    read="final policy's rewards among stones",
+    since=FIRST,
     smoke="CMA-ES collects less reward than NEAT in the room with three stones, but more than a random policy",
 )
 @expected(Outcome.REFUTED, tier="full", because=LUCKY)
@@ -185,6 +268,110 @@ def test_cma_es_is_below_neat(trials, verdict, claim_tier):
     cma_es = trials("cma_es", on="stones")
     neat = trials("neat", on="stones")
     says = cma_es.reward < neat.reward
+    verdict.reading(
+        "rewards of training's best episodes",
+        cma_es.reward_in_training < neat.reward_in_training,
+        because="Fig. 5 may show what evolution reports",
+        since=AUDIT,
+    )
+    if claim_tier == "full":
+        on_obstacles = (trials(method, on="obstacles").reward for method in ("neat", "cma_es"))
+        verdict.reading(
+            "rewards among obstacles",
+            next(on_obstacles) > next(on_obstacles),
+            because="the sentence is about transfer learning in ecorobot, which has two tasks of it",
+            since=AUDIT,
+        )
     if claim_tier == "smoke":
         says &= cma_es.reward > trials("random_policy", on="stones").reward
     verdict(says)
+
+
+@claim(
+    "S9",
+    says="MAP-elites collects low rewards due to reaching the end of the maze without collecting the stones",
+    where="§5.2.1, Fig. 5",
+    line=358,
+    read="some elite ends at the target",
+    since=AUDIT,
+    smoke=None,
+    because=A_LATER_SENTENCE,
+)
+@expected(Outcome.REFUTED, tier="full", because="no archive of ten has an elite at the target")
+def test_map_elites_reaches_the_end_of_the_maze(trials, verdict):
+    verdict(trials("map_elites", on="stones").has_found_the_target.in_most_trials())
+
+
+@claim(
+    "S10",
+    says="coverage is optimal in both cases [the maze with stepping stones, and without]",
+    where="§5.2.1, Fig. 6",
+    line=366,
+    read="0.95 of the cells that can be reached",
+    since=AUDIT,
+    smoke=None,
+    because=A_LATER_SENTENCE,
+)
+@expected(
+    Outcome.REFUTED, tier="full", because="elites stand on 62 to 90% of the cells with stones, on 58 to 88% without"
+)
+def test_map_elites_covers_both_mazes(trials, verdict):
+    stones, plain = trials("map_elites", on="stones"), trials("map_elites", on="deceptive_maze_difficult")
+    for least, name in ((0.8, "0.8 of the cells"), (0.5, "half of the cells")):
+        verdict.reading(
+            name,
+            stones.archive_coverage.between(least, 1) & plain.archive_coverage.between(least, 1),
+            because="optimal may mean as much as a map can show",
+            since=AUDIT,
+        )
+    verdict(stones.archive_coverage.between(0.95, 1) & plain.archive_coverage.between(0.95, 1))
+
+
+@claim(
+    "S11",
+    says="NEAT and CMA-ES perform best",
+    where="§5.2.1, Fig. 5",
+    line=358,
+    read="more reward than each of the others",
+    since=AUDIT,
+    smoke=None,
+    because=A_LATER_SENTENCE,
+)
+@pytest.mark.parametrize(
+    "method",
+    [
+        pytest.param(
+            "neat", marks=expected(Outcome.REFUTED, tier="full", because="goal-conditioned PPO collects more: see S4")
+        ),
+        "cma_es",
+    ],
+)
+def test_neat_and_cma_es_perform_best(trials, verdict, method):
+    best, others = trials(method, on="stones"), ("hyperneat", "map_elites", "ppo", "goal_ppo")
+    rest = {other: trials(other, on="stones") for other in others}
+    verdict.reading(
+        "more stones than each of the others",
+        reduce(and_, (best.stones > other.stones for other in rest.values())),
+        because="the caption is about progress through stones",
+        since=AUDIT,
+    )
+    verdict(reduce(and_, (best.reward > other.reward for other in rest.values())))
+
+
+@claim(
+    "S12",
+    says="crossing all stones and reaching the target, which incurs a fitness of about 10,000",
+    where="§3.2",
+    line=229,
+    read="8,000 to 12,000 for a controller that crosses all",
+    since=AUDIT,
+    smoke=None,
+    because="it is about the task at its own size",
+)
+@expected(
+    Outcome.REFUTED,
+    tier="full",
+    because="an episode ends at the target: 2,530 in 436 steps, and 5,460 for one that waits before the last stone",
+)
+def test_all_stones_pay_ten_thousand(trials, verdict):
+    verdict(trials("waypoints", on="stones").reward.between(8_000, 12_000))

@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 from approximations import on_a_processor
 
-from evoclaims.kernels import machine_code
-from evoclaims.kernels.block_shape import BlockShape
-from evoclaims.kernels.gpu_kernel import BLOCK, ENTRY, GpuProgram
+from evoclaims.kernels.emit import machine_code
+from evoclaims.kernels.emit.block_shape import BlockShape
+from evoclaims.kernels.emit.gpu_kernel import BLOCK, ENTRY, GpuProgram
 
 NOT_A_NUMBER = 0x7FC00000
 CALLED = ctypes.CFUNCTYPE(None)

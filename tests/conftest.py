@@ -10,6 +10,7 @@ import shutil
 import signal
 import tempfile
 import warnings
+from pathlib import Path
 from typing import Final
 
 import pytest
@@ -37,6 +38,14 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # as in what a shell runs
 if _CACHE not in os.environ:
     _made = os.environ[_CACHE] = tempfile.mkdtemp(prefix="evoclaims-tests-")
     os.environ["JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS"] = "0"  # an entry is read ten times as fast as compiled
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Refuse claims beside tests: their trials would be compiled with the flags above, and have other bits."""
+    here = Path(__file__).parent
+    places = [(config.invocation_params.dir / arg.partition("::")[0]).resolve() for arg in config.args]
+    if strange := [str(place) for place in places if not place.is_relative_to(here)]:
+        raise pytest.UsageError(f"Run `pytest tests` alone, without {', '.join(strange)}: it compiles otherwise.")
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

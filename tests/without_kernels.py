@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from typing import Any
 from unittest.mock import patch
 
-from evoclaims.kernels.grouped import GroupKernel
+from evoclaims.kernels.call.grouped import GroupKernel
 
 BREEDING = ("The breeding of genomes",)
 """The name of the kernels of NEAT that are not its networks'."""

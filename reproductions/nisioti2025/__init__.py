@@ -7,6 +7,7 @@ from pathlib import Path
 from evoclaims import FIXED_10, SEQUENTIAL, Reproduction, Tier
 from reproductions.nisioti2025 import ecorobot, stepping_gates
 from reproductions.nisioti2025.measures import PaperTrials
+from reproductions.nisioti2025.null_agents import NULL_AGENTS
 from reproductions.nisioti2025.variants import VARIANTS
 
 REPRODUCTION = Reproduction(
@@ -19,6 +20,7 @@ REPRODUCTION = Reproduction(
     },
     variants=VARIANTS,
     trials=PaperTrials,
+    null_agents=NULL_AGENTS,
     mutants=f"{__name__}.mutants",
     figures=tuple(f"{__name__}.{name}" for name in (*(f"fig{n}" for n in range(3, 11)), "tables")),
 )

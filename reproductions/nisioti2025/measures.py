@@ -5,11 +5,33 @@ The names in quotation marks are hashed into the claims' fingerprints.
 
 from __future__ import annotations
 
+import itertools
+
+import numpy as np
+
 from evoclaims import Event, Measure, TrialGroup
+from evoclaims.envs import Circuit
+
+
+def constant_success(circuit: Circuit) -> tuple[float, ...]:
+    """Return the success by level of the best circuit that always gives the same answer."""
+    table = circuit.table
+    answers = itertools.product((False, True), repeat=table.targets.shape[1])
+    rights = [((table.targets == np.array(answer)) | ~table.active).all(axis=1) for answer in answers]
+    best = max(rights, key=lambda right: float(right.mean()))
+    return tuple(float(best[:rows].mean()) for rows in table.rows_at_level)
 
 
 class PaperTrials(TrialGroup):
     """Trials of one condition, with the measures of the paper's own tasks and methods."""
+
+    @property
+    def success_beyond_guessing(self) -> Measure:
+        """Success at the last level of a circuit: 0 is that of the best constant answer, 1 is perfect."""
+        guess = constant_success(self.condition.task)[-1]
+        return self.measure(
+            "success beyond guessing on the last level", lambda t: (t.metrics["last_success"] - guess) / (1.0 - guess)
+        )
 
     @property
     def stones(self) -> Measure:
@@ -40,6 +62,21 @@ class PaperTrials(TrialGroup):
         return self.event("reaches the target", lambda t: t.metrics["reached"] > 0.5)
 
     @property
+    def seldom_reaches_the_target(self) -> Event:
+        """The final policy reaches the target in at most half of the examination's episodes."""
+        return self.event("seldom reaches the target", lambda t: t.metrics["reached"] <= 0.5)
+
+    @property
+    def share_of_targets(self) -> Measure:
+        """Share of the examination's episodes in which the final policy reaches the target."""
+        return self.measure("share of episodes that reach the target", lambda t: t.metrics["reached"])
+
+    @property
+    def target_found(self) -> Measure:
+        """1 if some individual has reached the target, else 0; for methods with an archive."""
+        return self.measure("whether the target was found", lambda t: t.curves["reached"][-1])
+
+    @property
     def never_reaches_the_target(self) -> Event:
         """The final policy reaches the target in no episode of the examination."""
         return self.event("never reaches the target", lambda t: t.metrics["reached"] == 0)
@@ -58,6 +95,26 @@ class PaperTrials(TrialGroup):
         return self.event(f"passes at most {obstacles:g} obstacles", lambda t: t.metrics["obstacles"] <= obstacles)
 
     @property
+    def obstacles_passed(self) -> Measure:
+        """Obstacles that the final policy passes, averaged over the examination's episodes."""
+        return self.measure("obstacles passed", lambda t: t.metrics["obstacles"])
+
+    @property
+    def speed(self) -> Measure:
+        """How far the final policy comes in a step, m, averaged over the examination's episodes."""
+        return self.measure("m a step", lambda t: t.metrics["furthest"] / t.metrics["episode_steps"])
+
+    @property
+    def reward_before_costs(self) -> Measure:
+        """Episode reward of the final policy with its control cost given back."""
+        return self.measure("reward before costs", lambda t: t.metrics["last_fitness"] + t.metrics["control_cost"])
+
+    @property
+    def reward_in_training(self) -> Measure:
+        """Reward of the best individual of the last generation in its one episode; for methods that evolve."""
+        return self.measure("reward of training's best episode", lambda t: t.curves["fitness"][-1])
+
+    @property
     def reward_gained(self) -> Measure:
         """Reward per episode at the last report of training, less that at the first; for tasks of one level."""
         return self.measure("reward gained", lambda t: t.curves["fitness"][-1] - t.curves["fitness"][0])
@@ -66,6 +123,19 @@ class PaperTrials(TrialGroup):
     def overturned(self) -> Measure:
         """Share of the final policy's steps in which the robot is upside-down."""
         return self.measure("share of steps upside-down", lambda t: t.metrics["upside_down"], better="lower")
+
+    def is_overturned(self, share: float) -> Event:
+        """The robot is upside-down in more than a share of the final policy's steps."""
+        return self.event(
+            f"upside-down in more than {share:g} of the steps", lambda t: t.metrics["upside_down"] > share
+        )
+
+    def pays(self, share: float) -> Event:
+        """The final policy's control cost is more than a share of its reward before costs."""
+        return self.event(
+            f"control cost above {share:g} of the reward",
+            lambda t: t.metrics["control_cost"] > share * (t.metrics["last_fitness"] + t.metrics["control_cost"]),
+        )
 
     @property
     def control_cost(self) -> Measure:
@@ -84,6 +154,22 @@ class PaperTrials(TrialGroup):
         most = self._neurons_half_hidden
         name = "at most half of the champion's neurons are hidden"
         return self.event(name, lambda t: t.curves["champion_nodes"][-1] <= most)
+
+    @property
+    def champion_size(self) -> Measure:
+        """Neurons and connections of the final champion; for methods that grow networks.
+
+        All neurons, since genomes with few inputs have room for more hidden ones.
+        """
+        return self.measure(
+            "neurons and connections of the champion",
+            lambda t: t.curves["champion_nodes"][-1] + t.curves["champion_connections"][-1],
+        )
+
+    @property
+    def champion_connections(self) -> Measure:
+        """Connections of the final champion; for methods that grow networks."""
+        return self.measure("connections of the champion", lambda t: t.curves["champion_connections"][-1])
 
     @property
     def _neurons_half_hidden(self) -> int:

@@ -12,6 +12,7 @@ from evoclaims.judging.measure import Measure as Measure
 from evoclaims.judging.measure import Profile as Profile
 from evoclaims.judging.verdict import Outcome as Outcome
 from evoclaims.methods.training_loop import TrainingLoop as TrainingLoop
+from evoclaims.paper.null_agent import NullAgent as NullAgent
 from evoclaims.paper.reproduction import Reproduction as Reproduction
 from evoclaims.paper.reproduction import Tier as Tier
 from evoclaims.paper.trial_group import TrialGroup as TrialGroup

@@ -49,22 +49,22 @@ def test_a_claim_that_lacks_a_text_says_which(lacking: str) -> None:
 @pytest.mark.parametrize("word", ["id", "says", "where", "smoke"])
 def test_what_is_no_text_is_refused_with_what_it_is(word: str) -> None:
     texts: dict[str, Any] = {"id": "T1", **TEXTS, word: 1}
-    with pytest.raises(UserError, match=f"has 1 as its {word}, which is no text: write it in quotes"):
+    with pytest.raises(UserError, match=f"has 1 as its {word}, which is not text. Write it in quotes"):
         claim(texts.pop("id"), **texts)
 
 
 def test_an_accepted_outcome_must_be_known_and_have_a_reason() -> None:
-    with pytest.raises(UserError, match="There is no outcome 'rejected'; known: supported, refuted"):
+    with pytest.raises(UserError, match="The outcome 'rejected' does not exist. Use one of supported, refuted"):
         expected("rejected", because="it is")
-    with pytest.raises(UserError, match="says because="):
+    with pytest.raises(UserError, match="needs because="):
         expected(Outcome.REFUTED, because=" ")
-    with pytest.raises(UserError, match="says because="):
+    with pytest.raises(UserError, match="needs because="):
         claim("T1", **TEXTS, expect=Outcome.REFUTED)
 
 
 def test_a_claim_without_a_smoke_test_says_why_and_keeps_its_sentence() -> None:
     texts = {**TEXTS, "smoke": None}
-    with pytest.raises(UserError, match="has no smoke test says because="):
+    with pytest.raises(UserError, match="without a smoke test needs because="):
         claim("T1", **texts)
     with pytest.raises(UserError, match="accept the outcome with @expected"):
         claim("T1", **texts, expect=Outcome.REFUTED, because="it is")

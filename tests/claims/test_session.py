@@ -147,7 +147,7 @@ def test_missing_trials_are_run_and_a_bad_store_or_device_is_found_before(tmp_pa
 
 def test_a_test_gives_exactly_one_verdict(session: Session, says: Claim) -> None:
     better, worse = _pair(session)
-    verdict = Verdicts(lambda assertion: session.settle(ClaimTest(says, "smoke", ""), assertion))
+    verdict = Verdicts(lambda assertion, _: session.settle(ClaimTest(says, "smoke", ""), assertion))
     with pytest.raises(UserError, match=r"takes an assertion about trials.*not True"):
         verdict(True)  # type: ignore[arg-type]
     with pytest.raises(UserError, match=r"takes an assertion about trials.*not 'mean success over levels' alone"):

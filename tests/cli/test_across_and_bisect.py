@@ -122,20 +122,23 @@ def test_nothing_is_judged_where_the_newest_release_is_installed(
     [
         (("across",), "Name what is to differ: --package NAME VERSION"),
         (("across", "--package", "pebble"), "--package pebble names no version"),
-        (("across", "--package", "pebble", "latest"), "'latest' is no version of a package: write such as 0.3.2."),
+        (
+            ("across", "--package", "pebble", "latest"),
+            "'latest' is not a version of a package. Write one such as 0.3.2.",
+        ),
         (("across", "--package", "pebble", "installed"), "pebble is not installed here: name a version."),
         (("across", "--package", "pebble", "1.0", "--as", "xml"), "There is no form named 'xml'."),
         (("across", "--package", "pebble", "1.0", "--tier", "tiny"), "There is no tier named 'tiny'."),
         (("across", "--package", "pebble", "1.0", "--only", "T9"), "There is no claim named 'T9'."),
         (("bisect", "T9", *BISECT[2:]), "There is no claim named 'T9'."),
         (("across", "--constraints", "a/pins.txt", "b/pins.txt"), "Several environments would be called pins: give"),
-        (("across", "--package", "", "1.0"), "'' is no name of a package: write such as jax."),
-        (("across", "--package", "jax @ file:", "1.0"), "'jax @ file:' is no name of a package"),
-        (("bisect", "a", "--package=-rfile", "--good=1", "--bad=2", "--releases=1"), "'-rfile' is no name of a"),
+        (("across", "--package", "", "1.0"), "'' is not the name of a package. Write one such as jax."),
+        (("across", "--package", "jax @ file:", "1.0"), "'jax @ file:' is not the name of a package"),
+        (("bisect", "a", "--package=-rfile", "--good=1", "--bad=2", "--releases=1"), "'-rfile' is not the name of a"),
         (("across", "--python", ""), "'' is no version of Python: write such as 3.13."),
         (("across", "--constraints", "none.txt"), "Cannot read the constraints none.txt"),
         ((*BISECT, "--by", "luck"), "There is no kind of change named 'luck'. Known: bits, drift, verdict."),
-        (("bisect", "a", "--package", "p", "--good", "2", "--bad", "1", "--releases", "1"), "2 does not come before 1"),
+        (("bisect", "a", "--package", "p", "--good", "2", "--bad", "1", "--releases", "1"), "2 is not older than 1"),
     ],
 )
 def test_what_cannot_be_asked_is_a_sentence_before_any_environment(

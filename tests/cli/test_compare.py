@@ -252,7 +252,7 @@ def test_a_timeline_shows_the_versions_that_differ(accepted: Evoclaims) -> None:
     ("arguments", "said"),
     [
         (("--fail=supported->refutd",), "There is no outcome named 'refutd'. Did you mean 'refuted'?"),
-        (("--fail=refuted",), "'refuted' is no change of a verdict"),
+        (("--fail=refuted",), "'refuted' is not a change of a verdict"),
         (("a", "b", "c"), "Two stores or two revisions can be compared, not 3."),
         (("--tier=ful",), "There is no tier named 'ful'."),
         (("--timeline", "x"), "There is no accepted claim named 'x'. Known: a, b."),
@@ -286,7 +286,7 @@ def test_without_a_repository_a_revision_is_one_sentence_and_folders_still_compa
 ) -> None:
     monkeypatch.setenv("GIT_CEILING_DIRECTORIES", str(project.path.parent))
     status, _, err = evoclaims("compare", "HEAD")
-    assert (status, "lies in no git repository" in err) == (2, True)
+    assert (status, "is not in a git repository" in err) == (2, True)
     _copy("one")
     assert evoclaims("compare", "one", "one")[0] == 0
 
@@ -300,11 +300,11 @@ def test_a_torn_reference_of_a_revision_is_one_sentence(accepted: Evoclaims, git
     path.unlink()
     status, _, err = accepted("compare", "HEAD")
     assert status == 2
-    assert "Line 1 of reference/smoke/right-parity.jsonl at HEAD is no reference trial: it is not one whole" in err
+    assert "Line 1 of reference/smoke/right-parity.jsonl at HEAD is not a reference trial: it is not one whole" in err
 
 
 def test_before_the_first_accept_there_is_nothing_to_compare_with(evoclaims: Evoclaims) -> None:
     for arguments in ((), ("--timeline",)):
         status, _, err = evoclaims("compare", *arguments)
         assert status == 2
-        assert "No verdict has been accepted yet: `evoclaims accept` accepts those of now." in err
+        assert "No verdict has been accepted yet: run `evoclaims accept` to accept the current ones." in err

@@ -215,10 +215,10 @@ CHAMPION = ("maze", "--method=random", "--seed=4")
         ),
         (
             ("maze", "--out=maze.pdf"),
-            "--out names a file that ends in .svg or .png, which tells its format; 'maze.pdf' does not.",
+            "--out names a file that ends in .svg or .png, which selects its format; 'maze.pdf' does not.",
         ),
-        ((*CHAMPION, "--as=page", "--out=it.svg"), "--out names a file that ends in .html, which tells its format"),
-        ((*CHAMPION, "--as=gif", "--out=claims"), "--out names a file that ends in .gif, which tells its format"),
+        ((*CHAMPION, "--as=page", "--out=it.svg"), "--out names a file that ends in .html, which selects its format"),
+        ((*CHAMPION, "--as=gif", "--out=claims"), "--out names a file that ends in .gif, which selects its format"),
         (
             ("maze", "--out=tiny_paper.py/x.svg"),
             "Cannot write tiny_paper.py/x.svg: File exists. Name another file with --out.",

@@ -120,7 +120,7 @@ def test_a_torn_line_among_the_reference_trials_is_found_before_anything_is_judg
     monkeypatch.setattr("evoclaims.cli.project.judge", None)
     code, _, err = evoclaims(command)
     assert (code, err.count("\n")) == (2, 1)
-    assert "reference/smoke/right-parity.jsonl is no reference trial" in err
+    assert "reference/smoke/right-parity.jsonl is not a reference trial" in err
 
 
 def test_a_verdict_from_reference_trials_alone_is_told_as_one(

@@ -104,7 +104,7 @@ def test_nothing_is_submitted_twice_and_what_failed_is_submitted_again(evoclaims
     assert lines[0].endswith(", smoke: Priority")
     assert lines[1].endswith(", smoke: on node7")
     assert lines[2].endswith(", smoke: out of memory on node8")
-    assert lines[3].endswith(", smoke: it is not queued any more and has said nothing")
+    assert lines[3].endswith(", smoke: it is no longer queued and has printed nothing")
     assert lines[4] == "1 queued, 1 running, 2 failed"
     _, out, _ = evoclaims("submit")
     assert "queued already, as job 41_0" in out

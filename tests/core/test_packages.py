@@ -8,6 +8,7 @@ from typing import Any, ClassVar
 
 import pytest
 
+from evoclaims.core import packages
 from evoclaims.core.errors import UserError
 from evoclaims.core.packages import UNDECLARED, agree, depends_on, differences, installed, packages_of, short_hash
 from evoclaims.core.provenance import PACKAGES
@@ -92,7 +93,12 @@ def test_a_provenance_that_does_not_say_what_its_trial_depends_on_is_an_old_one(
         assert depends_on(odd) is None
 
 
-def test_installed_versions_and_their_differences() -> None:
+def test_installed_versions_and_their_differences(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(packages, "changing_flags", lambda: None)
     here = installed(("numpy", "evoclaims-no-such-package"))
     assert here == {"numpy": version("numpy"), "evoclaims-no-such-package": None}
     assert differences(here, {**here, "numpy": "0"}) == {"numpy": (version("numpy"), "0")}
+    monkeypatch.setattr(packages, "changing_flags", lambda: "--xla_a=1")
+    flagged = installed(("numpy",))
+    assert differences(installed(("numpy", "XLA_FLAGS")), flagged) == {}
+    assert flagged == {"numpy": version("numpy"), "XLA_FLAGS": "--xla_a=1"}

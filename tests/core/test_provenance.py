@@ -200,3 +200,17 @@ def test_processors_of_one_name_are_told_apart_by_their_widest_vectors(monkeypat
         monkeypatch.setattr(binding, "get_host_cpu_features", lambda features=features: features)
         told.append(provenance.instructions())
     assert told == ["znver4 avx512f", "znver4 avx2", "znver4"]
+
+
+@pytest.mark.parametrize(
+    ("flags", "kept"),
+    [
+        (None, None),
+        ("", None),
+        ("--xla_dump_to=/tmp/x --xla_force_host_platform_device_count=8", None),
+        ("--xla_b=1 --xla_a=2", "--xla_a=2 --xla_b=1"),
+        ("--xla_a=1 --xla_a=2  --xla_dump_to=x", "--xla_a=2"),
+    ],
+)
+def test_flags_that_change_a_trial_are_told_from_those_that_do_not(flags: str | None, kept: str | None) -> None:
+    assert provenance.flags_that_change(flags) == kept

@@ -89,5 +89,5 @@ def test_a_torn_champion_is_an_error_that_names_the_file(mapped: Any) -> None:
 
 
 def test_only_a_maze_has_a_map(paper: Any) -> None:
-    with pytest.raises(UserError, match="lies over the area of a maze, which 'small' is not"):
+    with pytest.raises(UserError, match="needs the area of a maze; 'small' is not a maze"):
         paper.draw(ElitesMap((Ground("no maze", "one", "small"),), ()))

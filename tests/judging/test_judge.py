@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from evoclaims.judging.design import FIXED_10, SEQUENTIAL, Design, Look
 from evoclaims.judging.judge import attainability, judge, needed_trials
+from evoclaims.judging.measure import Event
 from evoclaims.judging.verdict import Outcome
 
 HIGH, LOW = [float(i) for i in range(10, 20)], [float(i) for i in range(10)]
@@ -217,7 +218,7 @@ def test_trials_that_are_all_copies_of_one_are_no_evidence(source) -> None:
     a = _with_champions(source, "a", ["one"])
     verdict = judge(a.solved().in_most_trials() & (a.score() > 0.5), FIXED_10)
     assert verdict.outcome is Outcome.INCONCLUSIVE
-    assert verdict.reason.startswith("all 10 trials of a are copies of one: the same champion and training curves")
+    assert verdict.reason.startswith("all 10 trials of a are copies of one: training gave the same, whatever the seed")
     assert judge(a.solved().in_every_trial(), FIXED_10).outcome is Outcome.SUPPORTED
     assert judge(a.solved().in_every_trial() & (a.score() > 0.5), FIXED_10).outcome is Outcome.INCONCLUSIVE
     a.deterministic = True
@@ -226,38 +227,86 @@ def test_trials_that_are_all_copies_of_one_are_no_evidence(source) -> None:
 
 @pytest.mark.parametrize(
     ("champions", "curves"),
-    [(["one", "two"], [(1.0,)]), (["one"], [(1.0,), (2.0,)]), ([""], [(1.0,)])],
+    [(list("abcdefghij"), [(1.0,)]), (["a"], [(float(n),) for n in range(10)]), ([""], [(1.0,)])],
     ids=["different champions", "different curves", "no champions"],
 )
-def test_trials_that_agree_by_chance_or_keep_no_champion_are_evidence(source, champions, curves) -> None:
+def test_trials_that_differ_or_keep_no_champion_are_evidence(source, champions, curves) -> None:
     a = _with_champions(source, "a", champions, curves)
-    assert judge(a.solved().in_most_trials(), FIXED_10).outcome is Outcome.SUPPORTED
+    verdict = judge(a.solved().in_most_trials(), FIXED_10)
+    assert (verdict.outcome, verdict.n) == (Outcome.SUPPORTED, 10)
+    assert verdict.reason.startswith("p = ")
+
+
+def _of_a_loop(source, label, values, returned):  # type: ignore[no-untyped-def]
+    """Return a source of trials of a training loop; of each seed, curve, metrics, actions, and whether these grade."""
+    made = source(label, values)
+    for seed, trial in made.trials.items():
+        curve, metrics, actions, graded = returned(seed)
+        marks = {"metrics": str(metrics), "actions": str(actions), "graded": graded}
+        curves = {"fitness": (curve,)} if curve is not None else {}
+        provenance = {"trained_by": "loops:one", "returned": marks}
+        made.trials[seed] = replace(trial, champion="", curves=curves, digest=str(seed), provenance=provenance)
+    return made
 
 
 @pytest.mark.parametrize(
-    ("numbers", "outcome"),
+    ("returned", "distinct"),
     [
-        ([0.857], Outcome.INCONCLUSIVE),
-        ([0.857, 0.9], Outcome.SUPPORTED),
-        ([1.0], Outcome.SUPPORTED),
-        ([1], Outcome.SUPPORTED),
+        (lambda seed: (0.857, 0, "", False), 1),  # curves alone
+        (lambda seed: (None, 100, "", False), 1),  # metrics alone, whole
+        (lambda seed: (None, 0, "acts", False), 1),  # a policy alone
+        (lambda seed: (0.857, f"took {seed} s", "", False), 1),  # wall times hide nothing
+        (lambda seed: (None, f"took {seed} s", "acts", True), 1),
+        (lambda seed: (0.857 + seed % 2, 0, "", False), 2),
+        (lambda seed: (None, seed % 2, "", False), 2),
+        (lambda seed: (None, 0, seed // 2, False), 5),
+        (lambda seed: (None, min(seed, 8), "", False), 9),
+        (lambda seed: (500.0, seed, "", False), 10),  # whole curves may be equal by chance
+        (lambda seed: (0.857, 0, seed, False), 10),  # so may those of a schedule, where policies differ
+        (lambda seed: (0.857 + seed, 0, "acts", True), 10),
     ],
-    ids=["one number", "two numbers", "one whole number", "one that is read as an int"],
 )
-def test_a_training_loop_that_tells_the_same_whatever_its_seed_is_no_evidence(source, numbers, outcome) -> None:
-    a = source("a", [1.0] * 10)
-    for seed, trial in a.trials.items():
-        number = numbers[seed % len(numbers)]
-        a.trials[seed] = replace(
-            trial,
-            champion="",
-            curves={"fitness": (number,)},
-            digest=str(number),
-            provenance={"trained_by": "loops:one"},
-        )
-    verdict = judge(a.solved().in_most_trials(), FIXED_10)
-    assert verdict.outcome is outcome
-    assert verdict.reason.startswith("all 10 trials of a are copies of one") == (outcome is Outcome.INCONCLUSIVE)
+def test_copies_of_a_training_loop_count_once(source, returned, distinct) -> None:
+    a, b = _of_a_loop(source, "a", HIGH, returned), source("b", LOW)
+    for assertion in (a.solved().in_most_trials(), a.score() > b.score(), b.score() < a.score()):
+        verdict = judge(assertion, FIXED_10)
+        if distinct == 10:
+            assert "copies" not in verdict.reason
+            assert verdict.n == 10
+            continue
+        assert "copies" in verdict.reason
+        attainable = assertion.attainable(distinct, FIXED_10).supported <= FIXED_10.alpha
+        assert (verdict.outcome is Outcome.SUPPORTED) == (distinct > 1 and attainable)
+        if distinct > 1:
+            assert verdict.n == distinct
+            assert f"which count once: n = {distinct} instead of 10" in verdict.reason
+            alone = judge(assertion, replace(FIXED_10, looks=(Look(distinct, FIXED_10.alpha),)))
+            if returned(9) != returned(0) and distinct == 9:  # the first nine seeds are those that count
+                assert (verdict.p, verdict.outcome) == (alone.p, alone.outcome)
+
+
+def test_copies_are_named_by_their_seeds_and_support_nothing_alone(source) -> None:
+    a = _of_a_loop(source, "a", HIGH, lambda seed: (0.5 + seed % 2, 0, "", False))
+    verdict = judge(a.score() > source("b", LOW).score(), FIXED_10)
+    assert verdict.outcome is Outcome.INCONCLUSIVE
+    assert "a has copies of the same training (seeds 0, 2, 4, 6, 8; seeds 1, 3, 5, 7, 9)" in verdict.reason
+    assert "underpowered: needs n = " in verdict.reason
+
+
+def test_equal_trials_that_may_be_chance_do_not_make_what_is_rare_look_usual(source) -> None:
+    """Four of ten trials fail, each in its way; the six that succeed are equal: left out, most trials would fail."""
+    a = _of_a_loop(source, "a", [1.0] * 6 + [0.0] * 4, lambda seed: (None, max(seed, 5), "", False))
+    at_half = replace(FIXED_10, looks=(Look(10, 0.2),))
+    fails = Event(a, "fails", lambda trial: not trial.metrics["score"])
+    verdict = judge(fails.in_most_trials(0.5), at_half)
+    assert verdict.n == 5
+    assert verdict.outcome is Outcome.INCONCLUSIVE
+
+
+def test_a_second_look_goes_on_behind_copies_in_the_first(source) -> None:
+    a = _of_a_loop(source, "a", HIGH, lambda seed: (max(seed, 1) + 0.5, 0, "", False))
+    verdict = judge(a.solved().in_most_trials(0.5), replace(FIXED_10, looks=(Look(5, 0.01), Look(10, 0.04))))
+    assert (verdict.outcome, verdict.n) == (Outcome.SUPPORTED, 9)
 
 
 def test_trials_of_a_training_loop_in_a_pilot_which_keeps_no_digests_are_evidence(source) -> None:

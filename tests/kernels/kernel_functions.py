@@ -9,7 +9,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from evoclaims.kernels.seldom import seldom
+from evoclaims.kernels.trace.seldom import seldom
 
 X = np.random.default_rng(0).normal(size=(37, 4)).astype(np.float32)  # the second block is not full
 Y = np.random.default_rng(1).normal(size=(37, 4)).astype(np.float32)

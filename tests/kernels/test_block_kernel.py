@@ -17,12 +17,12 @@ from kernel_functions import FUNCTIONS
 
 from evoclaims.envs.ecorobot.robots import ANT
 from evoclaims.envs.ecorobot.stones import SteppingStones
-from evoclaims.kernels import block_kernel, block_shape
-from evoclaims.kernels.block_shape import BlockShape
-from evoclaims.kernels.kernel import Kernel
-from evoclaims.kernels.shared_slots import slots
-from evoclaims.kernels.warp_assignment import SLACK, STRETCHES, Group, assign
-from evoclaims.kernels.warp_schedule import schedule
+from evoclaims.kernels.call.kernel import Kernel
+from evoclaims.kernels.emit import block_kernel, block_shape
+from evoclaims.kernels.emit.block_shape import BlockShape
+from evoclaims.kernels.emit.shared_slots import slots
+from evoclaims.kernels.emit.warp_assignment import SLACK, STRETCHES, Group, assign
+from evoclaims.kernels.emit.warp_schedule import schedule
 
 
 def _kernel(function: Callable[..., Any], arguments: Any) -> Kernel:

@@ -11,7 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from evoclaims.kernels.by_platform import BY_PLATFORM, by_platform
+from evoclaims.kernels.call.by_platform import BY_PLATFORM, by_platform
 
 X = np.random.default_rng(0).normal(size=(3, 4)).astype(np.float32)
 Y = np.random.default_rng(1).normal(size=(3, 4)).astype(np.float32)

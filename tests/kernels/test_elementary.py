@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from evoclaims.kernels.algebra import Algebra
-from evoclaims.kernels.elementary import ELEMENTARY
-from evoclaims.kernels.one_kernel import one_kernel
+from evoclaims.kernels.call.one_kernel import one_kernel
+from evoclaims.kernels.trace.algebra import Algebra
+from evoclaims.kernels.trace.elementary import ELEMENTARY
 
 SMALLEST: Final = float(np.finfo(np.float32).tiny)
 ENDS: Final = np.array([0, 1, -1, 2, -2, 0.5, -0.5, 3, -3, np.inf, -np.inf, np.nan, 1e38, 0.3, 2**24, 1e9], np.float32)

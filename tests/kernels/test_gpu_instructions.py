@@ -16,15 +16,15 @@ from approximations import on_a_processor
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from evoclaims.kernels import block_kernel, gpu_kernel, group_kernel, host_kernel, machine_code
-from evoclaims.kernels.block_shape import BlockShape
-from evoclaims.kernels.expressions import Input, in_order
-from evoclaims.kernels.gpu_instructions import GpuInstructions
-from evoclaims.kernels.group_kernel import Rows, Sizes
-from evoclaims.kernels.kernel import Kernel
-from evoclaims.kernels.llvm_names import literal
-from evoclaims.kernels.shared_slots import slots
-from evoclaims.kernels.warp_schedule import schedule
+from evoclaims.kernels.call.kernel import Kernel
+from evoclaims.kernels.emit import block_kernel, gpu_kernel, group_kernel, host_kernel, machine_code
+from evoclaims.kernels.emit.block_shape import BlockShape
+from evoclaims.kernels.emit.gpu_instructions import GpuInstructions
+from evoclaims.kernels.emit.group_kernel import Rows, Sizes
+from evoclaims.kernels.emit.llvm_names import literal
+from evoclaims.kernels.emit.shared_slots import slots
+from evoclaims.kernels.emit.warp_schedule import schedule
+from evoclaims.kernels.trace.expressions import Input, in_order
 
 UNITS = (-2, -1, 0, 1, 2)
 """How far off an approximation may be."""

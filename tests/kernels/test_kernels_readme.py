@@ -8,15 +8,20 @@ from pathlib import Path
 
 import pytest
 
-from evoclaims.kernels import llvm_names
+from evoclaims import kernels
+from evoclaims.kernels.emit import llvm_names
 
-FOLDER = Path(llvm_names.__file__).parent
+FOLDER = Path(llvm_names.__file__).parents[1]
 README = (FOLDER / "README.md").read_text(encoding="utf-8")
 
 
 def test_every_file_is_explained_and_no_other() -> None:
-    files = {path.name for path in FOLDER.glob("*.py")} - {"__init__.py"}
-    assert set(re.findall(r"^\| `(\w+\.py)` \|", README, re.MULTILINE)) == files
+    files = {path.relative_to(FOLDER).as_posix() for path in FOLDER.rglob("*.py") if path.name != "__init__.py"}
+    assert set(re.findall(r"^\| `([\w/]+\.py)` \|", README, re.MULTILINE)) == files
+
+
+def test_every_public_name_is_explained_and_no_other() -> None:
+    assert set(re.findall(r"^\| `(\w+)` \|", README, re.MULTILINE)) == set(kernels.__all__)
 
 
 def test_the_example_prints_a_kernel(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -1,11 +1,13 @@
-"""Machine code is compiled once a machine, kept on disk, and made again when its file is damaged."""
+"""Machine code is compiled once a machine, kept on disk, and made again when its file is damaged or another user's."""
 
 from __future__ import annotations
 
 import ctypes
+import hashlib
 import os
 import subprocess
 import sys
+import warnings
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
@@ -15,15 +17,17 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from filelock import FileLock
 
-from evoclaims.kernels import machine_code
-from evoclaims.kernels.one_kernel import one_kernel
+from evoclaims.core import private_files
+from evoclaims.kernels.call.one_kernel import one_kernel
+from evoclaims.kernels.emit import machine_code
 
 TEXT = "define i32 @seven(i32 %x) {\n%y = mul i32 %x, 7\nret i32 %y\n}\n"
 NEW_LINKER = machine_code._linker.__wrapped__
 PROCESS = """
 import sys, time, jax
-from evoclaims.kernels import machine_code
+from evoclaims.kernels.emit import machine_code
 
 def slowly(text, compiled=machine_code.compiled):
     print("compiles", flush=True)
@@ -87,6 +91,69 @@ def test_a_damaged_file_is_made_again(
     assert _seven_times(5) == 35
     assert compiled == [TEXT, TEXT]
     assert path.read_bytes() == whole
+
+
+def _plant(path: Path) -> bytes:
+    """Put machine code with a sound checksum and another result into the cache, as another user could."""
+    code = machine_code.compiled(TEXT.replace("7", "8"))
+    path.write_bytes(hashlib.sha256(code).digest() + code)
+    return path.read_bytes()
+
+
+@pytest.mark.skipif(not hasattr(os, "getuid"), reason="files have no owner's number and mode here")
+@pytest.mark.parametrize("fault", ["", "owner", "writable file", "writable folder", "folder's owner", "writable above"])
+def test_machine_code_another_user_could_have_written_is_not_run(
+    fault: str, compiled: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    _seven_times(1)
+    folder = tmp_path / "kernels"
+    path = folder / f"{machine_code.key_of(TEXT)}.o"
+    assert (path.stat().st_mode & 0o777, folder.stat().st_mode & 0o777) == (0o600, 0o700)
+    planted = _plant(path)
+    del compiled[:]
+    for place in {"owner": [path], "folder's owner": [folder]}.get(fault, []):
+        if os.getuid():  # only root can give a file away: be somebody else instead
+            monkeypatch.setattr(os, "getuid", lambda: 12345)
+        else:
+            os.chown(place, 65534, 65534)
+    for place in {"writable file": [path], "writable folder": [folder], "writable above": [tmp_path]}.get(fault, []):
+        place.chmod(0o777)
+    _forget(monkeypatch)
+    private_files.say_refused.cache_clear()
+    if not fault:  # the planted code does run where nobody else could have written it
+        assert (_seven_times(2), compiled) == (16, [])
+        return
+    with pytest.warns(UserWarning, match=r"^Not using compiled programs in .* \((uid|mode) .* They are compiled again"):
+        assert _seven_times(2) == 14
+    assert compiled == [TEXT]
+    healed = fault in ("owner", "writable file") and path.read_bytes() != planted
+    assert healed or path.read_bytes() == planted
+
+
+def test_refused_code_is_reported_once_and_never_an_error(
+    compiled: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, recwarn: pytest.WarningsRecorder
+) -> None:
+    (tmp_path / "kernels").mkdir(mode=0o700)
+    (tmp_path / "kernels").chmod(0o777)
+    private_files.say_refused.cache_clear()
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert _seven_times(2) == 14  # as in a pytest run in which warnings are errors
+    private_files.say_refused.cache_clear()
+    for _ in range(3):
+        _forget(monkeypatch)
+        assert _seven_times(2) == 14
+    assert [str(one.message)[:30] for one in recwarn] == ["Not using compiled programs in"]
+
+
+def test_a_lock_that_is_never_released_ends_in_compiling_alone(
+    compiled: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(machine_code, "PATIENCE", 0.05)
+    (tmp_path / "kernels").mkdir(mode=0o700)
+    with FileLock(tmp_path / "kernels" / f"{machine_code.key_of(TEXT)}.lock"):  # as one stopped by Ctrl-Z holds it
+        assert _seven_times(6) == 42
+    assert compiled == [TEXT]
 
 
 def test_another_text_or_another_processor_has_another_key(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -16,11 +16,11 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from kernel_functions import FUNCTIONS, NO_KERNELS, X, Y
 
-from evoclaims.kernels import block_shape, machine_code
-from evoclaims.kernels.algebra import Algebra
-from evoclaims.kernels.elementary import WIDEST
-from evoclaims.kernels.kernel import Kernel
-from evoclaims.kernels.one_kernel import one_kernel
+from evoclaims.kernels.call.kernel import Kernel
+from evoclaims.kernels.call.one_kernel import one_kernel
+from evoclaims.kernels.emit import block_shape, machine_code
+from evoclaims.kernels.trace.algebra import Algebra
+from evoclaims.kernels.trace.elementary import WIDEST
 
 
 @pytest.mark.parametrize("case", FUNCTIONS)

@@ -13,8 +13,8 @@ from assembler import kernels_for_gpus
 from hypothesis import given
 from hypothesis import strategies as st
 
-from evoclaims.kernels import machine_code
-from evoclaims.kernels.random_bits import fast
+from evoclaims.kernels.call.random_bits import kernel_prng
+from evoclaims.kernels.emit import machine_code
 
 DRAWS: Final[dict[str, Callable[..., Any]]] = {
     "bits": jax.random.bits,
@@ -48,16 +48,16 @@ def _widths(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> 
 @pytest.mark.parametrize("shape", [(), (1,), (3,), (64,), (65,), (100, 3), (4, 0)])
 def test_every_draw_is_jaxs(shape: tuple[int, ...]) -> None:
     for draw in DRAWS.values():
-        made, wanted = draw(fast(_keys()[1]), shape), draw(_keys()[1], shape)
+        made, wanted = draw(kernel_prng(_keys()[1]), shape), draw(_keys()[1], shape)
         np.testing.assert_array_equal(made, wanted)
-        many = jax.jit(jax.vmap(lambda key, draw=draw: draw(fast(key), shape)))(_keys())
+        many = jax.jit(jax.vmap(lambda key, draw=draw: draw(kernel_prng(key), shape)))(_keys())
         np.testing.assert_array_equal(many, jax.vmap(lambda key, draw=draw: draw(key, shape))(_keys()))
 
 
 @given(st.integers(0, 2**32 - 1), st.integers(0, 2**32 - 1), st.integers(0, 2**32 - 1))
 def test_a_key_folded_in_a_number_is_jaxs(first: int, second: int, number: int) -> None:
     plain = jax.random.wrap_key_data(jnp.array([first, second], jnp.uint32))
-    assert (_numbers(_fold(fast(plain), jnp.uint32(number))) == _numbers(_fold(plain, jnp.uint32(number)))).all()
+    assert (_numbers(_fold(kernel_prng(plain), jnp.uint32(number))) == _numbers(_fold(plain, jnp.uint32(number)))).all()
 
 
 _fold = jax.jit(jax.random.fold_in)
@@ -65,9 +65,9 @@ _fold = jax.jit(jax.random.fold_in)
 
 @pytest.mark.parametrize("shape", [(), (1,), (7,), (3, 5), (0,), (2, 0)])
 def test_keys_split_from_one_are_jaxs_and_such_keys_too(shape: tuple[int, ...]) -> None:
-    made, wanted = jax.random.split(fast(_keys()[0]), shape), jax.random.split(_keys()[0], shape)
+    made, wanted = jax.random.split(kernel_prng(_keys()[0]), shape), jax.random.split(_keys()[0], shape)
     np.testing.assert_array_equal(_numbers(made), _numbers(wanted))
-    assert made.dtype == fast(_keys()).dtype != wanted.dtype
+    assert made.dtype == kernel_prng(_keys()).dtype != wanted.dtype
 
 
 def test_many_keys_and_many_numbers_are_folded_as_by_jax() -> None:
@@ -77,17 +77,19 @@ def test_many_keys_and_many_numbers_are_folded_as_by_jax() -> None:
         jax.vmap(jax.vmap(jax.random.fold_in, (None, 0)), (0, None)),  # [5] keys with [3] numbers
     ):
         np.testing.assert_array_equal(
-            _numbers(jax.jit(many)(fast(_keys()), numbers[:, 0])), _numbers(many(_keys(), numbers[:, 0]))
+            _numbers(jax.jit(many)(kernel_prng(_keys()), numbers[:, 0])), _numbers(many(_keys(), numbers[:, 0]))
         )
     each = jax.vmap(jax.vmap(jax.random.fold_in), (None, 0))
-    np.testing.assert_array_equal(_numbers(jax.jit(each)(fast(_keys()), numbers)), _numbers(each(_keys(), numbers)))
+    np.testing.assert_array_equal(
+        _numbers(jax.jit(each)(kernel_prng(_keys()), numbers)), _numbers(each(_keys(), numbers))
+    )
 
 
 def test_one_program_draws_any_amount() -> None:
     """A kernel per size would be compiled for every shape that is drawn."""
     before = set(machine_code._libraries)
     for size in (5, 6, 700):
-        jax.jit(lambda key, size=size: jax.random.bits(key, (size,)))(fast(_keys()[0]))
+        jax.jit(lambda key, size=size: jax.random.bits(key, (size,)))(kernel_prng(_keys()[0]))
     assert len(set(machine_code._libraries) - before) <= 1
 
 
@@ -97,15 +99,15 @@ def test_nothing_of_xlas_loops_is_left_in_a_program_for_processors() -> None:
         return jax.random.normal(one, (9,)), jax.random.randint(two, (), 0, 7)
 
     assert "while" in jax.jit(function).lower(_keys()[0]).as_text()
-    assert "while" not in jax.jit(function).lower(fast(_keys()[0])).as_text()
+    assert "while" not in jax.jit(function).lower(kernel_prng(_keys()[0])).as_text()
 
 
 def test_keys_of_other_generators_are_left_alone() -> None:
     key = jax.random.key(1, impl="rbg")
-    assert fast(key) is key
+    assert kernel_prng(key) is key
     with jax.threefry_partitionable(False):
-        assert fast(_keys()).dtype == _keys().dtype
+        assert kernel_prng(_keys()).dtype == _keys().dtype
 
 
 def test_other_devices_draw_as_ever() -> None:
-    assert not kernels_for_gpus(lambda key: jax.random.bits(fast(key), (9,)), _keys()[0])
+    assert not kernels_for_gpus(lambda key: jax.random.bits(kernel_prng(key), (9,)), _keys()[0])

@@ -13,13 +13,21 @@ from hypothesis import given
 from hypothesis import strategies as st
 from kernel_functions import FUNCTIONS, X
 
-from evoclaims.kernels import seldom as seldom_conditions
-from evoclaims.kernels.algebra import Algebra
-from evoclaims.kernels.expressions import FUSED, Expression, Input, LoopResult, ScalarOperation, in_order, is_known
-from evoclaims.kernels.kernel import Kernel
-from evoclaims.kernels.machine_code import lanes
-from evoclaims.kernels.one_kernel import one_kernel
-from evoclaims.kernels.seldom import seldom
+from evoclaims.kernels.call.kernel import Kernel
+from evoclaims.kernels.call.one_kernel import one_kernel
+from evoclaims.kernels.emit.machine_code import lanes
+from evoclaims.kernels.trace import seldom as seldom_conditions
+from evoclaims.kernels.trace.algebra import Algebra
+from evoclaims.kernels.trace.expressions import (
+    FUSED,
+    Expression,
+    Input,
+    LoopResult,
+    ScalarOperation,
+    in_order,
+    is_known,
+)
+from evoclaims.kernels.trace.seldom import seldom
 
 NUMBER = np.dtype(np.float32)
 SMALL_NUMBERS = st.integers(-64, 64).map(lambda n: np.float32(n / 4))

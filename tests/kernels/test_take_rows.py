@@ -12,8 +12,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
-from evoclaims.kernels import machine_code
-from evoclaims.kernels.take_rows import take_rows
+from evoclaims.kernels.call.take_rows import take_rows
+from evoclaims.kernels.emit import machine_code
 from evoclaims.kernels.unsupported import Unsupported
 
 taken = jax.jit(take_rows)

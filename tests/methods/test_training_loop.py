@@ -62,7 +62,7 @@ def test_what_another_process_cannot_call_is_a_sentence() -> None:
 def test_it_has_no_champion_and_says_so() -> None:
     loop = TrainingLoop(train, packages=())
     for call in (loop.init, loop.best):
-        with pytest.raises(UserError, match="'train' is a training loop of its own"):
+        with pytest.raises(UserError, match="'train' is a training loop"):
             call(None, None)
 
 

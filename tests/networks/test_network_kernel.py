@@ -17,8 +17,9 @@ from block_machine import run
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from evoclaims.kernels import group_kernel, grouped, machine_code
-from evoclaims.kernels.gpu_kernel import GpuProgram
+from evoclaims.kernels.call import grouped
+from evoclaims.kernels.emit import group_kernel, machine_code
+from evoclaims.kernels.emit.gpu_kernel import GpuProgram
 from evoclaims.networks import graph, wiring
 from evoclaims.networks.genome import EMPTY, Connections, Genome, Nodes
 from evoclaims.networks.graph import GraphNetwork

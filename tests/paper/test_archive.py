@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 
 from evoclaims.core.errors import UserError
+from evoclaims.core.packages import without_flags
 from evoclaims.paper import references
 from evoclaims.paper.archive import Archive
 from evoclaims.paper.reproduction import Reproduction
@@ -55,7 +56,7 @@ def test_what_is_judged_is_stored_unless_a_committed_trial_goes_before_it(
     tmp_path: Path, store: Store, made: Any, reproduction: Reproduction
 ) -> None:
     condition = reproduction.tier("smoke").condition("better", "small")
-    here, packages = dict(condition.versions), list(condition.versions)
+    here, packages = without_flags(condition.versions), list(condition.packages)
     ours = {"versions": here, "depends_on": packages}
     older = {"versions": {**here, "jax": "0.0.1"}, "depends_on": packages}
     for seed, status, provenance in ((0, "done", ours), (1, "done", older), (2, "timeout", ours), (3, "done", older)):
@@ -75,5 +76,5 @@ def test_a_torn_file_of_reference_trials_is_said(
     path = references.path_of(tmp_path, "smoke", "better", "small")
     references.write(path, [made(condition, 0, 1.0)])
     path.write_bytes(path.read_bytes()[:-20])
-    with pytest.raises(UserError, match="is no reference trial"):
+    with pytest.raises(UserError, match="is not a reference trial"):
         Archive(store, tmp_path).trials(condition, [0])

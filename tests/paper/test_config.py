@@ -212,7 +212,9 @@ def test_a_time_limit_that_is_no_time_is_a_sentence(project: Path) -> None:
 
 
 def test_a_reproduction_with_text_for_a_folder_or_a_number_for_a_design_is_refused() -> None:
-    with pytest.raises(UserError, match=r"folder='\.': write Path\(__file__\)\.parent"):
+    with pytest.raises(UserError, match=r"folder='\.'\. Write Path\(__file__\)\.parent"):
         Reproduction("tiny", "A Tiny Paper", ".", {})  # type: ignore[arg-type]
-    with pytest.raises(UserError, match=r"A tier has a design, unlike 10: Tier\(conditions, Design\.fixed\(10\)\)"):
+    with pytest.raises(
+        UserError, match=r"A tier's design is a Design, not 10\. Write Tier\(conditions, Design\.fixed\(10\)\)"
+    ):
         Tier({}, 10)  # type: ignore[arg-type]

@@ -1,4 +1,4 @@
-"""Committed pilots: they keep what claims read and nothing else, and what is no pilot of a condition is told."""
+"""Committed pilots: they keep what claims read and nothing else, and what is not a pilot of a condition is told."""
 
 from __future__ import annotations
 
@@ -91,14 +91,14 @@ def test_a_pilot_that_was_edited_or_torn_is_a_sentence(
 ) -> None:
     pilots.write(path, trials, readings)
     path.write_text(path.read_text().replace(was, now, 1))
-    with pytest.raises(UserError, match="is no pilot: .* make it anew with `evoclaims power --run`"):
+    with pytest.raises(UserError, match="is not a pilot: .* make it anew with `evoclaims power --run`"):
         pilots.load(path)
     path.write_text("")
-    with pytest.raises(UserError, match="is no pilot: Input data was truncated"):
+    with pytest.raises(UserError, match="is not a pilot: Input data was truncated"):
         pilots.load(path)
     path.unlink()
     path.mkdir()
-    with pytest.raises(UserError, match="is no pilot"):
+    with pytest.raises(UserError, match="is not a pilot"):
         pilots.load(path)
 
 

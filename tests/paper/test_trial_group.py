@@ -93,10 +93,10 @@ def test_each_event_holds_where_its_name_says(group: Any, event: Any, held: tupl
 @pytest.mark.parametrize(
     ("event", "said"),
     [
-        (lambda g: g.solves_level(-1), "2 levels, counted from 0: .* of -1 .* From 0 to 1"),
-        (lambda g: g.solves_level(2), "2 levels, counted from 0: .* of 2 .* From 0 to 1"),
-        (lambda g: g.solves_no_level_beyond(1), "2 levels, counted from 0: .* of 1 .* From -1 to 0"),
-        (lambda g: g.solves_no_level_beyond(-2), "of -2"),
+        (lambda g: g.solves_level(-1), "2 levels, counted from 0: .* level -1 .* from 0 to 1"),
+        (lambda g: g.solves_level(2), "2 levels, counted from 0: .* level 2 .* from 0 to 1"),
+        (lambda g: g.solves_no_level_beyond(1), "2 levels, counted from 0: .* level 1 .* from -1 to 0"),
+        (lambda g: g.solves_no_level_beyond(-2), "level -2"),
     ],
 )
 def test_what_would_always_hold_of_a_level_or_never_is_refused(group: Any, event: Any, said: str) -> None:
@@ -188,7 +188,7 @@ def test_what_breaks_in_a_measure_is_not_taken_for_a_misspelled_one(reproduction
 
 
 def test_trials_that_are_none_are_refused(reproduction: Reproduction) -> None:
-    with pytest.raises(UserError, match="The reproduction 'tiny' says trials=.*: name a subclass of TrialGroup"):
+    with pytest.raises(UserError, match="The reproduction 'tiny' has trials=.* Name a subclass of TrialGroup"):
         replace(reproduction, trials={"stones": len})  # type: ignore[arg-type]
 
 

@@ -155,7 +155,7 @@ class TestOld(unittest.TestCase):
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        (CLASS, "TestOld::test_it is a claim and cannot be given a tier: write it as a function"),
+        (CLASS, "TestOld::test_it is a claim that cannot run at a tier. Write it as a function"),
         ("@pytest.mark.claim\ndef test_a(trials):\n    pass\n", "has the mark pytest.mark.claim but no claim"),
     ],
 )

@@ -129,7 +129,9 @@ def test_a_torn_reference_fails_the_run_and_does_not_keep_the_verdicts_from_bein
     torn.write_text("torn\n")
     result = project.run("--claims-json=out.json")
     assert result.ret == pytest.ExitCode.TESTS_FAILED
-    result.stdout.fnmatch_lines(["error: Line 1 of *right-parity.jsonl is no reference trial*", "claims: 1 supported"])
+    result.stdout.fnmatch_lines(
+        ["error: Line 1 of *right-parity.jsonl is not a reference trial*", "claims: 1 supported"]
+    )
     plain = json.loads((project.path / "out.json").read_text())
     assert [report["outcome"] for report in plain["claims"]] == ["supported"]
     assert plain["drift"] is None

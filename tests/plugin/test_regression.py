@@ -103,7 +103,7 @@ def test_what_other_trials_have_changed_is_not_said_to_be_from_the_same(accepted
     forget(stored, right)
     for trial in right:
         stored.put(aged(spoiled(trial)), {})
-    said = "the trials of right on parity (smoke) have drifted from the reference trials, as said above"
+    said = "the trials of right on parity (smoke) have drifted from the reference trials (see above)"
     for option in ("--claims-any-version", "--claims-stored"):
         shown = accepted.run(option, "--claims-only=a", own_store=True).stdout.str()
         assert f"a (smoke): supported -> refuted: {said}" in shown

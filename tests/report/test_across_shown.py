@@ -43,7 +43,7 @@ def test_the_newest_table_is_read_back_as_it_was_kept(tmp_path: Path, found: Acr
 
 def test_a_file_that_holds_something_else_is_named(tmp_path: Path) -> None:
     (tmp_path / FILE).write_text("{}")
-    with pytest.raises(UserError, match=r"across\.json holds nothing that `evoclaims across` has found .*: delete it"):
+    with pytest.raises(UserError, match=r"across\.json is not a file of `evoclaims across` .* Delete it"):
         last([tmp_path])
 
 

@@ -172,5 +172,5 @@ def test_a_run_of_hours_is_told_of_with_what_is_unknown_of_it_and_a_short_one_is
         "The missing trials take up to 3 hours of a processor's core here. `ev"
     )
     assert told(a=7_200.0, b=None).startswith(
-        "The missing trials take up to 2 hours of a processor's core here, and more of which no trial tells. `evoclaims"
+        "The missing trials take up to 2 hours of a processor's core here, and more without a timing. `evoclaims"
     )

@@ -274,7 +274,7 @@ def test_parts_and_subclasses_of_a_users_own_are_told_apart_by_their_classes() -
 
 
 def test_a_field_that_cannot_be_written_is_a_sentence_that_names_the_class() -> None:
-    with pytest.raises(UserError, match="A field of RandomSearch tells its trials apart and is no number, word"):
+    with pytest.raises(UserError, match="A field of RandomSearch identifies its trials and is not a number, word"):
         _ = Condition(RandomSearch(8, network=Mlp), TASK, "direct", BUDGET).id  # type: ignore[arg-type]
 
 

@@ -18,7 +18,7 @@ from jax.extend import core as jaxprs
 
 from evoclaims.core.packages import ALWAYS, UNDECLARED, packages_of
 from evoclaims.envs.ecorobot import robot_task
-from evoclaims.kernels import machine_code
+from evoclaims.kernels.emit import machine_code
 from evoclaims.methods.map_elites import MapElites
 from evoclaims.networks.mlp import Mlp
 from evoclaims.trials.devices import MATMUL_PRECISION

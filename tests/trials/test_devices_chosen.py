@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from evoclaims.core import private_files
 from evoclaims.core.errors import UserError
 from evoclaims.trials import devices
 
@@ -59,3 +60,31 @@ def test_a_cpu_is_one_device_and_there_is_a_cache_that_lasts(tmp_path: Path) -> 
 
 def test_what_a_user_has_decided_stays(tmp_path: Path) -> None:
     assert _configured(JAX_NUM_CPU_DEVICES="3", JAX_COMPILATION_CACHE_DIR=str(tmp_path)) == (3, str(tmp_path))
+
+
+def test_a_relative_cache_folder_is_ignored(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", "relcache")
+    monkeypatch.setenv("HOME", str(tmp_path))
+    assert devices._cache() == tmp_path / ".cache" / "evoclaims" / "xla"
+
+
+@pytest.mark.skipif(not hasattr(os, "getuid"), reason="files have no owner's number and mode here")
+@pytest.mark.parametrize("writable", ["", "evoclaims/xla", "evoclaims", "."])
+def test_a_cache_that_others_can_write_is_not_used(
+    writable: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    private_files.say_refused.cache_clear()
+    folder = tmp_path / "evoclaims" / "xla"
+    previous = os.umask(0)
+    try:
+        assert devices._cache() == folder
+    finally:
+        os.umask(previous)
+    assert folder.stat().st_mode & 0o777 == folder.parent.stat().st_mode & 0o777 == 0o700
+    (tmp_path / writable).chmod(0o777 if writable else 0o1777)  # the sticky bit keeps others from exchanging folders
+    if not writable:
+        assert devices._cache() == folder
+        return
+    with pytest.warns(UserWarning, match="^Not using compiled programs in"):
+        assert devices._cache() is None

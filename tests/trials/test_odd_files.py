@@ -10,14 +10,22 @@ from typing import Any
 
 import pytest
 
+from evoclaims.cli.jobs import last_words
 from evoclaims.core.errors import UserError
 from evoclaims.core.files import read_file
+from evoclaims.judging.verdict import Outcome
 from evoclaims.paper import references
+from evoclaims.paper.config import load_config
+from evoclaims.paper.reported import load_published
 from evoclaims.trials import checkpoint
 from evoclaims.trials.integrity import verify
+from evoclaims.trials.notice import progress_path
+from evoclaims.trials.progress import RunProgress, ignore
 from evoclaims.trials.result import TrialResult
+from evoclaims.trials.shared_progress import shared
 from evoclaims.trials.store import DamagedFileError, Store
 from evoclaims.verdicts import history
+from evoclaims.verdicts.claim_report import ClaimReport, evidence_path, save, succeeding
 
 pytestmark = pytest.mark.oldest
 
@@ -109,6 +117,49 @@ def test_an_odd_file_of_accepted_verdicts_is_a_sentence(tmp_path: Path, make: Ca
     make(tmp_path / history.FILE)
     with pytest.raises(UserError, match="Cannot read"):
         history.load(tmp_path / history.FILE)
+
+
+def as_endless_device(path: Path) -> None:
+    path.symlink_to("/dev/zero")
+
+
+def as_brackets(path: Path) -> None:
+    path.write_text("[" * 200_000 + "]" * 200_000)
+
+
+@pytest.mark.parametrize("make", [*ODD, as_link_to_nowhere, as_endless_device, as_brackets])
+def test_an_odd_file_of_evidence_is_passed_over_and_replaced(tmp_path: Path, make: Callable[[Path], None]) -> None:
+    report = ClaimReport("A", "", "smoke", "it is", "§1", Outcome.SUPPORTED, "so it is")
+    path = evidence_path(report, tmp_path)
+    path.parent.mkdir(parents=True)
+    make(path)
+    assert succeeding(report, tmp_path) is report
+    if make is not as_folder:
+        save(report, tmp_path)
+        assert succeeding(report, tmp_path).before is not None
+
+
+@pytest.mark.parametrize("make", [*ODD, as_link_to_nowhere, as_endless_device])
+def test_an_odd_log_of_a_job_has_no_last_words(tmp_path: Path, make: Callable[[Path], None]) -> None:
+    make(tmp_path / "1_0_log.out")
+    assert last_words(tmp_path / "1_0_log.out") == ""
+
+
+@pytest.mark.parametrize("make", [*ODD, as_endless_device])
+def test_odd_files_of_settings_and_numbers_are_a_sentence(tmp_path: Path, make: Callable[[Path], None]) -> None:
+    make(tmp_path / "pyproject.toml")
+    with pytest.raises(UserError, match="Cannot read"):
+        load_config(tmp_path)
+    with pytest.raises(UserError, match="Cannot read"):
+        load_published(tmp_path / "pyproject.toml")
+
+
+def test_a_pipe_where_progress_is_shared_keeps_nobody_waiting(tmp_path: Path) -> None:
+    path = progress_path(tmp_path, "a" * 64)
+    path.parent.mkdir(parents=True)
+    as_pipe(path)
+    with shared(tmp_path, "a" * 64, ignore) as tell:
+        tell(RunProgress("a on b", "training", 1))
 
 
 def test_reference_trials_of_a_name_that_no_file_can_have_are_not_there(tmp_path: Path) -> None:

@@ -17,12 +17,13 @@ import toy_loops
 from toy_loops import Nowhere
 
 from evoclaims.core.errors import UserError
+from evoclaims.envs.foreign.gymnasium_task import GymnasiumTask
 from evoclaims.envs.gates.parity import NParity
 from evoclaims.judging.sample import UnreadableTrialError, checked
 from evoclaims.methods.training_loop import TrainingLoop
 from evoclaims.trials import crashes
 from evoclaims.trials.budget import Budget
-from evoclaims.trials.loop_process import Reporter
+from evoclaims.trials.loop_process import Reporter, actions_of
 from evoclaims.trials.progress import RunProgress
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.runner import run
@@ -270,3 +271,25 @@ def test_stored_trials_of_any_version_are_read_where_their_package_is_not_instal
     for seeds, any_version in (([0], False), ([0, 1], True)):
         with pytest.raises(UserError, match="needs pytest, not installed here"):
             run(noting, seeds, store, cpus, any_version=any_version)
+
+
+def test_policies_are_told_from_each_other_by_their_actions_on_fixed_starts() -> None:
+    """Whatever the seeds of their examinations are, and where a policy knows some observations alone."""
+
+    def table(seen: Any) -> int:
+        return {0: 1}[int(seen[0] > 10)]
+
+    def limited(seen: Any) -> int:
+        return {True: 0}[bool(seen[2] < 0.05)]
+
+    for task in (GymnasiumTask("CartPole-v1"), NParity(3)):
+        found = [actions_of(task, policy) for policy in (table, table, limited, lambda seen: 0)]
+        assert found[0] == found[1]
+        assert len({hashed for hashed, _ in found}) == 3
+        assert not any(graded for _, graded in found)
+    assert actions_of(NParity(3), lambda bits: [0.25])[1]
+
+
+def test_what_training_gave_is_recorded_apart_from_the_examination(store: Store, cpus: list[Any]) -> None:
+    first, second, third = run(condition(toy_loops.knows_parity, NParity(3)), range(3), store, cpus)
+    assert first.provenance["returned"] == third.provenance["returned"] != second.provenance["returned"]

@@ -68,6 +68,32 @@ def test_every_record_of_a_trial_stays_whichever_comes_first(store: Store, make_
         assert verify(one, repair=False) == []
 
 
+def test_a_record_answers_for_its_own_flags_of_xla_alone(store: Store, make_result: Make) -> None:
+    plain, slow = _made(make_result, OLD, 1.0), _made(make_result, OLD, 0.5)
+    dumped = {**plain.provenance, "xla_flags": "--xla_dump_to=here"}
+    plain = replace(plain, provenance=dumped)  # which changes no trial
+    slow = replace(slow, provenance={**slow.provenance, "xla_flags": "--xla_level=0 --xla_dump_to=here"})
+    flagged = {**OLD, packages.FLAGS: "--xla_level=0"}
+    for first, second in ((plain, slow), (slow, plain)):
+        one = Store(store.root / first.digest[:8])
+        assert [one.put(result, {}) for result in (first, second)] == ["stored"] * 2
+        assert (one.made_with(plain.id, OLD), one.made_with(plain.id, flagged)) == (plain, slow)
+        assert one.made_with(plain.id, {**OLD, packages.FLAGS: "--xla_level=1"}) is None
+        assert verify(one, repair=False) == []
+
+
+def test_a_record_with_flags_of_a_release_whose_names_had_none_gives_way(store: Store, make_result: Make) -> None:
+    plain, slow = _made(make_result, OLD, 1.0), _made(make_result, OLD, 0.5)
+    slow = replace(slow, provenance={**slow.provenance, "xla_flags": "--xla_level=0"})
+    store.put(slow, {})
+    store.home(slow).rename(store.record_path(slow.id, OLD))
+    assert verify(store, repair=False) == []
+    assert store.made_with(slow.id, {**OLD, packages.FLAGS: "--xla_level=0"}) == slow
+    assert store.made_with(slow.id, OLD) is None
+    assert store.put(plain, {}) == "stored"
+    assert store.made_with(slow.id, OLD) == plain
+
+
 def test_of_other_versions_the_newest_is_judged(store: Store, make_result: Make) -> None:
     for versions, ended in ((OLD, "2025-03-01"), (NEW, "2025-02-01")):
         store.put(_made(make_result, versions, 0.5, ended), {})

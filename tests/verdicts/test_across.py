@@ -75,7 +75,7 @@ def found(store: Store) -> Across:
 
 def test_each_cell_tells_verdict_drift_and_bits_against_the_first_environment(found: Across) -> None:
     told = {
-        label.removeprefix("jax "): across_table.said(cell)
+        label.removeprefix("jax "): across_table.cell_lines(cell)
         for (claim, label), cell in found.cells.items()
         if claim == "ours"
     }
@@ -83,7 +83,7 @@ def test_each_cell_tells_verdict_drift_and_bits_against_the_first_environment(fo
     assert told["2"] == ("✓ supported", "same to the bit")
     assert told["3"] == ("✗ refuted, CHANGED", "A12 0.00, p 3.2e-05, DRIFT", "10 of 10 differ")
     assert told["4"] == ("✓ supported", "A12 0.50, p 1", "10 of 10 differ")
-    assert across_table.said(found.cells["plain", "jax 3"]) == ("- not run", "–")
+    assert across_table.cell_lines(found.cells["plain", "jax 3"]) == ("- not run", "–")
     assert found.changed == {"jax 3": ["ours"]}
 
 
@@ -100,7 +100,7 @@ def test_lines_say_why_one_has_no_verdicts_which_changed_and_what_drifted_how_fa
 def test_trials_that_are_the_same_records_are_not_compared(store: Store) -> None:
     again = replace(_environment(store, "1"), label="again")
     cell = across([_environment(store, "1"), again]).cells["ours", "again"]
-    assert across_table.said(cell) == ("✓ supported", "the same trials")
+    assert across_table.cell_lines(cell) == ("✓ supported", "the same trials")
 
 
 def test_the_first_environment_is_the_first_that_has_verdicts(store: Store) -> None:

@@ -104,7 +104,7 @@ def test_outside_of_a_repository_there_are_no_revisions(
 ) -> None:
     elsewhere = tmp_path_factory.mktemp("elsewhere")
     monkeypatch.setenv("GIT_CEILING_DIRECTORIES", str(elsewhere.parent))
-    with pytest.raises(UserError, match="lies in no git repository"):
+    with pytest.raises(UserError, match="is not in a git repository"):
         find_revision("HEAD", elsewhere)
 
 

@@ -55,7 +55,7 @@ def test_without_a_check_for_drift_nothing_is_said_to_be_no_mistake(rows: tuple[
 def test_a_change_of_what_is_computed_is_told_from_chance() -> None:
     assert _why(replace(NEW, trials="1")).startswith("from the same trials to the bit")
     drifted = replace(FINE, status="drift")
-    assert _why(rows=(drifted,)) == "the trials of a on t (smoke) have drifted from the reference trials, as said above"
+    assert _why(rows=(drifted,)) == "the trials of a on t (smoke) have drifted from the reference trials (see above)"
     changes = [DigestChange(condition * 64, 0, "x", "y") for condition in "cd"]
     assert "the code which runs them has changed, or its processor is another one" in _why(
         digests=DigestCheck(10, tuple(changes[:1]))

@@ -65,7 +65,7 @@ def test_a_claim_is_chosen_with_all_its_cases_or_one() -> None:
 def test_a_claim_without_a_verdict_is_one_sentence() -> None:
     with pytest.raises(UnknownNameError, match=r"There is no accepted claim named 'G1\[c\]'\. Did you mean"):
         timeline({("smoke", "G1[b]"): (FIRST,)}, "G1[c]")
-    with pytest.raises(UserError, match="No verdict has been accepted yet: `evoclaims accept`"):
+    with pytest.raises(UserError, match="No verdict has been accepted yet: run `evoclaims accept`"):
         timeline({})
 
 

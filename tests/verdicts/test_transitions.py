@@ -121,8 +121,8 @@ def test_several_patterns_are_parted_by_commas() -> None:
     [
         ("", "No change of a verdict is named"),
         (" , ", "No change of a verdict is named"),
-        ("refuted", "'refuted' is no change of a verdict: write OLD->NEW"),
-        ("supported->refuted->error", "is no change of a verdict"),
+        ("refuted", "'refuted' is not a change of a verdict. Write OLD->NEW"),
+        ("supported->refuted->error", "is not a change of a verdict"),
         ("supported->supported", "never happens: a verdict that stays supported has not changed"),
     ],
 )

@@ -43,7 +43,7 @@ class AsPublished:
         for method, task in names:
             numbers = self._numbers(method, task, condition)
             if any(numbers.values()):
-                return [_record(TrialSpec(condition, seed), numbers) for seed in seeds]
+                return [record(TrialSpec(condition, seed), numbers) for seed in seeds]
         label = " on ".join(names[0]) if names else condition.label
         raise NotStoredError(f"no number of {label} is published")
 
@@ -104,7 +104,7 @@ def _implied(metrics: Mapping[str, float], levels: Mapping[str, tuple[float, ...
     return {"furthest_solved": count - 1.0} if metrics.get("last_success") == 1.0 else {}
 
 
-def _record(spec: TrialSpec, numbers: Numbers) -> TrialResult:
+def record(spec: TrialSpec, numbers: Numbers) -> TrialResult:
     """Return a record of a finished trial with these numbers."""
     return TrialResult(
         id=spec.id,

@@ -11,6 +11,7 @@ import pytest
 from evoclaims.core.errors import UserError, require_known
 from evoclaims.core.tiers import TIERS
 from evoclaims.judging.verdict import Outcome
+from evoclaims.verdicts.readings import moment
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -24,12 +25,22 @@ class Claim:
         says: the paper's own words.
         where: section and figure; "control" for a check of the benchmark itself, which is counted apart.
         smoke: the scaled-down statement that the smoke tier judges instead; None if it judges none.
+        line: of the paper's source in which the sentence stands; None where nobody says.
+        read: the name of the reading that the test judges.
+        since: when that reading was written (ISO 8601, UTC); empty where nobody says.
     """
 
     id: str
     says: str
     where: str
     smoke: str | None
+    line: int | None = None
+    read: str = "as judged"
+    since: str = ""
+
+    def is_read_at(self, tier: str) -> bool:
+        """Whether a tier judges the paper's own sentence, whose readings count there."""
+        return tier != "smoke" or self.smoke is None
 
     def statement(self, tier: str) -> str:
         """Return what is judged at a tier; the paper's own words where the smoke tier judges nothing."""
@@ -52,7 +63,17 @@ class Expectation:
 
 
 def claim(
-    claim_id: str, /, *, says: str, where: str, smoke: str | None, expect: Outcome | None = None, because: str = ""
+    claim_id: str,
+    /,
+    *,
+    says: str,
+    where: str,
+    smoke: str | None,
+    expect: Outcome | None = None,
+    because: str = "",
+    line: int | None = None,
+    read: str = "as judged",
+    since: str = "",
 ) -> Callable[[F], F]:
     """Mark a test as the check of a claim; the test runs once per tier.
 
@@ -64,13 +85,18 @@ def claim(
             then not judged there (see `without_smoke` for one parameter of a claim).
         expect: an accepted outcome, for every tier and parameter; a narrower one (see `expected`) overrides it.
         because: why it is accepted, or why there is no smoke test; required with `expect` and with `smoke=None`.
+        line: the line of the paper's source in which the sentence stands.
+        read: a name for the reading that the test judges; `verdict.reading(...)` adds others.
+        since: when that reading was written, such as "2026-11-26" or "2026-11-26 14:30" (UTC).
 
     Raises:
-        UserError: when a text is missing, or `because` would have to explain two things.
+        UserError: when a text is missing, `since` is not a date, or `because` would have to explain two things.
     """
     for word, text in {"id": claim_id, "says": says, "where": where, "smoke": smoke}.items():
         if not (isinstance(text, str) or (text is None and word == "smoke")):
-            raise UserError(f"The claim {claim_id!r} has {text!r} as its {word}, which is no text: write it in quotes.")
+            raise UserError(
+                f"The claim {claim_id!r} has {text!r} as its {word}, which is not text. Write it in quotes."
+            )
         if text is not None and not text.strip():
             raise UserError(f"The claim {claim_id or '(without id)'} lacks its {word}.")
     if smoke is None and expect is not None:
@@ -78,7 +104,9 @@ def claim(
             f"The claim {claim_id} has smoke=None and expect=...: its because=... says why there is no smoke test, so "
             "accept the outcome with @expected(...)."
         )
-    marks = [pytest.mark.claim(Claim(claim_id, says, where, smoke))]
+    if since:
+        moment(since)
+    marks = [pytest.mark.claim(Claim(claim_id, says, where, smoke, line, read, since))]
     if smoke is None:
         marks.append(without_smoke(because=because))
     if expect is not None:
@@ -99,9 +127,9 @@ def expected(outcome: Outcome | str, *, because: str, tier: str | None = None) -
         UserError: for an unknown outcome or tier, or without a reason.
     """
     if outcome not in set(Outcome):
-        raise UserError(f"There is no outcome {outcome!r}; known: {', '.join(Outcome)}.")
+        raise UserError(f"The outcome {outcome!r} does not exist. Use one of {', '.join(Outcome)}.")
     if not because.strip():
-        raise UserError(f"An accepted {outcome} verdict says because=...: what is known about why.")
+        raise UserError(f"An accepted {outcome} verdict needs because=...: what is known about the reason.")
     if tier is not None:
         require_known("tier", tier, TIERS)
     return pytest.mark.claim_expect(Expectation(Outcome(outcome), because, tier))
@@ -114,7 +142,7 @@ def without_smoke(*, because: str) -> pytest.MarkDecorator:
         UserError: without a reason.
     """
     if not because.strip():
-        raise UserError("What has no smoke test says because=...: why no small instance can show it.")
+        raise UserError("A claim without a smoke test needs because=...: why no small instance can show it.")
     return pytest.mark.claim_without_smoke(because)
 
 

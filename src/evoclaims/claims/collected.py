@@ -48,8 +48,8 @@ class ClaimTest:
         callspec, claim = getattr(item, "callspec", None), claim_of(item)
         if callspec is None or TIER not in callspec.params:
             raise UserError(
-                f"{item.nodeid} is a claim and cannot be given a tier: write it as a function, or as a method of a "
-                "class that is no unittest.TestCase."
+                f"{item.nodeid} is a claim that cannot run at a tier. Write it as a function, or as a method of a "
+                "class that is not a unittest.TestCase."
             )
         if not isinstance(claim, Claim):
             raise UserError(f"{item.nodeid} has the mark pytest.mark.claim but no claim: use @claim(...) of evoclaims.")

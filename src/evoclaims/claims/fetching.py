@@ -34,7 +34,7 @@ class RunMissing:
     Attributes:
         store: where trials are kept.
         device: "auto", "cpu" or "gpu".
-        watch: is told the progress.
+        watch: receives the progress.
         time_limit: seconds that a batch of trials may take.
         any_version: accept a stored trial made with any versions; else one made with versions other than this
             environment's is run again.

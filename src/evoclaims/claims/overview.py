@@ -21,7 +21,7 @@ class Overview:
         judged: claims, of `claims`.
         done: trials in the store, of the `trials` that the claims need at most.
         running: the batches under way.
-        seconds_left: about how long the run will still take; None where no timing on this machine tells.
+        seconds_left: about how long the run will still take; None without a timing from this machine.
     """
 
     judged: int
@@ -82,7 +82,7 @@ class Watching:
                 self._took[name] = spent, self._took[name][1]
 
     def _seconds_left(self, owed: Iterable[str], now: dict[str, Running]) -> float | None:
-        """Return how long the workers will still take; None where nothing tells it of a condition that is owed."""
+        """Return how long the workers will still take; None if a missing condition has no timing."""
         scale = scale_of(self._took.values())
         left = [remaining(self._took[name], scale, now.get(name)) for name in owed]
         known = [one for one in left if one is not None]
@@ -92,12 +92,12 @@ class Watching:
 
 
 def remaining(took: tuple[float | None, float | None], scale: float | None, now: Running | None) -> float | None:
-    """Return about how many seconds a condition will still take; None where no timing on this machine tells.
+    """Return about how many seconds a condition will still take; None without a timing from this machine.
 
     Args:
         took: the condition's seconds here and elsewhere, as far as they are known.
         scale: how many times as long conditions take here as elsewhere; None while unknown.
-        now: the batch, if it is running: its own speed tells most.
+        now: the batch, if it is running: its own speed is the best estimate.
     """
     if now is not None and now.progress.seconds_left is not None:
         return now.progress.seconds_left

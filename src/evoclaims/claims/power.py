@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from evoclaims.claims.collected import ClaimTest
 from evoclaims.claims.reporting import judged
 from evoclaims.claims.selection import selected
-from evoclaims.claims.session import Session
+from evoclaims.claims.session import Reading, Session
 from evoclaims.judging.assertion import Assertion
 from evoclaims.judging.fingerprint import fingerprint
 from evoclaims.judging.power import Draws, Power, power
@@ -33,7 +33,7 @@ class Listening(Session):
 
     assertions: dict[str, Assertion] = field(default_factory=dict)
 
-    def settle(self, test: ClaimTest, assertion: Assertion) -> ClaimReport:
+    def settle(self, test: ClaimTest, assertion: Assertion, others: Sequence[Reading] = ()) -> ClaimReport:
         """Keep an assertion."""
         design, name = self.design(test.tier), named(test.claim.id, test.case)
         self.assertions[name] = assertion
@@ -74,7 +74,7 @@ class Asserted:
 
 @dataclass(frozen=True)
 class ClaimPower:
-    """A claim's power and the outcome that it should have; or, as its `trouble`, why the power cannot be told."""
+    """A claim's power and the outcome that it should have; or, as its `trouble`, why the power cannot be computed."""
 
     name: str
     expected: Outcome

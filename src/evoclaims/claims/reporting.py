@@ -7,6 +7,7 @@ from dataclasses import replace
 
 from evoclaims.claims.claim import Expectation
 from evoclaims.claims.collected import ClaimTest
+from evoclaims.core.canonical import content_hash
 from evoclaims.judging.assertion import Assertion
 from evoclaims.judging.design import Design
 from evoclaims.judging.judge import attainability
@@ -27,6 +28,7 @@ def judged(
     return replace(
         unjudged(test, verdict.outcome, verdict.reason),
         verdict=verdict,
+        asserts=content_hash(assertion.plain()),
         sources=tuple(_source(group, seeds, again.get(group.fingerprint, ())) for group in groups),
         attainable=tuple(
             Attainable(look.n, look.alpha, p.supported, p.refuted) for look, p in attainability(assertion, design)
@@ -35,7 +37,7 @@ def judged(
 
 
 def unjudged(test: ClaimTest, outcome: Outcome, reason: str, *, has_test: bool = True) -> ClaimReport:
-    """Build the report of a claim without a verdict: its test broke or was skipped, or there is none at this tier."""
+    """Build the report of a claim without a verdict: its test broke or was skipped, or this tier has no test."""
     return ClaimReport(
         claim=test.claim.id,
         case=test.case,
@@ -45,6 +47,7 @@ def unjudged(test: ClaimTest, outcome: Outcome, reason: str, *, has_test: bool =
         outcome=outcome,
         reason=reason,
         has_test=has_test,
+        line=test.claim.line,
     )
 
 

@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Any
 
 from evoclaims.claims.as_published import AsPublished
 from evoclaims.claims.claim import Expectation
 from evoclaims.claims.collected import ClaimTest
 from evoclaims.claims.fetching import NotStoredError, StoredOnly
+from evoclaims.claims.null_agents import satisfied_by
 from evoclaims.claims.reporting import expecting, judged
 from evoclaims.core.errors import UserError
 from evoclaims.core.packages import agree, recorded
@@ -29,8 +31,9 @@ from evoclaims.trials.result import TrialResult
 from evoclaims.trials.spec import Condition, TrialSpec
 from evoclaims.trials.store import Store
 from evoclaims.verdicts import mutation_matrix
-from evoclaims.verdicts.claim_report import ClaimReport, located, named, save, succeeding
+from evoclaims.verdicts.claim_report import CONTROL, ClaimReport, located, named, save, succeeding
 from evoclaims.verdicts.mutation_matrix import Matrix
+from evoclaims.verdicts.readings import ReadAs, moment
 from evoclaims.verdicts.upgrade import Succession, Upgrade, predecessors, upgrade
 
 
@@ -44,6 +47,16 @@ class _Used:
     condition: Condition
     ids: set[str] = field(default_factory=set)
     again: set[int] = field(default_factory=set)
+
+
+@dataclass(frozen=True)
+class Reading:
+    """A reading of a claim's sentence, not yet judged; `ReadAs` has its parts after that."""
+
+    name: str
+    assertion: Assertion
+    because: str
+    since: str
 
 
 @dataclass(frozen=True)
@@ -92,18 +105,66 @@ class Session:
             return design
         return replace(design, looks=(Look(self.trials, design.alpha),))
 
-    def settle(self, test: ClaimTest, assertion: Assertion) -> ClaimReport:
-        """Judge an assertion; trials that may not be run make the verdict "not run"."""
+    def settle(self, test: ClaimTest, assertion: Assertion, others: Sequence[Reading] = ()) -> ClaimReport:
+        """Judge an assertion; trials that may not be run make the verdict "not run".
+
+        A session that only reads trials judges `others`, too, the further readings of the sentence.
+        """
+        verdict = self._verdict(test, assertion)
+        report = judged(test, assertion, self.design(test.tier), verdict, self.again)
+        report = replace(report, satisfied_by=self._satisfied_by(test, assertion, verdict))
+        if self.variant or not isinstance(self.fetch, StoredOnly) or not test.claim.is_read_at(test.tier):
+            return report
+        first = Reading(test.claim.read, assertion, "the test's own assertion", test.claim.since)
+        read = [
+            self._read(test.tier, first, verdict),
+            *(self._read(test.tier, one, self._verdict(test, one.assertion)) for one in others),
+        ]
+        return replace(report, readings=tuple(read))
+
+    def _verdict(self, test: ClaimTest, assertion: Assertion) -> Verdict:
+        """Return the verdict on an assertion; "not run" where trials may not be run."""
         design, name, tier = self.design(test.tier), named(test.claim.id, test.case), test.tier
         try:
             if self.leaves(tier, assertion):
                 raise NotStoredError(f"the variant {self.variant} changes none of its trials")
-            verdict = judge(assertion, design, claim=name, tier=tier)
+            return judge(assertion, design, claim=name, tier=tier)
         except NotStoredError as error:
             mark = fingerprint(assertion, design, claim=name, tier=tier)
             of = next((f"{one.label}: " for one in assertion.sources() if one.fingerprint == error.condition), "")
-            verdict = Verdict(Outcome.NOT_RUN, f"{of}{error}", assertion.describe(), mark)
-        return judged(test, assertion, design, verdict, self.again)
+            return Verdict(Outcome.NOT_RUN, f"{of}{error}", assertion.describe(), mark)
+
+    def _read(self, tier: str, reading: Reading, verdict: Verdict) -> ReadAs:
+        """Return a reading with its verdict, and when the first of its trials started."""
+        seeds = self.design(tier).seeds(verdict.n)
+        trials = [trial for source in reading.assertion.sources() for trial in source.fetch(seeds)] if seeds else []
+        started = min((str(trial.timing["started"]) for trial in trials if "started" in trial.timing), default="")
+        return ReadAs(
+            reading.name,
+            reading.because,
+            reading.since,
+            verdict.describe,
+            verdict.outcome,
+            verdict.reason,
+            started,
+        )
+
+    def _satisfied_by(self, test: ClaimTest, assertion: Assertion, verdict: Verdict) -> tuple[str, ...]:
+        """Return the null agents that satisfy a claim of the paper; controls are about such agents themselves.
+
+        Only trials that were looked at are asked for again, so that nothing runs for it.
+        """
+        agents, design = self.reproduction.null_agents, self.design(test.tier)
+        if not agents or not verdict.n or test.claim.where == CONTROL or isinstance(self.fetch, AsPublished):
+            return ()
+        look, reads = Look(verdict.n, design.alpha), isinstance(self.fetch, StoredOnly)
+        if reads and assertion.attainable(look.n, design).supported > look.alpha:
+            look = Look(design.last.n, design.alpha)
+
+        def others(method: str, task: str) -> TrialGroup:
+            return self.group(method, task, test.tier)
+
+        return satisfied_by(agents, assertion, look, design, others if reads else None)
 
     def complete(self, report: ClaimReport, expectation: Expectation | None) -> ClaimReport:
         """Return a report with the variant, an accepted outcome, what mutants showed, and the file that holds it.
@@ -191,8 +252,9 @@ class Session:
 class Verdicts:
     """The `verdict` fixture: takes exactly one assertion per test, settles it, and keeps its report."""
 
-    settle: Callable[[Assertion], ClaimReport]
-    report: ClaimReport | None = None
+    settle: Callable[[Assertion, Sequence[Reading]], object]
+    report: Any = None
+    readings: list[Reading] = field(default_factory=list)
 
     def __call__(self, assertion: Assertion) -> None:
         """Judge the claim's assertion.
@@ -207,8 +269,32 @@ class Verdicts:
                 raise UserError(f"verdict(...) was given the function {name} itself: call it, as in {name}().")
             raise UserError(
                 f"verdict(...) takes an assertion about trials, such as verdict(a.mean_success > b.mean_success), "
-                f"not {f'{assertion.name!r} alone: say what holds of it' if alone else repr(assertion)}."
+                f"not {f'{assertion.name!r} alone: compare it with something' if alone else repr(assertion)}."
             )
         if self.report is not None:
             raise UserError("A claim has one verdict: join several assertions with & (and) or | (or).")
-        self.report = self.settle(assertion)
+        self.report = self.settle(assertion, self.readings)
+
+    def reading(self, name: str, assertion: Assertion, *, because: str, since: str) -> None:
+        """Add another reading of the claim's sentence, before `verdict(...)`: the verdict shows whether it depends.
+
+        It counts where the paper's own sentence is judged, not at a tier with a smaller statement.
+
+        Args:
+            name: a few words.
+            assertion: what the sentence says if it is read so.
+            because: why it may be read so.
+            since: when the reading was written, such as "2026-11-26" or "2026-11-26 14:30" (UTC).
+
+        Raises:
+            UserError: after the verdict, for a name that is taken, a missing text, or something else than a date or an
+                assertion.
+        """
+        if self.report is not None:
+            raise UserError(f"The reading {name!r} comes after the verdict: write verdict.reading(...) before it.")
+        if not isinstance(assertion, Assertion):
+            raise UserError(f"The reading {name!r} is {assertion!r} and takes an assertion, as verdict(...) does.")
+        if not (name.strip() and because.strip()) or name in (one.name for one in self.readings):
+            raise UserError(f"The reading {name!r} needs a name of its own and because=...: why the sentence means it.")
+        moment(since)
+        self.readings.append(Reading(name, assertion, because, since))

@@ -15,7 +15,7 @@ import pytest
 from evoclaims.claims.claim import gap_of
 from evoclaims.claims.collected import TIER, ClaimTest
 from evoclaims.claims.fetching import NotStoredError, RunMissing
-from evoclaims.claims.session import Session
+from evoclaims.claims.session import Session, Verdicts
 from evoclaims.core.errors import UserError
 from evoclaims.core.provenance import machine_class
 from evoclaims.judging.assertion import Assertion
@@ -83,7 +83,7 @@ def workload(session: Session, tests: Mapping[pytest.Item, ClaimTest]) -> Worklo
     claims, works = dict[str, tuple[str, ...]](), dict[str, Work]()
     for item, test in tests.items():
         claims[item.nodeid] = ()
-        with suppress(Exception):  # what is wrong with a method or a task is told when the claim is judged
+        with suppress(Exception):  # an error of a method or a task is reported when the claim is judged
             groups = {group.fingerprint: group for group in _needed(session, item, test)}
             for condition_id in groups.keys() - works.keys():
                 works[condition_id] = _work(session, session.fetch, test.tier, groups[condition_id], platform)
@@ -94,7 +94,7 @@ def workload(session: Session, tests: Mapping[pytest.Item, ClaimTest]) -> Worklo
 def weights(works: Iterable[Work]) -> dict[Work, float]:
     """Return about how many seconds each condition takes, as far as it can be guessed, to tell long from short ones.
 
-    Where no trial tells, its environment steps do, at the middle pace of the others.
+    Without a timing, its environment steps are used, at the middle pace of the others.
     """
     works = list(works)
     scale = scale_of((work.here, work.elsewhere) for work in works) or 1.0
@@ -128,18 +128,22 @@ def seconds_of(here: float | None, elsewhere: float | None, scale: float | None)
 def _needed(session: Session, item: pytest.Item, test: ClaimTest) -> Sequence[TrialGroup]:
     """Return the trials that a claim needs: its test is called once, as far as it gets without trials.
 
-    Nothing is known of a test with fixtures of its own, which are for the run itself. What a test raises is told when
-    it is run.
+    Nothing is known of a test with fixtures of its own, which are for the run itself. What a test raises is reported
+    when it is run.
     """
     found: list[TrialGroup] = []
     judged: list[Assertion] = []
+
+    def keep(assertion: Assertion, readings: object) -> Assertion:
+        judged.append(assertion)
+        return assertion
 
     def trials(method: str, *, on: str) -> TrialGroup:
         found.append(replace(session.group(method, on, test.tier), get=_never))
         return found[-1]
 
     function: Callable[..., Any] = item.obj  # type: ignore[attr-defined]
-    given = {**item.callspec.params, TIER: test.tier, "trials": trials, "verdict": judged.append}  # type: ignore[attr-defined]
+    given = {**item.callspec.params, TIER: test.tier, "trials": trials, "verdict": Verdicts(keep)}  # type: ignore[attr-defined]
     names = inspect.signature(function).parameters
     if gap_of(item, test.tier) or not set(names) <= set(given):
         return ()
@@ -153,7 +157,11 @@ def _needed(session: Session, item: pytest.Item, test: ClaimTest) -> Sequence[Tr
     if isinstance(item.parent, pytest.Class):  # the run needs a new object of its class
         vars(item).pop("_instance", None)
         vars(item).pop("_obj", None)
-    return () if judged and session.leaves(test.tier, judged[0]) else found
+    if not judged:
+        return found
+    # A condition that only another reading of the sentence asks for is not run.
+    needed = {source.fingerprint for source in judged[0].sources()}
+    return () if session.leaves(test.tier, judged[0]) else [one for one in found if one.fingerprint in needed]
 
 
 def _never(condition: Condition, seeds: Sequence[int]) -> Sequence[TrialResult]:
@@ -170,7 +178,7 @@ def _work(session: Session, fetch: RunMissing, tier: str, group: TrialGroup, pla
     timed = len(missing) or len(seeds)
     steps = condition.environment_steps * len(missing)
     here, elsewhere, slow = took(_made_here(session.store, condition, seeds), platform), None, None
-    with suppress(UserError):  # what is wrong with the reference trials is told at the end of the run
+    with suppress(UserError):  # errors of the reference trials are reported at the end of the run
         folder = session.reproduction.references
         elsewhere = took(references.of_condition(folder, tier, group.method, group.task, condition.id), platform)
         if platform == "cpu" and steps >= LONG:

@@ -8,6 +8,7 @@ from typing import Protocol
 
 _WITHOUT_TIER = {"jobs", "verify", "merge", "tables"}
 _TIERS = {
+    "audit": ("full", "full (default: the paper's own sentences) or smoke"),
     **dict.fromkeys(("report", "accept", "compare", "export"), ("all", "smoke, full or all (default)")),
     "replicate": ("full", "full (default: the paper's size) or smoke"),
 }
@@ -135,6 +136,12 @@ def _reading(add: _Add) -> None:
     )
     status.add_argument("--as", dest="form", metavar="FORM", help="print csv, json or markdown instead of a table")
 
+    add(
+        "audit",
+        "show what verdicts rest on: null agents, readings, duplicates, chance, power, and sentences without a claim; "
+        "run nothing; exit status 1 when a supported verdict is vacuous or a claim names no line and date",
+    )
+
     report = add("report", "write a web page and a Markdown file about all claims from the trials at hand; run nothing")
     report.add_argument(
         "--trajectories",
@@ -197,14 +204,16 @@ def _keeping(add: _Add) -> None:
     reference = add("reference", "write the stored trials of a tier as the committed reference trials")
     reference.add_argument("--variant", metavar="NAME", default="", help="those that only this variant has")
 
-    add("accept", "write the verdicts of now into verdicts.toml, as accepted; exit status 1 when that changed the file")
+    add(
+        "accept", "write the current verdicts into verdicts.toml, as accepted; exit status 1 when that changed the file"
+    )
 
 
 def _comparing(add: _Add) -> None:
     """Add what compares verdicts, of dates or of environments."""
     compare = add(
         "compare",
-        "show what changed: verdicts of now against the accepted ones; or a git revision against the working tree; or "
+        "show what changed: current verdicts against the accepted ones; or a git revision against the working tree; or "
         "a store (OLD) against --storage; or two revisions, or two stores, against each other; run nothing",
     )
     compare.add_argument("places", nargs="*", metavar="OLD [NEW]", help="a git revision or a folder of trials")

@@ -78,7 +78,7 @@ def _sides(project: Project, tiers: Sequence[str], places: Sequence[str]) -> tup
     if not places:
         accepted = comparison.working_tree(reproduction)
         if not accepted.verdicts:
-            raise UserError("No verdict has been accepted yet: `evoclaims accept` accepts those of now.")
+            raise UserError("No verdict has been accepted yet: run `evoclaims accept` to accept the current ones.")
         now = replace(
             comparison.store(reproduction, project.archive, project.judge(*tiers)),
             name=f"judged from the store {project.store.root}, and from reference trials where it has no better ones",

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 import os
 import subprocess
 import tempfile
@@ -18,6 +17,7 @@ from evoclaims.cli.store_folder import open_store
 from evoclaims.cli.terminal import terminal
 from evoclaims.core.environments import Environment, NotInstallableError, Recipe, make, reason
 from evoclaims.core.errors import UnknownNameError, UserError
+from evoclaims.core.files import at_once, read_json
 from evoclaims.core.printable import printable
 from evoclaims.core.tiers import TIERS
 from evoclaims.paper.config import find_root, load_config
@@ -31,7 +31,7 @@ KEPT = "environments"
 """Folder of the environments, in the store."""
 
 LOG = "pytest.log"
-"""What the last run in an environment has said, in its folder."""
+"""The output of the last run in an environment, in its folder."""
 
 
 class NotJudgedError(Exception):
@@ -87,14 +87,14 @@ class Elsewhere:
             with tempfile.TemporaryDirectory() as folder:  # another command may use the environment at the same time
                 verdicts = Path(folder) / "verdicts.json"
                 command = self._command(environment, store, verdicts)
-                status, said = _watched(command, self.root, environment.folder / LOG)
+                status, output = _watched(command, self.root, environment.folder / LOG)
                 reports = _reports(verdicts)
         except BrokenPipeError:  # nobody reads what this command prints
             raise
         except OSError as error:  # a full disk
             raise NotJudgedError(f"pytest cannot be run there ({error})") from error
         if not reports or status not in (0, 1, 5):  # pytest's: all well, failures, and nothing measured
-            raise NotJudgedError(f"pytest ended with {status}: {printable(reason(said))}")
+            raise NotJudgedError(f"pytest ended with {status}: {printable(reason(output))}")
         return reports
 
     def _command(self, environment: Environment, store: Store, verdicts: Path) -> list[str]:
@@ -114,7 +114,7 @@ class Elsewhere:
 def _reports(verdicts: Path) -> list[ClaimReport]:
     """Return the reports that a run has written; none if there is no such file, or it is another evoclaims'."""
     try:
-        return [ClaimReport.from_json(plain) for plain in json.loads(verdicts.read_bytes())["claims"]]
+        return [ClaimReport.from_json(plain) for plain in read_json(verdicts)["claims"]]
     except (OSError, ValueError, KeyError, TypeError):
         return []
 
@@ -123,7 +123,7 @@ def _watched(command: list[str], folder: Path, log: Path) -> tuple[int, str]:
     """Run a command, write what it says to a file, and show the newest line on a terminal.
 
     Returns:
-        Its status and all that it said.
+        Its exit status and its output.
     """
     write, columns = terminal()
     line_shown = LiveLine(write if columns else lambda _: None, columns)
@@ -140,7 +140,7 @@ def _watched(command: list[str], folder: Path, log: Path) -> tuple[int, str]:
         errors="replace",
     ) as process:
         try:
-            with open(log, "w", encoding="utf-8", errors="backslashreplace") as file:
+            with open(log, "w", encoding="utf-8", errors="backslashreplace", opener=at_once) as file:
                 for line in process.stdout or ():
                     lines.append(line)
                     file.write(line)

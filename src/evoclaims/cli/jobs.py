@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,6 +13,7 @@ from evoclaims.cli.cluster.job_states import GONE, Seen, State, states
 from evoclaims.cli.cluster.submissions import Submission, SubmittedBatch, SubmittedJob, load_all, log_of
 from evoclaims.cli.project import Project, open_project
 from evoclaims.core.errors import UserError
+from evoclaims.core.files import open_file
 from evoclaims.trials.batches import StoredTrials
 from evoclaims.trials.notice import is_announced
 
@@ -47,9 +49,9 @@ def main(options: argparse.Namespace) -> int:
         return 0
     for row in rows:
         job, batch = row.job, row.batch
-        told = f": {row.reason}" * bool(row.reason)
+        because = f": {row.reason}" * bool(row.reason)
         log = f" ({row.log})" * row.log.exists()
-        print(f"{row.state:8} {job.id}  {batch.label}, {row.submission.tier_and_variant}{told}{log}")
+        print(f"{row.state:8} {job.id}  {batch.label}, {row.submission.tier_and_variant}{because}{log}")
     counts = {state: sum(row.state == state for row in rows) for state in ("queued", "running", "done", "failed")}
     print(", ".join(f"{count} {state}" for state, count in counts.items() if count))
     if counts["failed"]:
@@ -83,7 +85,7 @@ def _rows(project: Project) -> Iterator[JobRow]:
         if condition not in owed or (found.state is State.ENDED and not _lacks(project, place)):  # it ended meanwhile
             yield JobRow(**vars(place), state="done", reason="", log=log)
         else:
-            state, reason = _told(project, place, found, log)
+            state, reason = _state_and_reason(project, place, found, log)
             yield JobRow(**vars(place), state=state, reason=reason, log=log)
 
 
@@ -99,11 +101,11 @@ def _lacks(project: Project, place: Place) -> bool:
     return condition.id == place.batch.condition and bool(stored.missing(seeds))
 
 
-def _told(project: Project, place: Place, seen: Seen, log: Path) -> tuple[str, str]:
+def _state_and_reason(project: Project, place: Place, seen: Seen, log: Path) -> tuple[str, str]:
     """Return the state of a batch with missing trials, and its reason."""
     if seen.state is State.ENDED:
         words = "; ".join(filter(None, [seen.reason, last_words(log)]))
-        gone = "it is not queued any more and has said nothing" if seen == GONE else "it ended without a word"
+        gone = "it is no longer queued and has printed nothing" if seen == GONE else "it ended without a word"
         return "failed", words or gone
     elsewhere = len(place.job.batches) > 1 and not is_announced(project.store.root, place.batch.condition)
     if seen.state is State.RUNNING and elsewhere:
@@ -112,13 +114,13 @@ def _told(project: Project, place: Place, seen: Seen, log: Path) -> tuple[str, s
 
 
 def last_words(log: Path) -> str:
-    """Return the last sentence of ours in a job's output, else its last line; empty where there is none."""
+    """Return evoclaims' last sentence in a job's output, else its last line; empty without any."""
     try:
-        with open(log, "rb") as file:
-            file.seek(max(0, log.stat().st_size - TAIL))
+        with open_file(log) as file:
+            file.seek(max(0, file.seek(0, os.SEEK_END) - TAIL))
             lines = file.read().decode(errors="replace").splitlines()
     except OSError:
         return ""
     ours = [line for line in lines if line.startswith("evoclaims: ")]
-    said = [line for line in lines if line.strip()]
-    return ours[-1].removeprefix("evoclaims: ") if ours else said[-1].strip() if said else ""
+    printed = [line for line in lines if line.strip()]
+    return ours[-1].removeprefix("evoclaims: ") if ours else printed[-1].strip() if printed else ""

@@ -50,22 +50,22 @@ def judge(config: SuiteConfig, asked: Sequence[tuple[Session, str]]) -> list[lis
         KeyboardInterrupt: when the run is interrupted.
     """
     run = _Run(config, asked)
-    said = io.StringIO()
-    with contextlib.redirect_stderr(said), pytest.MonkeyPatch.context() as environment:
+    errors = io.StringIO()
+    with contextlib.redirect_stderr(errors), pytest.MonkeyPatch.context() as environment:
         for name in _ENVIRONMENT:
             environment.delenv(name, raising=False)
         gc.freeze()  # the garbage collection at the end of a run of pytest takes long with all imported objects
         try:
             status = pytest.main([*run.arguments], plugins=[run])
         except (Exception, SystemExit) as error:  # such as a plugin that does not import
-            run.troubles.append(_told(error, config.root))
+            run.troubles.append(_sentence(error, config.root))
             status = pytest.ExitCode.INTERNAL_ERROR
         finally:
             gc.unfreeze()
     if run.interrupted:
         raise KeyboardInterrupt
     if not run.troubles and status in (pytest.ExitCode.USAGE_ERROR, pytest.ExitCode.INTERNAL_ERROR):
-        run.troubles.append(" ".join(said.getvalue().split()).removeprefix("ERROR: ").removesuffix("."))
+        run.troubles.append(" ".join(errors.getvalue().split()).removeprefix("ERROR: ").removesuffix("."))
     if run.troubles:
         rest = f", and {len(run.troubles) - 1} more such errors" if len(run.troubles) > 1 else ""
         raise UserError(f"The claims in {run.claims} cannot be collected: {run.troubles[0]}{rest}.")
@@ -113,7 +113,7 @@ class _Run:
         except KeyboardInterrupt:
             raise
         except BaseException as error:  # a conftest.py may raise SystemExit as well
-            self.troubles.append(_told(error.__cause__ or error, self._root))
+            self.troubles.append(_sentence(error.__cause__ or error, self._root))
             raise pytest.UsageError from error
         finally:
             args[:] = [*self.arguments, f"--import-mode={early_config.known_args_namespace.importmode}"]
@@ -123,14 +123,14 @@ class _Run:
     ) -> None:
         """Keep what broke a file of claims."""
         if isinstance(report, pytest.CollectReport) and call.excinfo is not None:
-            told = _told(call.excinfo.value, self._root)
+            sentence = _sentence(call.excinfo.value, self._root)
             # pytest 8 names a test that it cannot collect without its file.
-            nowhere = isinstance(call.excinfo.value, pytest.fail.Exception) and node.path.name not in told
-            self.troubles.append(f"{node.nodeid}: {told}" if nowhere else told)
+            nowhere = isinstance(call.excinfo.value, pytest.fail.Exception) and node.path.name not in sentence
+            self.troubles.append(f"{node.nodeid}: {sentence}" if nowhere else sentence)
 
     def pytest_internalerror(self, excinfo: pytest.ExceptionInfo[BaseException]) -> bool:
         """Keep what a plugin or a conftest.py has raised, and print nothing of it."""
-        self.troubles.append(_told(excinfo.value, self._root))
+        self.troubles.append(_sentence(excinfo.value, self._root))
         return True
 
     def pytest_keyboard_interrupt(self, excinfo: pytest.ExceptionInfo[BaseException]) -> None:
@@ -188,7 +188,7 @@ class _Run:
                 )
 
 
-def _told(error: BaseException, root: Path) -> str:
+def _sentence(error: BaseException, root: Path) -> str:
     """Return in one line what kept claims from being collected."""
     if isinstance(error, pytest.Collector.CollectError | pytest.UsageError | pytest.fail.Exception):
         cause = error.__cause__

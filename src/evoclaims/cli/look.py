@@ -155,12 +155,13 @@ def _with_robot(tier: Tier, name: str, task: Any) -> RobotTask:
 
 
 def _target(out: str | None, default: str, endings: tuple[str, ...]) -> tuple[Path, str]:
-    """Return the file to write, and its ending, which tells the format."""
+    """Return the file to write, and its ending, which selects the format."""
     path = FIGURES / f"{default}.{endings[0]}" if out is None else Path(out)
     ending = path.suffix.removeprefix(".").lower()
     if ending not in endings:
         raise UserError(
-            f"--out names a file that ends in .{' or .'.join(endings)}, which tells its format; {str(path)!r} does not."
+            f"--out names a file that ends in .{' or .'.join(endings)}, which selects its format; "
+            f"{str(path)!r} does not."
         )
     return path, ending
 

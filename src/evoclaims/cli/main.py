@@ -63,8 +63,8 @@ def _ended(arguments: Sequence[str] | None) -> int:
         print(f"\nevoclaims: interrupted{goes_on}.", file=sys.stderr)
         return INTERRUPTED
     except Exception as error:
-        if told := _raised_in_project(error):
-            print(f"evoclaims: {told}.", file=sys.stderr)
+        if sentence := _raised_in_project(error):
+            print(f"evoclaims: {sentence}.", file=sys.stderr)
             return USER_ERROR
         raise
 

@@ -38,7 +38,7 @@ def _source(name: str, into: Store) -> Store:
     """Return a store to copy from.
 
     Raises:
-        UserError: when there is none, or it is the one to copy into.
+        UserError: when it does not exist, or is the one to copy into.
     """
     if not name or not os.path.lexists(name):
         raise UserError(f"There is no trial store {name!r}: the folder does not exist.")

@@ -1,4 +1,4 @@
-"""`evoclaims new`: a project of one's own that runs, or that of a paper which evoclaims has."""
+"""`evoclaims new`: write a new project that runs, or a copy of a paper's project."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ CHECKOUT: Final = PROJECTS.parents[2]
 
 PARTS: Final = ("docs", "reproductions", "claims", "pyproject.toml")
 """What a project consists of, with the pages that its claims name, if any; its settings come last, so that a part of
-one is none."""
+one is not."""
 
 
 def main(options: argparse.Namespace) -> int:
@@ -70,7 +70,7 @@ def _write(project: Path, folder: Path) -> None:
                     target.parent.mkdir(parents=True, exist_ok=True)
                     shutil.copy(path, target)
     except OSError as error:
-        said = error.strerror or error
+        reason = error.strerror or error
         raise UserError(
-            f"Cannot write a project to {folder}: {said}. Delete what is there, or name another."
+            f"Cannot write a project to {folder}: {reason}. Delete what is there, or name another."
         ) from error

@@ -98,8 +98,8 @@ def main(options: argparse.Namespace) -> int:
         if names not in used:
             condition, n = tier.condition(*names), tier.design.last.n
             few = f", and the design looks at {n}" if len(condition.existing or ()) < n else ""
-            said = f"{' on '.join(names)}: nothing to run: {where_from(condition)}{few}"
-            console.print(said)
+            line = f"{' on '.join(names)}: nothing to run: {where_from(condition)}{few}"
+            console.print(line)
     _print_spent(console, tier, {names: costs[names] for names in used})
     ends = ", ".join(f"{outcome.symbol} {outcome}" for outcome in (Outcome.SUPPORTED, Outcome.REFUTED))
     console.print(
@@ -114,8 +114,8 @@ def main(options: argparse.Namespace) -> int:
             console.print(f"{report.name}: error: {report.reason}")
     if any(pace is None for pace in paces.values()) and not untimed:
         console.print("\nTimes are unknown where no trial has run on such a device; --measure times a few steps.")
-    for said in untimed:
-        print(f"evoclaims: {printable(said)}", file=sys.stderr)
+    for line in untimed:
+        print(f"evoclaims: {printable(line)}", file=sys.stderr)
     return int(bool(untimed))
 
 

@@ -28,7 +28,7 @@ from evoclaims.verdicts.versions import change
 
 
 def main(options: argparse.Namespace) -> int:
-    """Print the power of each claim; 1 when one is below 0.95 or cannot be told, or a condition failed."""
+    """Print the power of each claim; 1 when one is below 0.95 or unknown, or a condition failed."""
     project = open_project(options.storage)
     design = project.reproduction.tier(options.tier).design
     if options.draws < 1:
@@ -43,8 +43,8 @@ def main(options: argparse.Namespace) -> int:
     imported = bool(wanted) and all(condition.existing is not None for condition in wanted.values())
     advice = [] if imported else [_advice(options)]
     if not any(one.power for one in powers):
-        told = "; ".join(power_cells.troubles(powers)[:1]) or "no claim has a test"
-        raise UserError(" ".join([f"No power can be told at the {options.tier} tier: {told}.", *advice]))
+        first = "; ".join(power_cells.troubles(powers)[:1]) or "no claim has a test"
+        raise UserError(" ".join([f"No power can be computed at the {options.tier} tier: {first}.", *advice]))
     console = PlainSpokenConsole(file=styled())
     console.print_whole(plain_table(power_cells.HEADINGS, map(power_cells.cells, powers)))
     for sentence in (*power_cells.about(powers, design.last.n), *power_cells.troubles(powers)):

@@ -19,7 +19,7 @@ from evoclaims.verdicts.versions import change
 def main(options: argparse.Namespace) -> int:
     """Write one file per condition that the tier's claims use and the store holds enough trials of.
 
-    A variant's condition that is committed under another name, and not under its own, is said and not written.
+    A variant's condition that is committed under another name, and not under its own, is reported and not written.
     """
     project = open_project(options.storage)
     reproduction, store = project.reproduction, project.store

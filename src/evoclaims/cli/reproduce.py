@@ -18,7 +18,7 @@ ALL = "all"
 
 
 def main(options: argparse.Namespace) -> int:
-    """Draw, write and say what is missing; 1 when no requested figure shows a number of ours."""
+    """Draw, write and report what is missing; 1 when no requested figure shows a measured number."""
     project = open_project(options.storage)
     reproduction = project.reproduction
     reproduction.tier(options.tier, options.variant)

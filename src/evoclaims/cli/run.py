@@ -75,13 +75,13 @@ def _print_trials(store: Store, name: str, condition: Condition, seeds: Sequence
     found = (store.get(TrialSpec(condition, seed).id, condition.versions) for seed in seeds)
     results = [result for result in found if result is not None]
     for name in condition.edited_since(results):
-        print(f"  {edited_code.said(name)}")
+        print(f"  {edited_code.summary(name)}")
     for result in results:
         print(f"  {describe(result)}")
     crashed = [result for result in results if result.status == "crashed"]
-    said = last_said(crashed[0]).splitlines() if crashed else []
-    if len(said) > 1:
-        print(f"  what seed {crashed[0].seed} said last:", *said, sep="\n    ")
+    lines = last_said(crashed[0]).splitlines() if crashed else []
+    if len(lines) > 1:
+        print(f"  what seed {crashed[0].seed} printed last:", *lines, sep="\n    ")
     return bool(crashed)
 
 
@@ -92,9 +92,9 @@ def _print_matrix(project: Project, tier: str, variant: str) -> None:
     print(f"\n{variant}: {project.reproduction.variants[variant].says}")
     for row in rows:
         for name, outcome in row.outcomes.items():
-            said = f"{row.plain} -> {outcome}" if name in row.hangs_on else f"{outcome} either way"
+            outcomes = f"{row.plain} -> {outcome}" if name in row.hangs_on else f"{outcome} either way"
             if row.plain is Outcome.NOT_RUN:
-                said = f"{outcome}; not run under the protocol itself"
-            print(f"  {row.claim}: {said}")
+                outcomes = f"{outcome}; not run under the protocol itself"
+            print(f"  {row.claim}: {outcomes}")
     if not rows:
         print("  No claim can be judged yet: each needs all trials of its tier.")

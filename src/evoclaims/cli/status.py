@@ -49,8 +49,8 @@ def main(options: argparse.Namespace) -> int:
             )
     if options.form is None:
         _print(reports, options.tier, options.why)
-        if said := _where_from(reports, project):
-            print(said)
+        if note := _where_from(reports, project):
+            print(note)
         for protocol in plain:
             print(_changes(protocol, reports, project.reproduction, options.variant))
     else:

@@ -53,7 +53,7 @@ def open_store(name: str) -> Store:
 
 
 def _project() -> Path:
-    """Return the root of the project around the current folder; the folder itself where there is none."""
+    """Return the root of the project around the current folder; the folder itself outside a project."""
     try:
         return find_root(Path.cwd())
     except UserError:

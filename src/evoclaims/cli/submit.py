@@ -86,7 +86,7 @@ def _plan(
         return []
     jobs = dealt(batches, request.together) if request.cluster == "local" else [[one] for one in batches]
     where = "this machine" if request.cluster == "local" else "SLURM"
-    asks = request.told()
+    asks = request.summary()
     print(
         f"{plural(len(batches), 'batch', 'batches')} of the {options.tier} tier in {plural(len(jobs), 'job')} on "
         f"{where}, at most {min(request.together, len(jobs))} at a time{asks and f', each with {asks}'}:"
@@ -190,8 +190,8 @@ def _send(request: JobRequest, folder: Path, requeues: int, work: Sequence[Batch
     except (RuntimeError, OSError) as error:
         if request.cluster == "slurm":  # nothing was submitted, since an array is one call
             shutil.rmtree(folder, ignore_errors=True)
-        said = " ".join(str(error).split())
-        raise UserError(f"The jobs were not submitted: {said or type(error).__name__}") from error
+        reason = " ".join(str(error).split())
+        raise UserError(f"The jobs were not submitted: {reason or type(error).__name__}") from error
 
 
 def _setup_here(request: JobRequest) -> list[str]:

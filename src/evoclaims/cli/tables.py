@@ -4,10 +4,12 @@ A table is between two comments, the first of which says what it shows:
 
     <!-- evoclaims: verdicts full full:published smoke -->    verdicts by tier, or by tier and variant of the protocol
     <!-- evoclaims: marks text=full smoke -->                verdicts as marks; sentences in the file stay
-    <!-- evoclaims: tally full -->                            how many verdicts of a tier ended how, in a sentence
+    <!-- evoclaims: tally full -->                            how many sentences and cases of a tier ended how
     <!-- evoclaims: numbers full all -->                      published numbers and ours, under all variants
     <!-- evoclaims: details full -->                          verdicts that variants of the protocol may change
     <!-- evoclaims: refutations full -->                     which refuted claims end otherwise under a variant
+    <!-- evoclaims: readings full -->                         the readings of each sentence of the paper, and their verdicts
+    <!-- evoclaims: uncovered -->                             the paper's sentences that no claim judges, and why not
     <!-- evoclaims: measures -->                              what claims can read from trials
     <!-- evoclaims: assertions -->                            what they can say of it, and how it is judged
     <!-- evoclaims: commands -->                             the commands of evoclaims and their options
@@ -27,9 +29,11 @@ from evoclaims.cli import commands
 from evoclaims.cli.output_files import write
 from evoclaims.cli.project import Project, open_project
 from evoclaims.core.errors import UnknownNameError, UserError
+from evoclaims.core.files import read_text
 from evoclaims.figures.replication import replications
 from evoclaims.judging.verdict import Outcome
-from evoclaims.report import replication_cells, vocabulary
+from evoclaims.paper.uncovered import uncovered
+from evoclaims.report import readings_table, replication_cells, vocabulary
 from evoclaims.report.formatting import plural
 from evoclaims.report.markdown import numbers, robustness
 from evoclaims.report.markdown_text import literal, table
@@ -58,7 +62,7 @@ def main(options: argparse.Namespace) -> int:
         for name in options.files:
             path = Path(name)
             try:
-                before = path.read_text(encoding="utf-8")
+                before = read_text(path)
             except (OSError, UnicodeError) as error:
                 raise UserError(f"Cannot read {path}: {getattr(error, 'strerror', None) or error}.") from error
             after = filled(before, project)
@@ -128,6 +132,12 @@ def _tally(project: Project, words: list[str], *_: str) -> str:
     return tally(reports)
 
 
+def _readings(project: Project, words: list[str], *_: str) -> str:
+    """Return the readings of each sentence that a tier judges."""
+    (reports,) = project.judge_variants([(_tier(project, words), "")])
+    return readings_table.readings(reports)
+
+
 def _details(project: Project, words: list[str], *_: str) -> str:
     """Return the verdicts of a tier under the protocol and under each variant, of the claims that a variant touches."""
     rows, variants = _under_variants(project, _tier(project, words))
@@ -173,8 +183,8 @@ def _numbers(project: Project, words: list[str], *_: str) -> str:
     variants = ("", *project.reproduction.variants) if rest else ("",)
     found = replications(project.archive, project.reproduction, tier, variants)
     (papers,) = project.judge_sessions([(project.as_published(tier), tier)])
-    said = [*replication_cells.totals(found), *replication_cells.put_to_the_paper(papers)]
-    return "\n\n".join((numbers(found), "\n".join(f"* {literal(line)}" for line in said)))
+    lines = [*replication_cells.totals(found), *replication_cells.put_to_the_paper(papers)]
+    return "\n\n".join((numbers(found), "\n".join(f"* {literal(line)}" for line in lines)))
 
 
 _KINDS: Final[Mapping[str, Callable[[Project, list[str], str], str]]] = {
@@ -184,6 +194,8 @@ _KINDS: Final[Mapping[str, Callable[[Project, list[str], str], str]]] = {
     "details": _details,
     "refutations": _refutations,
     "numbers": _numbers,
+    "readings": _readings,
+    "uncovered": lambda project, *_: readings_table.without_claims(uncovered(project.reproduction.folder)),
     "measures": lambda project, *_: vocabulary.measures(project.reproduction.trials),
     "assertions": lambda *_: vocabulary.assertions(),
     "commands": lambda *_: commands.reference(),

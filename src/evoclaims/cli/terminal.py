@@ -18,7 +18,7 @@ class OutputError(Exception):
 
 @contextmanager
 def _written() -> Iterator[None]:
-    """Raise an `OutputError` for an error in a `with` block; a reader that has gone is none."""
+    """Raise an `OutputError` for an error in a `with` block; a reader that has gone is not an error."""
     try:
         yield
     except BrokenPipeError:

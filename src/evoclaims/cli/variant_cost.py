@@ -1,4 +1,4 @@
-"""What a variant of the protocol costs to run, said beforehand; what is committed need not run."""
+"""What a variant of the protocol will cost to run; what is committed need not run."""
 
 from __future__ import annotations
 

@@ -19,8 +19,9 @@ WHOLE: Final = re.compile(r"int|tuple\[int(, (int|\.\.\.))*\]")
 def as_plain(value: Any) -> Any:
     """Turn frozen dataclasses, tuples and scalars into plain JSON values.
 
-    A dataclass becomes its fields, and the name of its class if that is none of this package's, where no two with the
-    same fields mean different things. Fields whose metadata holds `canonical=False` are left out. NaN and the
+    A dataclass becomes its fields, and the name of its class if that is not of this package, where no two with the
+    same fields mean different things. Fields whose metadata holds `canonical=False` are left out, and those with
+    `canonical="if set"` where they have their default: such a field may be added to a released class. NaN and the
     infinities become the strings "nan", "inf", "-inf", since JSON cannot express them.
 
     Raises:
@@ -48,8 +49,14 @@ def fields_of(value: Any) -> dict[str, Any]:
     return {
         field.name: as_plain(getattr(value, field.name))
         for field in dataclasses.fields(value)
-        if field.metadata.get("canonical", True)
+        if _is_canonical(field, getattr(value, field.name))
     }
+
+
+def _is_canonical(field: dataclasses.Field[Any], value: Any) -> bool:
+    """Whether a field's value is part of the canonical form."""
+    canonical = field.metadata.get("canonical", True)
+    return bool(canonical) and (canonical != "if set" or value != field.default)
 
 
 def require_whole_numbers(value: Any) -> None:

@@ -32,7 +32,7 @@ from packaging.version import InvalidVersion, Version
 from evoclaims.core.canonical import content_hash
 from evoclaims.core.errors import UserError
 from evoclaims.core.file_names import file_name
-from evoclaims.core.files import write_atomically
+from evoclaims.core.files import read_json, read_text, write_atomically
 from evoclaims.core.pins import without, without_hashes
 
 PROGRAM: Final = "evoclaims"
@@ -140,7 +140,7 @@ def make(recipe: Recipe, kept: Path, project: Path, begins: Callable[[], None]) 
     folder.parent.mkdir(parents=True, exist_ok=True)
     with FileLock(f"{folder}.lock"):
         try:
-            return Environment(folder, json.loads((folder / COMPLETE).read_bytes()))
+            return Environment(folder, read_json(folder / COMPLETE))
         except (OSError, ValueError):
             shutil.rmtree(folder, ignore_errors=True)
         begins()
@@ -157,12 +157,12 @@ def checked(version: str) -> str:
     """Return a version as it was written.
 
     Raises:
-        UserError: when it is none.
+        UserError: when it is invalid.
     """
     try:
         Version(version)
     except InvalidVersion as error:
-        raise UserError(f"{version!r} is no version of a package: write such as 0.3.2.") from error
+        raise UserError(f"{version!r} is not a version of a package. Write one such as 0.3.2.") from error
     return version
 
 
@@ -170,12 +170,12 @@ def checked_name(package: str) -> str:
     """Return the normalized name of a package.
 
     Raises:
-        UserError: when it is none; an installer might take it for an option, or for nothing to install.
+        UserError: when it is invalid; an installer might take it for an option, or for nothing to install.
     """
     try:
         return canonicalize_name(package, validate=True)
     except InvalidName as error:
-        raise UserError(f"{package!r} is no name of a package: write such as jax.") from error
+        raise UserError(f"{package!r} is not the name of a package. Write one such as jax.") from error
 
 
 def installed_here() -> dict[str, str]:
@@ -230,8 +230,8 @@ def _begin_apart(recipe: Recipe, empty: Environment) -> tuple[list[str], bool]:
 def _requirements(project: Path) -> list[str]:
     """Return what an environment apart from this one needs: this program, and the project where it can be installed."""
     try:
-        described = tomllib.loads((project / "pyproject.toml").read_text(encoding="utf-8")).get("project", {})
-    except (OSError, ValueError):
+        described = tomllib.loads(read_text(project / "pyproject.toml")).get("project", {})
+    except (OSError, ValueError, RecursionError):
         described = {}
     own = [] if described.get("name") == PROGRAM else _this_program()
     return [*own, "--editable", str(project.resolve())] if described else own
@@ -254,7 +254,7 @@ def _pins(recipe: Recipe) -> str:
     if recipe.constraints is None:
         return ""
     try:
-        pins = recipe.constraints.read_text(encoding="utf-8")
+        pins = read_text(recipe.constraints)
     except (OSError, UnicodeError) as error:
         raise UserError(f"Cannot read the constraints {recipe.constraints}: {error}.") from error
     return without(pins, recipe.package)
@@ -264,7 +264,7 @@ def _run(command: Sequence[str]) -> str:
     """Run a command and return what it printed.
 
     Raises:
-        NotInstallableError: with the last thing that it said, when it fails.
+        NotInstallableError: with the last line of its output, when it fails.
     """
     environment = {name: value for name, value in os.environ.items() if name != "PYTHONHOME"}
     done = subprocess.run(command, capture_output=True, text=True, errors="replace", env=environment, check=False)
@@ -273,9 +273,9 @@ def _run(command: Sequence[str]) -> str:
     return done.stdout
 
 
-def reason(said: str) -> str:
+def reason(output: str) -> str:
     """Return in a line why a command has failed: its last error with what belongs to it, or else its last line."""
-    lines = [line.rstrip() for line in said.splitlines() if line.strip(" =\t")]
+    lines = [line.rstrip() for line in output.splitlines() if line.strip(" =\t")]
     errors = [index for index, line in enumerate(lines) if _ERROR.match(line)]
     first = errors[-1] if errors else len(lines) - 1
     more = itertools.takewhile(lambda line: line.startswith((" ", "╰", "│")), lines[first + 1 :])

@@ -4,24 +4,29 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import io
+import json
 import os
 import secrets
 import stat
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Final
+from typing import Any, BinaryIO, Final
 
 from evoclaims.core.errors import StorageError
 
 ELSEWHERE: Final = "name another folder."
 """What a user can do about a file that cannot be written, if nothing else is known."""
 
+MOST_BYTES: Final = 2**31
+"""Of a file that is read as a whole: a larger one, such as one of holes alone, would take the memory."""
+
 _FULL: Final = (errno.ENOSPC, getattr(errno, "EDQUOT", errno.ENOSPC))
 """Errors of a disk or a quota that is full, where there is another way out."""
 
 
-def read_file(path: Path) -> bytes:
-    """Return the bytes of a regular file (or of a link to one).
+def open_file(path: Path) -> BinaryIO:
+    """Open a regular file (or a link to one) for reading.
 
     Raises:
         OSError: when it is missing or unreadable; when it is a folder, or a pipe or device, which could block the
@@ -33,20 +38,51 @@ def read_file(path: Path) -> bytes:
         os.close(descriptor)
         if stat.S_ISDIR(mode):
             raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
-        raise OSError(errno.EINVAL, "it is no regular file", str(path))
-    with open(descriptor, "rb") as file:
+        raise OSError(errno.EINVAL, "it is not a regular file", str(path))
+    return open(descriptor, "rb")
+
+
+def read_file(path: Path) -> bytes:
+    """Return the bytes of a file; raises as `open_file` does, and for one of more than `MOST_BYTES`."""
+    with open_file(path) as file:
+        if os.fstat(file.fileno()).st_size > MOST_BYTES:
+            raise OSError(errno.EFBIG, os.strerror(errno.EFBIG), str(path))
         return file.read()
 
 
-def write_atomically(path: Path, data: bytes, elsewhere: str = ELSEWHERE) -> None:
+def read_json(path: Path) -> Any:
+    """Return what a file holds as JSON.
+
+    Raises:
+        OSError: as `read_file` does.
+        ValueError: when it is not JSON, or nested too deeply.
+    """
+    try:
+        return json.loads(read_file(path))
+    except RecursionError as error:
+        raise ValueError("it is nested too deeply") from error
+
+
+def read_text(path: Path) -> str:
+    """Return a UTF-8 text, with each end of a line as a line feed.
+
+    Raises:
+        OSError: as `read_file` does.
+        ValueError: when it is not UTF-8.
+    """
+    return io.StringIO(read_file(path).decode(), newline=None).read()
+
+
+def write_atomically(path: Path, data: bytes, elsewhere: str = ELSEWHERE, mode: int = 0o666) -> None:
     """Write `data` to `path`; a reader always sees the whole old file or the whole new one, even after a kill.
 
     Missing parent folders are created. `elsewhere` is the end of the sentence that says how to write to another place.
+    `mode` is the new file's, less what the umask forbids.
 
     Raises:
         StorageError: when the folder cannot be written or the disk is full.
     """
-    with _aside(path, data, elsewhere) as aside:
+    with _aside(path, data, elsewhere, mode) as aside:
         os.replace(aside, path)
 
 
@@ -68,6 +104,11 @@ def write_once(path: Path, data: bytes, elsewhere: str = ELSEWHERE) -> bool:
     return True
 
 
+def at_once(path: str, flags: int) -> int:
+    """Open a file for writing: an `opener` of `open`, by which a pipe that nobody reads is an error and no wait."""
+    return os.open(path, flags | getattr(os, "O_NONBLOCK", 0), 0o666)
+
+
 def write_where_named(path: Path, data: bytes, elsewhere: str = ELSEWHERE) -> None:
     """Write `data` to what a user has named: through a link, or straight into a device or pipe such as /dev/stdout.
 
@@ -83,10 +124,10 @@ def write_where_named(path: Path, data: bytes, elsewhere: str = ELSEWHERE) -> No
     if is_file:
         write_atomically(Path(os.path.realpath(path)) if os.path.islink(path) else path, data, elsewhere)
         return
-    at_once = getattr(os, "O_NONBLOCK", 0)
+    unblocked = getattr(os, "O_NONBLOCK", 0)
     try:
-        with open(os.open(path, os.O_WRONLY | at_once), "wb") as file:
-            if at_once:
+        with open(os.open(path, os.O_WRONLY | unblocked), "wb") as file:
+            if unblocked:
                 os.set_blocking(file.fileno(), True)
             file.write(data)
     except OSError as error:
@@ -94,12 +135,12 @@ def write_where_named(path: Path, data: bytes, elsewhere: str = ELSEWHERE) -> No
 
 
 @contextlib.contextmanager
-def _aside(path: Path, data: bytes, elsewhere: str) -> Iterator[Path]:
+def _aside(path: Path, data: bytes, elsewhere: str, mode: int = 0o666) -> Iterator[Path]:
     """Yield a temporary file beside `path` with `data` on disk; it is deleted after the block unless renamed."""
     aside = path.with_name(f".{path.name}.{os.getpid()}.{secrets.token_hex(4)}.tmp")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        with open(aside, "wb") as file:
+        with open(aside, "wb", opener=lambda name, flags: os.open(name, flags, mode)) as file:
             file.write(data)
             file.flush()
             os.fsync(file.fileno())

@@ -8,10 +8,13 @@ from typing import Any, Final
 
 from evoclaims.core.canonical import content_hash
 from evoclaims.core.errors import UserError
-from evoclaims.core.provenance import PACKAGES, version_of
+from evoclaims.core.provenance import PACKAGES, changing_flags, flags_that_change, version_of
 
 Versions = Mapping[str, str | None]
-"""Package versions by name; None if not installed."""
+"""Package versions by name, None if not installed; and under `FLAGS` the flags of XLA that change a trial, if any."""
+
+FLAGS: Final = "XLA_FLAGS"
+"""Flags by which XLA compiles otherwise decide, like versions, which stored trial answers."""
 
 ALWAYS: Final = ("jax", "jaxlib", "numpy")
 """Used by every trial."""
@@ -38,7 +41,7 @@ def packages_of(component: Any) -> tuple[str, ...]:
     declared = getattr(component, "packages", UNDECLARED)
     if not isinstance(declared, tuple) or not all(isinstance(name, str) for name in declared):
         raise UserError(
-            f"The packages of {getattr(component, 'name', component)} are {declared!r}; write a tuple of their names, "
+            f"The packages of {getattr(component, 'name', component)} are {declared!r}. Write a tuple of their names, "
             'such as packages = ("optax",), or () when it needs nothing beyond jax and numpy.'
         )
     return tuple(sorted({*declared, *(name for part in _parts(component) for name in packages_of(part))}))
@@ -73,14 +76,26 @@ def _parts(component: Any) -> Iterator[Any]:
 
 
 def installed(packages: tuple[str, ...]) -> dict[str, str | None]:
-    """Return the package versions in this environment."""
-    return {name: version_of(name) for name in packages}
+    """Return the package versions in this environment, and the flags that change its trials if there are any."""
+    return _with_flags({name: version_of(name) for name in packages if name != FLAGS}, changing_flags(), packages)
 
 
 def recorded(provenance: Mapping[str, Any], packages: tuple[str, ...]) -> dict[str, str | None]:
-    """Return the package versions recorded in a provenance; None where none is recorded."""
+    """Return the package versions recorded in a provenance, None where none is recorded, and flags as `installed`."""
     versions = provenance.get("versions")
-    return {name: versions.get(name) if isinstance(versions, Mapping) else None for name in packages}
+    known = versions if isinstance(versions, Mapping) else {}
+    flags = flags_that_change(provenance.get("xla_flags"))
+    return _with_flags({name: known.get(name) for name in packages if name != FLAGS}, flags, packages)
+
+
+def _with_flags(versions: dict[str, str | None], flags: str | None, asked: tuple[str, ...]) -> dict[str, str | None]:
+    """Add the flags, if there are any, or if they are asked for by name."""
+    return {**versions, FLAGS: flags} if flags or FLAGS in asked else versions
+
+
+def without_flags(versions: Versions) -> dict[str, str | None]:
+    """Return the versions of packages alone."""
+    return {name: version for name, version in versions.items() if name != FLAGS}
 
 
 def depends_on(provenance: Mapping[str, Any]) -> tuple[str, ...] | None:
@@ -92,13 +107,18 @@ def depends_on(provenance: Mapping[str, Any]) -> tuple[str, ...] | None:
 
 
 def agree(provenance: Mapping[str, Any], versions: Versions) -> bool:
-    """Whether a provenance has exactly these versions."""
-    return recorded(provenance, tuple(versions)) == dict(versions)
+    """Whether a provenance has exactly these versions, and these flags or none."""
+    return _set(recorded(provenance, tuple(versions))) == _set(versions)
 
 
 def short_hash(versions: Versions) -> str:
     """Return the hash of versions used in a record's file name."""
-    return content_hash(dict(versions))[:SHORT_HASH]
+    return content_hash(_set(versions))[:SHORT_HASH]
+
+
+def _set(versions: Versions) -> dict[str, str | None]:
+    """Return versions without flags that are not set."""
+    return {name: version for name, version in versions.items() if name != FLAGS or version is not None}
 
 
 def differences(old: Versions, new: Versions) -> dict[str, tuple[str | None, str | None]]:

@@ -39,6 +39,9 @@ FIXES_BITS: Final = ("machine", "versions", "xla_flags", "matmul_precision", "x6
 VECTORS: Final = ("avx512f", "avx2", "avx", "neon", "sse2")
 """Instruction sets for vectors as LLVM calls them, the widest first."""
 
+CHANGES_NOTHING: Final = ("--xla_dump_", "--xla_force_host_platform_device_count", "--xla_gpu_cuda_data_dir")
+"""How flags of XLA begin that leave all computations as they are."""
+
 GIT_SECONDS: Final = 5.0
 """Time limit for git; on a slow network folder, a missing revision is better than a stalled run."""
 
@@ -80,6 +83,23 @@ def _collected() -> dict[str, Any]:
     }
 
 
+@functools.cache
+def changing_flags() -> str | None:
+    """Return the flags of XLA by which this process compiles otherwise than by default; see `flags_that_change`.
+
+    Read once, as XLA does.
+    """
+    return flags_that_change(os.environ.get("XLA_FLAGS"))
+
+
+def flags_that_change(flags: object) -> str | None:
+    """Return those flags of XLA that may change a trial, in order, of each name the last; None if there is none."""
+    if not isinstance(flags, str):
+        return None
+    last = {flag.partition("=")[0]: flag for flag in flags.split() if not flag.startswith(CHANGES_NOTHING)}
+    return " ".join(last[name] for name in sorted(last)) or None
+
+
 def what_fixes_bits(provenance: Mapping[str, Any]) -> dict[str, Any]:
     """Return the parts of a provenance that determine a computation's bits, if present.
 
@@ -88,7 +108,8 @@ def what_fixes_bits(provenance: Mapping[str, Any]) -> dict[str, Any]:
     """
     device = provenance.get("device") or {}
     names = (*FIXES_BITS, "cuda" if device.get("platform") == "gpu" else "instructions")
-    return {"kind": device.get("kind"), **{name: provenance[name] for name in names if name in provenance}}
+    found = {"kind": device.get("kind"), **{name: provenance[name] for name in names if name in provenance}}
+    return {name: flags_that_change(value) if name == "xla_flags" else value for name, value in found.items()}
 
 
 def git_state() -> dict[str, Any] | None:

@@ -24,9 +24,9 @@ def in_one_line(error: BaseException, root: Path) -> str:
         root: the user's project; the place is the innermost frame in one of its files, else the innermost of all.
     """
     text = _text(error)
-    told = text if isinstance(error, UserError) and text else f"{type(error).__name__}{': ' * bool(text)}{text}"
+    sentence = text if isinstance(error, UserError) and text else f"{type(error).__name__}{': ' * bool(text)}{text}"
     place = _place(error, root)
-    return told.removesuffix(".") + f" ({place})" * bool(place)
+    return sentence.removesuffix(".") + f" ({place})" * bool(place)
 
 
 def is_of_project(error: BaseException, root: Path) -> bool:

@@ -35,6 +35,6 @@ def between(first: str, last: str, releases: list[str]) -> list[str]:
     """
     low, high = Version(first), Version(last)
     if not low < high:
-        raise UserError(f"{first} does not come before {last}: name the older release first.")
+        raise UserError(f"{first} is not older than {last}. Name the older release first.")
     inner = sorted((one for one in releases if low < Version(one) < high), key=Version)
     return [first, *inner, last]

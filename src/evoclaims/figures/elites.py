@@ -54,32 +54,33 @@ class ElitesMap:
 
     Attributes:
         grounds: one per panel.
-        told: measures of all trials that are listed below each panel, by their labels.
+        listed: measures of all trials that are listed below each panel, by their labels.
         width: of the figure, inches.
     """
 
     grounds: tuple[Ground, ...]
-    told: tuple[tuple[str, MeasureOf], ...]
+    listed: tuple[tuple[str, MeasureOf], ...]
     width: float = 7.0
 
     def __call__(self, scope: Scope, heading: Heading) -> Drawing:
         """Draw the maps from a tier's trials."""
         read_all = [
-            [(name, read(scope, one.method, one.task, measure)) for name, measure in self.told] for one in self.grounds
+            [(name, read(scope, one.method, one.task, measure)) for name, measure in self.listed]
+            for one in self.grounds
         ]
         maps = [_first_map(scope, one) for one in self.grounds]
-        absent = absences(readings for told in read_all for _, readings in told)
+        absent = absences(readings for listed in read_all for _, readings in listed)
         without = [_unmapped(scope, one) for one, found in zip(self.grounds, maps, strict=True) if found is None]
         missing = (*absent, *without)
         with plain():
-            row = sheet.PanelRow(0.0, below=0.44 + 2 * len(self.told) * LINE, right=0.6, columns=len(self.grounds))
+            row = sheet.PanelRow(0.0, below=0.44 + 2 * len(self.listed) * LINE, right=0.6, columns=len(self.grounds))
             wide = row.wide(self.width)
             figure, axes = sheet.build(heading, self.width, [replace(row, height=wide)], [], [*missing, HOW])
-            for axis, one, found, told in zip(axes, self.grounds, maps, read_all, strict=True):
-                _paint(axis, _task(scope, one), one, found, told, wide)
+            for axis, one, found, listed in zip(axes, self.grounds, maps, read_all, strict=True):
+                _paint(axis, _task(scope, one), one, found, listed, wide)
         panels = zip(self.grounds, maps, read_all, strict=True)
-        table = frame((row for one, found, told in panels for row in _rows(one, found, told)), "x", "y")
-        shown = sum(len(readings.values) for told in read_all for _, readings in told)
+        table = frame((row for one, found, listed in panels for row in _rows(one, found, listed)), "x", "y")
+        shown = sum(len(readings.values) for listed in read_all for _, readings in listed)
         return Drawing(figure, table, (HOW,), missing, shown, f"{heading.title} ({heading.place})")
 
 
@@ -87,7 +88,7 @@ def _task(scope: Scope, ground: Ground) -> Maze:
     """Return the maze of a panel."""
     task = scope.tier.condition(ground.method, ground.task).task
     if not isinstance(task, Maze):
-        raise UserError(f"A map of elites lies over the area of a maze, which {ground.task!r} is not.")
+        raise UserError(f"A map of elites needs the area of a maze; {ground.task!r} is not a maze.")
     return task
 
 
@@ -110,7 +111,7 @@ def _unmapped(scope: Scope, ground: Ground) -> str:
 
 
 def _paint(
-    axis: Any, task: Maze, ground: Ground, found: Map | None, told: list[tuple[str, Readings]], wide: float
+    axis: Any, task: Maze, ground: Ground, found: Map | None, listed: list[tuple[str, Readings]], wide: float
 ) -> None:
     """Paint one map over its maze, and below it the measures of all trials, in lines of `wide` inches."""
     paint_ground(axis, task, ())
@@ -125,7 +126,7 @@ def _paint(
         mesh = paint_elites(axis, task, found.fitnesses)
         bar = axis.figure.colorbar(mesh, cax=axis.inset_axes((1.03, 0.1, 0.03, 0.8)))
         bar.outline.set_linewidth(0.5)
-    lines = [line for name, readings in told for line in sheet.wrap(f"{name}: {_summary(readings)}", wide, SMALL)]
+    lines = [line for name, readings in listed for line in sheet.wrap(f"{name}: {_summary(readings)}", wide, SMALL)]
     corner = {"xycoords": "axes fraction", "xytext": (0, -30), "textcoords": "offset points"}
     axis.annotate("\n".join(lines), (0.0, 0.0), va="top", fontsize=SMALL, **corner)
 
@@ -144,9 +145,9 @@ def _text(value: float) -> str:
     return f"{value:,.0f}" if abs(value) >= 100 else f"{value:.2f}"
 
 
-def _rows(ground: Ground, found: Map | None, told: list[tuple[str, Readings]]) -> Iterator[dict[str, Any]]:
+def _rows(ground: Ground, found: Map | None, listed: list[tuple[str, Readings]]) -> Iterator[dict[str, Any]]:
     """Yield a panel's rows of the table: the measures of all trials, then the elites of the map, by cell."""
-    for name, readings in told:
+    for name, readings in listed:
         yield from readings.rows(panel=ground.title, at=name, series=ground.method)
     if found is not None:
         names = {"panel": ground.title, "at": "map", "series": ground.method, "method": ground.method}

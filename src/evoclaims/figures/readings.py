@@ -33,7 +33,7 @@ class Reading:
         seed, trial: which trial; `trial` is its id.
         status: the record's; "not finite" for a finished trial with such a number, "not measured" for one without a
             number, "not run" without a trial.
-        value: the number; None where there is none to draw.
+        value: the number; None without a number to draw.
         rank: what rank tests use: the number, or the worst (-inf or inf) for a trial that diverged or ran out of time.
     """
 

@@ -57,13 +57,13 @@ def build(
     """
     room = width - 2 * EDGE
     title, place = wrap(heading.title, room, TITLE, bold=True), wrap(heading.place, room, SMALL)
-    told = [line for note in notes for line in wrap(note, room, SMALL)]
+    lines = [line for note in notes for line in wrap(note, room, SMALL)]
     columns = _columns(legend, room)
     lines_of_legend = -(-len(legend) // columns) if legend else 0
     head = EDGE + len(title) * TITLE * LINE + len(place) * SMALL * LINE + 0.04
     key = lines_of_legend * (TEXT * LINE + 0.02)
     body = sum(row.above + row.height + row.below for row in rows)
-    height = head + key + body + len(told) * SMALL * LINE + EDGE
+    height = head + key + body + len(lines) * SMALL * LINE + EDGE
     figure = optional("matplotlib.figure").Figure(figsize=(width, height), facecolor="white")
     _write(figure, title, EDGE, EDGE, TITLE, fontweight="bold")
     _write(figure, place, EDGE, EDGE + len(title) * TITLE * LINE, SMALL, color=FAINT)
@@ -85,7 +85,7 @@ def build(
     for row in rows:
         axes += _frames(figure, row, top)
         top += row.above + row.height + row.below
-    _write(figure, told, EDGE, top, SMALL)
+    _write(figure, lines, EDGE, top, SMALL)
     return figure, axes
 
 

@@ -50,7 +50,7 @@ class Assertion(ABC):
 
     Attributes:
         kind: a name for tables.
-        entry: what the vocabulary says of it; a kind of one's own may have none.
+        entry: its entry in the vocabulary; a custom kind may have none.
     """
 
     kind: ClassVar[str]

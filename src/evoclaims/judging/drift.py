@@ -111,7 +111,7 @@ class DriftReport:
     @property
     def lines(self) -> list[str]:
         """A line for each row that drifted, each edited table, and each condition that could not be checked."""
-        edited = [f"EDITED {said}" for said in self.edited]
+        edited = [f"EDITED {line}" for line in self.edited]
         drifted = [f"DRIFT in {row.in_words}" for row in self.rows if row.drifted]
         unchecked = (f"not checked: {row.label}: {row.detail or row.status}" for row in self.unchecked)
         return [*drifted, *edited, *dict.fromkeys(unchecked)]

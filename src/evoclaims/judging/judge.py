@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-import itertools
-import math
 from bisect import bisect_left
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from evoclaims.judging.assertion import Assertion, Finding
+from evoclaims.judging.copies import Copies, copies
 from evoclaims.judging.counting import MAX_TRIALS
 from evoclaims.judging.design import Design, Look
 from evoclaims.judging.fingerprint import fingerprint
-from evoclaims.judging.sample import Declared, Limited, Source, Trials, UnreadableTrialError
+from evoclaims.judging.sample import Limited, Source, Trials, UnreadableTrialError
+from evoclaims.judging.spending import overspent
 from evoclaims.judging.verdict import Outcome, PValues, Verdict
 from evoclaims.trials.crashes import why
-from evoclaims.trials.result import TRAINED_BY, TrialResult
+from evoclaims.trials.result import TrialResult
 
 
 @dataclass(frozen=True)
@@ -28,6 +28,7 @@ class Ending:
         trials: what was looked at.
         finding: what they say; None where trials crashed or cannot be read.
         note: why judging ended without a decision or before it, if it did; without a finding, the reason.
+        copies: which trials are copies of each other.
     """
 
     outcome: Outcome
@@ -35,6 +36,7 @@ class Ending:
     trials: Trials
     finding: Finding | None
     note: str = ""
+    copies: str = ""
 
 
 def judge(assertion: Assertion, design: Design, *, claim: str = "", tier: str = "") -> Verdict:
@@ -64,6 +66,8 @@ def judge(assertion: Assertion, design: Design, *, claim: str = "", tier: str = 
         attainable_p_refuted=finding.attainable.refuted if tested else None,
         evidence=finding.evidence,
         without_result=_without_result(assertion, ending.trials),
+        overspent=overspent(assertion, ending.trials)[0],
+        copies=ending.copies,
         deciding=finding.deciding(outcome.direction),
     )
 
@@ -99,15 +103,22 @@ def decide(
         if not _decidable(assertion.attainable(look.n, design), look.alpha):
             continue
         if short := _shortage(assertion, look, design):
-            return ending and replace(ending, note=f"{short}; ")
+            return ending and replace(ending, note=f"{ending.note}{short}; ")
         trials = {source.fingerprint: fetch(source, design.seeds(look.n)) for source in assertion.sources()}
         crashed = _crashed(assertion, trials)
         if crashed:
             return Ending(Outcome.ERROR, look, trials, None, crashed)
-        copied = _copied(assertion, trials)
-        if copied:
-            return Ending(Outcome.INCONCLUSIVE, look, trials, None, copied)
+        if refusal := overspent(assertion, trials)[1]:
+            return Ending(Outcome.ERROR, look, trials, None, refusal)
+        found = copies(assertion, trials)
+        if found.alone:
+            return Ending(Outcome.INCONCLUSIVE, look, trials, None, _all_copies(found.alone, look.n))
         try:
+            if found.sentence:
+                ending = _counted_once(assertion, design, look, trials, found)
+                if ending.outcome is not Outcome.INCONCLUSIVE:
+                    return ending
+                continue  # what later trials could change is not bounded: these may be copies, too
             finding = assertion.find(trials, design, look.alpha)
         except UnreadableTrialError as error:
             return Ending(Outcome.ERROR, look, trials, None, str(error))
@@ -145,7 +156,7 @@ def _shortage(assertion: Assertion, look: Look, design: Design) -> str:
     for source in assertion.sources():
         existing = source.existing if isinstance(source, Limited) else None
         if existing is not None and design.seeds(look.n)[-1] >= existing:
-            few = f"there are {existing}" if existing > 1 else "there is 1" if existing else "there is none"
+            few = f"there are {existing}" if existing > 1 else "there is 1" if existing else "there are none"
             return f"underpowered: needs n = {design.seeds(look.n)[-1] + 1} trials of {source.label}, and {few}"
     return ""
 
@@ -158,41 +169,41 @@ def _crashed(assertion: Assertion, trials: Trials) -> str:
         for trial in trials[source.fingerprint]
         if trial.status == "crashed"
     ]
-    reason = next((f"; the first: {said}" for _, said in crashed if said), "")
+    reason = next((f"; the first: {why}" for _, why in crashed if why), "")
     return f"trials crashed: {', '.join(name for name, _ in crashed)}{reason}" if crashed else ""
 
 
-def _copied(assertion: Assertion, trials: Trials) -> str:
-    """Return a sentence that names a condition whose trials are all one and the same, or nothing.
+def _all_copies(label: str, n: int) -> str:
+    """Return the sentence on a condition that has a single trial in truth."""
+    return (
+        f"all {n} trials of {label} are copies of one: training gave the same, whatever the seed. Tests take trials "
+        "for independent: does the method draw from its key or seed? One without chance, such as a control, declares "
+        "deterministic = True; in_every_trial() asserts facts. A training loop whose trainings do differ reports or "
+        "returns numbers that show it"
+    )
 
-    Ten copies of a trial say as much as one, and a test would take them for ten draws. What may be the same by chance
-    (a success, a network of few bits) is not enough: champions and whole training curves are, and of a training loop,
-    which keeps no champion, all that it has told, if that is more than whole numbers. A method may say that it draws
-    nothing.
+
+def _counted_once(assertion: Assertion, design: Design, look: Look, trials: Trials, found: Copies) -> Ending:
+    """Return how a look ends whose trials have copies among them.
+
+    Copies count once. Equal trials may also be independent by chance, and leaving these out would favour what is rare:
+    so a decision needs both, the trials that count and all trials. Each test is valid at the look's alpha in its case.
+
+    Raises:
+        UnreadableTrialError: when a number of a finished trial cannot be judged.
     """
-    for source in assertion.drawn():
-        first, *others = trials[source.fingerprint]
-        if not others or (isinstance(source, Declared) and source.deterministic):
-            continue
-        if first.champion:
-            alike, same = all((a.champion, a.curves) == (first.champion, first.curves) for a in others), "champion"
-        else:
-            told = bool(first.digest) and _is_telling(first)  # a pilot keeps no digest
-            alike, same = told and all(a.digest == first.digest for a in others), "metrics"
-        if alike:
-            return (
-                f"all {1 + len(others)} trials of {source.label} are copies of one: the same {same} and training "
-                "curves, whatever the seed. Tests take trials for independent: does the method draw from its key or "
-                "seed? One without chance, such as a control, declares deterministic = True; in_every_trial() asserts "
-                "facts"
-            )
-    return ""
-
-
-def _is_telling(trial: TrialResult) -> bool:
-    """Whether a training loop has told a number that two of its trials hardly share by chance."""
-    told = (*trial.metrics.values(), *itertools.chain.from_iterable(trial.curves.values()))
-    return TRAINED_BY in trial.provenance and not all(float(x).is_integer() for x in told if math.isfinite(x))
+    counted = Look(found.kept, look.alpha)
+    what = f"{found.sentence}, which count once: n = {found.kept} instead of {look.n}; "
+    if not _decidable(assertion.attainable(counted.n, design), counted.alpha):
+        note = f"{what}underpowered: {_needs(assertion, design)}"
+        return Ending(Outcome.INCONCLUSIVE, counted, found.trials, None, note, found.sentence)
+    of_all = assertion.find(trials, design, look.alpha).p.outcome(look.alpha)
+    finding = assertion.find(found.trials, design, counted.alpha)
+    outcome = finding.p.outcome(counted.alpha)
+    if outcome is not of_all and outcome is not Outcome.INCONCLUSIVE:
+        what += f"with all {look.n} trials it would be {of_all}, and decided is what both show; "
+    agreed = outcome if outcome is of_all else Outcome.INCONCLUSIVE
+    return Ending(agreed, counted, found.trials, finding, what, found.sentence)
 
 
 def _without_result(assertion: Assertion, trials: Trials) -> str:

@@ -19,7 +19,7 @@ LEVEL: Final = 0.95
 """How often a repetition falls inside."""
 
 FEWEST: Final = 5
-"""Fewest trials of ours that are compared with a published mean: those of the first look."""
+"""Fewest of our trials that are compared with a published mean: those of the first look."""
 
 
 class Spread(StrEnum):
@@ -50,7 +50,7 @@ class PublishedMean:
 
     Attributes:
         mean: of its trials.
-        error: its error bar; None where there is none, 0 where none can be seen.
+        error: its error bar; None without one, 0 where none can be seen.
         trials: how many trials it is the mean of, at least 2.
         scale: the smallest and the largest value that a trial can have; None for no limits.
         precision: the largest difference between the number as printed and the mean that was measured: 0.5 for "five".
@@ -102,7 +102,7 @@ class Repetition:
     Attributes:
         predictions: one per reading of the published spread that its scale allows.
         answer: inside or outside if all predictions agree.
-        reason: why it cannot be said, or what the scale says about the error bar; may be empty.
+        reason: why it is unknown, or what the scale says about the error bar; may be empty.
     """
 
     predictions: tuple[Prediction, ...]
@@ -117,7 +117,7 @@ def repetition(published: PublishedMean, ours: Sequence[float], planned: int, br
         published: the mean.
         ours: our trials' values, shape [n].
         planned: the number of trials that a prediction is for while ours are too few.
-        broken: how many further trials of ours gave no number.
+        broken: how many further trials gave no number.
     """
     missing = _missing(len(ours), broken)
     predictions, reason = _predictions(published, () if missing else ours, planned)

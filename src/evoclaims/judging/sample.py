@@ -98,7 +98,7 @@ def is_failed(trial: TrialResult) -> bool:
 class _Numbers(Mapping[str, Any]):
     """What a trial has measured, by name; reading a NaN is an error, since any comparison with it is silently false.
 
-    So is a missing name, which the error tells.
+    So is a missing name, which the error names.
     """
 
     def __init__(self, numbers: Mapping[str, Any], where: str, lacking: str = "") -> None:
@@ -112,8 +112,8 @@ class _Numbers(Mapping[str, Any]):
         if value == ():
             raise MissingNumberError(f"There is no {name!r} in {self._where}.{guess(name, self._numbers)}")
         if any(math.isnan(number) for number in (value if isinstance(value, list | tuple) else (value,))):
-            said = f"{self._lacking} {name!r} for" if self._lacking else f"{name!r} is NaN in"
-            raise UnreadableTrialError(f"{said} {self._where}.")
+            subject = f"{self._lacking} {name!r} for" if self._lacking else f"{name!r} is NaN in"
+            raise UnreadableTrialError(f"{subject} {self._where}.")
         return value
 
     def __iter__(self) -> Iterator[str]:

@@ -58,7 +58,7 @@ class PValues:
     refuted: float
 
     def __post_init__(self) -> None:
-        """Reject what is no probability, such as that of a kind of one's own."""
+        """Reject an invalid probability, for example from a custom kind."""
         if not (0.0 <= self.supported <= 1.0 and 0.0 <= self.refuted <= 1.0):
             raise UserError(f"A p value lies between 0 and 1, unlike {self.supported} or {self.refuted}.")
 
@@ -187,6 +187,8 @@ class Verdict:
         attainable_p_refuted: the smallest p against it that n and the ties allowed.
         evidence: one entry for each part of the assertion.
         without_result: which trials ended without a result, and how; they got the worst rank.
+        overspent: which trials spent more than their budgets.
+        copies: which trials are copies of each other; `reason` says so, too.
         deciding: index in `evidence` of the part that gives the whole assertion's p value; None without evidence.
     """
 
@@ -203,6 +205,8 @@ class Verdict:
     evidence: tuple[Evidence, ...] = ()
     without_result: str = ""
     deciding: int | None = None
+    overspent: str = ""
+    copies: str = ""
 
     @property
     def decision(self) -> Decision | None:

@@ -44,7 +44,7 @@ class Window:
 def shared(windows: Sequence[Window]) -> Window:
     """Return the window in which values of all of `windows` can be ranked: the shortest and the coarsest.
 
-    What only one of two windows tells apart is then equal, or beyond the limit, in both: values of one distribution
+    What only one of two windows distinguishes is then equal, or beyond the limit, in both: values of one distribution
     stay exchangeable, and rank tests exact. Of two samples with a limit each it is Gehan's order (1965): a pair of
     which nobody knows which is larger is a tie.
 

@@ -142,7 +142,7 @@ def circuit_for(task: Task) -> ThresholdCircuit:
     """Return the hand-built circuit for a task.
 
     Raises:
-        UserError: when there is none.
+        UserError: when it does not exist.
     """
     if isinstance(task, NParity):
         return parity_circuit(task.bits)

@@ -130,7 +130,7 @@ class MapElites:
         """Draw or vary one batch, evaluate it and put it into the archive.
 
         Metrics: "coverage" (share of the reachable cells that hold an elite), "elites" (how many there are) and
-        "reached" (see `MapElitesState`). Fitness and success are the best elite's; where there is none, the lowest
+        "reached" (see `MapElitesState`). Fitness and success are the best elite's; without elites, the lowest
         number and 0.
 
         Raises:
@@ -192,7 +192,7 @@ class MapElites:
         return self.batch * task.horizon
 
     def fitness_map(self, state: MapElitesState) -> Float[Array, "x y"]:
-        """Return the elites' fitnesses, shape [cells along x, cells along y]; -inf where there is none."""
+        """Return the elites' fitnesses, shape [cells along x, cells along y]; -inf without an elite."""
         along_x, along_y = self.cells
         # In QDax's cell index, x varies fastest.
         fitnesses: Float[Array, "x y"] = state.archive.fitnesses.reshape(along_y, along_x).T
@@ -217,9 +217,9 @@ class MapElites:
         keys = jax.random.split(key, self.batch)
         episodes = jax.vmap(lambda p, k: task.episode(policy_of(self.network, task, p), k, level))(population, keys)
         if not {"x", "y"} <= set(episodes.metrics):
-            told = ", ".join(sorted(episodes.metrics)) or "none"
+            known = ", ".join(sorted(episodes.metrics)) or "none"
             raise UserError(
-                f'MAP-Elites maps episodes by their metrics "x" and "y"; the metrics of {task.name!r} are: {told}.'
+                f'MAP-Elites maps episodes by their metrics "x" and "y"; the metrics of {task.name!r} are: {known}.'
             )
         return episodes
 

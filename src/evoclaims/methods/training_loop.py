@@ -20,10 +20,10 @@ class TrainingLoop:
     It is called as `function(task, seed, budget, **settings)`, with `report=` too if it has a parameter of that name,
     and returns its metrics (a table of numbers by name) or `(metrics, policy)`. See docs/foreign.md.
 
-    * `task` is the condition's: one of ours, or another library's environment, which `task.make()` returns.
+    * `task` is the condition's: a built-in task, or another library's environment, which `task.make()` returns.
     * `seed` is the trial's; the function derives all randomness from it.
     * `budget` is the condition's `Budget`, such as `Budget(environment_steps=100_000)`.
-    * `report(step, **numbers)` tells how far training is; the numbers become curves, about `budget.reports` points.
+    * `report(step, **numbers)` reports how far training is; the numbers become curves, about `budget.reports` points.
     * `policy` maps an observation to an action, deterministically. It is examined on the task as every method's is.
       Without one, the metrics are what the function says, and the trial's provenance says so.
 
@@ -35,6 +35,9 @@ class TrainingLoop:
         name: of the method; the function's if empty.
         revision: raise it when the function computes something else.
         deterministic: whether its trials have no chance in them, so that they may be copies of each other.
+        overspend: by which share of its budget a trial may exceed it, for loops that cannot stop in time: with 0.5 a
+            claim is an error where one spends more than 1.5 times its budget. Claims name what is overspent by more
+            than 2% in any case. It is part of the trial's id where it is set.
     """
 
     function: Callable[..., Any] | str
@@ -43,10 +46,17 @@ class TrainingLoop:
     name: str = field(default="", kw_only=True, metadata=_NOT_HASHED)
     revision: int = field(default=1, kw_only=True, metadata=_NOT_HASHED)
     deterministic: bool = field(default=False, kw_only=True, metadata=_NOT_HASHED)
+    overspend: float = field(default=1.0, kw_only=True, metadata={"canonical": "if set"})
 
     def __post_init__(self) -> None:
         """Replace the function by its place, after checking that it takes the settings."""
         object.__setattr__(self, "settings", dict(self.settings))
+        if isinstance(self.overspend, bool) or not (isinstance(self.overspend, int | float) and self.overspend >= 0):
+            raise UserError(
+                f"overspend={self.overspend!r} of a training loop is a share of its budget, 0 or above: write 0.5 "
+                "where it may spend 1.5 times its budget."
+            )
+        object.__setattr__(self, "overspend", float(self.overspend))  # 1 and 1.0 are one id
         for name, value in self.settings.items():
             if not _is_plain(value):
                 raise UserError(
@@ -72,15 +82,15 @@ class TrainingLoop:
     def init(self, *_: Any, **__: Any) -> NoReturn:
         """Raise a `UserError`: the function trains, not steps that the engine compiles."""
         raise UserError(
-            f"{self.name!r} is a training loop of its own: it is run whole, and its policies are examined where they "
-            "are trained and are not kept, so there is no champion."
+            f"{self.name!r} is a training loop. Its policies are examined where they are trained and are not kept, so "
+            "it has no champion."
         )
 
     step = best = init
 
 
 def _is_plain(value: Any) -> bool:
-    """Whether the canonical JSON of a value tells it from all others."""
+    """Whether the canonical JSON of a value identifies it."""
     if isinstance(value, dict):
         return all(isinstance(name, str) and _is_plain(item) for name, item in value.items())
     if isinstance(value, list | tuple):
@@ -99,9 +109,9 @@ def check_arguments(function: Callable[..., Any], settings: Mapping[str, Any]) -
     Raises:
         UserError: when it does not.
     """
-    told = {"report": None} if wants_report(function) else {}
+    optional = {"report": None} if wants_report(function) else {}
     try:
-        inspect.signature(function).bind(None, 0, None, **{**settings, **told})
+        inspect.signature(function).bind(None, 0, None, **{**settings, **optional})
     except TypeError as error:
         raise UserError(
             f"The training function {function.__qualname__} does not take (task, seed, budget) and the settings "

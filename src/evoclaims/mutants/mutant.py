@@ -68,7 +68,7 @@ def with_task(says: str, change: Callable[[Any], Any], only: type | tuple[type, 
 
 
 def _where_compiled(mutant: Mutant) -> Mutant:
-    """Leave out training loops: they call no function of a method of ours, and are given tasks as their modules are."""
+    """Skip training loops: they call none of our methods' functions and import tasks anew: no fault reaches them."""
     return replace(mutant, change=lambda one: None if isinstance(one.method, TrainingLoop) else mutant.change(one))
 
 

@@ -4,7 +4,7 @@ Node i computes z = bias + response · Σ w x over its connections (TensorNEAT, 
 its activation function of z. An output emits z to other nodes, and its result is the output function of z. A node
 without a connection from an emitting node emits nothing, nor does an input that is not finite; the result of an
 output that emits nothing is 0. A value that overflows is passed on as 0, and so is the sine of an angle beyond 50,000,
-which the kernel (`network_kernel`) does not compute.
+which the kernel (`kernels/genomes/network.py`) does not compute.
 
 Machines without the kernel compute the pass by matrices.
 """
@@ -19,10 +19,10 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int
 
 from evoclaims.core.pytree import pytree
-from evoclaims.kernels.grouped import GroupKernel
+from evoclaims.kernels import GroupKernel
+from evoclaims.kernels.genomes.network import network_kernel
 from evoclaims.networks.activations import ACTIVATIONS, apply_activation, check_activations
 from evoclaims.networks.genome import Genome
-from evoclaims.networks.network_kernel import network_kernel
 from evoclaims.networks.wiring import Wiring, wired
 
 
@@ -31,7 +31,7 @@ class Graph:
     """A network in matrix form, its nodes in topological order.
 
     Attributes:
-        weights: weights[i, j] of the connection from j to i; 0 where there is none.
+        weights: weights[i, j] of the connection from j to i; 0 without one.
         linked: whether there is a connection from j to i; strictly lower triangular.
         bias, response: of each node.
         activation: of each node, index into the network's activation functions; identity for outputs.
@@ -122,4 +122,5 @@ def _kernel(network: GraphNetwork, capacity: tuple[int, int]) -> GroupKernel:
         *genome, observation = leaves
         return [network.propagate(network.matrices(Wiring(*genome)), observation)]
 
-    return network_kernel(network.inputs, network.outputs, network.activations, network.output, capacity, function)
+    nodes = [ACTIVATIONS[name] for name in (*network.activations, "identity")]
+    return network_kernel(network.inputs, network.outputs, nodes, ACTIVATIONS[network.output], capacity, function)

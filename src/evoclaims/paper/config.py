@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from evoclaims.core.errors import UserError, guess
+from evoclaims.core.files import read_text
 from evoclaims.paper.importing import import_module
 from evoclaims.trials.time_limit import DEFAULT_LIMIT, seconds_of
 
@@ -48,7 +49,7 @@ def find_root(start: Path) -> Path:
     """Return the nearest folder at or above `start` whose pyproject.toml has `[tool.evoclaims]`.
 
     Raises:
-        UserError: when there is none.
+        UserError: when it does not exist.
     """
     for folder in (start, *start.parents):
         if "evoclaims" in _tool_tables(folder / "pyproject.toml"):
@@ -114,9 +115,9 @@ def load_reproduction(config: SuiteConfig) -> Reproduction:
 def _tool_tables(path: Path) -> dict[str, object]:
     """Return the tables under [tool] in a pyproject.toml; empty when there is no such file."""
     try:
-        tool = tomllib.loads(path.read_text(encoding="utf-8")).get("tool", {})
+        tool = tomllib.loads(read_text(path)).get("tool", {})
     except FileNotFoundError:
         return {}
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, RecursionError) as error:
         raise UserError(f"Cannot read {path}: {error}.") from error
     return tool if isinstance(tool, dict) else {}

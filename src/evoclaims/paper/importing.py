@@ -31,8 +31,8 @@ def import_module(name: str, root: Path, named_by: str) -> ModuleType:
         if isinstance(error, ModuleNotFoundError) and error.name and f"{name}.".startswith(f"{error.name}."):
             meant = _meant(error.name, root)
             raise UserError(f"There is no module {name!r} in {root}, which {named_by} names.{meant}") from error
-        said = in_one_line(error, root)
-        raise UserError(f"The module {name!r}, which {named_by} names, does not import: {said}.") from error
+        reason = in_one_line(error, root)
+        raise UserError(f"The module {name!r}, which {named_by} names, does not import: {reason}.") from error
 
 
 def _meant(lacking: str, root: Path) -> str:

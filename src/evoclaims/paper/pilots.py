@@ -154,4 +154,4 @@ def _own(trial: TrialResult | _Trial) -> dict[str, Any]:
 
 def _fail(path: Path, why: str) -> NoReturn:
     """Raise the error of a file that is no pilot."""
-    raise UserError(f"{path} is no pilot: {printable(why).removesuffix('.')}. {_MEND}")
+    raise UserError(f"{path} is not a pilot: {printable(why).removesuffix('.')}. {_MEND}")

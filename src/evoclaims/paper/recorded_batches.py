@@ -29,7 +29,7 @@ class RecordedBatch:
 
     @property
     def core_seconds(self) -> float | None:
-        """Seconds of a processor's core; of a trial alone its running time, None where nothing is told of several."""
+        """Seconds of a processor's core; of a trial alone its running time, None for a batch of several without one."""
         return self.run if self.processor is None and len(self.trials) == 1 else self.processor
 
     def seconds(self, trials: int) -> float:
@@ -38,12 +38,12 @@ class RecordedBatch:
 
 
 def took(trials: Iterable[TrialResult], platform: str) -> RecordedBatch | None:
-    """Return the largest batch among trials of one condition on a platform; None if there is none."""
+    """Return the largest batch among trials of one condition on a platform; None if no batch is known."""
     return largest(trial for trial in trials if trial.device.get("platform") == platform)
 
 
 def largest(trials: Iterable[TrialResult]) -> RecordedBatch | None:
-    """Return the largest batch of trials that came to an end; None if there is none."""
+    """Return the largest batch of trials that came to an end; None if no batch is known."""
     ended = by_batch(trial for trial in trials if trial.status in COMPLETE)
     return max(ended, key=lambda batch: len(batch.trials), default=None)
 
@@ -58,6 +58,6 @@ def by_batch(trials: Iterable[TrialResult]) -> list[RecordedBatch]:
         together = list(each.values())
         compiling, running = (max(float(trial.timing[name]) for trial in together) for name in ("compile", "run"))
         layout = layout_on(str(together[0].device["platform"]))
-        told = [float(trial.timing["processor"]) for trial in together if "processor" in trial.timing]
-        found.append(RecordedBatch(together, compiling, running, layout, max(told, default=None)))
+        measured = [float(trial.timing["processor"]) for trial in together if "processor" in trial.timing]
+        found.append(RecordedBatch(together, compiling, running, layout, max(measured, default=None)))
     return found

@@ -60,8 +60,8 @@ def records(data: bytes, name: str, advice: str = "") -> tuple[TrialResult, ...]
         try:
             results.append(parse(line))
         except RecordError as error:
-            said = f"Line {number} of {name} is no reference trial: {error.reason}. {advice}"
-            raise UserError(said.rstrip()) from error
+            message = f"Line {number} of {name} is not a reference trial: {error.reason}. {advice}"
+            raise UserError(message.rstrip()) from error
     return tuple(results)
 
 

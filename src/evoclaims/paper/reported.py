@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, Final, TypeGuard
 
 from evoclaims.core.errors import UserError, require_known
+from evoclaims.core.files import read_text
 
 FILE: Final = "reported.toml"
 """Name of the file in a reproduction's folder."""
@@ -52,7 +53,7 @@ class Published:
     trials: int | None = None
 
     def value(self, task: str, quantity: str, method: str, at: int = 0) -> Reported | None:
-        """Return a method's number at a place on a plot's axis, counted from 0; None where there is none."""
+        """Return a method's number at a place on a plot's axis, counted from 0; None without one."""
         found = self.plots.get(task, {}).get(quantity, {})
         numbers = found.get("methods", {}).get(method)
         if numbers is None or at >= len(numbers["mean"]):
@@ -76,8 +77,8 @@ def load_published(path: Path) -> Published:
         UserError: when it is missing, damaged, or a number lacks its place, or something has the place of a number.
     """
     try:
-        plain = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
+        plain = tomllib.loads(read_text(path))
+    except (OSError, ValueError, RecursionError) as error:
         raise UserError(f"Cannot read the published numbers in {path}: {error}.") from error
     if wrong := [*_wrong_plots(plain.get("plots", {})), *_wrong_tables(plain.get("tables", {})), *_wrong_rest(plain)]:
         raise UserError(
@@ -89,7 +90,7 @@ def load_published(path: Path) -> Published:
 
 
 def _wrong_plots(plots: Any) -> Iterator[str]:
-    """Yield the names of what is among the plots and is none."""
+    """Yield the names of entries among the plots that are not plots."""
     for task, found in plots.items() if isinstance(plots, dict) else [("plots", plots)]:
         if isinstance(found, dict):
             yield from (f"{task}.{name}" for name, plot in found.items() if not _is_plot(plot))
@@ -98,7 +99,7 @@ def _wrong_plots(plots: Any) -> Iterator[str]:
 
 
 def _wrong_tables(tables: Any) -> Iterator[str]:
-    """Yield the names of what is among the tables and is none."""
+    """Yield the names of entries among the tables that are not tables."""
     for name, table in tables.items() if isinstance(tables, dict) else [("tables", tables)]:
         if not (isinstance(table, dict) and table.get("place") and table.get("values")):
             yield name

@@ -9,6 +9,7 @@ from pathlib import Path
 from evoclaims.core.errors import UnknownNameError, UserError, require_known
 from evoclaims.core.tiers import TIERS
 from evoclaims.judging.design import Design
+from evoclaims.paper.null_agent import NullAgent
 from evoclaims.paper.reported import FILE, Published, load_published
 from evoclaims.paper.trial_group import TrialGroup
 from evoclaims.paper.variant import Conditions, Names, Variant
@@ -46,7 +47,8 @@ class Tier:
         """Reject a number of trials in the place of the design."""
         if not isinstance(self.design, Design):
             raise UserError(
-                f"A tier has a design, unlike {self.design!r}: Tier(conditions, Design.fixed(10)) looks at ten trials."
+                f"A tier's design is a Design, not {self.design!r}. Write Tier(conditions, Design.fixed(10)) for "
+                "ten trials."
             )
 
     def condition(self, method: str, task: str) -> Condition:
@@ -84,6 +86,7 @@ class Reproduction:
         trials: class that `trials(...)` returns: `TrialGroup`, or a subclass with the paper's own measures.
         mutants: module with the paper's own planted faults; it holds MUTANTS, `evoclaims.mutants.Mutant` by name, and
             is imported only when they are tried.
+        null_agents: by name, what has learnt nothing: an assertion that one of them satisfies is vacuous.
 
     Tables of imported trials are looked for in `folder`.
 
@@ -99,17 +102,18 @@ class Reproduction:
     variants: Mapping[str, Variant] = field(default_factory=dict)
     trials: type[TrialGroup] = TrialGroup
     mutants: str = ""
+    null_agents: Mapping[str, NullAgent] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         """Check the folder and the class of the trials, and say where imported ones are."""
         if not isinstance(self.folder, Path):
             raise UserError(
-                f"The reproduction {self.name!r} says folder={self.folder!r}: write Path(__file__).parent, "
+                f"The reproduction {self.name!r} has folder={self.folder!r}. Write Path(__file__).parent, "
                 "a pathlib.Path."
             )
         if not (isinstance(self.trials, type) and issubclass(self.trials, TrialGroup)):
             raise UserError(
-                f"The reproduction {self.name!r} says trials={self.trials!r}: name a subclass of TrialGroup whose "
+                f"The reproduction {self.name!r} has trials={self.trials!r}. Name a subclass of TrialGroup whose "
                 "properties are the paper's own measures, or leave it out."
             )
         has = {name: tuple(tier.conditions) for name, tier in self.tiers.items()}

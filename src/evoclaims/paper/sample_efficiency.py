@@ -34,7 +34,7 @@ def steps_to(source: Source, condition: Condition, curve: str, value: float, lev
     levels = condition.task.levels
     wanted = levels - 1 if level is None else level
     if not math.isfinite(value):
-        raise UserError(f"{source.label}: a curve is asked when it reaches a finite value, unlike {value}.")
+        raise UserError(f"{source.label}: steps_to takes a finite value, not {value}.")
     if curve == "success" and not 0.0 <= value <= 1.0:
         raise UserError(f"{source.label}: a success is a share of 0 to 1, and never reaches {value:g}.")
     if not 0 <= wanted < levels:

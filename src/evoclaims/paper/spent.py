@@ -20,7 +20,7 @@ class Spent:
         trials: how many there are.
         seconds: of one accelerator, by its kind, with compiling; empty when no trial was made on one.
         core_pace: seconds of a CPU's core per environment step, by trials of the same method and task, if need be of
-            another tier, or under the protocol where the variant has none; None where no record tells.
+            another tier, or under the protocol where the variant has none; None without a record.
     """
 
     trials: int

@@ -168,8 +168,8 @@ class TrialGroup:
         """Reject a level about which an event would always hold, or never."""
         if not first <= level <= last:
             raise UserError(
-                f"{self.label} has {self.condition.task.levels} levels, counted from 0: what is said of {level} holds "
-                f"always, or never. From {first} to {last} it says something."
+                f"{self.label} has {self.condition.task.levels} levels, counted from 0: an event at level {level} "
+                f"would always hold, or never. Use a level from {first} to {last}."
                 if first <= last
                 else f"{self.label} has a single level, which is 0, and so none beyond it."
             )

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any, Final
 import pytest
 
 from evoclaims.core.errors import UserError
+from evoclaims.core.files import read_file
 from evoclaims.plugin.progress import progress_of
 
 if TYPE_CHECKING:
@@ -25,7 +26,7 @@ if TYPE_CHECKING:
     from evoclaims.claims.workload import Workload
 
 FILE: Final = "claims_workload"
-"""Name under which the controller tells its workers the file."""
+"""Name under which the controller sends its workers the file."""
 
 _OTHER_ORDERS: Final = ("failedfirst", "newfirst", "stepwise")
 """Options that ask for an order of tests, or depend on it."""
@@ -109,7 +110,7 @@ class Distribution:
         if LOAD in self._config.stash:
             return
 
-        load = self._config.stash[LOAD] = msgspec.json.decode(file.read_bytes(), type=Workload)
+        load = self._config.stash[LOAD] = msgspec.json.decode(read_file(file), type=Workload)
         line = progress_of(self._config)
         if line is not None:
             line.begin(load, workers=len(node.nodemanager.specs), tick=True)

@@ -180,9 +180,9 @@ def verdict(request: pytest.FixtureRequest, claim_tier: str) -> Verdicts:
     session, test = make_session(request.config), ClaimTest.of(request.node)
     line = progress_of(request.config)
 
-    def settle(assertion: Any) -> ClaimReport:
+    def settle(assertion: Any, readings: Any) -> ClaimReport:
         try:
-            return session.settle(test, assertion)
+            return session.settle(test, assertion, readings)
         finally:
             if line is not None:
                 line.close()

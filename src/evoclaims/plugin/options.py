@@ -74,8 +74,8 @@ def check(config: pytest.Config) -> None:
             _check_changes(config, changes)
         if config.getoption("claims_committed") and not config.getoption("claims_stored"):
             raise UserError(
-                "--claims-committed says what --claims-stored takes where the store has no trial, and does nothing by "
-                "itself: add --claims-stored, or leave it out."
+                "--claims-committed lets --claims-stored use committed trials where the store has none. It does "
+                "nothing alone: add --claims-stored, or leave it out."
             )
     except UserError as error:
         raise pytest.UsageError(str(error)) from error
@@ -120,8 +120,8 @@ def _check_root(config: pytest.Config) -> None:
         return
     if not config.rootpath.is_relative_to(project):
         raise UserError(
-            f"pytest takes {config.rootpath} for the root of this run, not {project}, where the project is, since it "
-            f"reads an existing path after a space as a place of tests. Write {' and '.join(spaced)} with =, as in "
+            f"pytest uses {config.rootpath} as the root of this run instead of the project {project}, because it "
+            f"reads an existing path after a space as a path of tests. Write {' and '.join(spaced)} with =, as in "
             f"{spaced[0]}=PATH."
         )
 

@@ -92,17 +92,17 @@ def pytest_runtest_makereport(
     if report.skipped:
         return report
     vars(report).pop("wasxfail", None)  # only expect=... accepts a verdict, and no mark of pytest's
-    said = f"{claimed.name} ({claimed.tier}) is {claimed.outcome}: {claimed.reason}"
+    sentence = f"{claimed.name} ({claimed.tier}) is {claimed.outcome}: {claimed.reason}"
     undecided = claimed.outcome == "inconclusive" and item.config.getoption("claims_undecided") == "fail"
     failed = claimed.failed or (undecided and not claimed.as_expected)
     # By pytest itself: what xfail(strict=True) expects to fail has not, or a part of the test has.
     failed_by_pytest = report.failed and not (call.excinfo or failed)
     if report.when == "setup" and not failed:  # or the test would be called without its fixtures
-        report.outcome, report.longrepr = "skipped", (item.location[0], item.location[1] or 0, said)
+        report.outcome, report.longrepr = "skipped", (item.location[0], item.location[1] or 0, sentence)
     elif not failed_by_pytest:
         report.outcome = "failed" if failed else "passed"
         if call.excinfo is None or call.excinfo.errisinstance(UserError):
-            report.longrepr = shown(said) if failed else None
+            report.longrepr = shown(sentence) if failed else None
         else:
             report.longrepr = shortened(call.excinfo, item) or report.longrepr
     properties: list[tuple[str, object]] = [
@@ -130,8 +130,10 @@ def _claim_report(item: pytest.Item, call: pytest.CallInfo[None], report: pytest
     if because := _gap(item):
         return unjudged(test, Outcome.NOT_RUN, f"it has no {test.tier} test: {because}", has_test=False)
     if report.skipped:  # or failed as an xfail mark expects
-        said = report.longrepr[2] if isinstance(report.longrepr, tuple) else f"xfail: {getattr(report, 'wasxfail', '')}"
-        why = said.removeprefix("Skipped: ") or "no reason given"
+        sentence = (
+            report.longrepr[2] if isinstance(report.longrepr, tuple) else f"xfail: {getattr(report, 'wasxfail', '')}"
+        )
+        why = sentence.removeprefix("Skipped: ") or "no reason given"
         return unjudged(test, Outcome.NOT_RUN, f"its test was skipped ({why})")
     if call.excinfo is not None:
         claimed = unjudged(test, Outcome.ERROR, _sentence(call.excinfo, item.config.rootpath))
@@ -143,7 +145,7 @@ def _claim_report(item: pytest.Item, call: pytest.CallInfo[None], report: pytest
 
 
 def _sentence(excinfo: pytest.ExceptionInfo[BaseException], root: Path) -> str:
-    """Return an exception as one line, with its place in the project `root` if it is none of evoclaims' own."""
+    """Return an exception as one line, with its place in the project `root` unless it is evoclaims' own."""
     if isinstance(excinfo.value, pytest.FixtureLookupError) and excinfo.value.argname:
         return f"There is no fixture named {excinfo.value.argname!r}: a claim takes trials and verdict."
     text = str(excinfo.value).strip().splitlines()

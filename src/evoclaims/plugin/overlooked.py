@@ -13,7 +13,7 @@ import pytest
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_pycollect_makeitem(collector: pytest.Module | pytest.Class, name: str, obj: object) -> None:
-    """Refuse a claim on a function, or in a class, whose name is none of a test, by the settings of the run."""
+    """Refuse a claim on a function, or in a class, that pytest does not collect under the run's settings."""
     if inspect.isclass(obj):
         if any(map(_is_claim, vars(obj).values())) and _is_left_out(collector, name, obj):
             begun = " or ".join(collector.config.getini("python_classes"))

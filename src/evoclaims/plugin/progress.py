@@ -22,7 +22,7 @@ TICK_SECONDS: Final = 0.5
 """Time between two looks at what xdist's workers do."""
 
 QUIET: Final = -2
-"""From this verbosity on (-qq), nothing is told of the progress."""
+"""From this verbosity on (-qq), no progress is shown."""
 
 
 def progress_of(config: pytest.Config) -> ProgressLine | None:
@@ -43,15 +43,15 @@ class ProgressLine:
         self._ticking: threading.Thread | None = None
 
     def begin(self, load: Workload, workers: int, tick: bool) -> None:
-        """Begin to show how far a run is; with `tick`, now and then by itself, else whenever a run tells something.
+        """Begin to show how far a run is; with `tick`, now and then by itself, else whenever a run reports something.
 
-        A run that takes a processor hours is told of beforehand.
+        A run that takes hours on a processor is announced beforehand.
         """
         from evoclaims.claims.overview import Watching
         from evoclaims.report.live_line import beforehand
 
-        if told := beforehand(load):
-            self._write(f"\n{told}\n")
+        if notice := beforehand(load):
+            self._write(f"\n{notice}\n")
         self._watching = Watching(load, workers)
         if tick and self._ticking is None:
             self._ticking = threading.Thread(target=self._tick, daemon=True)

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from evoclaims.core.errors import UserError
+from evoclaims.core.files import read_text
 from evoclaims.plugin.progress import progress_of
 
 if TYPE_CHECKING:
@@ -52,7 +53,7 @@ def make_session(config: pytest.Config) -> Session:
     for tier in reproduction.tiers:
         reproduction.tier(tier, made.variant)
         made.design(tier)
-    _ = made.mutants  # a damaged file is told before the first trial
+    _ = made.mutants  # a damaged file is reported before the first trial
     fetch.check()
     config.stash[SESSION] = made
     return made
@@ -61,8 +62,8 @@ def make_session(config: pytest.Config) -> Session:
 def import_from_root(config: pytest.Config) -> None:
     """Let claim files import the project's modules, as they can where a command collects them."""
     path = config.rootpath / "pyproject.toml"
-    with contextlib.suppress(OSError, ValueError, UserError):  # an unreadable file is told where the project is loaded
-        if "evoclaims" in path.read_text(encoding="utf-8"):  # other projects import nothing for it
+    with contextlib.suppress(OSError, ValueError, UserError):  # an unreadable file is reported later
+        if "evoclaims" in read_text(path):  # other projects import nothing for it
             from evoclaims.paper.config import load_config, make_importable
 
             make_importable(load_config(config.rootpath).root)

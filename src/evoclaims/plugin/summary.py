@@ -28,7 +28,7 @@ ATTRIBUTE: Final = "claim_report"
 """Attribute of a test's report that holds the claim's, also from an xdist worker to its controller."""
 
 TROUBLE: Final = "claims_trouble"
-"""Name under which an xdist worker tells its controller why it runs nothing."""
+"""Name under which an xdist worker sends its controller the reason why it runs nothing."""
 
 
 KNOWN: Final[pytest.StashKey[set[str]]] = pytest.StashKey()
@@ -105,7 +105,7 @@ class Summary:
 
     @contextmanager
     def _telling(self) -> Iterator[None]:
-        """Tell of an error when the run has ended, and go on."""
+        """Report an error when the run has ended, and go on."""
         try:
             yield
         except UserError as error:
@@ -143,9 +143,9 @@ class Summary:
         """Print the verdict table and its details."""
         if not self.reports:
             for trouble in [*self._troubles, *self._died]:
-                terminalreporter.write_line(self._said(f"ERROR: {trouble}"), red=True)
+                terminalreporter.write_line(self._safe(f"ERROR: {trouble}"), red=True)
             if exitstatus == pytest.ExitCode.NO_TESTS_COLLECTED and self._config.stash.get(KNOWN, ()):
-                terminalreporter.write_line(self._said(self._choices()), yellow=True)
+                terminalreporter.write_line(self._safe(self._choices()), yellow=True)
             return
         from evoclaims.report import table_cells, terminal_table
         from evoclaims.report.closing_lines import without_smoke_test
@@ -163,14 +163,14 @@ class Summary:
             terminalreporter.write_line("")
         notes = self._notes()
         for note in notes:
-            terminalreporter.write_line(self._said(note))
+            terminalreporter.write_line(self._safe(note))
         for trouble in [*self._troubles, *self._died]:
-            terminalreporter.write_line(self._said(f"error: {trouble}"), red=True)
+            terminalreporter.write_line(self._safe(f"error: {trouble}"), red=True)
         unsaved = sorted({report.unsaved for report in self.reports} - {""})
         warnings = [f"The files of evidence could not be written. {reason}" for reason in unsaved[:1]]
         for warning in (*warnings, self._write_step_summary(notes)):
             if warning:
-                terminalreporter.write_line(self._said(f"warning: {warning}"), yellow=True)
+                terminalreporter.write_line(self._safe(f"warning: {warning}"), yellow=True)
         if table_cells.faults(self.reports):
             terminalreporter.write_line(table_cells.faults(self.reports))
         terminalreporter.write_line(f"claims: {table_cells.totals(self.reports)}", bold=True)
@@ -206,11 +206,11 @@ class Summary:
         """Say which options together have selected no claim; nothing where none of them was given."""
         mark, tier = self._config.getoption("markexpr", ""), self._config.getoption("claims_tier")
         given = {"--claims-tier": tier, "-m": mark, "-k": self._config.getoption("keyword", "")}
-        told = [f"{option} {shlex.quote(value)}" for option, value in given.items() if value]
+        options = [f"{option} {shlex.quote(value)}" for option, value in given.items() if value]
         two = ", which are two tiers" if mark in TIERS and tier not in (None, mark) else ""
-        return f" by {' with '.join(told)}{two}" if told else ""
+        return f" by {' with '.join(options)}{two}" if options else ""
 
-    def _said(self, text: str) -> str:
+    def _safe(self, text: str) -> str:
         """Return a line that is safe for the terminal."""
         return self._drawn(shown(text))
 

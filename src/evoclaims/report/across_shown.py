@@ -54,10 +54,10 @@ def last(stores: Iterable[Path]) -> AcrossShown | None:
 
 
 def _read(path: Path) -> AcrossShown | None:
-    """Return what is kept in a file; None if there is none."""
+    """Return what is kept in a file; None without the file."""
     try:
         return msgspec.json.decode(read_file(path), type=AcrossShown)
     except (FileNotFoundError, NotADirectoryError):
         return None
-    except (OSError, ValueError) as error:
-        raise UserError(f"{path} holds nothing that `evoclaims across` has found ({error}): delete it.") from error
+    except (OSError, ValueError, RecursionError) as error:
+        raise UserError(f"{path} is not a file of `evoclaims across` ({error}). Delete it.") from error

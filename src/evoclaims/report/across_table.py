@@ -40,7 +40,7 @@ def _part(found: Across, labels: Sequence[str]) -> Table:
         shown.add_column(label, max_width=COLUMN - 1)
     for claim in found.claims:
         cells = (found.cells.get((claim, label)) for label in labels)
-        shown.add_row(claim, *("\n".join(said(cell)) for cell in cells))
+        shown.add_row(claim, *("\n".join(cell_lines(cell)) for cell in cells))
     return shown
 
 
@@ -48,7 +48,7 @@ def markdown(found: Across, command: str) -> str:
     """Return a page: what changed, the table, the lines that belong to it, and the command that makes it."""
     labels = [one.label for one in found.environments]
     rows = [
-        [literal(claim), *("<br>".join(map(literal, said(found.cells.get((claim, label))))) for label in labels)]
+        [literal(claim), *("<br>".join(map(literal, cell_lines(found.cells.get((claim, label))))) for label in labels)]
         for claim in found.claims
     ]
     parts = [
@@ -63,10 +63,10 @@ def markdown(found: Across, command: str) -> str:
 
 def headline(found: Across) -> str:
     """Return in a sentence what changed against the first environment, and which have no verdicts."""
-    said = [f"{label} changes {', '.join(claims)}" for label, claims in found.changed.items()]
-    said += [f"{label} has no verdicts" for label in found.without_verdicts]
-    if said:
-        return f"{'; '.join(said)}."
+    parts = [f"{label} changes {', '.join(claims)}" for label, claims in found.changed.items()]
+    parts += [f"{label} has no verdicts" for label in found.without_verdicts]
+    if parts:
+        return f"{'; '.join(parts)}."
     compared = len(found.environments) - 1
     if not compared:
         return "There is one environment alone, so that nothing is compared."
@@ -100,7 +100,7 @@ def rows(found: Across) -> list[Row]:
     return judged + [{"environment": one.label, "trouble": one.trouble} for one in found.environments if one.trouble]
 
 
-def said(cell: Cell | None) -> tuple[str, ...]:
+def cell_lines(cell: Cell | None) -> tuple[str, ...]:
     """Return the lines of a cell: the verdict, and how its trials compare with the first environment's."""
     if cell is None:
         return (NONE,)

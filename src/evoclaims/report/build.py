@@ -13,7 +13,7 @@ from evoclaims.judging.design import Design
 from evoclaims.judging.verdict import Outcome
 from evoclaims.paper.archive import Archive
 from evoclaims.paper.reproduction import Reproduction
-from evoclaims.report import origin, replication_cells, table_cells, training_curves
+from evoclaims.report import audit, origin, replication_cells, table_cells, training_curves
 from evoclaims.report.champion import Draw, champion_of, network
 from evoclaims.report.charts_of_verdicts import timeline_chart
 from evoclaims.report.evidence import Part, judged_parts, unjudged_part
@@ -26,6 +26,7 @@ from evoclaims.verdicts import edited_code
 from evoclaims.verdicts.claim_report import ClaimReport
 from evoclaims.verdicts.history import AcceptedVerdict, History, eras, key_of
 from evoclaims.verdicts.mutation_matrix import Matrix, described
+from evoclaims.verdicts.readings import by_reading
 from evoclaims.verdicts.source_trials import SourceTrials
 
 Verdicts = Mapping[str, Sequence[ClaimReport]]
@@ -134,10 +135,19 @@ class _Gathering:
             parts=_parts(report, read),
             conditions=tuple(self._condition(report.tier, source) for source in report.sources if source.trials),
             made=made,
-            warnings=(*_broken(every), *origin.warnings(made), *_edited(report), *filter(None, [failing])),
+            warnings=(
+                *_broken(every),
+                *origin.warnings(made),
+                *_edited(report),
+                *_overspent(report),
+                *filter(None, [failing]),
+            ),
             history=eras(entries),
             change=_change(entries, report),
             faults=described(self.mutants, report) if report.n else "",
+            nulls=audit.nulls(report, self.reproduction.null_agents),
+            read=by_reading(report.readings),
+            power=table_cells.power(report),
         )
 
     def _condition(self, tier: str, source: SourceTrials) -> str:
@@ -162,16 +172,22 @@ class _Gathering:
 
 
 def _parts(report: ClaimReport, read: Mapping[str, Sequence[TrialSummary]]) -> tuple[Part, ...]:
-    """Return the evidence; if there is none, only the trials."""
+    """Return the evidence; without it, only the trials."""
     if report.verdict is not None and report.verdict.evidence:
         return judged_parts(report.verdict)
     return tuple(unjudged_part(label, trials) for label, trials in read.items() if trials)
 
 
+def _overspent(report: ClaimReport) -> tuple[str, ...]:
+    """Return a warning about trials that spent more than their budgets, if there is one."""
+    over = report.verdict.overspent if report.verdict else ""
+    return (f"Over budget: {over}.",) if over else ()
+
+
 def _edited(report: ClaimReport) -> list[str]:
     """Return a sentence for each method or task that was edited after trials of a claim had run."""
-    said = [clean(edited_code.said(name)) for name in edited_code.edited(report)]
-    return [f"{words[0].upper()}{words[1:]}." for words in said]
+    lines = [clean(edited_code.summary(name)) for name in edited_code.edited(report)]
+    return [f"{words[0].upper()}{words[1:]}." for words in lines]
 
 
 def _change(entries: Sequence[AcceptedVerdict], report: ClaimReport) -> str:

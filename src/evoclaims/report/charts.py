@@ -27,7 +27,7 @@ LEAST: Final = 1e-300
 """The smallest difference that ticks tell apart: below, floats run out of digits."""
 
 _DASHES: Final = ("none", "6 3", "2 2", "8 2 2 2")
-"""How the lines of several conditions are told apart."""
+"""How the lines of several conditions are distinguished."""
 
 DOT, BLOCK = 7.0, 44.0
 """Width of a dot, and of the widest block of close values, which fits into the edges."""

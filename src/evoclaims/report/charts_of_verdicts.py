@@ -46,4 +46,4 @@ def _mark(cell: Cell | None, trouble: str) -> VerdictMark:
     if cell is None:
         return VerdictMark(None, trouble or "no verdict")
     a12 = 0.5 if cell.drift is None or cell.drift.a12 is None else cell.drift.a12
-    return VerdictMark(cell.outcome, "; ".join(across_table.said(cell)), a12, cell.drifted)
+    return VerdictMark(cell.outcome, "; ".join(across_table.cell_lines(cell)), a12, cell.drifted)

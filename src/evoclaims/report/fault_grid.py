@@ -40,7 +40,7 @@ class FaultGrid:
         score: the mutation score, in a sentence.
         mutants: the faults that were tried.
         rows: the claims.
-        untried: names of further judged claims, of which no row of the matrix tells; empty if it tells of none.
+        untried: names of further judged claims, without a row in the matrix; may be empty.
     """
 
     tier: str
@@ -51,7 +51,7 @@ class FaultGrid:
 
 
 def fault_grid(matrix: Matrix, tier: str, reports: Iterable[ClaimReport]) -> FaultGrid:
-    """Return the grid of a tier; rows of the matrix that are about other verdicts than those of now are left out."""
+    """Return the grid of a tier; rows of the matrix about other than the current verdicts are left out."""
     ordered = history.ordered(reports)
     found = {report.name: (report, row) for report in ordered if (row := current(matrix, report)) is not None}
     rows = tuple(

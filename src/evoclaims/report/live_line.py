@@ -25,7 +25,7 @@ REWRITE_SECONDS: Final = 0.5
 
 
 class LiveLine:
-    """Draws the progress line; as a watcher of runs, it describes the one that it is told of."""
+    """Draws the progress line; as a watcher of runs, it describes the one that reports to it."""
 
     def __init__(
         self,
@@ -44,7 +44,7 @@ class LiveLine:
         self._clock = clock
         self._at = -self._seconds
         self._open = False
-        self._said = ""
+        self._shown = ""
 
     def __call__(self, progress: RunProgress) -> None:
         """Show the newest state of a run."""
@@ -54,13 +54,13 @@ class LiveLine:
         """Show what `text` returns, if anything, unless the line was rewritten just now; `at_once` shows it even so."""
         if not at_once and self._clock() - self._at < self._seconds:
             return
-        said = text()
-        if not said or (said == self._said and self._open and self._width is not None):
+        text_now = text()
+        if not text_now or (text_now == self._shown and self._open and self._width is not None):
             return
         self._at = self._clock()
         start = "" if self._open and self._width is None else "\r" if self._open else "\n"
-        self._write(start + (f"  {said}\n" if self._width is None else said[: self._width].ljust(self._width)))
-        self._open, self._said = True, said
+        self._write(start + (f"  {text_now}\n" if self._width is None else text_now[: self._width].ljust(self._width)))
+        self._open, self._shown = True, text_now
 
     def close(self) -> None:
         """Leave the line, so that other output starts on a fresh one."""
@@ -87,13 +87,13 @@ def describe(progress: RunProgress) -> str:
 def describe_all(overview: Overview) -> str:
     """Return the line of a run of claims: claims, trials, time left, and what is running.
 
-    Several batches are told in few words each, so that all have room.
+    Several batches get few words each, so that all have room.
     """
     left = "" if overview.seconds_left is None else f", about {duration(overview.seconds_left)} left"
     now = [one.progress for one in overview.running]
-    said = [describe(now[0])] if len(now) == 1 else [_briefly(one) for one in now]
+    parts = [describe(now[0])] if len(now) == 1 else [_briefly(one) for one in now]
     count = f"{overview.judged}/{overview.claims} claims, {overview.done:,}/{overview.trials:,} trials{left}"
-    return "; ".join([count, *said])
+    return "; ".join([count, *parts])
 
 
 def _briefly(progress: RunProgress) -> str:
@@ -111,7 +111,7 @@ def beforehand(load: Workload) -> str:
         return ""
     return (
         f"The missing trials take up to {seconds / HOUR:,.0f} hours of a processor's core here"
-        f"{'' if whole else ', and more of which no trial tells'}. `evoclaims plan` of this tier says which, and what "
+        f"{'' if whole else ', and more without a timing'}. `evoclaims plan` of this tier says which, and what "
         "they took elsewhere. A run that is stopped goes on where it was."
     )
 

@@ -130,6 +130,10 @@ def _section(section: Section, page: Page) -> Iterator[str]:
         yield f"**{literal(warning)}**" if warning else ""
     yield literal(report.reason)
     yield literal(section.faults)
+    yield literal(section.nulls)
+    if len(report.readings) > 1:
+        yield literal(f"Readings of the sentence: {section.read or 'not all are judged'}.")
+    yield literal(f"Power: {section.power}." if section.power else "")
     if report.because:
         yield f"Accepted as {literal(report.expected or '')}: {literal(report.because)}"
     parts = [part for part in section.parts if part.numbers]

@@ -19,7 +19,7 @@ from evoclaims.report.verdict_chart import VerdictChart
 from evoclaims.verdicts.claim_report import ClaimReport
 from evoclaims.verdicts.history import AcceptedVerdict
 from evoclaims.verdicts.robustness import Robustness
-from evoclaims.verdicts.sensitivity import Tally
+from evoclaims.verdicts.sensitivity import APART, Tally
 
 
 @dataclass(frozen=True)
@@ -67,6 +67,9 @@ class Section:
         history: accepted verdicts, oldest first; a new tuple begins where what is judged has changed.
         change: what differs from the last accepted verdict; empty when nothing does.
         faults: which planted faults change the verdict.
+        nulls: which null agents satisfy the assertion.
+        read: whether the verdict depends on the reading.
+        power: of a verdict that is inconclusive.
     """
 
     report: ClaimReport
@@ -82,6 +85,9 @@ class Section:
     history: tuple[tuple[AcceptedVerdict, ...], ...] = ()
     change: str = ""
     faults: str = ""
+    nulls: str = ""
+    read: str = ""
+    power: str = ""
 
     @property
     def devices(self) -> str:
@@ -110,7 +116,7 @@ class Board:
     def counts(self) -> Mapping[Tally, int]:
         """The number of the paper's claims by what they count as; of outcomes that no claim has, too."""
         found = table_cells.counts(section.report for section in self.papers)
-        return {tally: found.get(tally, 0) for tally in Tally if tally in found or tally is not Tally.INSENSITIVE}
+        return {tally: found.get(tally, 0) for tally in Tally if tally in found or tally not in APART}
 
     @property
     def accepted(self) -> int:

@@ -36,21 +36,21 @@ def cells(one: ClaimPower) -> tuple[str, ...]:
 
 def about(claims: Sequence[ClaimPower], n: int) -> list[str]:
     """Say how to read the table, and how many verdicts of a run end otherwise."""
-    told = [one.power for one in claims if one.power]
-    if not told:
+    known = [one.power for one in claims if one.power]
+    if not known:
         return []
-    missed, flipped = sum(1 - found.power for found in told), sum(found.flips for found in told)
-    below = sum(not found.suffices for found in told)
+    missed, flipped = sum(1 - found.power for found in known), sum(found.flips for found in known)
+    below = sum(not found.suffices for found in known)
     outcomes = ", ".join(f"{outcome.symbol} {outcome}" for outcome in _OUTCOMES)
     return [
-        f"Power: the share of {told[0].draws:,} draws of {plural(n, 'trial')} a condition, with replacement from its "
+        f"Power: the share of {known[0].draws:,} draws of {plural(n, 'trial')} a condition, with replacement from its "
         f"pilot, in which the claim ends as expected ({outcomes}); flips: in which it ends the other way; needs: about "
         f"how many trials {ENOUGH:g} takes. The interval is what draws leave open, not the pilot's size.",
-        f"Of {plural(len(told), 'verdict')} of a run, {number(missed)} end otherwise than expected on average, "
+        f"Of {plural(len(known), 'verdict')} of a run, {number(missed)} end otherwise than expected on average, "
         f"{number(flipped)} of them the other way. {plural(below, 'claim')} below {ENOUGH:g}.",
     ]
 
 
 def troubles(claims: Sequence[ClaimPower]) -> list[str]:
-    """Return a line for each claim whose power cannot be told."""
+    """Return a line for each claim whose power is unknown."""
     return [f"{one.name}: {one.trouble}" for one in claims if one.trouble]

@@ -58,7 +58,7 @@ def _place(one: Replication, varied: bool) -> tuple[str, str]:
 
 
 def _intervals(one: Replication) -> list[str]:
-    """Return the interval by each reading of the published spread, or why there is none."""
+    """Return the interval by each reading of the published spread, or why it is missing."""
     return [*map(_interval, one.repetition.predictions)] or [one.repetition.reason]
 
 
@@ -68,5 +68,5 @@ def _interval(prediction: Prediction) -> str:
     if prediction.spread is Spread.NONE:
         got = "" if prediction.ours is None else f": ours {number(prediction.ours)}"
         return f"{ends} {prediction.of}{got}"
-    told = "" if prediction.answer is Answer.UNKNOWN else f" {SYMBOLS[prediction.answer]}"
-    return f"{ends} {prediction.spread.short}{told}"
+    mark = "" if prediction.answer is Answer.UNKNOWN else f" {SYMBOLS[prediction.answer]}"
+    return f"{ends} {prediction.spread.short}{mark}"

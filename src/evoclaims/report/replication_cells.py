@@ -106,8 +106,8 @@ def would_not_pass(report: ClaimReport) -> str:
 def _interval(prediction: Prediction) -> str:
     """Return an interval, such as "0.776 to 0.938 (SD: outside)"."""
     ends = f"{number(prediction.low)} to {number(prediction.high)}"
-    told = "" if prediction.answer is Answer.UNKNOWN else f": {prediction.answer}"
+    answer = "" if prediction.answer is Answer.UNKNOWN else f": {prediction.answer}"
     if prediction.spread is Spread.NONE:
         got = "" if prediction.ours is None else f", ours {number(prediction.ours)}"
-        return f"{ends} {prediction.of}{got} ({prediction.spread.short}{told})"
-    return f"{ends} ({prediction.spread.short}{told})"
+        return f"{ends} {prediction.of}{got} ({prediction.spread.short}{answer})"
+    return f"{ends} ({prediction.spread.short}{answer})"

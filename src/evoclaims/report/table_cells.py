@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Sequence
 
-from evoclaims.judging.verdict import Direction
+from evoclaims.judging.design import Look
+from evoclaims.judging.event_power import RATES, event_power
+from evoclaims.judging.verdict import Direction, Outcome
 from evoclaims.report.formatting import p_value, place_key, places
 from evoclaims.verdicts import mixed_versions
 from evoclaims.verdicts.claim_report import ClaimReport
@@ -24,10 +26,38 @@ def in_the_papers_order(reports: Iterable[ClaimReport]) -> list[ClaimReport]:
 def verdict(report: ClaimReport) -> str:
     """Return the outcome, such as "✗ refuted"; with an asterisk if it was examined and accepted.
 
-    Beside it stands "insensitive" if no planted fault changes it.
+    Beside it stands "insensitive" if no planted fault changes it, "vacuous" if a null agent is supported as well, and
+    "by reading" if another reading of the sentence ends otherwise.
     """
-    insensitive = f", {report.tried}" * (report.tried is Tried.INSENSITIVE)
-    return f"{report.outcome.symbol} {report.outcome}{'*' * report.as_expected}{insensitive}"
+    return f"{report.outcome.symbol} {report.outcome}{'*' * report.as_expected}{remarks(report)}"
+
+
+def remarks(report: ClaimReport) -> str:
+    """Return what stands beside an outcome, such as ", insensitive"; empty if nothing does."""
+    said = {
+        "insensitive": report.tried is Tried.INSENSITIVE,
+        "vacuous": report.is_vacuous,
+        "by reading": report.depends_on_the_reading,
+    }
+    return "".join(f", {word}" for word, holds in said.items() if holds)
+
+
+def power(report: ClaimReport) -> str:
+    """Return how often an undecided "most trials" would be supported at some true rates; empty for other verdicts."""
+    verdict = report.verdict
+    if verdict is None or report.outcome is not Outcome.INCONCLUSIVE or not report.attainable:
+        return ""
+    open_ = [part for part in verdict.evidence if part.events and part.outcome is not Outcome.SUPPORTED and part.bounds]
+    looks = [Look(look.n, look.alpha) for look in report.attainable]
+    rates = ", ".join(f"{rate:g}" for rate in RATES)
+
+    def at_rates(p0: float) -> str:
+        return ", ".join(f"{event_power(looks, p0, rate):.2f}" for rate in RATES)
+
+    return "; ".join(
+        f"“{part.describe}” would be supported with probability {at_rates(part.bounds[0].value)} at true rates of {rates}"
+        for part in open_
+    )
 
 
 def verdict_of_versions(report: ClaimReport) -> str:

@@ -13,6 +13,7 @@ from rich.cells import cell_len, set_cell_size
 from rich.text import Text
 
 from evoclaims.core.printable import printable
+from evoclaims.core.provenance import changing_flags
 from evoclaims.judging.drift import DriftReport
 from evoclaims.judging.verdict import Outcome
 from evoclaims.report import table_cells
@@ -59,14 +60,18 @@ def verdict_table(reports: Sequence[ClaimReport], width: int, colour: bool) -> s
     heading, *rows = zip(names, sentences, verdicts, *columns, strict=True)
     lines = [Text(_GAP.join(heading), style="bold")]
     for report, (name, sentence, verdict, *rest) in zip(ordered, rows, strict=True):
-        said = (verdict, _COLOURS[report.outcome])
-        lines.append(Text.assemble(name + _GAP + sentence + _GAP, said, *(_GAP + cell for cell in rest)))
+        styled = (verdict, _COLOURS[report.outcome])
+        lines.append(Text.assemble(name + _GAP + sentence + _GAP, styled, *(_GAP + cell for cell in rest)))
     folders = sorted({os.path.relpath(Path(report.evidence).parent) for report in reports if report.evidence})
     captions = [f"evidence: {printable(folder)}/<claim>.json" for folder in folders]
     if any(report.as_expected for report in reports):
         captions.append("* looked into and accepted")
     if any(report.tried is Tried.INSENSITIVE for report in reports):
         captions.append("insensitive: no fault planted in the claim's methods changes its verdict, so it is no support")
+    if any(report.is_vacuous for report in reports):
+        captions.append("vacuous: a null agent, which has learnt nothing, is supported as well, so it is no support")
+    if any(report.depends_on_the_reading for report in reports):
+        captions.append("by reading: another reading of the sentence ends otherwise (evoclaims audit)")
     captions += mixed_versions.lines(reports) + edited_code.lines(reports)
     below = _rendered("\n".join(captions), width, colour).splitlines() if captions else []
     return "\n".join([*(_rendered(line, width, colour).rstrip() for line in lines), *map(str.rstrip, below)])
@@ -110,17 +115,19 @@ def _shortened(text: str, room: int) -> str:
 
 
 def explanations(reports: Sequence[ClaimReport], width: int, colour: bool) -> str:
-    """Return a line for every verdict that is not plainly supported: why, what was accepted, which trials broke."""
+    """Return a line for every verdict that is not plainly supported: why, what was accepted, what its trials did."""
     lines = []
     for report in reports:
         broken = report.verdict.without_result if report.verdict else ""
-        if report.outcome == Outcome.SUPPORTED and report.expected in (None, report.outcome) and not broken:
+        over = report.verdict.overspent if report.verdict else ""
+        plain = report.outcome == Outcome.SUPPORTED and report.expected in (None, report.outcome)
+        if plain and not (broken or over or (report.verdict and report.verdict.copies)):
             continue
         note = ""
         if report.expected is not None and report.outcome != Outcome.NOT_RUN:
             kept = "accepted" if report.as_expected else f"no longer {report.expected}, which was accepted"
             note = f" [{kept}: {report.because}]"
-        worst = f" [worst rank: {broken}]" if broken else ""
+        worst = (f" [worst rank: {broken}]" if broken else "") + (f" [over budget: {over}]" if over else "")
         lines.append(f"{report.outcome.symbol} {report.name}: {report.reason}{worst}{note}")
     return _rendered("\n".join(" ".join(line.split()) for line in lines), width, colour) if lines else ""
 
@@ -132,10 +139,16 @@ def drift_lines(drift: DriftReport, changed: Sequence[str], compared: int) -> st
         f"reference trials: {drift.tested} comparisons, {drifted} drifted (exact rank tests, Holm, α = {drift.alpha:g})"
     )
     where = ": " * bool(changed) + ", ".join(f"{label} ({count})" for label, count in Counter(changed).items())
+    flags = changing_flags()
+    because = (
+        f"since XLA_FLAGS here change bits ({flags}), and none has a reference of the same flags, machine and versions"
+        if flags
+        else "since none has a reference of the same machine and versions"
+    )
     bits = (
         f"to the bit: {compared} trials compared with the same machine and versions, {len(changed)} changed{where}"
         if compared
-        else "to the bit: no trial could be compared, since none has a reference of the same machine and versions"
+        else f"to the bit: no trial could be compared, {because}"
     )
     return "\n".join([head, *drift.lines, bits])
 

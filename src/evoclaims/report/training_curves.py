@@ -65,15 +65,15 @@ def panels(trials: Sequence[TrialSummary]) -> tuple[tuple[CurvePanel, ...], str]
     ordered = [name for name in FIRST if name in names] + sorted(names - set(FIRST))
     constant = {name: value for name in ordered if (value := _constant(usable, name)) is not None}
     varying = [name for name in ordered if name not in constant]
-    said = [f"{clean(name)} is {number(value)} throughout training" for name, value in constant.items()]
+    notes = [f"{clean(name)} is {number(value)} throughout training" for name, value in constant.items()]
     if len(usable) < len(trials):
-        said.append(f"{len(trials) - len(usable)} of {len(trials)} trials have at most one point")
+        notes.append(f"{len(trials) - len(usable)} of {len(trials)} trials have at most one point")
     if varying[MOST_PANELS:]:
-        said.append(f"not drawn: {', '.join(map(clean, varying[MOST_PANELS:]))}")
+        notes.append(f"not drawn: {', '.join(map(clean, varying[MOST_PANELS:]))}")
     longest = max(trial.reports for trial in usable)
     if longest > POINTS:
-        said.append(f"at most {POINTS} of {longest} reports are drawn")
-    text = "; ".join(said)
+        notes.append(f"at most {POINTS} of {longest} reports are drawn")
+    text = "; ".join(notes)
     return tuple(_panel(usable, name) for name in varying[:MOST_PANELS]), text[:1].upper() + text[1:] + "." * bool(text)
 
 

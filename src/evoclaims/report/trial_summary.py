@@ -26,7 +26,7 @@ class TrialSummary:
     Attributes:
         trial: its id.
         seed, status, champion: as in its record.
-        score: the "mean_success" metric; None where there is none.
+        score: the "mean_success" metric; None without it.
         origin: where it was made.
         reports: how many points its curves have.
         curves: by name, at most `POINTS` evenly spread points of each, the first and the last among them.

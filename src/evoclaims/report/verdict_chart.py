@@ -33,13 +33,13 @@ class VerdictMark:
 
     Attributes:
         outcome: of the verdict; None for a cross.
-        said: what the mark tells to whom points at it.
+        tooltip: text shown when the pointer is over the mark.
         height: from 0 to 1; 0.5 is on the line.
         ringed: whether there is a ring around it.
     """
 
     outcome: Outcome | None
-    said: str
+    tooltip: str
     height: float = LEVEL
     ringed: bool = False
 
@@ -51,7 +51,7 @@ class VerdictChart:
     Attributes:
         title: of the picture.
         note: what heights and rings mean, on top.
-        columns: headings by the names of columns, which are told to whom points at them.
+        columns: headings by the names of columns, shown as tooltips.
         rows: by claim, the mark in each column that has one.
     """
 
@@ -100,7 +100,7 @@ def _pieces(chart: VerdictChart, width: int) -> Iterator[str]:
 
 def _drawn(mark: VerdictMark, x: float, middle: float) -> str:
     """Return a mark in the column around `x` and the row around `middle`."""
-    title = f"<title>{_text(mark.said)}</title>"
+    title = f"<title>{_text(mark.tooltip)}</title>"
     if mark.outcome is None:
         return f'<path d="M{x - 4:g} {middle - 4:g}l8 8m0-8l-8 8" stroke="{GREY}">{title}</path>'
     y = middle + (LEVEL - mark.height) * (ROW - 16)

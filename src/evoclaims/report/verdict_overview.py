@@ -8,12 +8,12 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Final
 
 from evoclaims.judging.verdict import Outcome
+from evoclaims.report import table_cells
 from evoclaims.report.formatting import plural
 from evoclaims.report.markdown_text import literal, table
 from evoclaims.report.table_cells import NONE, in_the_papers_order
 from evoclaims.report.trial_summary import Reader
 from evoclaims.verdicts.claim_report import ClaimReport
-from evoclaims.verdicts.sensitivity import Tried
 
 Versions = dict[str, str]
 _Rows = dict[tuple[str, str], dict[str, list[ClaimReport]]]
@@ -135,8 +135,8 @@ def _verdict(report: ClaimReport, made: Environments) -> str:
     """Return a verdict with its evidence in short, such as "**refuted** (2 of 10 trials; A)"."""
     if not report.n:
         return NONE if report.variant and report.outcome is Outcome.NOT_RUN else literal(report.outcome)
-    insensitive = f", {report.tried}" * (report.tried is Tried.INSENSITIVE)
-    return f"**{literal(report.outcome)}**{insensitive} ({literal(_evidence(report))}; {made.letters(report)})"
+    outcome = f"**{literal(report.outcome)}**{table_cells.remarks(report)}"
+    return f"{outcome} ({literal(_evidence(report))}; {made.letters(report)})"
 
 
 def _evidence(report: ClaimReport) -> str:

@@ -101,7 +101,7 @@ class Packed(Mapping[str, NDArray[Any]]):
         """Read an array.
 
         Raises:
-            KeyError: when there is none of this name.
+            KeyError: for an unknown name.
             ValueError: when it does not match its checksum.
         """
         self.kinds[name]

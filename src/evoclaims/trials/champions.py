@@ -15,7 +15,7 @@ from evoclaims.core.errors import UserError
 from evoclaims.core.keys import EVALUATION, TRAINING, trial_key
 from evoclaims.core.provenance import what_fixes_bits
 from evoclaims.envs.base import Episode
-from evoclaims.kernels.random_bits import fast
+from evoclaims.kernels import kernel_prng
 from evoclaims.methods.base import Policy
 from evoclaims.methods.hyperneat import SubstrateNetwork
 from evoclaims.methods.neat.evolution import GenomeMethod
@@ -70,7 +70,7 @@ def replay(condition: Condition, result: TrialResult, parameters: Any, devices: 
 
     def score(seed: Int[Array, ""], parameters: Any) -> Episode:
         policy = replace(_policy(condition), parameters=parameters)
-        return score_every_level(condition.task, policy, fast(trial_key(seed, EVALUATION)))
+        return score_every_level(condition.task, policy, kernel_prng(trial_key(seed, EVALUATION)))
 
     arguments = jax.tree.map(lambda leaf: np.asarray(leaf)[None], (np.int32(result.seed), parameters))
     layout = layout_on(devices[0].platform)

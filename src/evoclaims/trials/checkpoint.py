@@ -15,7 +15,7 @@ from msgspec import convert
 
 from evoclaims.core.canonical import content_hash
 from evoclaims.core.errors import UserError
-from evoclaims.core.files import write_atomically
+from evoclaims.core.files import open_file, write_atomically
 from evoclaims.trials.arrays import Packed, pack
 from evoclaims.trials.program import TrialState
 from evoclaims.trials.result_codec import is_hash
@@ -133,9 +133,7 @@ def _opened(path: Path) -> Iterator[tuple[Header, Packed]]:
         FileNotFoundError: when the file is gone.
     """
     try:
-        if path.exists() and not path.is_file():
-            raise DamagedFileError(path, "it is not a file")
-        with path.open("rb") as file:
+        with open_file(path) as file:
             packed = Packed(file)
             if packed.nbytes(_HEADER) > _HEADER_BYTES:
                 raise DamagedFileError(path, "its header is longer than that of any batch of trials")

@@ -19,7 +19,7 @@ from evoclaims.core.errors import UserError
 from evoclaims.core.keys import TRAINING, trial_key
 from evoclaims.core.pytree import strong
 from evoclaims.envs.base import Episode, MisfitError, Task, TaskState, fitting
-from evoclaims.kernels.random_bits import fast
+from evoclaims.kernels import kernel_prng
 from evoclaims.methods.base import Method, Policy, Progress
 from evoclaims.trials.success import SHARES
 
@@ -85,12 +85,12 @@ def traced_progress(method: Method[Any], task: Task) -> Progress:
         _check_unchanged(f"{task.name!r} changes its state by a step", shown.inner, following.inner)
 
         def step(seed: Int[Array, ""], level: Int[Array, ""], state: Any) -> tuple[Any, Progress]:
-            told: object = method.step(_key(seed), task, level, state)
-            if not (isinstance(told, tuple) and len(told) == 2):
+            returned: object = method.step(_key(seed), task, level, state)
+            if not (isinstance(returned, tuple) and len(returned) == 2):
                 raise MisfitError(
-                    f"a step of {method.name!r} returns {_kind(told)}, not two values: state, Progress(...)"
+                    f"a step of {method.name!r} returns {_kind(returned)}, not two values: state, Progress(...)"
                 )
-            after, progress = told
+            after, progress = returned
             return strong(after), progress
 
         try:
@@ -160,7 +160,7 @@ def check_scores(task: Task, final: Episode) -> None:
 
 def _key(seed: Int[Array, ""]) -> Array:
     """Return a key for tracing."""
-    return fast(trial_key(seed, TRAINING))
+    return kernel_prng(trial_key(seed, TRAINING))
 
 
 def _check_task_state(task: Task, function: str, state: TaskState) -> None:
@@ -223,7 +223,7 @@ def _check_unchanged(what: str, before: Any, after: Any) -> None:
 
 
 def _is_array(leaf: object) -> bool:
-    """Whether there is one array, or the shape of one; a list of arrays is none."""
+    """Whether there is one array, or the shape of one; a list of arrays is not one."""
     return hasattr(leaf, "shape") and hasattr(leaf, "dtype")
 
 

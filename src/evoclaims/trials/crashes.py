@@ -23,10 +23,10 @@ def is_of_another_process(result: TrialResult) -> bool:
 
 
 def why(result: TrialResult) -> str:
-    """Return why a trial has crashed, in one line: the last that its process said; empty where nothing is known."""
+    """Return why a trial has crashed, in one line: the last line of its process; empty if unknown."""
     return last_said(result).rpartition("\n")[2]
 
 
 def last_said(result: TrialResult) -> str:
-    """Return what the process of a crashed trial said last, such as the end of a traceback; empty if not known."""
+    """Return the last output of a crashed trial's process, such as the end of a traceback; empty if not known."""
     return str(result.provenance.get("crash") or "")

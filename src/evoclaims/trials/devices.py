@@ -12,6 +12,7 @@ import jax
 from threadpoolctl import threadpool_limits
 
 from evoclaims.core.errors import UserError, require_known
+from evoclaims.core.private_files import doubt, make_private, say_refused
 
 DEVICE_NAMES: Final = ("auto", "cpu", "gpu")
 MATMUL_PRECISION: Final = "highest"
@@ -31,12 +32,27 @@ def configure() -> None:
     gc.set_threshold(*_COLLECTIONS)  # looking through all of them took a sixth of the time of tracing
     config: Any = jax.config
     if config.jax_compilation_cache_dir is None:
-        home = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
-        config.update("jax_compilation_cache_dir", str(home / "evoclaims" / "xla"))
+        if folder := _cache():
+            config.update("jax_compilation_cache_dir", str(folder))
         config.update("jax_persistent_cache_min_compile_time_secs", 0.2)
         # jax would otherwise evict nothing and warn about nothing; a broken cache must not break a run.
         config.update("jax_raise_persistent_cache_errors", False)
     choose("auto")  # fail here with a clear error, not with a traceback in a later import
+
+
+def _cache() -> Path | None:
+    """Return the folder of compiled programs; None, with a warning, where another user could put programs into it."""
+    named = Path(os.environ.get("XDG_CACHE_HOME", ""))
+    # A relative path is invalid by the XDG specification: it would let any folder bring its own programs.
+    folder = (named if named.is_absolute() else Path.home() / ".cache") / "evoclaims" / "xla"
+    try:
+        make_private(folder)
+        why = doubt(folder.parent) or doubt(folder)
+    except OSError:  # a read-only disk: jax goes on without
+        return folder
+    if why:
+        say_refused(folder, why)
+    return None if why else folder
 
 
 def keep_off_gpus() -> None:

@@ -15,7 +15,7 @@ from typing import Final
 
 VISIBLE: Final = "CUDA_VISIBLE_DEVICES"
 MEMORY: Final = "XLA_PYTHON_CLIENT_MEM_FRACTION"
-"""The share of a GPU's memory that jax takes when it starts: three quarters, unless it is told otherwise."""
+"""The share of a GPU's memory that jax takes when it starts: three quarters, unless it is configured otherwise."""
 
 SHARED_MEMORY: Final = 0.9
 """What several processes on one GPU take of its memory together."""

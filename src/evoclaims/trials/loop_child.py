@@ -23,13 +23,13 @@ class Child:
 
     def __init__(self, request: LoopRequest, environment: Mapping[str, str]) -> None:
         """Start it, as the leader of a group of its own, with these environment variables besides this process's."""
-        self._said = tempfile.TemporaryFile()  # noqa: SIM115  (closed by `close`)
+        self._output = tempfile.TemporaryFile()  # noqa: SIM115  (closed by `close`)
         self._process = subprocess.Popen(
             # Modules are where this process has them, and what was printed is there when the process is killed.
             [sys.executable, "-P", "-u", "-m", "evoclaims.trials.loop_process"],
             stdin=subprocess.PIPE,  # stays open as long as this process lives
             stdout=subprocess.PIPE,
-            stderr=self._said,
+            stderr=self._output,
             env={**os.environ, **environment},
             start_new_session=True,
         )
@@ -63,8 +63,8 @@ class Child:
             assert pipe is not None
             with contextlib.suppress(OSError):
                 pipe.close()
-        with self._said as said:
-            said.seek(max(said.seek(0, os.SEEK_END) - _READ, 0))
-            last = last_lines(said.read().decode(errors="replace"))
+        with self._output as output:
+            output.seek(max(output.seek(0, os.SEEK_END) - _READ, 0))
+            last = last_lines(output.read().decode(errors="replace"))
         how = signal.Signals(-status).name if -status in set(signal.Signals) else f"status {status}"
         return f"{last}\nits process ended with {how}".lstrip()

@@ -9,24 +9,25 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Int
+from numpy.typing import NDArray
 
 from evoclaims.core.keys import EVALUATION, trial_key
 from evoclaims.envs.base import Episode, Task
-from evoclaims.kernels.random_bits import fast
+from evoclaims.kernels import kernel_prng
 from evoclaims.trials.devices import MATMUL_PRECISION
 from evoclaims.trials.loop_messages import Scores
 from evoclaims.trials.rollout import score_every_level
 
 
 def examined(task: Task, policy: Callable[[Any], Any], seed: int) -> Scores:
-    """Return the scores of a policy on a task of ours (metrics of the last level), with keys unknown to training.
+    """Return the scores of a policy on a built-in task (metrics of the last level), with keys unknown to training.
 
     It is examined as all methods' policies are: observations [observation_size] in, actions [action_size] out.
     """
     fitted = _fitted(task, policy)
 
     def score(number: Int[Array, ""]) -> Episode:
-        return score_every_level(task, fitted, fast(trial_key(number, EVALUATION)))
+        return score_every_level(task, fitted, kernel_prng(trial_key(number, EVALUATION)))
 
     with jax.default_matmul_precision(MATMUL_PRECISION):
         final: Episode = jax.device_get(jax.jit(score)(np.int32(seed)))
@@ -35,6 +36,11 @@ def examined(task: Task, policy: Callable[[Any], Any], seed: int) -> Scores:
         fitness=tuple(map(float, final.fitness)),
         metrics={name: float(values[-1]) for name, values in final.metrics.items()},
     )
+
+
+def fixed_observations(task: Task, count: int) -> NDArray[np.float32]:
+    """Return observations that are the same for every policy, shape [count, observation_size]."""
+    return np.random.default_rng(0).normal(size=(count, task.observation_size)).astype(np.float32)
 
 
 def _fitted(task: Task, policy: Callable[[Any], Any]) -> Callable[[Array], Array]:

@@ -53,11 +53,15 @@ class Trained(msgspec.Struct, frozen=True, tag=True):
         metrics: as the function returned them.
         scores: None if it returned no policy.
         step: of its last report; None if it reported nothing.
+        actions: hash of the policy's actions on fixed starts; empty without a policy.
+        graded: whether one of these is no whole number.
     """
 
     metrics: dict[str, float]
     scores: Scores | None
     step: int | None
+    actions: str = ""
+    graded: bool = False
 
 
 class Failed(msgspec.Struct, frozen=True, tag=True):
@@ -81,6 +85,6 @@ def decode(line: bytes) -> Answer:
 
 
 def last_lines(text: str) -> str:
-    """Return how much of a traceback, or of what a process said last, is kept as the reason of a crash."""
+    """Return how much of a traceback, or of a process's last output, is kept as the reason of a crash."""
     lines = [line.rstrip() for line in text.splitlines() if line.strip()]
     return "\n".join(printable(line)[:_LONGEST_LINE] for line in lines[-_LAST_LINES:])

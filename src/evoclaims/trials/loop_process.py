@@ -19,6 +19,7 @@ from typing import Any, Final
 
 import msgspec
 
+from evoclaims.core.canonical import as_plain, content_hash
 from evoclaims.core.errors import UserError
 from evoclaims.core.portable import from_plain, resolve
 from evoclaims.envs.foreign.scoring import ForeignTask
@@ -32,6 +33,12 @@ COUNTS: Final = ("steps", "environment_steps")
 TOLD_SECONDS: Final = 0.2
 """Least time between two reports that are passed on, but for the points of the curve."""
 
+WATCHED: Final = 64
+"""Most actions by which policies are told from each other."""
+
+FIXED_START: Final = 2**31 - 1
+"""The seed of the starts from which these are watched, the same for every trial."""
+
 MOST_STEPS: Final = 2**53
 """What a count may be at most, as in records: a float holds it exactly."""
 
@@ -40,7 +47,7 @@ class Reporter:
     """The function `report` of a trial.
 
     Attributes:
-        last: step of the last report, told or not; None before the first.
+        last: step of the last report, passed on or not; None before the first.
     """
 
     def __init__(self, every: int, answer: Callable[[Answer], None]) -> None:
@@ -55,27 +62,27 @@ class Reporter:
         """Tell how far training is, in the budget's unit, and numbers such as `fitness=12.5`.
 
         Raises:
-            UserError: when the step is no count, a number is none, or the success is no share.
+            UserError: when the step is not a count, a value is not a number, or the success is not a share.
         """
         self.last = step = int(step)
         if not 0 <= step <= MOST_STEPS:
             raise UserError(f"A training function reports a number of steps, and not {step}.")
-        told = numbers(values)
-        check_success("A training loop", told.get("success", 0.0), solves=False, advice="report such a share")
+        given = numbers(values)
+        check_success("A training loop", given.get("success", 0.0), solves=False, advice="report such a share")
         kept = step >= self._next
         if not kept and time.monotonic() - self._told < TOLD_SECONDS:
             return
         if kept:
             self._next = (step // self._every + 1) * self._every
         self._told = time.monotonic()
-        self._answer(LoopReport(step, told, kept))
+        self._answer(LoopReport(step, given, kept))
 
 
 def numbers(values: Mapping[str, Any]) -> dict[str, Any]:
     """Return a training loop's numbers as floats.
 
     Raises:
-        UserError: when one is no number, or a count that is none.
+        UserError: when one is not a number, or not a count.
     """
     if not isinstance(values, Mapping):
         raise UserError(f"A training function returns a table of numbers by name, or (table, policy), not {values!r}.")
@@ -102,8 +109,8 @@ def train(request: LoopRequest, answer: Callable[[Answer], None]) -> Trained:
     """Call the function, and examine its policy."""
     function, task, budget = resolve(request.function), from_plain(request.task), from_plain(request.budget)
     report = Reporter(budget.chunk(1), answer)
-    told = {"report": report} if wants_report(function) else {}
-    returned = function(task, request.seed, budget, **from_plain(request.settings), **told)
+    given = {"report": report} if wants_report(function) else {}
+    returned = function(task, request.seed, budget, **from_plain(request.settings), **given)
     metrics, policy = returned if isinstance(returned, tuple) and len(returned) == 2 else (returned, None)
     told_metrics = numbers(metrics)
     if policy is not None and not callable(policy):
@@ -111,9 +118,54 @@ def train(request: LoopRequest, answer: Callable[[Answer], None]) -> Trained:
     if policy is None:
         check_shares("A training loop", told_metrics, "return such a share, or give the metric another name")
         return Trained(told_metrics, None, report.last)
+    actions, graded = actions_of(task, policy)  # before the examination, which may change what a policy draws from
     scores = examined(task, policy, request.seed)
     check_success("The examination of a training loop's policy", *scores.success, advice="make the task's such a share")
-    return Trained(told_metrics, scores, report.last)
+    return Trained(told_metrics, scores, report.last, actions, graded)
+
+
+def actions_of(task: Any, policy: Callable[[Any], Any]) -> tuple[str, bool]:
+    """Return the hash of a policy's actions on fixed starts, and whether some number in them is not whole.
+
+    Policies with other parameters nearly always differ here, and copies of one never do, whatever their seeds.
+    """
+    seen: list[Any] = []
+
+    def watched(observation: Any) -> Any:
+        if len(seen) == WATCHED:
+            raise _EnoughError
+        action = policy(observation)
+        seen.append(_plain_action(action))
+        return action
+
+    try:
+        if isinstance(task, ForeignTask):
+            task.examine_natively(watched, FIXED_START)
+        else:
+            from evoclaims.trials import loop_examination
+
+            for observation in loop_examination.fixed_observations(task, WATCHED):
+                watched(observation)
+    except _EnoughError:
+        pass
+    except Exception as error:  # a policy may be a table without these observations
+        seen.append(type(error).__name__)
+    graded = any(isinstance(x, float) and math.isfinite(x) and x % 1 != 0 for one in seen for x in one)
+    return content_hash(as_plain(seen)), graded
+
+
+class _EnoughError(Exception):
+    """As many actions as are needed have been seen."""
+
+
+def _plain_action(action: Any) -> list[float] | str:
+    """Return an action's numbers; of an action that is no array, its text."""
+    import numpy as np
+
+    try:
+        return [float(number) for number in np.ravel(np.asarray(action))]
+    except (TypeError, ValueError):
+        return repr(action)
 
 
 def examined(task: Any, policy: Callable[[Any], Any], seed: int) -> Scores:

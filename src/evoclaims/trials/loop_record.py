@@ -8,9 +8,10 @@ from typing import Any, Final
 
 import jax
 
+from evoclaims.core.canonical import content_hash
 from evoclaims.methods.training_loop import TrainingLoop
 from evoclaims.trials.loop_messages import Trained
-from evoclaims.trials.result import TRAINED_BY, Status, TrialResult
+from evoclaims.trials.result import RETURNED, TRAINED_BY, Status, TrialResult
 from evoclaims.trials.result_making import make_record
 from evoclaims.trials.spec import TrialSpec
 
@@ -28,7 +29,7 @@ def trained_record(
     """Return the record of a trial whose function has returned.
 
     The metrics are those of the function, those of every method (see `result_making.make_result`) and the task's own.
-    What an examination says counts, whatever the function said. Without one, those that the function does not return
+    The examination's numbers count, not the function's. Without one, those that the function does not return
     are NaN: a claim that reads such a number is an error. A trial has diverged when its function returned a NaN, or its
     policy's scores are not finite.
     """
@@ -62,5 +63,10 @@ def trained_record(
     origin = {
         TRAINED_BY: spec.condition.method.place,
         SCORED_BY: "training function" if scores is None else "examination",
+        RETURNED: {
+            "metrics": content_hash(dict(returned)),
+            "actions": trained.actions,
+            "graded": trained.graded,
+        },
     }
     return make_record(spec, status, metrics, levels, curves, b"", timing, devices, origin)

@@ -59,8 +59,8 @@ class RunningLoop:
         """The training curves; a number that a report left out is NaN there."""
         names = dict.fromkeys(name for point in self.points for name in point.numbers)
         steps = [float(point.step) for point in self.points]
-        told = {name: [point.numbers.get(name, math.nan) for point in self.points] for name in names}
-        return {**told, "steps": steps, "environment_steps": steps} if steps else {}
+        reported = {name: [point.numbers.get(name, math.nan) for point in self.points] for name in names}
+        return {**reported, "steps": steps, "environment_steps": steps} if steps else {}
 
 
 class LoopTrials:
@@ -82,7 +82,7 @@ class LoopTrials:
                 f"The training loop {self._method.name!r} needs {', '.join(missing)}, not installed here: "
                 f"pip install {' '.join(missing)}"
             )
-        _ = stored.condition.task.horizon  # what has none is said before training, not after it
+        _ = stored.condition.task.horizon  # a task without one is refused before training, not after it
         self._request = {
             "function": self._method.place,
             "task": to_plain(stored.condition.task),
@@ -189,7 +189,7 @@ class LoopTrials:
         steps = [condition.steps if one.outcome else one.newest.step if one.newest else 0 for one in running]
         reached = [min(step, condition.steps) for step in steps]
         done = sum(reached) / max(condition.steps * len(running), 1)
-        told = [one.newest.numbers["success"] for one in running if one.newest and "success" in one.newest.numbers]
+        reported = [one.newest.numbers["success"] for one in running if one.newest and "success" in one.newest.numbers]
         return RunProgress(
             condition=condition.label,
             phase="training",
@@ -197,6 +197,6 @@ class LoopTrials:
             ended=ended,
             steps=max(reached),
             total_steps=condition.steps,
-            best=max(told, default=None),
+            best=max(reported, default=None),
             seconds_left=seconds * (1 - done) / done if done > 0.01 else None,
         )

@@ -91,7 +91,7 @@ def announced(
 
 
 def sweep(store_root: Path) -> None:
-    """Remove the notices of this machine's ended processes, and what they told: nobody might ever look at them."""
+    """Remove the notices and progress files of this machine's ended processes: nobody else may ever look at them."""
     for path in sorted((store_root / "running").glob("*.lock")):
         lease = _lease(path)
         if _has_ended(lease.owner):
@@ -119,7 +119,7 @@ def _is_ours(lease: filelock.SoftFileLease) -> bool:
 
 
 def _refreshed(path: Path) -> int:
-    """Return when a notice was last refreshed, by the clock of its writer; 0 if there is none."""
+    """Return when a notice was last refreshed, by the clock of its writer; 0 without one."""
     try:
         return path.lstat().st_mtime_ns
     except OSError:

@@ -14,7 +14,7 @@ from jaxtyping import Array, Bool, Float, Int
 from evoclaims.core.keys import EVALUATION, TRAINING, streams, trial_key
 from evoclaims.core.pytree import pytree, strong
 from evoclaims.envs.base import Episode, Numbered, Task
-from evoclaims.kernels.random_bits import fast
+from evoclaims.kernels import kernel_prng
 from evoclaims.methods.base import Progress
 from evoclaims.trials import curriculum
 from evoclaims.trials.compatibility import both_named, check_scores, traced_progress
@@ -89,7 +89,7 @@ class Program:
         """
         progress = self._progress
         method, task = self.condition.method, self.condition.task
-        init_key = streams(fast(trial_key(seed, TRAINING)), "init")[0]
+        init_key = streams(kernel_prng(trial_key(seed, TRAINING)), "init")[0]
         return TrialState(
             seed=seed,
             method=strong(method.init(init_key, task)),
@@ -104,7 +104,7 @@ class Program:
     def advance(self, trial: TrialState, until: Int[Array, ""]) -> tuple[TrialState, Report]:
         """Take steps until the trial has ended or has taken `until` of them."""
         method, task = self.condition.method, self._task(trial)
-        training_key = streams(fast(trial_key(trial.seed, TRAINING)), "step")[0]
+        training_key = streams(kernel_prng(trial_key(trial.seed, TRAINING)), "step")[0]
 
         def running(trial: TrialState) -> Bool[Array, ""]:
             return ~self._ended(trial) & (trial.steps < until)
@@ -139,7 +139,7 @@ class Program:
         method, task = self.condition.method, self._task(trial)
         policy = method.best(task, trial.method)
         with both_named(method, task):
-            final = score_every_level(task, policy, fast(trial_key(trial.seed, EVALUATION)))
+            final = score_every_level(task, policy, kernel_prng(trial_key(trial.seed, EVALUATION)))
             check_scores(task, final)
         return Score(final=final, parameters=policy.parameters, solved_at=trial.ascent.solved_at)
 

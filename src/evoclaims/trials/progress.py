@@ -18,7 +18,7 @@ class RunProgress:
         best: highest success on `level`; None before the first report.
         level: highest current level of any trial, of `levels`.
         seconds_left: estimate for the batch; None while unknown.
-        remark: whether the phase is a remark of its own, which is told once and not passed over.
+        remark: whether the phase is a remark that is shown once and never skipped.
     """
 
     condition: str

@@ -14,6 +14,9 @@ COMPLETE: tuple[str, ...] = ("done", "diverged")
 SCHEMA = 1
 TRAINED_BY: Final = "trained_by"
 """Key of the provenance of a training loop's trial: the place of its function, "module:name"."""
+RETURNED: Final = "returned"
+"""Key of the same: hashes of the "metrics" that its function returned and of its policy's "actions" on fixed starts
+(empty without a policy), and whether some action is "graded", no whole number."""
 
 
 @dataclass(frozen=True)
@@ -36,7 +39,7 @@ class TrialResult:
             a timed-out trial also "limit", the seconds that its batch was allowed; on a processor "processor", the
             seconds of its cores that running took.
         provenance: versions, device, flags and git revision (see `core.provenance`).
-        champion: SHA-256 of the stored champion's file, filled in by `Store.put`; empty while there is none.
+        champion: SHA-256 of the stored champion's file, filled in by `Store.put`; empty until then.
     """
 
     id: str

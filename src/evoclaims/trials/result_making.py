@@ -11,7 +11,7 @@ import jax
 import numpy as np
 from numpy.typing import NDArray
 
-from evoclaims.core.packages import DEPENDS_ON
+from evoclaims.core.packages import DEPENDS_ON, without_flags
 from evoclaims.core.provenance import collect, device_of
 from evoclaims.core.source_code import CODE
 from evoclaims.methods.base import Method, PartlyUsed
@@ -103,8 +103,8 @@ def make_unfinished(
     metrics = {"steps": last.get("steps", 0.0), "environment_steps": last.get("environment_steps", 0.0)}
     if "level" in last:
         metrics["furthest_reached"] = last["level"]
-    said = {"crash": reason} if reason else {}
-    return make_record(spec, status, metrics, {}, curves, reason.encode(), timing, devices, said)
+    notes = {"crash": reason} if reason else {}
+    return make_record(spec, status, metrics, {}, curves, reason.encode(), timing, devices, notes)
 
 
 def make_record(
@@ -150,7 +150,7 @@ def provenance(devices: Sequence[jax.Device], condition: Condition) -> dict[str,
     found = collect()
     return {
         **found,
-        "versions": {**found["versions"], **condition.versions},
+        "versions": {**found["versions"], **without_flags(condition.versions)},
         DEPENDS_ON: list(condition.packages),
         **({CODE: dict(condition.code)} if condition.code else {}),
         "device": device_of(devices),

@@ -1,4 +1,4 @@
-"""What a running batch tells other processes: its progress, in a file beside its notice.
+"""The progress of a running batch, for other processes: in a file beside its notice.
 
 These files are hints, as notices are: one that cannot be written or read costs a line of progress, and nothing else.
 """
@@ -15,7 +15,7 @@ from typing import Final
 import msgspec
 
 from evoclaims.core.errors import UserError
-from evoclaims.core.files import read_file
+from evoclaims.core.files import at_once, read_file
 from evoclaims.trials.notice import is_announced, progress_path
 from evoclaims.trials.progress import RunProgress, Watcher
 
@@ -40,7 +40,7 @@ class Running:
 
 @contextlib.contextmanager
 def shared(store_root: Path, condition_id: str, watch: Watcher) -> Iterator[Watcher]:
-    """Give a watcher that passes on to `watch`, and tells other processes until the `with` block ends."""
+    """Give a watcher that passes on to `watch`, and shares the progress until the `with` block ends."""
     path, since = progress_path(store_root, condition_id), time.time()
     written, phase = -WRITE_SECONDS, ""
 
@@ -48,8 +48,8 @@ def shared(store_root: Path, condition_id: str, watch: Watcher) -> Iterator[Watc
         nonlocal written, phase
         if progress.phase != phase or time.monotonic() - written >= WRITE_SECONDS:
             written, phase = time.monotonic(), progress.phase
-            with contextlib.suppress(OSError):
-                path.write_bytes(msgspec.json.encode(Running(condition_id, since, progress)))
+            with contextlib.suppress(OSError), open(path, "wb", opener=at_once) as file:
+                file.write(msgspec.json.encode(Running(condition_id, since, progress)))
         watch(progress)
 
     try:

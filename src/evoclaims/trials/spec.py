@@ -71,14 +71,14 @@ def _described(component: Any, kind_of: Literal["method", "task", ""]) -> dict[s
         )
     require_whole_numbers(component)
     inherited = not is_own(type(component)) and not _has_own_name(component)
-    told = {"class": kind} if inherited else {}  # it computes something else than the class whose name it has
+    named = {"class": kind} if inherited else {}  # it computes something else than the class whose name it has
     try:
         parameters = fields_of(component)
     except TypeError as error:
         raise UserError(
-            f"A field of {kind} tells its trials apart and is no number, word, tuple or frozen dataclass: {error}."
+            f"A field of {kind} identifies its trials and is not a number, word, tuple or frozen dataclass: {error}."
         ) from error
-    return {"name": component.name, "revision": component.revision, "parameters": parameters, **told}
+    return {"name": component.name, "revision": component.revision, "parameters": parameters, **named}
 
 
 def _has_own_name(component: Any) -> bool:
@@ -124,6 +124,11 @@ class Condition:
     def id(self) -> str:
         """SHA-256 of the canonical JSON of the condition, revisions included."""
         return content_hash(self.plain)
+
+    @cached_property
+    def trial_ids(self) -> dict[int, str]:
+        """Ids of the condition's trials by seed, as far as they were asked for: hashing takes a millisecond each."""
+        return {}
 
     @cached_property
     def packages(self) -> tuple[str, ...]:
@@ -217,4 +222,7 @@ class TrialSpec:
     @cached_property
     def id(self) -> str:
         """SHA-256 of the canonical JSON of the specification."""
-        return content_hash(self.plain)
+        known = self.condition.trial_ids
+        if self.seed not in known:
+            known[self.seed] = content_hash(self.plain)
+        return known[self.seed]

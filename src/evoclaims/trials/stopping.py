@@ -61,7 +61,7 @@ def postponed() -> Iterator[threading.Event]:
 
 
 def _interrupt(number: int, frame: FrameType | None) -> None:
-    """Ask the running batch to end; interrupt at once on Ctrl-C, where there is none, or where it was asked before."""
+    """Ask the running batch to end; interrupt at once on Ctrl-C, without a batch, or at the second request."""
     global _deaf_since
     if _is_deaf(frame):
         _deaf_since = _deaf_since or time.monotonic()

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from evoclaims.core.errors import StorageError
 from evoclaims.core.files import read_file, write_atomically, write_once
-from evoclaims.core.packages import Versions, agree, depends_on, recorded
+from evoclaims.core.packages import Versions, agree, depends_on, recorded, without_flags
 from evoclaims.trials.arrays import pack, unpack
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.result_codec import dump, parse
@@ -101,7 +101,7 @@ class Store(StoreFiles):
         return next((result for result in rest if agree(result.provenance, versions)), None)
 
     def get(self, trial_id: str, versions: Versions | None = None) -> TrialResult | None:
-        """Return the record of a trial, made with any versions, or None when there is none.
+        """Return the record of a trial, made with any versions, or None without one.
 
         For judging or viewing stored trials. Of several records, the one made with `versions` comes first, then the
         newest.
@@ -141,7 +141,9 @@ class Store(StoreFiles):
             raise DamagedFileError(path, error.reason) from error
         if result.id != trial_id:
             raise DamagedFileError(path, f"it holds another trial, {result.id}")
-        if path.name not in (f"{trial_id}.json", self.home(result).name):
+        versions = _versions(result)
+        plain = f"{trial_id}.json" if versions is None else self.record_path(trial_id, without_flags(versions)).name
+        if path.name not in (f"{trial_id}.json", plain, self.home(result).name):  # once, no name had flags
             raise DamagedFileError(path, "its name is not that of the versions that it was made with")
         return result
 
@@ -285,7 +287,7 @@ def _versions(result: TrialResult) -> Versions | None:
 
 
 def newest(results: Iterable[TrialResult]) -> TrialResult | None:
-    """Return the newest record; None if there is none. Records without a time count as oldest."""
+    """Return the newest record; None without any. Records without a time count as oldest."""
     return max(results, key=lambda result: str(result.timing.get("ended", "")), default=None)
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from evoclaims.core.errors import UserError
-from evoclaims.core.files import read_file, write_once
+from evoclaims.core.files import read_json, write_once
 
 MARK: Final = "store.json"
 SCHEMA: Final = 1
@@ -81,8 +81,8 @@ def mark(root: Path) -> None:
 def _check_mark(path: Path) -> None:
     """Reject a mark of another program or a later release."""
     try:
-        plain: Any = json.loads(read_file(path))
-    except (OSError, ValueError, RecursionError):
+        plain: Any = read_json(path)
+    except (OSError, ValueError):
         plain = None
     if not isinstance(plain, dict) or plain.get("program") != PROGRAM:
         raise UserError(

@@ -45,7 +45,7 @@ class TableFile:
         """Return a column; `role` says in an error what it was wanted for.
 
         Raises:
-            UnknownNameError: when there is none of this name.
+            UnknownNameError: for an unknown name.
         """
         require_known(f"column in {self.name} ({role})", name, self.columns)
         return self.columns[name]
@@ -65,8 +65,8 @@ class TableFile:
                 raise UserError(f"{self.name} has no row whose {name} is {value!r}.{known}")
             rows = [row for row in rows if _is(cells[row], value)]
         if not rows:
-            said = " and ".join(f"{name} {value!r}" for name, value in where.items())
-            raise UserError(f"{self.name} has no row with {said}." if where else f"{self.name} has no row.")
+            conditions = " and ".join(f"{name} {value!r}" for name, value in where.items())
+            raise UserError(f"{self.name} has no row with {conditions}." if where else f"{self.name} has no row.")
         return rows
 
     def numbers(self, name: str, role: str, rows: Sequence[int]) -> list[float | None]:

@@ -59,10 +59,10 @@ def accept(history: History, reports: Sequence[ClaimReport], archive: Archive, t
             left.append(f"{name} is {report.outcome} now ({printable(report.reason)}): {kept}")
             continue
         entry = entry_of(report, archive, today)
-        said = difference(past[-1] if past else None, entry)
-        if said:
+        changed = difference(past[-1] if past else None, entry)
+        if changed:
             grown[key] = (*past, entry)
-            accepted.append(f"{name}: {said}")
+            accepted.append(f"{name}: {changed}")
     return Acceptance(grown, tuple(accepted), tuple(retired), tuple(left))
 
 

@@ -104,17 +104,17 @@ class Across:
     @property
     def lines(self) -> list[str]:
         """What the table has no room for: troubles, what else differs, changed verdicts, and drift."""
-        said = []
+        lines = []
         for one in self.environments:
             notes = filter(None, [one.trouble and f"no verdicts: {one.trouble}", one.notes])
-            said += [f"{one.label}: {note}" for note in notes]
+            lines += [f"{one.label}: {note}" for note in notes]
             for claim in self.claims:
                 cell = self.cells.get((claim, one.label))
                 if cell is not None and cell.verdict_changed:
-                    said.append(f"{one.label}: {claim}: {cell.was} -> {cell.outcome}")
+                    lines.append(f"{one.label}: {claim}: {cell.was} -> {cell.outcome}")
             drift = self.upgrades[one.label].drift if one.label in self.upgrades else DriftReport((), 0)
-            said += [f"{one.label}: {line}" for line in drift.lines]
-        return said
+            lines += [f"{one.label}: {line}" for line in drift.lines]
+        return lines
 
 
 def judged(label: str, reports: Iterable[ClaimReport], store: Store, notes: str = "") -> Judged:

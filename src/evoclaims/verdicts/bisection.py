@@ -13,7 +13,7 @@ class Change:
     Attributes:
         before: index of the last member that is still as the first.
         after: index of the first member that is as the last.
-        unknown: the members between these, about which nothing can be said.
+        unknown: the members between these, about which nothing is known.
     """
 
     before: int
@@ -26,7 +26,7 @@ def bisect(length: int, has_changed: Callable[[int], bool | None]) -> Change:
 
     Args:
         length: of the row, at least two; the first member has not changed, and the last one has.
-        has_changed: whether the member at an index has; None if that cannot be said, so that another one near it is
+        has_changed: whether the member at an index has; None if that is unknown, so that another one near it is
             asked about. It is called at most once for each.
     """
     before, after = 0, length - 1

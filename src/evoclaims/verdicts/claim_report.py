@@ -13,8 +13,9 @@ from msgspec import convert
 from evoclaims.core.canonical import as_plain
 from evoclaims.core.errors import UserError
 from evoclaims.core.file_names import file_name
-from evoclaims.core.files import write_atomically
+from evoclaims.core.files import read_json, write_atomically
 from evoclaims.judging.verdict import Outcome, Verdict
+from evoclaims.verdicts.readings import ReadAs, depends
 from evoclaims.verdicts.sensitivity import Tally, Tried
 from evoclaims.verdicts.source_trials import SourceTrials, versions_of
 from evoclaims.verdicts.versions import Several
@@ -69,6 +70,10 @@ class ClaimReport:
         before: the verdict that the store held before this run, if any.
         tried: whether planted faults change the verdict, according to the committed matrix of mutants.
         has_test: whether the claim has a test at this tier.
+        line: of the paper's source in which the sentence stands; None where the claim does not say.
+        asserts: hash of the assertion alone, which two claims with one assertion share; empty where none was judged.
+        readings: of the sentence, the judged one first; empty where only that one was judged.
+        satisfied_by: names of the null agents that satisfy the assertion.
     """
 
     claim: str
@@ -89,6 +94,10 @@ class ClaimReport:
     before: LastVerdict | None = None
     tried: Tried = Tried.NOT_TRIED
     has_test: bool = True
+    line: int | None = None
+    asserts: str = ""
+    readings: tuple[ReadAs, ...] = ()
+    satisfied_by: tuple[str, ...] = ()
 
     @property
     def name(self) -> str:
@@ -103,8 +112,20 @@ class ClaimReport:
     @property
     def counted_as(self) -> Tally:
         """What the claim counts as, wherever claims are counted."""
+        if self.is_vacuous:
+            return Tally.VACUOUS
         insensitive = (self.outcome, self.tried) == (Outcome.SUPPORTED, Tried.INSENSITIVE)
         return Tally.INSENSITIVE if insensitive else Tally(self.outcome.value)
+
+    @property
+    def is_vacuous(self) -> bool:
+        """Whether it is supported, a null agent would be, too, and no planted fault has shown that it can fail."""
+        return self.outcome is Outcome.SUPPORTED and bool(self.satisfied_by) and self.tried is not Tried.SENSITIVE
+
+    @property
+    def depends_on_the_reading(self) -> bool:
+        """Whether another reading of the sentence ends otherwise."""
+        return depends(self.readings)
 
     @property
     def as_expected(self) -> bool:
@@ -166,7 +187,7 @@ def save(report: ClaimReport, root: Path) -> ClaimReport:
 def succeeding(report: ClaimReport, root: Path) -> ClaimReport:
     """Return the report with the claim's previous verdict, read from the file that this report will replace."""
     try:
-        last = ClaimReport.from_json(json.loads(evidence_path(report, root).read_bytes()))
+        last = ClaimReport.from_json(read_json(evidence_path(report, root)))
     except (OSError, ValueError):
         return report  # no file, or one written by another release: nothing is judged from it
     before = LastVerdict(last.outcome, last.fingerprint or None, versions_of(last.sources))

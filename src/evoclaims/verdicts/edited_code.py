@@ -16,7 +16,7 @@ def lines(reports: Sequence[ClaimReport]) -> list[str]:
     for report in reports:
         for name in edited(report):
             claims[name].append(f"{report.name} ({report.tier})")
-    return [printable(f"{said(name)}: {listed(names)}") for name, names in sorted(claims.items())]
+    return [printable(f"{summary(name)}: {listed(names)}") for name, names in sorted(claims.items())]
 
 
 def edited(report: ClaimReport) -> list[str]:
@@ -24,8 +24,8 @@ def edited(report: ClaimReport) -> list[str]:
     return sorted({name for source in report.sources for name in source.edited})
 
 
-def said(name: str) -> str:
-    """Return what is to be said of an edited method or task, but not of which trials."""
+def summary(name: str) -> str:
+    """Return a sentence about an edited method or task, without its trials."""
     return (
         f"the code of {name} was edited after trials had run, and they still count: if it computes something else now, "
         "raise its `revision`, and they run again"

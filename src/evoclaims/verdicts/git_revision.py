@@ -50,8 +50,8 @@ class GitRevision:
         """Return what git prints."""
         done = run_git(self.folder, *arguments)
         if done.returncode:
-            said = " ".join(done.stderr.decode(errors="replace").split())
-            raise UserError(f"git cannot read the revision {self.name}: {said}.")
+            reason = " ".join(done.stderr.decode(errors="replace").split())
+            raise UserError(f"git cannot read the revision {self.name}: {reason}.")
         return done.stdout
 
 
@@ -64,8 +64,8 @@ def find_revision(name: str, folder: Path) -> GitRevision | None:
     inside = run_git(folder, "rev-parse", "--is-inside-work-tree")
     if inside.returncode or inside.stdout.strip() != b"true":
         raise UserError(
-            f"{folder} lies in no git repository, so that no revision can be compared with. Compare two "
-            "stores instead, or `evoclaims compare` alone: verdicts of now with accepted ones."
+            f"{folder} is not in a git repository, so there is no revision to compare with. Compare two "
+            "stores instead, or `evoclaims compare` alone: current verdicts with accepted ones."
         )
     if not name or "\0" in name:
         return None

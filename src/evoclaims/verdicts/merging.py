@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
 from evoclaims.core.errors import UserError
-from evoclaims.core.files import read_file
+from evoclaims.core.files import read_json
 from evoclaims.trials.merging import Merged
 from evoclaims.trials.store import Store
 from evoclaims.verdicts.claim_report import ClaimReport, evidence_path, save
@@ -35,8 +34,8 @@ def merge_evidence(source: Store, into: Store, dry_run: bool = False) -> Iterato
             if there is None or replace(there, evidence="") == replace(report, evidence=""):
                 yield Merged(path, "there")
             else:
-                said = f"{report.outcome}, and {there.outcome} in {target}, which stays until claims are judged again"
-                yield Merged(path, "differs", said)
+                note = f"{report.outcome}, and {there.outcome} in {target}, which stays until claims are judged again"
+                yield Merged(path, "differs", note)
             continue
         if not dry_run:
             saved = save(report, into.root)
@@ -48,7 +47,7 @@ def merge_evidence(source: Store, into: Store, dry_run: bool = False) -> Iterato
 def _read(path: Path, root: Path) -> ClaimReport | None:
     """Read a file of evidence; None where it is damaged, or in a place that is not its claim's."""
     try:
-        report = ClaimReport.from_json(json.loads(read_file(path)))
-    except (OSError, ValueError, RecursionError):
+        report = ClaimReport.from_json(read_json(path))
+    except (OSError, ValueError):
         return None
     return report if evidence_path(report, root) == path else None

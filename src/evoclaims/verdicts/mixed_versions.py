@@ -41,15 +41,15 @@ def lines(reports: Sequence[ClaimReport]) -> list[str]:
             elsewhere.append(f"{report.name} ({report.tier})")
         for name, those in other.items():
             foreign[name] += those
-    said = [f"{MARK} versions are mixed: {what}: {listed(names)}" for what, names in mixed.items()]
+    lines = [f"{MARK} versions are mixed: {what}: {listed(names)}" for what, names in mixed.items()]
     if elsewhere:
         here = installed(tuple(foreign))
         packages = (
             f"{name} {in_words(different(those))} (here {here[name] or 'none'})"
             for name, those in sorted(foreign.items())
         )
-        said.append(f"not made with the installed versions: {', '.join(packages)}: {listed(elsewhere)}")
-    return [printable(line) for line in said]
+        lines.append(f"not made with the installed versions: {', '.join(packages)}: {listed(elsewhere)}")
+    return [printable(line) for line in lines]
 
 
 def listed(names: Sequence[str]) -> str:

@@ -148,10 +148,10 @@ def described(matrix: Matrix, report: ClaimReport) -> str:
     if row is None or row.tried is Tried.NOT_TRIED:
         return "Planted faults: not tried."
     killed = sum(attempt.fate is Fate.KILLED for attempt in row.attempts)
-    said = f"Planted faults: {killed} of {sum(attempt.fate.counts for attempt in row.attempts)} change this verdict"
+    text = f"Planted faults: {killed} of {sum(attempt.fate.counts for attempt in row.attempts)} change this verdict"
     if row.unnoticed:
-        said += f", none of those in {' or '.join(row.unnoticed)}"
-    return f"Insensitive. {said}." if row.tried is Tried.INSENSITIVE else f"{said}."
+        text += f", none of those in {' or '.join(row.unnoticed)}"
+    return f"Insensitive. {text}." if row.tried is Tried.INSENSITIVE else f"{text}."
 
 
 def fate(sound: Outcome, faulty: Outcome, *, equivalent: bool, drifted: bool) -> Fate:
@@ -216,23 +216,23 @@ def _written(row: Sensitivity) -> _Written:
     """Return a row as the file has it."""
     written = _Written(row.outcome, row.fingerprint, row.untried, {name: {} for name in row.methods}, {})
     for one in row.attempts:
-        said = str(one.outcome if one.fate is Fate.KILLED else one.fate)
-        getattr(written, one.part).setdefault(one.target, {})[one.mutant] = said
+        text = str(one.outcome if one.fate is Fate.KILLED else one.fate)
+        getattr(written, one.part).setdefault(one.target, {})[one.mutant] = text
     return written
 
 
 def _read(written: _Written) -> Sensitivity:
     """Return a row of the file; a `ValueError` for what is neither an outcome nor a fate."""
 
-    def attempt(part: Part, target: str, mutant: str, said: str) -> Attempt:
-        if said in set(Outcome):
-            return Attempt(mutant, part, target, Outcome(said), Fate.KILLED)
-        return Attempt(mutant, part, target, written.outcome, Fate(said))
+    def attempt(part: Part, target: str, mutant: str, text: str) -> Attempt:
+        if text in set(Outcome):
+            return Attempt(mutant, part, target, Outcome(text), Fate.KILLED)
+        return Attempt(mutant, part, target, written.outcome, Fate(text))
 
     attempts = (
-        attempt(part, target, mutant, said)
+        attempt(part, target, mutant, text)
         for part in get_args(Part)
         for target, faults in getattr(written, part).items()
-        for mutant, said in faults.items()
+        for mutant, text in faults.items()
     )
     return Sensitivity(written.outcome, written.fingerprint, tuple(written.method), tuple(attempts), written.untried)

@@ -17,7 +17,7 @@ def reason(
     Args:
         report: of the claim, as it is now.
         old: its accepted verdict, of the same fingerprint.
-        new: the verdict of now.
+        new: the current verdict.
         drift: the comparison of its trials, among others, with the reference trials.
         digests: the comparison to the bit of those that the same kind of machine made with the same versions.
     """
@@ -27,7 +27,7 @@ def reason(
     rows = [row for row in drift.rows if row.label in labels]
     drifted = sorted({row.label for row in rows if row.drifted})
     if drifted:
-        return f"the trials of {', '.join(drifted)} have drifted from the reference trials, as said above"
+        return f"the trials of {', '.join(drifted)} have drifted from the reference trials (see above)"
     if {change.condition for change in digests.changed} & {source.condition for source in report.sources}:
         return (
             "the same seeds gave other trials with the same versions on a machine of the same name: the code which "

@@ -34,19 +34,19 @@ class Regression:
         return {key: self.accepted[key] for key in keys}
 
     def lines(self, reasons: Mapping[tuple[str, str], str]) -> list[str]:
-        """Return the counts, and a line for each verdict that differs from the accepted one; empty if there is none.
+        """Return the counts, and a line for each verdict that differs from the accepted one; empty without any.
 
         Changed verdicts have their `reasons` behind them, by tier and claim.
         """
         if not self.transitions:
             return []
-        said = [one for one in self.transitions if one.kind in (Kind.CHANGED, Kind.NEW_HISTORY)]
+        changes = [one for one in self.transitions if one.kind in (Kind.CHANGED, Kind.NEW_HISTORY)]
         return [
             f"against the accepted verdicts: {transitions.counts(self.transitions)}",
             *(
                 f"{'REGRESSION ' * (one in self.matched)}{transitions.describe(one)}"
                 + (f": {reasons[one.tier, one.claim]}" if (one.tier, one.claim) in reasons else "")
-                for one in said
+                for one in changes
             ),
         ]
 

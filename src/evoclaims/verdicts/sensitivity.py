@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from enum import StrEnum
+from typing import Final
 
 from evoclaims.judging.verdict import Outcome
 
@@ -16,10 +17,11 @@ class Tried(StrEnum):
 
 
 class Tally(StrEnum):
-    """What a claim counts as: its outcome, unless that is support that no planted fault could have changed."""
+    """What a claim counts as: its outcome, unless no planted fault changes its support, or a null agent has it, too."""
 
     SUPPORTED = "supported"
     INSENSITIVE = "supported but insensitive"
+    VACUOUS = "supported but vacuous"
     REFUTED = "refuted"
     INCONCLUSIVE = "inconclusive"
     ERROR = "error"
@@ -28,4 +30,8 @@ class Tally(StrEnum):
     @property
     def symbol(self) -> str:
         """One character for tables: the outcome's."""
-        return (Outcome.SUPPORTED if self is Tally.INSENSITIVE else Outcome(self.value)).symbol
+        return (Outcome.SUPPORTED if self in APART else Outcome(self.value)).symbol
+
+
+APART: Final = (Tally.INSENSITIVE, Tally.VACUOUS)
+"""Support that is counted apart; tables leave it out where there is none."""

@@ -26,7 +26,7 @@ def timeline(history: History, claim: str = "") -> str:
 def chosen(history: History, claim: str) -> list[tuple[str, str]]:
     """Return the keys of a claim, or of one case of it, or of all claims, in order; raises as `timeline` does."""
     if not history:
-        raise UserError("No verdict has been accepted yet: `evoclaims accept` accepts those of now.")
+        raise UserError("No verdict has been accepted yet: run `evoclaims accept` to accept the current ones.")
     found = [key for key in sorted(history, key=in_order) if claim in ("", key[1], key[1].partition("[")[0])]
     if not found:
         raise UnknownNameError("accepted claim", claim, {name for _, name in history})

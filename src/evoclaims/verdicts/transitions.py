@@ -48,7 +48,7 @@ Standings = Mapping[tuple[str, str], Standing]
 
 @dataclass(frozen=True)
 class Transition:
-    """One claim's old and new verdict at one tier; None where there is none."""
+    """One claim's old and new verdict at one tier; None without one."""
 
     tier: str
     claim: str
@@ -83,7 +83,7 @@ def parse_patterns(text: str) -> tuple[Pattern, ...]:
         sides = [side.strip() for side in part.split(ARROW)]
         if len(sides) != 2:
             raise UserError(
-                f"{part!r} is no change of a verdict: write OLD{ARROW}NEW, such as 'supported{ARROW}refuted' or "
+                f"{part!r} is not a change of a verdict. Write OLD{ARROW}NEW, such as 'supported{ARROW}refuted' or "
                 f"'{ANY}{ARROW}refuted', and commas between several."
             )
         for side in sides:
@@ -94,7 +94,7 @@ def parse_patterns(text: str) -> tuple[Pattern, ...]:
             raise UserError(f"{part!r} never happens: a verdict that stays {old} has not changed.")
         patterns.append(Pattern(old, new))
     if not patterns:
-        raise UserError(f"No change of a verdict is named: write such as 'supported{ARROW}refuted'.")
+        raise UserError(f"No change of a verdict is named. Write one such as 'supported{ARROW}refuted'.")
     return tuple(patterns)
 
 
@@ -140,11 +140,11 @@ def counts(transitions: Sequence[Transition]) -> str:
 
 def describe(transition: Transition) -> str:
     """Return a transition in one line, without terminal control characters."""
-    said = _said(transition.old, transition.new, transition.kind)
-    return f"{printable(transition.claim)} ({printable(transition.tier)}): {said}"
+    change = _change(transition.old, transition.new, transition.kind)
+    return f"{printable(transition.claim)} ({printable(transition.tier)}): {change}"
 
 
-def _said(old: Standing | None, new: Standing | None, kind: Kind) -> str:
+def _change(old: Standing | None, new: Standing | None, kind: Kind) -> str:
     """Describe how a verdict changed."""
     if old is None or new is None:
         return f"{new.outcome}, new" if new else f"gone; it was {old.outcome}" if old else "no verdict"

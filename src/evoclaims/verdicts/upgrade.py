@@ -76,17 +76,17 @@ class Upgrade:
     @property
     def lines(self) -> list[str]:
         """What changed, which conditions were run again, how many trials differ, and what drifted how far."""
-        said: list[str] = []
+        lines: list[str] = []
         for change in dict.fromkeys(one.change for one in self.successions):
             those = [one for one in self.successions if one.change == change]
-            said.append(f"versions changed: {change}")
-            said += [f"  {_told(one)}" for one in those]
+            lines.append(f"versions changed: {change}")
+            lines += [f"  {_line(one)}" for one in those]
             labels = [one.label for one in those]
             drift = replace(self.drift, rows=tuple(row for row in self.drift.rows if row.label in labels))
             drifted = sum(row.drifted for row in drift.rows)
-            said += [f"  {line}" for line in drift.lines]
-            said.append(f"  {drift.tested} comparisons with the trials made before, {drifted} drifted")
-        return [printable(line) for line in said]
+            lines += [f"  {line}" for line in drift.lines]
+            lines.append(f"  {drift.tested} comparisons with the trials made before, {drifted} drifted")
+        return [printable(line) for line in lines]
 
     def to_json(self) -> dict[str, Any]:
         """Return what happened as strict JSON."""
@@ -126,7 +126,7 @@ def predecessors(records: Sequence[TrialResult], packages: tuple[str, ...]) -> t
 
 def verdict_changes(reports: Iterable[ClaimReport]) -> list[str]:
     """Return lines on verdicts that differ from the store's last run under the same rules."""
-    said = []
+    lines = []
     for report in reports:
         before = report.before
         if before is None or before.outcome in (Outcome.NOT_RUN, report.outcome):
@@ -135,13 +135,13 @@ def verdict_changes(reports: Iterable[ClaimReport]) -> list[str]:
             continue
         moved = versions.moved(before.versions, versions_of(report.sources))
         by = f" ({moved})" if moved else ""
-        said.append(
+        lines.append(
             printable(f"verdict changed: {report.name} ({report.tier}): {before.outcome} -> {report.outcome}{by}")
         )
-    return said
+    return lines
 
 
-def _told(one: Succession) -> str:
+def _line(one: Succession) -> str:
     """Describe what changed for one condition."""
     ran = f"{one.again} trials run again" if one.again else "run again before"
     pairs = one.pairs

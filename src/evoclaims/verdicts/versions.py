@@ -14,7 +14,8 @@ Several = Mapping[str, tuple[str | None, ...]]
 def found_in(trials: Iterable[TrialResult], packages: tuple[str, ...]) -> Several:
     """Return the different versions of packages that trials were made with."""
     made_with = [recorded(trial.provenance, packages) for trial in trials]
-    return {name: different(versions[name] for versions in made_with) for name in packages}
+    names = dict.fromkeys([*packages, *(name for versions in made_with for name in versions)])
+    return {name: different(versions.get(name) for versions in made_with) for name in names}
 
 
 def change(old: Versions, new: Versions) -> str:

@@ -19,8 +19,8 @@ from hypothesis import strategies as st
 from without_kernels import BREEDING, without_kernels
 
 from evoclaims.envs.gates.parity import NParity
-from evoclaims.kernels import group_kernel
-from evoclaims.kernels.gpu_kernel import GpuProgram
+from evoclaims.kernels.emit import group_kernel
+from evoclaims.kernels.emit.gpu_kernel import GpuProgram
 from evoclaims.methods.neat.neat import Neat
 from evoclaims.methods.neat.settings import Attribute, Mutation, Settings, Species
 from evoclaims.methods.neat.structure import _ordering, _removal, order_for, without_node

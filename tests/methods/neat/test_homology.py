@@ -18,8 +18,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from without_kernels import BREEDING, without_kernels
 
-from evoclaims.kernels import group_kernel
-from evoclaims.kernels.gpu_kernel import GpuProgram
+from evoclaims.kernels.emit import group_kernel
+from evoclaims.kernels.emit.gpu_kernel import GpuProgram
 from evoclaims.methods.neat.homology import (
     Counterparts,
     _by_comparison,

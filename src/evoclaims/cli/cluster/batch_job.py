@@ -21,7 +21,7 @@ PATIENCE: Final = 40.0
 """Seconds that a batch is given to write its checkpoint before it is killed; it is asked `SIGNAL_SECONDS` before."""
 
 SIGNAL_SECONDS: Final = 90
-"""How long before the end of its time a job is told; a job of a few minutes is told later."""
+"""How long before its time limit a job is warned; a job of a few minutes is warned later."""
 
 POLL_SECONDS: Final = 0.1
 
@@ -46,7 +46,7 @@ class BatchJob:
         for command in self.commands:
             status = self._run(command)
             if status == INTERRUPTED:
-                # The scheduler has told all processes of the job that it takes the machine back. It says to this one
+                # The scheduler has warned all processes of the job that it takes the machine back. It warns this one
                 # whether the job goes on later (see `checkpoint`), or kills it.
                 time.sleep(PATIENCE)
                 raise RuntimeError("The job was interrupted.")
@@ -76,9 +76,9 @@ class BatchJob:
     def _run(self, command: list[str]) -> int:
         """Run a command and return its status."""
         print(f"$ {shlex.join(command)}", flush=True)
-        # SLURM tells all processes of a job that its time is nearly over. The batch would die of that signal: it is
-        # blocked there, and `checkpoint` alone tells it. (A `subprocess.Popen` has locks, and may not be waited for in
-        # a signal's handler while it is waited for outside.)
+        # SLURM signals all processes of a job shortly before its time limit. The batch would die of that signal: it is
+        # blocked there, and `checkpoint` alone passes it on. (A `subprocess.Popen` has locks, and may not be waited for
+        # in a signal's handler while it is waited for outside.)
         self.process = os.posix_spawn(command[0], command, os.environ, setsigmask=[signal.SIGUSR2])
         status = _status(self.process)
         self.process = 0

@@ -66,7 +66,7 @@ class JobRequest:
     setup: tuple[str, ...]
     more: Mapping[str, Any]
 
-    def told(self) -> str:
+    def summary(self) -> str:
         """Return what a job asks for, as part of a sentence."""
         asks = [plural(self.gpus, "GPU")] * (self.gpus > 0)
         asks += [plural(self.cpus, "CPU core")] * (self.cpus > 0)

@@ -104,8 +104,8 @@ def _seen(state: str, reason: str, nodes: str) -> Seen:
         return Seen(State.QUEUED, reason)
     if state in AT_WORK:
         return Seen(State.RUNNING, f"on {nodes}" if nodes else "")
-    told = "" if state in ("COMPLETED", "FAILED") else state.lower().replace("_", " ")
-    return Seen(State.ENDED, f"{told} on {nodes}" if told and nodes else told)
+    detail = "" if state in ("COMPLETED", "FAILED") else state.lower().replace("_", " ")
+    return Seen(State.ENDED, f"{detail} on {nodes}" if detail and nodes else detail)
 
 
 def _answer(command: Sequence[str]) -> tuple[int, str, str]:

@@ -51,7 +51,7 @@ class Execution:
 
         Args:
             wanted: the conditions.
-            tell: is told the progress of worker processes; a process that runs everything draws its line.
+            tell: receives the progress of worker processes; a process that runs everything draws its line.
         """
         alone = run_jobs(self.project, self.order, wanted, self.line)
         for ended in alone if self.host.alone else self._in_processes(wanted, tell):

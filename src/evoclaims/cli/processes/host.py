@@ -38,7 +38,7 @@ def host_of(numprocesses: str, device: str) -> Host:
     """Return what a command may use; if processes are to share GPUs, jax in this process keeps off these.
 
     Raises:
-        UserError: for a number of processes that is none.
+        UserError: for an invalid number of processes.
     """
     if numprocesses != "auto" and (not numprocesses.isdecimal() or int(numprocesses) < 1):
         raise UserError(

@@ -49,7 +49,7 @@ class Workers:
     """Runs conditions in a process for each seat, several at a time."""
 
     def __init__(self, order: WorkOrder, seats: Sequence[Seat], tell: Callable[[str], None]) -> None:
-        """Start nothing yet; `tell` is told lines of progress."""
+        """Start nothing yet; `tell` receives lines of progress."""
         self._order = order
         self._seats = seats
         self._tell = tell

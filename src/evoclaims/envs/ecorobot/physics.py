@@ -14,7 +14,7 @@ from evoclaims.core.pytree import pytree
 from evoclaims.envs.ecorobot.constraints import constrained_acceleration
 from evoclaims.envs.ecorobot.pose import torso
 from evoclaims.envs.ecorobot.scene import GEOMS, Places, Scene, box_geoms, mjx, on_device
-from evoclaims.kernels.seldom import seldom
+from evoclaims.kernels.trace import seldom
 
 APART: Final = 1.0
 """Distance of contacts that do not touch, m."""

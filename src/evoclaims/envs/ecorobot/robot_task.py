@@ -24,7 +24,7 @@ from evoclaims.envs.ecorobot.pose import Pose, torso
 from evoclaims.envs.ecorobot.robots import SIMPLE_ROB, Robot
 from evoclaims.envs.ecorobot.scene import Places, Scene, scene
 from evoclaims.envs.ecorobot.sensors import Sensor
-from evoclaims.kernels.one_kernel import one_kernel
+from evoclaims.kernels.call import one_kernel
 
 ROBOT_PACKAGES: Final = ("llvmlite", "mujoco", "mujoco-mjx")
 """Packages that every robot task depends on; a task declares these and any others it needs."""

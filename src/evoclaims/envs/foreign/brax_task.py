@@ -22,7 +22,7 @@ from evoclaims.envs.foreign.jax_task import JaxTask, Moment
 class BraxTask(JaxTask):
     """A registered environment of Brax, such as `BraxTask("inverted_pendulum", settings={"backend": "positional"})`.
 
-    `BraxEnv` is the other way round: a task of ours as a Brax environment.
+    `BraxEnv` is the other way round: an evoclaims task as a Brax environment.
 
     Attributes:
         environment_id: as `brax.envs.get_environment` takes it.

@@ -18,7 +18,7 @@ from evoclaims.envs.foreign.scoring import ForeignTask, Scored
 class GymnasiumTask(ForeignTask):
     """An environment of Gymnasium, such as `GymnasiumTask("CartPole-v1", solved_at=475)`, with one level.
 
-    Training loops train on what `make` returns. Methods of ours are compiled with their task, which this cannot be.
+    Training loops train on what `make` returns. Built-in methods are compiled with their task; this one cannot be.
 
     Attributes:
         environment_id: as `gymnasium.make` takes it; "module:Name-v0" imports the module that registers it.

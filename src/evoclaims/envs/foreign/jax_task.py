@@ -198,7 +198,7 @@ class JaxTask(ForeignTask):
 
     @property
     def area(self) -> tuple[tuple[float, float], tuple[float, float]]:
-        """What MAP-Elites maps; raises a `UserError` where nothing is said of it."""
+        """What MAP-Elites maps; raises a `UserError` where it is not declared."""
         if self.descriptor is None:
             raise UserError(
                 f"MAP-Elites maps how episodes end, and nothing says by what of {self.name}: give the task a "

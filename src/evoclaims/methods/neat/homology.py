@@ -11,9 +11,9 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int
 
 from evoclaims.core.pytree import pytree
-from evoclaims.kernels.grouped import GroupKernel
-from evoclaims.kernels.one_kernel import one_kernel
-from evoclaims.methods.neat.homology_kernel import write_look_up, write_search
+from evoclaims.kernels import GroupKernel
+from evoclaims.kernels.call import one_kernel
+from evoclaims.kernels.genomes.homology import write_look_up, write_search
 from evoclaims.networks.genome import Connections, Genome, Nodes
 
 Weights = Callable[[Genome, Array, Array], Array]
@@ -33,7 +33,7 @@ class Counterparts:
     Attributes:
         nodes: the other's node genes; arbitrary where there is no counterpart.
         has_node: whether a node has a counterpart.
-        weight: the weight of the other's connection; NaN where there is none.
+        weight: the weight of the other's connection; NaN without one.
     """
 
     nodes: Nodes

@@ -14,9 +14,9 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int, PRNGKeyArray
 
 from evoclaims.core.pytree import select
-from evoclaims.kernels.grouped import GroupKernel
+from evoclaims.kernels import GroupKernel
+from evoclaims.kernels.genomes.structure import PASSED_OVER, ordering_kernel, removal_kernel
 from evoclaims.methods.neat.settings import Mutation
-from evoclaims.methods.neat.structure_kernels import PASSED_OVER, ordering_kernel, removal_kernel
 from evoclaims.networks.genome import EMPTY, Connections, Genome, Nodes
 
 
@@ -73,7 +73,7 @@ def add_node(happens: Bool[Array, ""], u: Float[Array, ""], genome: Genome, new_
 
 
 def delete_node(happens: Bool[Array, ""], u: Float[Array, ""], genome: Genome, inputs: int, outputs: int) -> Genome:
-    """Delete the hidden node that `u` in [0, 1) picks, with its connections; if there is none, do nothing."""
+    """Delete the hidden node that `u` in [0, 1) picks, with its connections; without hidden nodes, do nothing."""
     nodes = genome.nodes
     slots = jnp.arange(nodes.key.shape[0])
     chosen = _pick(u, genome.node_count - inputs - outputs)
@@ -257,7 +257,7 @@ def _one_if(condition: Bool[Array, "*shape"]) -> Int[Array, "*shape"]:
 
 
 def _pick(u: Float[Array, ""], count: Int[Array, ""]) -> Int[Array, ""]:
-    """Return one of 0 … count - 1 for a uniform `u` in [0, 1); 0 when there is none.
+    """Return one of 0 … count - 1 for a uniform `u` in [0, 1); 0 when count is 0.
 
     A count is a few hundred at most, against the 2²³ steps of u.
     """

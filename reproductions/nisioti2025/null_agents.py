@@ -1,0 +1,74 @@
+"""What has learnt nothing, to which every assertion is put (`evoclaims audit`): one that it satisfies is vacuous."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from evoclaims import Condition, NullAgent
+from evoclaims.envs import Circuit, DeceptiveMaze, RobotTask, SteppingStones
+from evoclaims.methods import Neat
+from reproductions.nisioti2025.measures import constant_success
+
+ARENA = math.hypot(8.0, 8.0)
+"""The diagonal by which the stones' shaping is divided, m."""
+
+Numbers = dict[str, dict[str, Any]]
+
+
+def no_action(condition: Condition) -> Numbers | None:
+    """Return what a robot has that stays where it starts: a test compares it with robots that take no action."""
+    task = condition.task
+    if not isinstance(task, RobotTask):
+        return None
+    reward, metrics = 0.0, dict[str, float]()
+    if isinstance(task, SteppingStones):
+        reward = task.episode_steps * (1.0 - math.dist(task.plan.start, task.stones[0]) / ARENA)
+        metrics = {"stones": 0.0}
+    elif isinstance(task, DeceptiveMaze):
+        metrics = {"distance": math.dist(task.plan.start, task.plan.target) - task.plan.within}
+    else:
+        metrics = {"obstacles": 0.0, "furthest": 0.0}
+        if task.robot.name == "ant":
+            reward = float(task.episode_steps)  # Brax pays an ant 1 a step to be up
+    if isinstance(task, SteppingStones | DeceptiveMaze):
+        metrics["coverage"] = 1.0 / float(task.reachable().sum())  # the cell in which it starts
+    idle = dict.fromkeys(("control_cost", "effort", "upside_down", "reached"), 0.0)
+    return {
+        "metrics": {**_nothing_solved(0.0), "last_fitness": reward, **idle, **metrics},
+        "levels": {},
+        "curves": {"coverage": (metrics.get("coverage", 0.0),), "reached": (0.0,), "fitness": (reward, reward)},
+    }
+
+
+def constant_circuit(condition: Condition) -> Numbers | None:
+    """Return what the best circuit has that gives one answer, whatever it is asked."""
+    task = condition.task
+    if not isinstance(task, Circuit):
+        return None
+    success = constant_success(task)
+    metrics = {**_nothing_solved(success[-1]), "mean_success": math.fsum(success) / len(success)}
+    return {"metrics": metrics, "levels": {"success": success}, "curves": {}}
+
+
+def full_arrays(condition: Condition) -> Numbers | None:
+    """Return the size of a network of NEAT's that fills the arrays of its genome."""
+    if not isinstance(condition.method, Neat):
+        return None
+    settings = condition.method.settings
+    sizes = {"champion_nodes": (float(settings.nodes),), "champion_connections": (float(settings.connections),)}
+    return {"metrics": {}, "levels": {}, "curves": sizes}
+
+
+def _nothing_solved(success: float) -> dict[str, float]:
+    """Return metrics of a trial that ends at its first level."""
+    return {"last_success": success, "mean_success": success, "furthest_solved": -1.0, "furthest_reached": 0.0}
+
+
+NULL_AGENTS = {
+    "no action": NullAgent("a robot that takes no action", no_action),
+    "constant circuit": NullAgent("the best circuit that always gives the same answer", constant_circuit),
+    "random policy": NullAgent("a network with random weights", method="random_policy"),
+    "random search": NullAgent("random search, with the evaluations of CMA-ES", method="random_search"),
+    "full arrays": NullAgent("a network that fills the arrays of its genome", full_arrays, everywhere=True),
+}

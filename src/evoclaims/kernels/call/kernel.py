@@ -1,0 +1,158 @@
+"""A function as a kernel: what it computes, and how a batch of it is called on processors and GPUs."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Callable, Sequence
+from functools import cached_property
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+from jax.extend.core import jaxpr_as_fun
+from jaxtyping import Array
+
+from evoclaims.kernels.call import calls
+from evoclaims.kernels.emit import block_kernel, block_shape, gpu_kernel, host_kernel, llvm_names, machine_code
+from evoclaims.kernels.emit.llvm_names import ArrayRow
+from evoclaims.kernels.trace.expressions import Input, everything
+from evoclaims.kernels.trace.interpreter import Numbers
+from evoclaims.kernels.trace.scalarize import scalarize
+from evoclaims.kernels.unsupported import Unsupported
+
+Shapes = tuple[jax.ShapeDtypeStruct, ...]
+
+
+class Kernel:
+    """A function of arrays of given shapes.
+
+    Attributes:
+        name: what it computes, for the warning and for profilers.
+        shapes: its arguments' leaves, without batch dimensions.
+        outputs: its results' leaves.
+        structure: its results' tree.
+    """
+
+    def __init__(self, function: Callable[..., Any], name: str, treedef: Any, shapes: Shapes) -> None:
+        """Trace the function once."""
+        self.name = name
+        self.shapes = shapes
+        self._traced, shape = jax.make_jaxpr(function, return_shape=True)(*jax.tree.unflatten(treedef, shapes))
+        self.outputs: Shapes = tuple(jax.ShapeDtypeStruct(x.shape, x.dtype) for x in jax.tree.leaves(shape))
+        self.structure = jax.tree.structure(shape)
+        self._gpu_programs: dict[tuple[int, tuple[int, ...]], gpu_kernel.GpuProgram] = {}
+
+    @cached_property
+    def supported(self) -> bool:
+        """Whether it can be a kernel; a warning says once why not."""
+        try:
+            machine_code.lanes()
+            llvm_names.check([number for result in self.results for number in result.flat])
+        except Unsupported as reason:
+            warnings.warn(f"{self.name} is not one kernel, and slower, because of {reason}.", stacklevel=5)
+            return False
+        return True
+
+    @cached_property
+    def results(self) -> list[Numbers]:
+        """The expressions of the numbers of each result."""
+        return scalarize(self._traced)
+
+    @cached_property
+    def written(self) -> list[int]:
+        """The results that are not empty."""
+        return [place for place, result in enumerate(self.results) if result.size]
+
+    @cached_property
+    def read(self) -> dict[int, ArrayRow]:
+        """The rows of the arguments that the results depend on."""
+        used = {e.array for e in everything(n for r in self.results for n in r.flat) if isinstance(e, Input)}
+        return {i: ArrayRow(math.prod(self.shapes[i].shape), self.shapes[i].dtype.kind) for i in sorted(used)}
+
+    @cached_property
+    def _host_text(self) -> str:
+        """LLVM's text of the kernel for this machine's processor, which is the same for every batch."""
+        return host_kernel.text([self.results[i] for i in self.written], self.read, machine_code.lanes())
+
+    def as_it_is(self, *leaves: Array) -> list[Array]:
+        """Call the function itself, for every element of a batch."""
+        depths = self.depths(leaves)
+        repeated: Any = jaxpr_as_fun(self._traced)
+        for level in reversed(range(max(depths))):
+            repeated = jax.vmap(repeated, [0 if depth > level else None for depth in depths])
+        made: list[Array] = repeated(*leaves)
+        return made
+
+    def depths(self, leaves: Sequence[Any]) -> list[int]:
+        """Return how many batch dimensions each argument has; one with fewer than others lacks the innermost."""
+        return [len(leaf.shape) - len(shape.shape) for leaf, shape in zip(leaves, self.shapes, strict=True)]
+
+    def batch(self, leaves: Sequence[Any]) -> tuple[int, ...]:
+        """Return the batch dimensions."""
+        depths = self.depths(leaves)
+        deepest = max(range(len(leaves)), key=depths.__getitem__)
+        shape: tuple[int, ...] = leaves[deepest].shape[: depths[deepest]]
+        return shape
+
+    def in_front(self, leaves: Sequence[Array], axes: Sequence[int | None]) -> list[Array]:
+        """Add a batch dimension in front of the others; arguments that are the same in the whole batch stay so."""
+        size = next(leaf.shape[axis] for leaf, axis in zip(leaves, axes, strict=True) if axis is not None)
+
+        def moved(leaf: Array, axis: int | None, alone: jax.ShapeDtypeStruct) -> Array:
+            if axis is not None:
+                return jnp.moveaxis(leaf, axis, 0)
+            return leaf if leaf.ndim == len(alone.shape) else jnp.broadcast_to(leaf, (size, *leaf.shape))
+
+        return list(map(moved, leaves, axes, self.shapes))
+
+    def on_host(self, *leaves: Array) -> list[Array]:
+        """Call the kernel for this machine's processor, for every element of a batch."""
+
+        def call(rows: int, shared: list[int], shapes: Shapes) -> Any:
+            layout = [rows, *(shared[i] for i in self.read)]
+            return calls.on_host(self._host_text, layout, [leaves[i] for i in self.read], shapes)
+
+        return self._call(leaves, call)
+
+    def on_gpu(self, *leaves: Array) -> list[Array]:
+        """Call the kernel for NVIDIA's GPUs, for every element of a batch."""
+
+        def call(rows: int, shared: list[int], shapes: Shapes) -> Any:
+            program = self._gpu_program(rows, tuple(shared[i] for i in self.read))
+            return calls.on_gpu(program, [leaves[i] for i in self.read], shapes, rows)
+
+        return self._call(leaves, call)
+
+    def _gpu_program(self, rows: int, shared: tuple[int, ...]) -> gpu_kernel.GpuProgram:
+        """Return the kernel for NVIDIA's GPUs: for how many elements, how many of which share a row of each array."""
+        if (rows, shared) not in self._gpu_programs:  # a legged robot's takes seconds
+            results, given = [self.results[i] for i in self.written], dict(zip(self.read, shared, strict=True))
+            shape = block_shape.chosen(results, rows)
+            if shape is None:
+                made = gpu_kernel.program(gpu_kernel.text(results, self.read, given, rows), self.name)
+            else:
+                text = block_kernel.text(shape, results, self.read, given, rows)
+                made = gpu_kernel.program(text, self.name, shape.warps, shape.teams, shape.shared_bytes)
+            self._gpu_programs[rows, shared] = made
+        return self._gpu_programs[rows, shared]
+
+    def _call(self, leaves: Sequence[Array], call: Callable[..., Any]) -> list[Array]:
+        """Return the results of a kernel for every element of a batch.
+
+        Args:
+            leaves: the arguments.
+            call: gets the number of elements, how many of them share a row of each argument, and the shapes of the
+                results that are not empty, each [elements, numbers]; returns these results.
+        """
+        depths, batch = self.depths(leaves), self.batch(leaves)
+        rows = math.prod(batch)
+        results = [jnp.zeros((*batch, *out.shape), out.dtype) for out in self.outputs]
+        if not rows or not self.written:
+            return results
+        shared = [math.prod(batch[depth:]) for depth in depths]
+        wanted = [self.outputs[i] for i in self.written]
+        shapes = [jax.ShapeDtypeStruct((rows, math.prod(out.shape)), out.dtype) for out in wanted]
+        for place, made in zip(self.written, call(rows, shared, shapes), strict=True):
+            results[place] = made.reshape(results[place].shape)
+        return results

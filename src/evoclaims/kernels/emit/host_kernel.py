@@ -1,0 +1,125 @@
+"""A kernel for the processor: LLVM's text of a loop over the batch.
+
+A vector lane computes an element of the batch, as in ispc. Arrays are stored element by element, so that lanes gather
+their numbers and scatter their results.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Final
+
+from evoclaims.kernels.emit.llvm_ir import Instructions
+from evoclaims.kernels.emit.llvm_names import BYTES, STORED, SUFFIXES, ArrayRow
+from evoclaims.kernels.emit.xla_handler import handler
+from evoclaims.kernels.trace.expressions import Input, in_order
+from evoclaims.kernels.trace.interpreter import Numbers
+
+WIDE: Final = 'nounwind "prefer-vector-width"="512" "min-legal-vector-width"="512"'
+"""Attributes of a function that uses the widest vectors there are."""
+
+
+def text(results: Sequence[Numbers], arrays: Mapping[int, ArrayRow], lanes: int) -> str:
+    """Return the text of a kernel.
+
+    Its arguments are an array of int32, [rows of the batch, and of each array read how many consecutive rows share one
+    of its rows], and the arrays read; its results are what `results` says, row by row.
+
+    Args:
+        results: what is computed for an element, none of them empty.
+        arrays: the rows of the arrays read, in order.
+        lanes: elements computed at a time.
+    """
+    page = Instructions(lanes)
+    _block(page, results, arrays)
+    given = [f"i64 %shared{a}" for a in arrays]
+    given += [f"ptr %a{a}" for a in arrays] + [f"ptr %z{z}" for z in range(len(results))]
+    body = "\n".join(page.lines)
+    block = f"define internal void @block({', '.join([*given, 'i64 %row', 'i64 %last'])}) {WIDE} {{\n{body}\n}}\n"
+    called = handler(1 + len(arrays), len(arrays), len(results))
+    return "\n".join(page.declared) + "\n" + block + _loop(given, lanes) + called
+
+
+def _block(page: Instructions, results: Sequence[Numbers], arrays: Mapping[int, ArrayRow]) -> None:
+    """Write the computation of rows `row`, `row` + 1, … to at most `last`, one per lane.
+
+    Lanes beyond `last` compute the last row, and store nothing.
+    """
+    lanes, integers, pointers = page.lanes, page.vector("i32"), page.vector("ptr")
+    page.label("entry")
+    left = page.put("sub i64 %last, %row")
+    few = page.call("llvm.umin.i64", "i64", [("i64", left), ("i64", str(lanes - 1))])
+    last = page.in_all_lanes("i32", page.put(f"trunc i64 {few} to i32"))
+    numbers = f"<{', '.join(f'i32 {lane}' for lane in range(lanes))}>"
+    inside = page.put(f"icmp ule {integers} {numbers}, {last}")
+    lane = page.call(page.mangled("umin", "i32"), integers, [(integers, numbers), (integers, last)])
+    rows = {array: _rows(page, array, row, lane) for array, row in arrays.items()}
+    everywhere = page.splat("i1", "true")
+
+    def load(number: Input) -> str:
+        kind = number.dtype.kind
+        stored = page.vector(STORED[kind])
+        where = (pointers, _addresses(page, *rows[number.array], number.place, kind))
+        others = ("i32", str(BYTES[kind])), (page.vector("i1"), everywhere), (stored, "poison")
+        value = page.call(page.mangled("masked.gather", SUFFIXES[kind], "p0"), stored, [where, *others])
+        return page.put(f"icmp ne {stored} {value}, zeroinitializer") if kind == "b" else value
+
+    registers: dict[int, str] = {}
+    page.compute(in_order([number for result in results for number in result.flat]), registers, load)
+    for place, result in enumerate(results):
+        kind = result.flat[0].dtype.kind
+        stored = page.vector(STORED[kind])
+        begin = page.put(f"mul i64 %row, {result.size}")
+        address = page.put(f"getelementptr {STORED[kind]}, ptr %z{place}, i64 {begin}")
+        offsets = page.put(f"mul {integers} {lane}, {page.splat('i32', str(result.size))}")
+        scatter = page.mangled("masked.scatter", SUFFIXES[kind], "p0")
+        for at, number in enumerate(result.flat):
+            value = page.operand(number, registers)
+            if kind == "b":
+                value = page.put(f"zext {page.vector('i1')} {value} to {stored}")
+            where = _addresses(page, address, offsets, at, kind)
+            others = ("i32", str(BYTES[kind])), (page.vector("i1"), inside)
+            page.call(scatter, "void", [(stored, value), (pointers, where), *others])
+    page.write("ret void")
+
+
+def _rows(page: Instructions, array: int, row: ArrayRow, lane: str) -> tuple[str, str]:
+    """Return registers: the address of the first lane's row of an array, and each lane's offset from it, in numbers."""
+    first = page.put(f"udiv i64 %row, %shared{array}")
+    skipped = page.put(f"urem i64 %row, %shared{array}")
+    begin = page.put(f"mul i64 {first}, {row.size}")
+    address = page.put(f"getelementptr {STORED[row.kind]}, ptr %a{array}, i64 {begin}")
+    # Whole numbers below 2³² are exact as doubles, and so is the whole part of their quotient. Processors divide
+    # vectors of doubles, but not of integers.
+    doubles, integers = page.vector("double"), page.vector("i32")
+    before = page.in_all_lanes("double", page.put(f"uitofp i64 {skipped} to double"))
+    shared = page.in_all_lanes("double", page.put(f"uitofp i64 %shared{array} to double"))
+    place = page.put(f"fadd {doubles} {page.put(f'uitofp {integers} {lane} to {doubles}')}, {before}")
+    further = page.put(f"fptosi {doubles} {page.put(f'fdiv {doubles} {place}, {shared}')} to {integers}")
+    return address, page.put(f"mul {integers} {further}, {page.splat('i32', str(row.size))}")
+
+
+def _addresses(page: Instructions, address: str, offsets: str, place: int, kind: str) -> str:
+    """Return a register with each lane's address of the number at `place` in its row."""
+    base = page.put(f"getelementptr {STORED[kind]}, ptr {address}, i64 {place}")
+    return page.put(f"getelementptr {STORED[kind]}, ptr {base}, {page.vector('i32')} {offsets}")
+
+
+def _loop(given: Sequence[str], lanes: int) -> str:
+    """Return the text of the loop over the batch; `given` are the parameters of `block` besides its rows."""
+    lines = [
+        f"define internal void @work({', '.join(['i64 %rows', *given])}) nounwind {{",
+        "entry:",
+        "%last = sub i64 %rows, 1",
+        "br label %again",
+        "again:",
+        "%row = phi i64 [ 0, %entry ], [ %following, %again ]",
+        f"call void @block({', '.join([*given, 'i64 %row', 'i64 %last'])})",
+        f"%following = add i64 %row, {lanes}",
+        "%more = icmp ult i64 %following, %rows",
+        "br i1 %more, label %again, label %done",
+        "done:",
+        "ret void",
+        "}",
+    ]
+    return "\n".join(lines) + "\n"

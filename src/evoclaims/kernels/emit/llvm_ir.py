@@ -1,0 +1,249 @@
+"""Scalar expressions as LLVM instructions on vectors: one vector lane per element of the batch.
+
+The instructions are the same for processors and GPUs, where a thread is one lane; only quotients and roots are made of
+others there (`gpu_instructions`, which says where these differ). Each is exactly rounded IEEE arithmetic. Which
+products are fused with a sum has been decided before (`fusing`), not by LLVM. So bits do not depend on the number of
+lanes, the machine or LLVM's version.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any, Final
+
+from evoclaims.kernels.emit.llvm_names import BINARY, CASTS, COMPARED, INTRINSICS, SUFFIXES, TYPES, literal
+from evoclaims.kernels.trace.expressions import (
+    FUSED,
+    Choice,
+    Chosen,
+    Expression,
+    Input,
+    Loop,
+    LoopResult,
+    Number,
+    ScalarOperation,
+    in_order,
+    is_known,
+)
+
+WEIGHTS: Final = '!0 = !{!"branch_weights", i32 1, i32 1000}'
+"""How often the whole way is taken, and the short one, so that registers are kept for the latter."""
+Loader = Callable[[Input], str]
+"""Returns the register with an input number."""
+
+
+class Instructions:
+    """The instructions written so far.
+
+    Attributes:
+        lanes: elements of the batch that an instruction computes.
+        lines: the instructions.
+        declared: declarations of the intrinsic functions used.
+        block: the basic block that is being written.
+    """
+
+    def __init__(self, lanes: int) -> None:
+        """Start empty."""
+        self.lanes = lanes
+        self.lines: list[str] = []
+        self.declared: dict[str, None] = {}
+        self.block = ""
+        self._registers = 0
+        self._loops = 0
+        self._branches = 0
+
+    def register(self) -> str:
+        """Return a new register."""
+        self._registers += 1
+        return f"%v{self._registers}"
+
+    def write(self, *lines: str) -> None:
+        """Add instructions without a result."""
+        self.lines += lines
+
+    def put(self, instruction: str) -> str:
+        """Add an instruction; return the register with its result."""
+        register = self.register()
+        self.lines.append(f"{register} = {instruction}")
+        return register
+
+    def allocate(self, type_: str, count: int, alignment: int) -> str:
+        """Return the address of fresh memory of this call; to be used before any loop."""
+        register = self.register()
+        self.lines.insert(1, f"{register} = alloca {type_}, i32 {count}, align {alignment}")  # after the first label
+        return register
+
+    def label(self, name: str) -> None:
+        """Begin a basic block."""
+        self.lines.append(f"{name}:")
+        self.block = name
+
+    def vector(self, type_: str) -> str:
+        """Return the type of a vector of lanes; with one lane, of the number itself."""
+        return type_ if self.lanes == 1 else f"<{self.lanes} x {type_}>"
+
+    def call(self, name: str, returns: str, operands: Sequence[tuple[str, str]], flags: str = "") -> str:
+        """Call an intrinsic function with (type, value) operands; return the result's register."""
+        self.declared[f"declare {returns} @{name}({', '.join(type_ for type_, _ in operands)})"] = None
+        given = f"{returns} @{name}({', '.join(f'{type_} {value}' for type_, value in operands)})"
+        if returns == "void":
+            self.write(f"call {given}")
+            return ""
+        return self.put(f"call {flags}{given}")
+
+    def mangled(self, name: str, *suffixes: str) -> str:
+        """Return an intrinsic function's name for vectors of lanes of these types."""
+        return ".".join(["llvm", name, *(s if self.lanes == 1 else f"v{self.lanes}{s}" for s in suffixes)])
+
+    def splat(self, type_: str, value: str) -> str:
+        """Return a constant in all lanes."""
+        return value if self.lanes == 1 else f"splat ({type_} {value})"
+
+    def in_all_lanes(self, type_: str, value: str) -> str:
+        """Copy a number into all lanes."""
+        if self.lanes == 1:
+            return value
+        vector = self.vector(type_)
+        one = self.put(f"insertelement {vector} poison, {type_} {value}, i64 0")
+        return self.put(f"shufflevector {vector} {one}, {vector} poison, <{self.lanes} x i32> zeroinitializer")
+
+    def operand(self, number: Number, registers: dict[int, Any]) -> str:
+        """Return a number's register, or its literal if it is known."""
+        if is_known(number):
+            return self.splat(TYPES[number.dtype.kind], literal(number))
+        return str(registers[id(number)])
+
+    def compute(self, expressions: Iterable[Expression], registers: dict[int, Any], load: Loader) -> None:
+        """Compute expressions in order; `registers` has each one's register by its id."""
+        for expression in expressions:
+            if id(expression) in registers:
+                continue
+            match expression:
+                case Input():
+                    place = load(expression)
+                case LoopResult(loop=around):
+                    if id(around) not in registers:
+                        registers[id(around)] = self._repeat(around, registers, load)
+                    place = registers[id(around)][expression.place]
+                case Chosen(choice=choice):
+                    if id(choice) not in registers:
+                        registers[id(choice)] = self._choose(choice, registers, load)
+                    place = registers[id(choice)][expression.place]
+                case ScalarOperation():
+                    place = self._operate(expression, registers)
+                case _:
+                    raise AssertionError(f"a number of no loop around: {expression}")
+            registers[id(expression)] = place
+
+    def _operate(self, operation: ScalarOperation, registers: dict[int, Any]) -> str:
+        """Write one operation."""
+        dtype, name = operation.operands[-1].dtype, operation.name
+        kind = dtype.kind
+        type_ = self.vector(TYPES[kind])
+        operands = [self.operand(o, registers) for o in operation.operands]
+        if name == "seldom":
+            return operands[0]
+        if name in FUSED:
+            return self._fused(name, *operands)
+        if (kind, name) == ("f", "div"):
+            return self.divided(operands[0], operands[1])
+        if (kind, name) == ("f", "sqrt"):
+            return self.root(operands[0])
+        if name in BINARY[kind]:
+            return self.put(f"{BINARY[kind][name]} {type_} {operands[0]}, {operands[1]}")
+        if name in COMPARED[kind]:
+            return self.put(f"{COMPARED[kind][name]} {type_} {operands[0]}, {operands[1]}")
+        if name in INTRINSICS[kind]:
+            flags = "nsz " if name in ("max", "min") and kind == "f" else ""  # a zero's sign is not kept track of
+            called = self.mangled(INTRINSICS[kind][name], SUFFIXES[kind])
+            return self.call(called, type_, [(type_, o) for o in operands], flags)
+        if name == "select":
+            return self.put(f"select {self.vector('i1')} {operands[0]}, {type_} {operands[1]}, {type_} {operands[2]}")
+        if name == "not":
+            return self.put(f"xor {type_} {operands[0]}, {self.splat(TYPES[kind], '-1' if kind == 'i' else 'true')}")
+        if name == "neg":
+            minus = f"sub {type_} {self.splat('i32', '0')}," if kind == "i" else f"fneg {type_}"
+            return self.put(f"{minus} {operands[0]}")
+        if name == "abs":
+            return self.call(self.mangled("abs", "i32"), type_, [(type_, operands[0]), ("i1", "false")])
+        to = self.vector(TYPES[operation.dtype.kind])
+        if name == "bits":
+            return self.put(f"bitcast {type_} {operands[0]} to {to}")
+        if kind == "f":  # to an integer: no overflow, and NaN is 0
+            return self.call(self.mangled("fptosi.sat", "i32", "f32"), to, [(type_, operands[0])])
+        return self.put(f"{CASTS[kind + operation.dtype.kind]} {type_} {operands[0]} to {to}")
+
+    def divided(self, dividend: str, divisor: str) -> str:
+        """Write an exactly rounded quotient of floats; return its register."""
+        return self.put(f"{BINARY['f']['div']} {self.vector('float')} {dividend}, {divisor}")
+
+    def root(self, number: str) -> str:
+        """Write an exactly rounded square root of a float; return its register."""
+        type_ = self.vector("float")
+        return self.call(self.mangled(INTRINSICS["f"]["sqrt"], "f32"), type_, [(type_, number)])
+
+    def _fused(self, name: str, c: str, a: str, b: str) -> str:
+        """Write a sum or difference of a number and a product, rounded once."""
+        type_ = self.vector("float")
+        if name == "fms":
+            c = self.put(f"fneg {type_} {c}")
+        elif name == "fnma":
+            a = self.put(f"fneg {type_} {a}")
+        return self.call(self.mangled("fma", "f32"), type_, [(type_, a), (type_, b), (type_, c)])
+
+    def _repeat(self, loop: Loop, registers: dict[int, Any], load: Loader) -> list[str]:
+        """Write a loop; return its results' registers."""
+        self.compute(in_order(loop.taken), registers, load)
+        self._loops += 1
+        again, after = f"again{self._loops}", f"after{self._loops}"
+        before, start = self.block, [self.operand(s, registers) for s in loop.start]
+        self.write(f"br label %{again}")
+        self.label(again)
+        head = len(self.lines)
+        carried, rounds = [self.register() for _ in loop.carried], self.register()
+        inside = {**registers, **{id(c): register for c, register in zip(loop.carried, carried, strict=True)}}
+        self.compute(in_order(loop.results), inside, load)
+        results = [self.operand(r, inside) for r in loop.results]
+        following = self.put(f"add i32 {rounds}, 1")
+        more = self.put(f"icmp ult i32 {following}, {loop.rounds}")
+        self.lines[head:head] = [
+            either(register, self.vector(TYPES[c.dtype.kind]), (first, before), (result, self.block))
+            for register, c, first, result in zip(carried, loop.carried, start, results, strict=True)
+        ] + [either(rounds, "i32", ("0", before), (following, self.block))]
+        self.write(f"br i1 {more}, label %{again}, label %{after}")
+        self.label(after)
+        return results
+
+    def _choose(self, choice: Choice, registers: dict[int, Any], load: Loader) -> list[str]:
+        """Write both ways of a choice; return the results' registers."""
+        self._branches += 1
+        whole, short, end = (f"{name}{self._branches}" for name in ("whole", "short", "end"))
+        condition = self.in_any_lane(self.operand(choice.condition, registers))
+        self.declared[WEIGHTS] = None
+        self.write(f"br i1 {condition}, label %{whole}, label %{short}, !prof !0")
+        ways = []
+        for name, numbers in ((whole, choice.whole), (short, choice.short)):
+            self.label(name)
+            inside = dict(registers)
+            self.compute(in_order(numbers), inside, load)
+            ways.append(([self.operand(n, inside) for n in numbers], self.block))
+            self.write(f"br label %{end}")
+        self.label(end)
+        (all_values, all_from), (few_values, few_from) = ways
+        results = [self.register() for _ in choice.whole]
+        self.lines += [
+            either(register, self.vector(TYPES[n.dtype.kind]), (a, all_from), (b, few_from))
+            for register, n, a, b in zip(results, choice.whole, all_values, few_values, strict=True)
+        ]
+        return results
+
+    def in_any_lane(self, condition: str) -> str:
+        """Return whether a condition is true in any lane."""
+        if self.lanes == 1:
+            return condition
+        return self.call(f"llvm.vector.reduce.or.v{self.lanes}i1", "i1", [(self.vector("i1"), condition)])
+
+
+def either(register: str, type_: str, *sources: tuple[str, str]) -> str:
+    """Return the instruction that takes the value of the block it was reached from; sources are (value, block)."""
+    return f"{register} = phi {type_} {', '.join(f'[ {value}, %{block} ]' for value, block in sources)}"

@@ -1,0 +1,206 @@
+"""Making expressions: constants are folded, equal expressions shared, and operations without effect dropped."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from typing import Any, Final
+
+import numpy as np
+
+from evoclaims.kernels.trace.expressions import COMPARISONS, FUSED, KNOWN, Expression, Number, ScalarOperation, is_known
+from evoclaims.kernels.unsupported import Unsupported
+
+Rule = Callable[..., Number | None]
+COMMUTATIVE: Final = frozenset({"add", "and", "eq", "max", "min", "mul", "ne", "or", "xor"})
+
+
+class Algebra:
+    """Makes expressions, and remembers those it has made."""
+
+    def __init__(self) -> None:
+        """Start empty."""
+        self._made: dict[tuple[Any, ...], ScalarOperation] = {}
+
+    def apply(self, name: str, *operands: Number) -> Number:
+        """Return an operation on numbers of one dtype (except the condition of "select").
+
+        NaN, infinity and the sign of 0 may be ignored, as in some compilers: 0 * x, 0 / x and x - x are all 0.
+        """
+        if all(map(is_known, operands)):
+            with np.errstate(all="ignore"):
+                return np.asarray(KNOWN[name](*operands))[()]
+        rule = RULES.get(name)
+        simpler = None if rule is None else rule(self, *operands)
+        if simpler is not None:
+            return simpler
+        return self._shared(name, operands, np.dtype(bool) if name in COMPARISONS else operands[-1].dtype)
+
+    def again(self, operation: ScalarOperation, operands: Sequence[Number]) -> Number:
+        """Return an operation that has been made, on other operands."""
+        if operation.name == "cast":
+            return self.cast(operands[0], operation.dtype)
+        if operation.name == "bits":
+            return self.bits(operands[0], operation.dtype)
+        if operation.name in FUSED:
+            return self._fused(operation.name, *operands)
+        return self.apply(operation.name, *operands)
+
+    def _fused(self, name: str, c: Number, a: Number, b: Number) -> Number:
+        """Return c + a · b, or what else `FUSED` has, rounded once."""
+        product = _mul(self, a, b)  # None unless it is exact
+        if product is None and _is(c, 0):
+            product = self.apply("mul", a, b)
+        if product is None:
+            return self._shared(name, (c, a, b), a.dtype)
+        if name == "fma":
+            return self.apply("add", c, product)
+        return self.apply("sub", c, product) if name == "fnma" else self.apply("sub", product, c)
+
+    def cast(self, number: Number, dtype: Any) -> Number:
+        """Return the number as another dtype; floats become integers by truncation."""
+        dtype = np.dtype(dtype)
+        if number.dtype == dtype:
+            return number
+        if is_known(number):
+            return _converted(number, dtype)
+        if dtype.kind == "b":
+            return self.apply("ne", number, number.dtype.type(0))
+        return self._shared("cast", (number,), dtype)
+
+    def bits(self, number: Number, dtype: Any) -> Number:
+        """Return the number that has the same bits in another dtype; float32 and int32."""
+        dtype = np.dtype(dtype)
+        if number.dtype == dtype:
+            return number
+        return number.view(dtype) if is_known(number) else self._shared("bits", (number,), dtype)
+
+    def _shared(self, name: str, operands: tuple[Number, ...], dtype: np.dtype[Any]) -> ScalarOperation:
+        """Return the one object for an operation on these operands."""
+        keys = [(o.dtype.str, o.tobytes()) if is_known(o) else ("", id(o)) for o in operands]
+        key = (name, dtype, *(sorted(keys, key=repr) if name in COMMUTATIVE else keys))
+        if key not in self._made:  # the key has operands' ids; the object keeps them alive
+            self._made[key] = ScalarOperation(dtype, name, operands)
+        return self._made[key]
+
+
+def _converted(number: Any, dtype: np.dtype[Any]) -> Any:
+    """Return a known number as another dtype; as in XLA, integers do not overflow, and NaN is 0."""
+    if dtype.kind == "i" and number.dtype.kind == "f":
+        limits = np.iinfo(dtype)
+        return dtype.type(0 if np.isnan(number) else int(min(max(float(number), limits.min), limits.max)))
+    return dtype.type(number)
+
+
+def _is(number: Number, value: float) -> bool:
+    """Whether a number is known to be `value`."""
+    return is_known(number) and bool(number == value)
+
+
+def _add(algebra: Algebra, a: Number, b: Number) -> Number | None:
+    return b if _is(a, 0) else a if _is(b, 0) else None
+
+
+def _sub(algebra: Algebra, a: Number, b: Number) -> Number | None:
+    if _is(b, 0):
+        return a
+    if a is b:
+        return a.dtype.type(0)
+    return algebra.apply("neg", b) if _is(a, 0) else None
+
+
+def _mul(algebra: Algebra, a: Number, b: Number) -> Number | None:
+    for x, y in ((a, b), (b, a)):
+        if _is(x, 0):
+            return x.dtype.type(0)
+        if _is(x, 1):
+            return y
+        if _is(x, -1):
+            return algebra.apply("neg", y)
+    return None
+
+
+def _div(algebra: Algebra, a: Number, b: Number) -> Number | None:
+    if b.dtype.kind == "i":
+        _check_divisor(b)
+    if _is(b, 1) or _is(a, 0):
+        return a
+    if b.dtype.kind == "f" and is_known(b) and abs(math.frexp(float(b))[0]) == 0.5 and abs(b) > 1e-30:
+        return algebra.apply("mul", a, b.dtype.type(1) / b)  # the reciprocal of a power of two is exact
+    return None
+
+
+def _rem(algebra: Algebra, a: Number, b: Number) -> Number | None:
+    if b.dtype.kind == "f":
+        raise Unsupported("a remainder of floats")
+    _check_divisor(b)
+    return None
+
+
+def _check_divisor(divisor: Number) -> None:
+    """Check that an integer divisor is known not to be 0: GPUs leave that result undefined."""
+    if not is_known(divisor) or divisor == 0:
+        raise Unsupported("a division by an integer that may be 0")
+
+
+def _neg(algebra: Algebra, a: Number) -> Number | None:
+    return a.operands[0] if isinstance(a, ScalarOperation) and a.name == "neg" else None
+
+
+def _same(algebra: Algebra, a: Number, b: Number) -> Number | None:
+    return a if a is b else None
+
+
+def _and(algebra: Algebra, a: Number, b: Number) -> Number | None:
+    if a.dtype == bool and (is_known(a) or is_known(b)):
+        known, other = (a, b) if is_known(a) else (b, a)
+        return other if known else known
+    return _same(algebra, a, b)
+
+
+def _or(algebra: Algebra, a: Number, b: Number) -> Number | None:
+    if a.dtype == bool and (is_known(a) or is_known(b)):
+        known, other = (a, b) if is_known(a) else (b, a)
+        return known if known else other
+    return _same(algebra, a, b)
+
+
+def _not(algebra: Algebra, a: Expression) -> Number | None:
+    return a.operands[0] if isinstance(a, ScalarOperation) and a.name == "not" else None
+
+
+def _shift(algebra: Algebra, a: Number, places: Number) -> Number | None:
+    if not is_known(places) or not 0 <= places < 32:
+        raise Unsupported("a shift by a number of bits that may be too large")
+    return None
+
+
+def _select(algebra: Algebra, condition: Number, yes: Number, no: Number) -> Number | None:
+    if is_known(condition):
+        return yes if condition else no
+    if yes is no or (is_known(yes) and is_known(no) and yes.tobytes() == no.tobytes()):
+        return yes
+    if yes.dtype == bool:  # GPUs have no instruction that selects between conditions
+        other = algebra.apply("and", algebra.apply("not", condition), no)
+        return algebra.apply("or", algebra.apply("and", condition, yes), other)
+    return None
+
+
+RULES: Final[dict[str, Rule]] = {
+    "add": _add,
+    "and": _and,
+    "div": _div,
+    "max": _same,
+    "min": _same,
+    "mul": _mul,
+    "neg": _neg,
+    "not": _not,
+    "or": _or,
+    "rem": _rem,
+    "select": _select,
+    "shift_left": _shift,
+    "shift_right_arithmetic": _shift,
+    "shift_right_logical": _shift,
+    "sub": _sub,
+}
+"""Simplifications by operation: each returns a simpler number, or None without one."""

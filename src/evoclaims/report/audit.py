@@ -1,0 +1,108 @@
+"""What verdicts rest on: which are vacuous, depend on the reading, are younger than their trials, or one result twice."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+
+from evoclaims.paper.null_agent import NullAgent
+from evoclaims.paper.uncovered import Uncovered
+from evoclaims.report import replication_cells, table_cells
+from evoclaims.report.formatting import plural
+from evoclaims.report.tally import tally
+from evoclaims.verdicts.claim_report import ClaimReport
+from evoclaims.verdicts.readings import by_reading
+from evoclaims.verdicts.sentences import sentences
+
+
+def nulls(report: ClaimReport, agents: Mapping[str, NullAgent]) -> str:
+    """Return which null agents satisfy a claim's assertion; empty where none was put to it."""
+    if not agents or not report.n or report.is_control:
+        return ""
+    found = [f"{name} ({agents[name].says})" for name in report.satisfied_by if name in agents]
+    if found:
+        return f"Null agents that satisfy this assertion: {', '.join(found)}."
+    return f"No null agent satisfies this assertion ({', '.join(agents)})."
+
+
+def lines(
+    reports: Sequence[ClaimReport], papers: Sequence[ClaimReport], rest: Sequence[Uncovered], nulls_: int
+) -> Iterator[str]:
+    """Yield an audit of a tier's verdicts, one finding a line below a heading for its kind.
+
+    Args:
+        reports: judged from the trials at hand.
+        papers: judged from the paper's own numbers.
+        rest: sentences without a claim.
+        nulls_: how many null agents there are.
+    """
+    ours = [report for report in reports if not report.is_control]
+    yield tally(ours).replace("**", "")
+    for heading, found in _kinds(ours, papers, nulls_):
+        yield ""
+        yield f"{heading}: {len(found) or 'none'}"
+        yield from (f"  {one}" for one in found)
+    yield ""
+    yield f"sentences without a claim: {len(rest) or 'none'}"
+    yield from (f"  line {one.line}: {one.says} ({one.because})" for one in rest)
+
+
+def fails(reports: Sequence[ClaimReport]) -> bool:
+    """Whether a supported verdict is vacuous, or a claim of the paper lacks its line or the date of its reading."""
+    return any(report.is_vacuous for report in reports) or bool(undated(reports))
+
+
+def undated(reports: Sequence[ClaimReport]) -> list[str]:
+    """Return the names of claims whose sentence is judged here, and that name no line or date of it."""
+    read = [report for report in reports if report.readings and not report.is_control]
+    return [report.name for report in read if report.line is None or not report.readings[0].since]
+
+
+def _kinds(ours: Sequence[ClaimReport], papers: Sequence[ClaimReport], agents: int) -> Iterator[tuple[str, list[str]]]:
+    """Yield each kind of finding with the findings."""
+    satisfied = [(report, f"{report.name}: {', '.join(report.satisfied_by)}") for report in ours if report.satisfied_by]
+    yield (
+        f"supported and vacuous (satisfied by one of {plural(agents, 'null agent')})",
+        [said for report, said in satisfied if report.is_vacuous],
+    )
+    yield (
+        "satisfied by a null agent, and not supported or changed by planted faults",
+        [f"{said} ({report.outcome})" for report, said in satisfied if not report.is_vacuous],
+    )
+    yield (
+        "verdicts that depend on the reading",
+        [
+            f"{report.name} ({report.outcome}): {by_reading(report.readings)}"
+            for report in ours
+            if report.depends_on_the_reading
+        ],
+    )
+    yield (
+        "judged by a reading that is younger than its trials",
+        [
+            f"{report.name} ({report.outcome}): since {report.readings[0].since}, trials {_date(report)}"
+            for report in ours
+            if report.readings and report.readings[0].late
+        ],
+    )
+    yield (
+        "sentences that the result of another one decides",
+        [f"{one.claim}: {', '.join(dict.fromkeys(one.same_as))}" for one in sentences(ours) if one.same_as],
+    )
+    yield (
+        "assertions that the paper's own numbers do not pass",
+        [
+            f"{report.name}: {report.outcome}"
+            for report in papers
+            if replication_cells.is_decided(report) and report.outcome != "supported"
+        ],
+    )
+    yield (
+        "power of inconclusive verdicts",
+        [f"{report.name}: {said}" for report in ours if (said := table_cells.power(report))],
+    )
+    yield "claims without the paper's line or a date", undated(ours)
+
+
+def _date(report: ClaimReport) -> str:
+    """Return when the first trial behind a report started, to the minute."""
+    return report.readings[0].trials_since[:16].replace("T", " ")
