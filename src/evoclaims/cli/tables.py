@@ -106,7 +106,7 @@ def _verdicts(project: Project, words: list[str], *_: str) -> str:
 
 
 def _marks(project: Project, words: list[str], before: str) -> str:
-    """Return the verdicts as marks: of the sentences in the table `before`, which somebody chose and shortened, or of all."""
+    """Return the verdicts as marks: of the sentences chosen and shortened in the table `before`, or of all."""
     return marks(*_columns(project, words), short_sentences(before))
 
 
