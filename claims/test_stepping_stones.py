@@ -40,7 +40,7 @@ LEARNED = [
     pytest.param(
         "goal_ppo",
         marks=expected(
-            Outcome.REFUTED,
+            Outcome.INCONCLUSIVE,
             tier="full",
             because="shown the next stone, PPO crosses several stones, and in some trials reaches the target in most "
             "episodes; in the published code no stone pays (docs/protocol.md)",

@@ -8,13 +8,14 @@ import os
 import pkgutil
 import shutil
 import signal
-import tempfile
 import warnings
 from pathlib import Path
 from typing import Final
 
 import pytest
 from hypothesis import settings
+
+from evoclaims.core.temporary import temporary_folder
 
 pytest_plugins = ["hand_made_paper", "pytester", "tiny_project"]
 
@@ -36,7 +37,7 @@ os.environ.setdefault("XLA_FLAGS", "--xla_backend_optimization_level=0 --xla_llv
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # as in what a shell runs in the background
     signal.signal(signal.SIGINT, signal.default_int_handler)
 if _CACHE not in os.environ:
-    _made = os.environ[_CACHE] = tempfile.mkdtemp(prefix="evoclaims-tests-")
+    _made = os.environ[_CACHE] = str(temporary_folder("evoclaims-tests-"))
     os.environ["JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS"] = "0"  # an entry is read ten times as fast as compiled
 
 

@@ -10,13 +10,16 @@ from reproductions.nisioti2025.measures import PaperTrials
 from reproductions.nisioti2025.null_agents import NULL_AGENTS
 from reproductions.nisioti2025.variants import VARIANTS
 
+TRIALS = 10
+"""Trials of each condition in the paper (§5): their power fixes the margin of comparisons."""
+
 REPRODUCTION = Reproduction(
     name="nisioti2025",
     title="When Does Neuroevolution Outcompete Reinforcement Learning in Transfer Learning Tasks?",
     folder=Path(__file__).parent,
     tiers={
-        "smoke": Tier(conditions={**stepping_gates.SMOKE, **ecorobot.SMOKE}, design=FIXED_10),
-        "full": Tier(conditions={**stepping_gates.FULL, **ecorobot.FULL}, design=SEQUENTIAL),
+        "smoke": Tier(conditions={**stepping_gates.SMOKE, **ecorobot.SMOKE}, design=FIXED_10.for_paper(TRIALS)),
+        "full": Tier(conditions={**stepping_gates.FULL, **ecorobot.FULL}, design=SEQUENTIAL.for_paper(TRIALS)),
     },
     variants=VARIANTS,
     trials=PaperTrials,

@@ -11,7 +11,7 @@ FIGURE = Figure(
             Ground("without stones", "map_elites", "deceptive_maze_difficult"),
             Ground("with stepping stones", "map_elites", "stones"),
         ),
-        told=(
+        listed=(
             ("share of the reachable cells with an elite", lambda trials: trials.archive_coverage),
             ("reward of the best elite", lambda trials: trials.reward),
         ),

@@ -14,7 +14,10 @@ from evoclaims.claims.collected import ClaimTest
 from evoclaims.claims.fetching import NotStoredError, RunMissing, StoredOnly
 from evoclaims.claims.session import Session, Verdicts
 from evoclaims.core.errors import UnknownNameError, UserError
-from evoclaims.paper import references
+from evoclaims.core.packages import without_flags
+from evoclaims.core.provenance import changing_flags
+from evoclaims.judging.verdict import Outcome
+from evoclaims.paper import pilots, references
 from evoclaims.paper.archive import Archive
 from evoclaims.paper.reproduction import Reproduction
 from evoclaims.paper.variant import Variant
@@ -23,6 +26,8 @@ from evoclaims.trials.progress import ignore
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.spec import Condition
 from evoclaims.trials.store import Store
+from evoclaims.verdicts import history
+from evoclaims.verdicts.history import AcceptedVerdict
 
 Made = Callable[..., TrialResult]
 
@@ -181,6 +186,8 @@ def test_the_same_trials_have_not_drifted(session: Session, says: Claim, made: M
     drift, digests = session.drift(_settled(session, made, says, lambda seed: seed / 10))
     assert not drift.drifted
     assert [(row.metric, row.status, row.n_new, row.n_ref) for row in drift.rows] == [
+        ("success at level 0", "no drift", 6, 10),  # what the claim reads
+        ("success at level 1", "no drift", 6, 10),
         ("mean_success", "no drift", 6, 10),
         ("last_fitness", "no drift", 6, 10),
         ("environment_steps", "no drift", 6, 10),
@@ -192,7 +199,12 @@ def test_shifted_trials_have_drifted(session: Session, says: Claim, made: Made) 
     _committed(session, made, lambda seed: seed / 100)
     drift, _ = session.drift(_settled(session, made, says, lambda seed: 0.5 + seed / 100))
     assert drift.drifted
-    assert [row.metric for row in drift.rows if row.drifted] == ["mean_success", "last_fitness"]
+    assert [row.metric for row in drift.rows if row.drifted] == [
+        "success at level 0",
+        "success at level 1",
+        "mean_success",
+        "last_fitness",
+    ]
 
 
 def test_under_a_variant_what_it_does_not_change_is_compared_too(session: Session, says: Claim, made: Made) -> None:
@@ -226,9 +238,9 @@ def test_stored_trials_that_were_not_judged_have_no_part_in_the_drift(
 ) -> None:
     """Those that ran out of time here stand back behind older ones, and older ones behind committed ones of here."""
     better, store = _pair(session)[0].condition, session.store
-    packages = list(better.versions)
-    here = {"versions": dict(better.versions), "depends_on": packages}
-    before = {"versions": {**better.versions, "jax": "0.0.1"}, "depends_on": packages}
+    packages, versions = list(better.packages), without_flags(better.versions)
+    here = {"versions": versions, "depends_on": packages, "xla_flags": changing_flags()}
+    before = {**here, "versions": {**versions, "jax": "0.0.1"}}
     path = references.path_of(session.reproduction.references, "smoke", "better", "small")
     references.write(path, [made(better, seed, 1.0, **before) for seed in range(10)])
     for seed in range(10):
@@ -251,4 +263,39 @@ def test_without_reference_trials_nothing_is_said_to_be_unchanged(session: Sessi
     drift, _ = session.drift(_settled(session, made, says, lambda seed: 1.0))
     assert {row.status for row in drift.rows} == {"no reference"}
     assert not drift.drifted
-    assert len(drift.unchecked) == 3
+    assert len(drift.unchecked) == 5
+
+
+def test_a_lost_support_comes_with_how_often_draws_from_the_pilots_lose_it(
+    session: Session, says: Claim, made: Made
+) -> None:
+    """Overlapping trials are inconclusive; a pilot without overlap never ends so, and one like them often does."""
+    better, worse = _pair(session)
+    for seed in range(6):
+        session.store.put(made(better.condition, seed, seed / 10), {})
+        session.store.put(made(worse.condition, seed, seed / 10), {})
+    reading = replace(session, fetch=StoredOnly(Archive(session.store)))
+
+    def chance() -> float | None:
+        groups = _pair(reading)
+        assertion = groups[0].mean_success > groups[1].mean_success
+        report = reading.settle(ClaimTest(says, "smoke", ""), assertion)
+        assert report.outcome == "inconclusive"
+        return report.chance
+
+    assert chance() is None  # nothing has been accepted
+    before = AcceptedVerdict(Outcome.SUPPORTED, "", 6, 0.01, "f" * 64, "2026-01-01", {}, "cpu", "", "t" * 64)
+    path = session.reproduction.folder / history.FILE
+    path.parent.mkdir(exist_ok=True)
+    path.write_text(history.dump({("smoke", "T1"): (before,)}))
+    assert chance() is None  # no pilot
+    for lead, low, high in ((1.0, 0.0, 0.0), (0.0, 0.5, 1.0)):
+        for name, group, shift in (("better", better, lead), ("worse", worse, 0.0)):
+            trials = [made(group.condition, 100 + seed, seed / 100 + shift) for seed in range(20)]
+            place = pilots.path_of(session.reproduction.folder, "smoke", name, "small")
+            pilots.write(place, trials, [group.mean_success])
+        found = chance()
+        assert found is not None
+        assert low <= found <= high
+    path.write_text(history.dump({("smoke", "T1"): (replace(before, outcome=Outcome.REFUTED),)}))
+    assert chance() is None

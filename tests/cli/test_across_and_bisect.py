@@ -12,7 +12,7 @@ from hand_made_verdicts import report
 from tiny_project import Evoclaims, Project
 
 from evoclaims.cli.elsewhere import Elsewhere
-from evoclaims.core.environments import Environment, Recipe
+from evoclaims.core.environments import Environment, Recipe, installed_here
 from evoclaims.trials.store import Store
 from evoclaims.verdicts.across import Judged
 
@@ -202,3 +202,27 @@ def test_no_claim_is_left_out_elsewhere_whatever_the_environment_says_of_pytest(
     monkeypatch.setattr(Environment, "python", Path(sys.executable))
     elsewhere = Elsewhere(project.path, project.path / "claims", stored, "smoke", None, "cpu")
     assert [one.outcome for one in elsewhere._run(Environment(project.path, {}), stored)] == ["refuted", "supported"]
+
+
+def test_an_environment_with_what_is_too_old_is_not_judged_and_its_packages_are_named(
+    evoclaims: Evoclaims, commands: list[list[str]], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    old = Environment(tmp_path / "old", {**installed_here(), "jax": "0.6.2", "pebble": "1.0"})
+    monkeypatch.setattr("evoclaims.cli.elsewhere.make", lambda *_: old)
+    status, out, _ = evoclaims("across", "--package", "pebble", "1.0")
+    assert (status, commands) == (2, [])
+    assert f"pebble 1.0: its installation changed jax {version('jax')} -> 0.6.2, too\n" in out
+    assert (
+        "pebble 1.0: it has jax 0.6.2 (oldest supported: 0.10.2); name a release that works with supported ones" in out
+    )
+
+
+def test_a_run_that_a_signal_kills_is_said_so_with_the_function(
+    evoclaims: Evoclaims, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    dies = "import ctypes, faulthandler; faulthandler.enable()\ndef deepest(): ctypes.string_at(0)\ndeepest()"
+    monkeypatch.setattr(Elsewhere, "_command", lambda *_: [sys.executable, "-c", dies])
+    made = Environment(tmp_path, {})
+    monkeypatch.setattr("evoclaims.cli.elsewhere.make", lambda *_: made)
+    _, out, _ = evoclaims("across", "--package", "pebble", "1.0")
+    assert "pebble 1.0: pytest was killed by SIGSEGV in string_at (" in out

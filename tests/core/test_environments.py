@@ -207,3 +207,23 @@ def test_releases_are_listed_oldest_first_and_final_ones_alone(wheels: Path) -> 
         between("1.10", "1.9", [])
     with pytest.raises(UserError, match="'new' is not a version"):
         checked("new")
+
+
+def test_what_comes_with_a_release_and_is_older_than_declared_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    declared = ["jax>=0.10.2,<0.13", "evosax~=0.3.2", "numpy", "submitit>=1.5; extra == 'slurm'", "odd>>1"]
+    monkeypatch.setattr(environments.importlib.metadata, "requires", lambda name: declared)
+    (tmp_path / "pyproject.toml").write_text('[project]\ndependencies = ["jax>=0.11", "Torch_X>2"]\n')
+    older = {"jax": "0.10.2", "evosax": "0.3.0", "numpy": "1.0", "submitit": "1.0", "torch-x": "1.9"}
+    environment = Environment(tmp_path, older)
+    expected = {"evosax": ("0.3.0", "0.3.2"), "jax": ("0.10.2", "0.11"), "torch-x": ("1.9", "2")}
+    assert environment.below("qdax", tmp_path) == expected
+    assert environment.below("evosax", tmp_path).keys() == {"jax", "torch-x"}  # the release on trial may be older
+    assert environment.below("jax", tmp_path) == expected  # but for what the process would die by
+    assert Environment(tmp_path, {"jax": "0.13.0", "evosax": "0.3.2"}).below("qdax", tmp_path) == {}
+
+
+def test_an_installer_that_a_signal_kills_is_said_so() -> None:
+    with pytest.raises(NotInstallableError, match=r"^python\S* was killed by SIGSEGV$"):
+        environments._run([sys.executable, "-c", "import os, signal; os.kill(os.getpid(), signal.SIGSEGV)"])

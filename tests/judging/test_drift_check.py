@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import math
+from dataclasses import replace
 
+import numpy as np
 import pytest
 
-from evoclaims.judging.drift import DriftCase, check_drift
+from evoclaims.judging.drift import DriftCase, check_drift, measured
 
 BEFORE = [0.50, 0.52, 0.54, 0.56, 0.58, 0.60, 0.62, 0.64, 0.66, 0.68]
 
@@ -16,13 +19,14 @@ BEFORE = [0.50, 0.52, 0.54, 0.56, 0.58, 0.60, 0.62, 0.64, 0.66, 0.68]
 def case(trial):
     """Return the factory of cases of the condition "c"; references take the seeds from 100."""
 
-    def make(new, reference=BEFORE, of="c", metrics=("score",), label="ppo on n_parity"):  # type: ignore[no-untyped-def]
+    def make(new, reference=BEFORE, of="c", metrics=("score",), label="ppo on n_parity", method=""):  # type: ignore[no-untyped-def]
         return DriftCase(
             label,
             "c",
             tuple(trial(seed, value, "c") for seed, value in enumerate(new)),
             tuple(trial(100 + seed, value, of) for seed, value in enumerate(reference)),
             metrics,
+            method=method,
         )
 
     return make
@@ -47,14 +51,68 @@ def test_trials_that_now_diverge_are_drift(case) -> None:
     assert check_drift([case(["diverged"] * 5)]).drifted
 
 
-def test_the_suite_pays_holms_correction(case) -> None:
-    drifting, steady = case([0.9] * 5), case([0.51, 0.55, 0.59, 0.63, 0.67])
-    few, many = check_drift([drifting] + [steady] * 4), check_drift([drifting] + [steady] * 15)
+def test_the_suite_pays_holms_correction_over_methods(case) -> None:
+    def suite(others: int):  # type: ignore[no-untyped-def]
+        steady = [case([0.51, 0.55, 0.59, 0.63, 0.67], method=f"m{n}") for n in range(others)]
+        return check_drift([case([0.9] * 5), *steady])
+
+    few, many = suite(4), suite(15)
     assert few.rows[0].p_holm == pytest.approx(5 * 2 / math.comb(15, 5))
     assert [row.drifted for row in few.rows] == [True, False, False, False, False]
     assert few.drifted
     assert not many.drifted
     assert {row.status for row in many.rows} == {"underpowered"}
+
+
+def test_what_cannot_have_changed_costs_nothing(case, trial) -> None:
+    """Trials that are their references to the bit are not tested, and neither are other groups."""
+    same = tuple(trial(seed, value, "c", digest=str(seed)) for seed, value in enumerate(BEFORE))
+    equal = [DriftCase(f"{n} on t", "c", same[:5], same, ("score",), method=str(n)) for n in range(20)]
+    steady = [replace(case([0.51, 0.55, 0.59, 0.63, 0.67], method=f"m{n}"), group="jax 1 -> 2") for n in range(20)]
+    report = check_drift([case([0.9] * 5), *equal, *steady])
+    assert report.rows[0].p_holm == report.rows[0].p == pytest.approx(2 / math.comb(15, 5))
+    assert {row.status for row in report.rows[1:21]} == {"no drift"}
+    assert {row.detail for row in report.rows[1:21]} == {"the same trials to the bit"}
+
+
+def test_a_method_is_tested_by_all_its_conditions_together(case) -> None:
+    """No condition alone shows what five of them show together; it is named where it shows most."""
+    up = [0.56, 0.60, 0.64, 0.68, 0.70, 0.72]
+    cases = [case([*up[n:], *up[:n]], label=f"ppo on {n}", method="ppo") for n in range(5)]
+    others = [case(BEFORE[::2], label=f"m{n} on t", method=f"m{n}") for n in range(5)]
+    together = check_drift([*cases, *others])
+    assert [row.label for row in together.rows if row.drifted] == ["ppo on 0"]
+    alone = check_drift([replace(one, method=one.label) for one in cases] + others)
+    assert not alone.drifted
+    assert alone.nearest is not None
+    assert "no drift shown; nearest: ppo on" in alone.undecided
+    assert together.detectable["ppo"] < min(shift for name, shift in together.detectable.items() if name != "ppo")
+
+
+def test_the_joint_p_is_that_of_all_permutations(case) -> None:
+    """Two measures of one condition, whose 3,003 splits are few enough to list."""
+    rng = np.random.default_rng(7)
+    new, old = rng.normal(0.7, 1, size=(5, 2)), rng.normal(size=(10, 2))
+    one = case([0.0] * 5)
+    sides = [
+        tuple(replace(t, metrics={"a": x, "b": y}) for t, (x, y) in zip(trials, values.tolist(), strict=True))
+        for trials, values in ((one.new, new), (one.reference, old))
+    ]
+    found = check_drift([replace(one, new=sides[0], reference=sides[1], metrics=("a", "b"))]).rows[0].p_holm
+    ranks = np.apply_along_axis(lambda column: column.argsort().argsort() - 7.0, 0, np.concatenate([new, old]))
+    z = np.array([ranks[list(chosen)].sum(axis=0) for chosen in itertools.combinations(range(15), 5)])
+    statistics = [np.abs(z.sum(axis=1)), (z**2).sum(axis=1), np.abs(z).max(axis=1)]
+    above = np.array([[np.mean(s >= x - 1e-9) for x in s] for s in statistics]).min(axis=0)
+    assert found == pytest.approx(np.mean(above <= above[0]), abs=0.03)
+
+
+def test_levels_and_curves_are_measures_too(trial) -> None:
+    one = replace(trial(0, 1.0), levels={"success": (0.25, 0.75)}, curves={"nodes": (1.0, 2.0)})
+    assert measured(one, "success at level 1") == 0.75
+    assert measured(one, "mean nodes while training") == 1.5
+    for unknown in ("success at level 2", "mean steps while training", "success"):
+        with pytest.raises(KeyError):
+            measured(one, unknown)
 
 
 def test_fewer_than_ten_references_are_said_and_no_pass(case) -> None:
@@ -90,7 +148,7 @@ def test_without_new_trials_nothing_was_run(case) -> None:
     ],
 )
 def test_a_metric_that_cannot_be_read_is_an_error_row_beside_the_others(case, new, metric, detail) -> None:
-    report = check_drift([case(new, metrics=(metric,)), case([0.9] * 5)])
+    report = check_drift([case(new, metrics=(metric,)), case([0.9] * 5, method="another")])
     assert report.rows[0].status == "error"
     assert detail in report.rows[0].detail
     assert report.rows[1].drifted
@@ -118,3 +176,22 @@ def test_a_value_without_limit_is_not_taken_for_the_largest_finite_one(case) -> 
 
 def test_values_that_single_precision_tells_apart_are_told_apart(case) -> None:
     assert check_drift([case([0.9008] * 5, [0.9007] * 10)]).drifted
+
+
+def test_a_pilot_counts_for_the_measures_that_it_has(case, trial) -> None:
+    def of(trials, **metrics):  # type: ignore[no-untyped-def]
+        return tuple(replace(one, metrics={name: f(one.seed) for name, f in metrics.items()}) for one in trials)
+
+    plain = case([0.0] * 5)
+    pilot = tuple(trial(1000 + seed, 0.0, "c") for seed in range(50))
+    both = replace(
+        plain,
+        new=of(plain.new, score=lambda seed: seed / 10, other=float),
+        reference=of(plain.reference, score=lambda seed: seed / 10, other=float),
+        pilot=of(pilot, score=lambda seed: seed / 10),
+        metrics=("score", "other"),
+    )
+    rows = {row.metric: row for row in check_drift([both]).rows}
+    assert (rows["score"].n_ref, rows["other"].n_ref) == (60, 10)
+    assert rows["other"].p_holm == pytest.approx(2 * min(rows["score"].p, rows["other"].p))
+    assert rows["score"].drifted or rows["other"].drifted

@@ -315,3 +315,23 @@ def test_trials_of_a_training_loop_in_a_pilot_which_keeps_no_digests_are_evidenc
     for seed, trial in a.trials.items():
         a.trials[seed] = replace(trial, **told)
     assert judge(a.solved().in_most_trials(), FIXED_10).outcome is Outcome.SUPPORTED
+
+
+def test_what_is_smaller_than_claimed_at_five_trials_may_be_refuted_at_ten(source) -> None:
+    # Of two parts, complete separation at n = 5 has p = 0.008 against the order and 0.004 against the size.
+    a, b = source("a", LOW), source("b", HIGH)
+    both = (a.score() > b.score()) & (a.score() > source("c", HIGH).score())
+    only = Design(SEQUENTIAL.looks[:1])
+    assert judge(both & (a.score() < b.score()), only).outcome is Outcome.SMALLER
+    verdict = judge(both & (a.score() < b.score()), SEQUENTIAL)
+    assert (verdict.outcome, verdict.n) == (Outcome.REFUTED, 10)
+
+
+def test_what_is_smaller_than_claimed_at_five_trials_stays_so_unless_refuted(source) -> None:
+    # All pairs are lost at n = 5; then all others are above. With three parts the rank test does not reject.
+    a, b = source("a", [*LOW[:5], *[99.0] * 5]), source("b", HIGH)
+    holds = source("c", [1.0] * 10).solved().in_most_trials(p0=0.3)
+    verdict = judge((a.score() > b.score()) & holds & holds, SEQUENTIAL)
+    assert (verdict.outcome, verdict.n) == (Outcome.SMALLER, 5)
+    assert verdict.reason.startswith("more trials do not refute it: of n = 5, p = 0.00615 against an effect as large")
+    assert a.asked == [tuple(range(5)), tuple(range(10))]

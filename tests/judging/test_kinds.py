@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from functools import reduce
 from itertools import product
 from operator import and_, or_
@@ -12,12 +13,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.stats import binom, kendalltau
 
+from evoclaims.judging.assertion import Finding
 from evoclaims.judging.design import FIXED_10, Design
 from evoclaims.judging.judge import attainability, judge
+from evoclaims.judging.kinds.most_trials import Solves
 from evoclaims.judging.kinds.trend import kendall_s
-from evoclaims.judging.verdict import Outcome
+from evoclaims.judging.sample import Trials
+from evoclaims.judging.verdict import Direction, Outcome, PValues
 
 SUPPORTED, REFUTED, INCONCLUSIVE = Outcome.SUPPORTED, Outcome.REFUTED, Outcome.INCONCLUSIVE
+SMALLER = Outcome.SMALLER
 RISING = [float(i) for i in range(10)]
 
 
@@ -31,10 +36,11 @@ def shifted(by: float) -> list[float]:
         (shifted(20), RISING, SUPPORTED),
         (RISING, shifted(20), REFUTED),
         (shifted(0.5), RISING, INCONCLUSIVE),
-        (RISING, shifted(0.5), REFUTED),  # below in every seed pair: the declared effect is rejected, not the rank
+        (RISING, shifted(0.5), INCONCLUSIVE),  # below in every pair of a seed, which are labels: A12 is 0.45
+        (RISING, shifted(2.5), SMALLER),  # A12 is 0.28: the rank test does not reject, the claimed size is rejected
         (RISING, RISING, INCONCLUSIVE),
         (RISING, ["diverged"] * 10, SUPPORTED),
-        (["timeout"] * 10, RISING, REFUTED),
+        (["diverged"] * 10, RISING, REFUTED),
     ],
 )
 def test_greater(source, a, b, outcome) -> None:
@@ -49,7 +55,7 @@ def test_greater_reports_every_value_and_its_effect(source) -> None:
     assert (evidence.n, evidence.a12, evidence.cliffs_delta) == (10, 1.0, 1.0)
     assert evidence.p == evidence.attainable_p == verdict.p == pytest.approx(5.4e-6, rel=0.01)
     assert evidence.outcome is SUPPORTED
-    assert "10 of 10 seed pairs" in evidence.detail
+    assert evidence.detail == "at least as high in 1 of all pairs of trials (p = 1 against A12 >= 0.71)"
 
 
 def test_below_is_above_with_the_sides_swapped(source) -> None:
@@ -57,17 +63,39 @@ def test_below_is_above_with_the_sides_swapped(source) -> None:
     assert judge(a < b, FIXED_10) == judge(b > a, FIXED_10)
 
 
+@dataclass(frozen=True)
+class BothWays(Solves):
+    """A custom kind whose tests contradict each other."""
+
+    def find(self, trials: Trials, design: Design, alpha: float) -> Finding:
+        p = PValues(0.02, 0.02)
+        return self.found(p, p, alpha, (self.event.sample(trials),), events=True)
+
+
 def test_evidence_both_ways_decides_neither(source) -> None:
-    # A ranks above B over all pairs, but seed by seed mostly just below: the pairs reject the margin.
-    a = [10.0, 20, 30, 40, 50, 60, 70, 80, 90, 100]
-    b = [11.0, 21, 31, 41, 51, 61, 0, 0, 0, 0]
-    wide = Design(looks=FIXED_10.looks, a12_margin=0.75)
-    verdict = judge(source("a", a).score() > source("b", b).score(), wide)
-    assert verdict.p is not None
-    assert verdict.p_refuted is not None
-    assert max(verdict.p, verdict.p_refuted) <= 0.05
-    assert verdict.outcome is INCONCLUSIVE
+    verdict = judge(BothWays(source("a", [1.0] * 10).solved()), FIXED_10)
+    assert (verdict.outcome, verdict.p, verdict.p_refuted) == (INCONCLUSIVE, 0.02, 0.02)
     assert "contradicts itself" in verdict.reason
+
+
+def test_an_effect_that_is_shown_to_be_small_is_smaller_than_claimed(source) -> None:
+    # A12 is 0.59 of 100 against 100: above, and below 0.71.
+    a = [float(i) + 9 for i in range(100)]
+    verdict = judge(source("a", a).score() > source("b", [float(i) for i in range(100)]).score(), Design.fixed(100))
+    assert verdict.outcome is SMALLER
+    assert verdict.p is not None
+    assert verdict.decision is not None
+    assert max(verdict.p, verdict.decision.p) <= 0.05
+    assert verdict.decision.direction is Direction.SIZE
+    assert "though it is above" in verdict.reason
+
+
+@pytest.mark.parametrize(("n", "outcome"), [(30, INCONCLUSIVE), (32, REFUTED)])
+def test_equality_within_the_margin_refutes_where_n_allows_it(source, n, outcome) -> None:
+    values = [float(i) for i in range(0, 2 * n, 2)]
+    other = [value + (1 if at % 2 else -1) for at, value in enumerate(values)]
+    verdict = judge(source("a", values).score() > source("b", other).score(), Design.fixed(n))
+    assert verdict.outcome is outcome
 
 
 @pytest.mark.parametrize(
@@ -230,20 +258,26 @@ def test_and_needs_every_part_and_or_needs_one(source, left, right) -> None:
 
 
 def test_a_part_that_contradicts_itself_decides_neither_and_nor_or(source) -> None:
-    a = source("a", [10.0, 20, 30, 40, 50, 60, 70, 80, 90, 100]).score()
-    b = source("b", [11.0, 21, 31, 41, 51, 61, 0, 0, 0, 0]).score()
-    wide = Design(looks=FIXED_10.looks, a12_margin=0.75)
-    part = a > b
-    both = judge(part, wide)
-    # Each p is significant alone, and not after the correction for four parts.
-    assert max(both.p, both.p_refuted) <= 0.05 < 4 * min(both.p, both.p_refuted)
+    part = BothWays(source("a", [1.0] * 10).solved())
     holds = [source(f"holds {i}", [1.0] * 10).solved().in_most_trials() for i in range(3)]
     fails = [source(f"fails {i}", [0.0] * 10).solved().in_most_trials() for i in range(3)]
-    undecided = judge(reduce(and_, holds, part), wide)
+    undecided = judge(reduce(and_, holds, part), FIXED_10)
     assert (undecided.outcome, undecided.deciding) == (INCONCLUSIVE, 0)
-    assert judge(reduce(or_, fails, part), wide).outcome is INCONCLUSIVE
-    assert judge(part & fails[0], wide).outcome is REFUTED
-    assert judge(part | holds[0].event.in_every_trial(), wide).outcome is SUPPORTED
+    assert judge(reduce(or_, fails, part), FIXED_10).outcome is INCONCLUSIVE
+    assert judge(part & fails[0], FIXED_10).outcome is REFUTED
+    assert judge(part | holds[0].event.in_every_trial(), FIXED_10).outcome is SUPPORTED
+
+
+def test_a_compound_is_smaller_than_claimed_where_a_part_is(source) -> None:
+    small = source("a", RISING).score() > source("b", shifted(3.5)).score()
+    holds, fails = (source(n, [v] * 10).solved().in_most_trials(p0=0.5) for n, v in (("c", 1.0), ("d", 0.0)))
+    assert judge(small, FIXED_10).outcome is REFUTED
+    small = source("a", RISING).score() > source("b", shifted(2.5)).score()
+    assert [judge(one, FIXED_10).outcome for one in (small, small & holds, small | fails)] == [SMALLER] * 3
+    assert judge(small & fails, FIXED_10).outcome is REFUTED
+    assert judge(small | holds, FIXED_10).outcome is SUPPORTED
+    both = judge(small & holds, FIXED_10)
+    assert (both.deciding, both.decision.p) == (0, pytest.approx(2 * judge(small, FIXED_10).p_smaller))
 
 
 def test_or_pays_holms_correction_where_it_is_supported_and_and_where_it_is_refuted(source) -> None:

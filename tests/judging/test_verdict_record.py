@@ -17,6 +17,7 @@ def test_each_outcome_has_its_symbol() -> None:
     assert {str(outcome): outcome.symbol for outcome in Outcome} == {
         "supported": "✓",
         "refuted": "✗",
+        "smaller than claimed": "↓",
         "inconclusive": "?",
         "error": "E",
         "not run": "-",

@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 from tiny_project import aged, forget, spoiled, trials_of
 
+from evoclaims.claims.session import Session
 from evoclaims.cli import main
 from evoclaims.core.errors import UserError
 from evoclaims.judging.verdict import Outcome
@@ -84,16 +85,37 @@ def test_a_changed_verdict_is_listed_and_fails_the_run_where_it_is_asked_to(
     ]
 
 
+@pytest.mark.parametrize(
+    ("chance", "status", "said"),
+    [
+        (None, 1, "; how often this happens by chance is not known without pilots"),
+        (0.01, 1, "; by chance this happens in 1.0% of draws from its pilots"),
+        (0.011, 0, "; by chance this happens in 1.1% of draws from its pilots"),
+    ],
+)
+def test_a_lost_support_fails_unless_chance_explains_it(
+    accepted: Any, monkeypatch: pytest.MonkeyPatch, chance: float | None, status: int, said: str
+) -> None:
+    path = Path("verdicts.toml")
+    kept = history.load(path)
+    changed = {**kept, ("smoke", "b"): (replace(kept["smoke", "b"][0], outcome=Outcome.SUPPORTED),)}
+    path.write_text(history.dump(changed))
+    monkeypatch.setattr(Session, "_chance", lambda self, report, *_: chance if report.name == "b" else None)
+    result = accepted.run("--claims-compare-fail=supported->refuted")
+    assert result.ret == status
+    assert said in result.stdout.str()
+    assert "REGRESSION b (smoke): supported -> inconclusive" in result.stdout.str() or not status
+    assert accepted.run().ret == 0
+
+
 def test_a_changed_verdict_says_why_it_may_have_changed(accepted: Any) -> None:
     _edit(outcome=Outcome.REFUTED)
     said = " from the same trials to the bit, so that the code which judges or reads them has changed"
     accepted.run().stdout.fnmatch_lines([f"a (smoke): refuted -> supported:{said}"])
     _edit(trials="0" * 64, device="abacus", n=7)
     shown = accepted.run().stdout.str()
-    draws = (
-        "its trials are other draws of the same experiment (device abacus -> cpu, n 7 -> 10); whether they drifted is"
-    )
-    assert f"a (smoke): refuted -> supported: {draws} not known: with 10 trials a side" in shown
+    draws = "its trials are other draws (device abacus -> cpu, n 7 -> 10); whether they drifted is"
+    assert f"a (smoke): refuted -> supported: {draws} not known. With 10 trials a side" in shown
 
 
 def test_what_other_trials_have_changed_is_not_said_to_be_from_the_same(accepted: Any, stored: Store) -> None:

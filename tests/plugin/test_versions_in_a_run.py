@@ -61,12 +61,12 @@ def test_trials_of_other_versions_run_again_and_the_summary_says_what_that_chang
     assert (
         lines[start + 1] == "right on parity (smoke): 10 trials run again, 10 of 10 not the same to the bit as before"
     )
-    assert lines[start + 2].startswith(
-        "DRIFT in right on parity (smoke): mean_success is higher now: median 0.25 -> 1, "
-    )
-    assert "A12 = 1.00, p = " in lines[start + 2]
-    assert lines[start + 3] == "3 comparisons with the trials made before, 1 drifted"
-    assert lines[start + 4] == f"verdict changed: a (smoke): refuted -> supported (numpy 1.0 -> {HERE})"
+    end = next(at for at, line in enumerate(lines) if at > start and " comparisons with the trials made" in line)
+    drift = lines[start + 2 : end]
+    assert all(line.startswith("DRIFT in right on parity (smoke): ") for line in drift)
+    assert any("mean_success is higher now: median 0.25 -> 1, A12 = 1.00, p = " in line for line in drift)
+    assert lines[end].endswith(f" comparisons with the trials made before, {len(drift)} drifted")
+    assert lines[end + 1] == f"verdict changed: a (smoke): refuted -> supported (numpy 1.0 -> {HERE})"
     assert result.ret == 1  # supported, and yet something has drifted that nobody has looked at
     told = json.loads((project.path / "out.json").read_text())["upgrade"]["conditions"]
     assert [(one["condition"], one["again"], one["changed"]) for one in told] == [("right on parity (smoke)", 10, 10)]

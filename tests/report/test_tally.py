@@ -19,14 +19,18 @@ def _reports(where: str, *outcomes: Outcome) -> list[ClaimReport]:
 @pytest.mark.parametrize(
     ("papers", "controls", "said"),
     [
-        ((Outcome.REFUTED,), (), "Of 1 case of the paper's sentences, 1 **refuted**."),
+        (
+            (Outcome.REFUTED,),
+            (),
+            "Of 1 sentence of the paper, 1 **refuted in some case**. By case, of 1: 1 **refuted**.",
+        ),
         (
             (Outcome.NOT_RUN, Outcome.REFUTED, Outcome.SUPPORTED, Outcome.SUPPORTED),
             (Outcome.SUPPORTED, Outcome.ERROR),
-            "Of 4 cases of the paper's sentences, 2 **supported**, 1 **refuted** and 1 **not run**. Of 2 cases of "
-            "controls, which test the benchmark itself, 1 **supported** and 1 **error**.",
+            "Of 1 sentence of the paper, 1 **refuted in some case**. By case, of 4: 2 **supported**, 1 **refuted** and "
+            "1 **not run**. Of 2 cases of controls, which test the benchmark itself, 1 **supported** and 1 **error**.",
         ),
-        ((), (), "Of 0 cases of the paper's sentences, none."),
+        ((), (), "Of 0 sentences of the paper, none. By case, of 0: none."),
         (
             (),
             (Outcome.SUPPORTED,),
@@ -44,5 +48,18 @@ def test_support_that_no_planted_fault_changes_is_counted_apart() -> None:
     sound, insensitive, refuted = _reports("§5", Outcome.SUPPORTED, Outcome.SUPPORTED, Outcome.REFUTED)
     reports = [sound, replace(insensitive, tried=Tried.INSENSITIVE), replace(refuted, tried=Tried.INSENSITIVE)]
     assert tally(reports) == (
-        "Of 3 cases of the paper's sentences, 1 **supported**, 1 **supported but insensitive** and 1 **refuted**."
+        "Of 1 sentence of the paper, 1 **refuted in some case**. By case, of 3: 1 **supported**, 1 **supported but "
+        "insensitive** and 1 **refuted**."
+    )
+
+
+def test_support_that_a_null_agent_has_as_well_is_counted_apart() -> None:
+    sound, vacuous = _reports("§5", Outcome.SUPPORTED, Outcome.SUPPORTED)
+    vacuous = replace(vacuous, satisfied_by=("no action",))
+    assert tally([sound, vacuous]) == (
+        "Of 1 sentence of the paper, 1 **supported but vacuous**. By case, of 2: 1 **supported** and 1 **supported but "
+        "vacuous**."
+    )
+    assert tally([replace(vacuous, tried=Tried.SENSITIVE)]).startswith(
+        "Of 1 sentence of the paper, 1 **supported in every case**."
     )

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import io
 import re
+import sys
 from dataclasses import replace
 
 import pytest
@@ -13,6 +15,7 @@ from rich.cells import cell_len
 
 from evoclaims.judging.drift import DriftReport, DriftRow
 from evoclaims.judging.verdict import Outcome
+from evoclaims.report.console import PlainSpokenConsole, plain_table
 from evoclaims.report.table_cells import totals
 from evoclaims.report.terminal_table import drift_lines, explanations, verdict_table
 
@@ -128,17 +131,47 @@ def test_the_comparison_with_the_references_says_what_drifted_and_what_it_did_no
     changed = ["a on b", "c on d", "a on b"]
     lines = drift_lines(DriftReport(rows, 0.01), changed, compared=4).splitlines()
     assert lines == [
-        "reference trials: 2 comparisons, 1 drifted (exact rank tests, Holm, α = 0.01)",
+        "reference trials: 2 comparisons, 1 drifted (by method, permutation tests, Holm, α = 0.01)",
         "DRIFT in a on b: steps is lower now: median 40.5 -> 30, A12 = 0.12, p = 0.0004 (Holm)",
         "not checked: c on d: 0 reference trials, 10 needed",
         "to the bit: 4 trials compared with the same machine and versions, 3 changed: a on b (2), c on d (1)",
     ]
 
 
-def test_where_nothing_could_be_compared_to_the_bit_nothing_is_said_to_be_unchanged() -> None:
-    assert drift_lines(DriftReport((), 0.01), changed=[], compared=0).splitlines()[-1] == (
-        "to the bit: no trial could be compared, since none has a reference of the same machine and versions"
+@pytest.mark.parametrize(
+    ("flags", "because"),
+    [
+        (None, "since none has a reference of the same machine and versions"),
+        (
+            "--xla_level=0",
+            "since XLA_FLAGS here change bits (--xla_level=0), and none has a reference of the same flags, machine and "
+            "versions",
+        ),
+    ],
+)
+def test_where_nothing_could_be_compared_to_the_bit_the_reason_is_said(
+    monkeypatch: pytest.MonkeyPatch, flags: str | None, because: str
+) -> None:
+    monkeypatch.setattr("evoclaims.report.terminal_table.changing_flags", lambda: flags)
+    last = drift_lines(DriftReport((), 0.01), changed=[], compared=0).splitlines()[-1]
+    assert last == f"to the bit: no trial could be compared, {because}"
+
+
+def test_without_drift_the_nearest_comparison_and_what_was_detectable_are_shown() -> None:
+    near = DriftRow("a on b", "steps", 10, 60, "no drift", 0.02, 0.2, a12=0.7, median_new=3.0, median_ref=2.0)
+    report = DriftReport((near,), 0.01, detectable={"b": 1.84, "a": 0.8, "c": 0.81})
+    assert drift_lines(report, [], compared=3).splitlines()[1] == (
+        "no drift shown; nearest: a on b: steps is higher now: median 2 -> 3, A12 = 0.70, p = 0.2 (Holm); found would "
+        "have been with probability 0.95 a shift of all conditions by 0.8 SD in a, c, 1.8 SD in b"
     )
+
+
+def test_what_trials_overspent_is_shown_also_where_a_claim_is_supported() -> None:
+    for field in ("overspent", "copies"):
+        shown = replace(report(), verdict=verdict(Outcome.SUPPORTED, **{field: "3 of 10 trials of a"}))
+        assert explanations([shown], 200, colour=False).startswith("✓ ")
+    over = replace(report(), verdict=verdict(Outcome.SUPPORTED, overspent="3 of 10 trials of a spent up to 9 of 5"))
+    assert "[over budget: 3 of 10 trials of a spent up to 9 of 5]" in explanations([over], 200, colour=False)
 
 
 def test_eighty_columns_leave_out_the_files_and_nothing_else() -> None:
@@ -188,3 +221,27 @@ def test_trials_without_a_result_are_told_of_whatever_the_verdict() -> None:
         told = explanations([report(outcome=outcome, verdict=broken)], 160, False)
         assert told.endswith("G1: for a reason [worst rank: 2 of 10 trials of a ran out of time (seeds 0, 3)]")
     assert explanations([report()], 160, False) == ""
+
+
+@pytest.mark.parametrize("encoding", ["ascii", "latin-1", "koi8-r", None])
+@pytest.mark.parametrize("width", [70, 100, 1000])
+def test_columns_stay_aligned_on_terminals_without_some_characters(encoding: str | None, width: int) -> None:
+    """Each row's verdict begins where the heading's does, whatever its sentence is spelled with."""
+    sentences = ["plain", "≤ 5 € or more", "α … β", "§§§", "a sentence that is long enough to be cut: " + "é" * 60]
+    reports = [report(f"G{at}", statement=text, where=f"§{at}") for at, text in enumerate(sentences)]
+    heading, *rows = verdict_table(reports, width, False, encoding).splitlines()
+    begin = heading.index("verdict")
+    mark = "+" if encoding else "✓"
+    for row in rows[: len(reports)]:
+        assert row.encode(encoding or "utf-8")
+        assert cell_len(row[: row.index(f"{mark} supported")]) == begin
+
+
+def test_columns_of_other_tables_stay_aligned_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    terminal = io.TextIOWrapper(io.BytesIO(), encoding="ascii")
+    monkeypatch.setattr(sys, "stdout", terminal)
+    rows = [("§1 α", "1"), ("plain", "2")]
+    PlainSpokenConsole(file=terminal, width=60).print_whole(plain_table(("claim …", "n"), rows))
+    terminal.flush()
+    lines = terminal.buffer.getvalue().decode("ascii").splitlines()
+    assert [line.rstrip() for line in lines] == ["claim ...     n", "sec. 1 alpha  1", "plain         2"]

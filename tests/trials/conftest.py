@@ -13,6 +13,7 @@ import pytest
 from made_trials import sound
 
 from evoclaims.core.canonical import content_hash
+from evoclaims.trials.arrays import pack
 from evoclaims.trials.result import Status, TrialResult
 from evoclaims.trials.store import Store
 
@@ -27,6 +28,9 @@ METRICS = {
 }
 """What every trial has measured that has come to its end."""
 
+PARAMETERS = {"layer_0/kernel": np.arange(6, dtype=np.float32).reshape(2, 3), "bias": np.asarray(0.5, np.float32)}
+"""Of its champion: its digest is of these, too."""
+
 
 def _make_result(
     seed: int = 0,
@@ -35,8 +39,9 @@ def _make_result(
     levels: Mapping[str, tuple[float, ...]] | None = None,
     curves: Mapping[str, tuple[float, ...]] | None = None,
     method: str = "an_algorithm",
+    champion: Mapping[str, Any] | None = None,
 ) -> TrialResult:
-    """Return a sound result of a method that is a name alone."""
+    """Return a sound result of a method that is a name alone, with the champion `parameters` or another one."""
     condition = {"engine": 1, "method": {"name": method, "revision": 1, "parameters": {"rate": 0.1}}}
     return sound(
         {**condition, "seed": seed},
@@ -44,7 +49,7 @@ def _make_result(
         metrics={**METRICS, **(metrics or {})},
         levels={"success": (1.0, 0.5), "fitness": (0.0, -0.5), **(levels or {})},
         curves={"best": (0.25, 0.75)} if curves is None else curves,
-        champion=b"parameters",
+        champion=pack(PARAMETERS if champion is None else champion) if champion != {} else b"",
         timing={"run": 1.5, "compile": 0.5, "batch": 3, "started": "2025-01-01T00:00:00+00:00"},
         provenance={"git": None, "versions": {"numpy": "2.0"}},
     )
@@ -74,7 +79,7 @@ def edit_record() -> Callable[..., None]:
 @pytest.fixture(scope="session")
 def parameters() -> dict[str, Any]:
     """A champion's parameters: a matrix [2, 3] and a scalar."""
-    return {"layer_0/kernel": np.arange(6, dtype=np.float32).reshape(2, 3), "bias": np.asarray(0.5, np.float32)}
+    return dict(PARAMETERS)
 
 
 @pytest.fixture

@@ -253,12 +253,16 @@ def test_what_does_not_fit_is_a_sentence_with_the_file_and_what_is_there(
     ("name", "text", "said"),
     [
         ("a.csv", "", "it has no first line with the columns' names"),
-        ("b.csv", "seed,return\n1\n", "row 1 has 1 cells, and its first line names 2 columns"),
+        (
+            "b.csv",
+            "seed,return\n1\n",
+            r"row 1 has 1 cells \('1'\), and its first line names 2 columns \('seed,return'\)",
+        ),
         ("c.csv", "seed,seed\n1,2\n", r"two of its columns have one name \(seed, seed\)"),
-        ("d.json", "[1, 2]", "it is neither a JSON list of objects nor one object a line"),
-        ("e.json", "{", "it is neither a JSON list of objects nor one object a line"),
+        ("d.json", "[1, 2]", "a table in JSON is a list of objects, .*, and row 1 is 1"),
+        ("e.json", "{", "a table in JSON is a list of objects, .*, and its line 1 is '{'"),
         ("f.parquet", "PAR", "it is no Parquet file"),
-        ("g.json", '[{"seed": 1, "seed": 2, "return": 3}]', r"two of its columns have one name \(seed, seed, return"),
+        ("g.json", '[{"seed": 1, "seed": 2, "return": 3}]', r"two of its columns have one name \(seed, return, seed"),
         ("h.jsonl", '{"seed": 1, "return": 3, "return": 4}', r"two of its columns have one name \(seed, return, ret"),
     ],
 )

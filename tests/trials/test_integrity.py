@@ -5,17 +5,17 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 
 from evoclaims.core.errors import UserError
 from evoclaims.trials import integrity
 from evoclaims.trials.integrity import Problem, verify
 from evoclaims.trials.notice import announced, notice_path
-from evoclaims.trials.result import TrialResult
+from evoclaims.trials.result import TrialResult, digest
 from evoclaims.trials.store import Store
 
 pytestmark = pytest.mark.oldest
@@ -55,6 +55,34 @@ def kinds(problems: list[Problem]) -> list[tuple[str, str]]:
 
 def test_a_sound_store_has_no_problems(store: Store, trial: TrialResult) -> None:
     assert verify(store, repair=True) == []
+
+
+@pytest.mark.parametrize("field", ["metrics", "levels", "curves", "status"])
+def test_an_edited_record_is_found_by_its_digest(
+    field: str, store: Store, trial: TrialResult, edit_record: Any
+) -> None:
+    edited = {
+        "metrics": {**trial.metrics, "last_success": 1.0},
+        "levels": {**trial.levels, "success": (1.0, 1.0)},
+        "curves": {"best": (0.25, 1.0)},
+        "status": "diverged",
+    }
+    edit_record(store.record_path(trial.id), **{field: edited[field]})
+    (problem,) = verify(store, repair=False)
+    assert (problem.kind, problem.reason) == ("record", "its digest is not that of its contents, so it was edited")
+
+
+@pytest.mark.parametrize(
+    "fields", [{"status": "crashed", "provenance": {"crash": "killed"}}, {"status": "crashed"}, {"status": "timeout"}]
+)
+def test_a_trial_without_an_outcome_has_the_digest_of_its_reason(
+    fields: dict[str, Any], store: Store, make_result: Make
+) -> None:
+    unfinished = replace(make_result(champion={}), **fields)
+    said = fields.get("provenance", {}).get("crash", "").encode()
+    made = digest(unfinished.status, unfinished.metrics, unfinished.levels, unfinished.curves, said)
+    store.put(replace(unfinished, digest=made), {})
+    assert verify(store, repair=False) == []
 
 
 def test_a_store_that_does_not_exist_yet_has_no_problems(store: Store) -> None:
@@ -214,10 +242,12 @@ def test_a_problem_reads_as_one_printable_line(store: Store) -> None:
     assert "quarantine" in str(problem)
 
 
-def test_every_trial_of_a_larger_store_is_read_back(store: Store, make_result: Make) -> None:
+def test_every_trial_of_a_larger_store_is_read_back(
+    store: Store, make_result: Make, parameters: dict[str, Any]
+) -> None:
     results = [make_result(seed) for seed in range(20)]
     for result in results:
-        store.put(result, {"w": np.ones(3)})
+        store.put(result, parameters)
     bad = {results[3].id, results[11].id}
     for trial_id in bad:
         store.champion_path(trial_id).write_bytes(b"")

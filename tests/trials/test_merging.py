@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import signal
 import subprocess
@@ -24,6 +25,9 @@ from evoclaims.trials.store import Store
 pytestmark = pytest.mark.oldest
 
 Make = Callable[..., TrialResult]
+
+ONES = {"w": np.ones(2)}
+"""Another champion."""
 
 
 @pytest.fixture
@@ -68,8 +72,8 @@ def test_a_dry_run_says_the_same_and_writes_nothing(store: Store, other: Store) 
 def test_of_two_different_records_the_existing_one_stays_and_both_are_named(
     store: Store, other: Store, make_result: Make
 ) -> None:
-    mine = make_result(1, metrics={"last_success": 0.25}, levels={"success": (1.0, 0.25)})
-    store.put(mine, {"w": np.ones(2)})
+    mine = make_result(1, metrics={"last_success": 0.25}, levels={"success": (1.0, 0.25)}, champion=ONES)
+    store.put(mine, ONES)
     fates = {one.path.name: one for one in _merge(other, store)}
     assert Counter(one.fate for one in fates.values()) == {"copied": 2, "differs": 1}
     (differs,) = (one for one in fates.values() if one.fate == "differs")
@@ -95,7 +99,7 @@ def test_where_two_records_were_made_is_said(store: Store, other: Store, make_re
 def test_a_trial_without_an_outcome_gives_way_and_never_replaces_one(
     status: str, store: Store, other: Store, make_result: Make
 ) -> None:
-    without = make_result(0, status=status)
+    without = make_result(0, status=status, champion={})
     store.put(without, {})
     assert Counter(one.fate for one in _merge(other, store)) == {"copied": 3}
     assert store.get(without.id).status == "done"  # type: ignore[union-attr]
@@ -103,6 +107,14 @@ def test_a_trial_without_an_outcome_gives_way_and_never_replaces_one(
     behind.put(without, {})
     assert [one.fate for one in _merge(behind, store)] == ["there"]
     assert store.get(without.id).status == "done"  # type: ignore[union-attr]
+
+
+def test_an_edited_record_with_a_sound_seal_is_left_out(store: Store, other: Store, edit_record: Any) -> None:
+    path = next(other.record_paths())
+    edit_record(path, metrics={**json.loads(path.read_text())["metrics"], "last_success": 1.0})
+    merged = {one.path: one for one in _merge(other, store)}
+    assert Counter(one.fate for one in merged.values()) == {"copied": 2, "damaged": 1}
+    assert merged[path].reason == "it is left out: its digest is not that of its contents, so it was edited"
 
 
 @pytest.mark.parametrize("torn", ["record", "champion"])
@@ -178,11 +190,11 @@ def test_a_kill_in_the_middle_leaves_a_store_that_the_next_merge_completes(
 def test_a_trial_that_a_run_stores_meanwhile_is_not_overwritten(
     store: Store, other: Store, make_result: Make, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    racing = make_result(0, metrics={"last_success": 0.25})
+    racing = make_result(0, metrics={"last_success": 0.25}, champion=ONES)
 
     def faster(self: Store, result: TrialResult, packed: bytes) -> str:
         monkeypatch.undo()
-        store.put(racing, {"w": np.ones(2)})
+        store.put(racing, ONES)
         return store.put_packed(result, packed)
 
     monkeypatch.setattr(Store, "put_packed", faster)

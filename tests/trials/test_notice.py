@@ -311,6 +311,29 @@ def test_a_process_of_another_container_is_not_taken_for_one_that_has_ended(tmp_
     assert path.exists()
 
 
+@pytest.mark.skipif(not Path("/proc/self/ns/pid").exists(), reason="only Linux numbers processes anew in containers")
+@pytest.mark.parametrize("inside", [True, False])
+def test_a_container_with_the_hosts_name_breaks_no_notice_of_the_host(
+    inside: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = forge(tmp_path, OTHER, pid=GONE, host=socket.gethostname())  # as filelock writes it on the host itself
+    monkeypatch.setattr(notices, "_INITIAL", 1 if inside else os.stat("/proc/self/ns/pid").st_ino)
+    sweep(tmp_path)
+    assert path.exists() is inside
+
+
+@pytest.mark.skipif(not Path("/proc/self/ns/pid").exists(), reason="only Linux tells which processes there are")
+def test_a_process_that_proc_hides_has_not_ended(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = forge(tmp_path, OTHER, pid=os.getpid(), host=filelock_host(tmp_path))
+
+    def hidden(self: Path, **_: str) -> str:
+        raise FileNotFoundError(self)
+
+    monkeypatch.setattr(Path, "read_text", hidden)
+    sweep(tmp_path)
+    assert path.exists()
+
+
 def test_a_folder_that_cannot_be_swept_stops_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def refuse(path: Path) -> None:
         raise OSError(errno.EROFS, "Read-only file system")

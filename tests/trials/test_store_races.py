@@ -60,8 +60,11 @@ def _interleaved(monkeypatch: pytest.MonkeyPatch, order: str, puts: dict[str, Ca
 def test_the_first_record_keeps_its_own_champion_in_every_order(
     store: Store, make_result: Make, monkeypatch: pytest.MonkeyPatch, order: str
 ) -> None:
-    results = {"A": make_result(), "B": make_result(metrics={"mean_success": 0.0})}
     champions = {"A": {"w": np.zeros(3)}, "B": {"w": np.ones(3)}}
+    numbers = {"A": 0.75, "B": 0.0}
+    results = {
+        name: make_result(metrics={"mean_success": numbers[name]}, champion=champions[name]) for name in champions
+    }
     puts = {name: lambda name=name: store.put(results[name], champions[name]) for name in "AB"}  # type: ignore[misc]
     became = _interleaved(monkeypatch, order, puts)
     first = min("AB", key=order.rindex)
@@ -88,7 +91,7 @@ def test_equal_trials_are_stored_once_in_every_order(
 @pytest.fixture
 def raced(store: Store, make_result: Make) -> TrialResult:
     """A trial whose champion lies beside the usual place, where a killed process has left another one."""
-    result = make_result()
+    result = make_result(champion={"w": np.ones(3)})
     store.put(result, {"w": np.zeros(3)})
     store.record_path(result.id).unlink()
     store.put(result, {"w": np.ones(3)})

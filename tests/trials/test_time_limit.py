@@ -7,6 +7,7 @@ import signal
 import threading
 import weakref
 from collections.abc import Callable
+from contextlib import nullcontext
 from typing import Any
 
 import pytest
@@ -14,6 +15,7 @@ from climbers import CLIMBING, SEEDS, Log, digests, run_climbers
 from hypothesis import given
 from hypothesis import strategies as st
 
+from evoclaims.core import waiting
 from evoclaims.core.errors import UserError
 from evoclaims.trials import allowance as allowances
 from evoclaims.trials.allowance import Allowance, OutOfTimeError
@@ -115,6 +117,52 @@ def test_under_a_limit_that_is_not_reached_trials_come_out_to_the_same_bits(
     assert digests(_run(store, cpus, 86_400.0)) == digests(uninterrupted)
 
 
+@pytest.mark.parametrize("waits", [True, False])
+def test_waiting_for_another_process_costs_no_time(waits: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    now, begun, late = 0.0, threading.Event(), threading.Event()
+
+    def look(*_: Any) -> None:
+        """Half a second goes by at each look; after 50 of them the work ends."""
+        nonlocal now
+        begun.wait()
+        if (now := now + 0.5) == 25.0:
+            late.set()
+
+    monkeypatch.setattr(waiting.time, "monotonic", lambda: now)
+    monkeypatch.setattr(allowances, "wait", look)
+
+    def work() -> str:
+        with waiting.waiting() if waits else nullcontext():
+            begun.set()
+            late.wait()
+        return "done"
+
+    if waits:
+        assert Allowance(5.0).spend(work) == "done"
+    else:
+        with pytest.raises(OutOfTimeError):
+            Allowance(5.0).spend(work)
+        late.set()
+
+
+def test_the_clock_stands_while_any_thread_waits(monkeypatch: pytest.MonkeyPatch) -> None:
+    now = 0.0
+    monkeypatch.setattr(waiting.time, "monotonic", lambda: now)
+    began = waiting.working_time()
+    now += 1
+    first, second = waiting.waiting(), waiting.waiting()
+    first.__enter__()
+    now += 10
+    second.__enter__()
+    now += 10
+    assert waiting.working_time() - began == 1
+    first.__exit__(None, None, None)
+    now += 10
+    second.__exit__(None, None, None)
+    now += 1
+    assert waiting.working_time() - began == 2
+
+
 def test_without_a_limit_the_work_stays_on_its_thread_and_with_one_it_has_its_own() -> None:
     assert Allowance(math.inf).spend(threading.current_thread) is threading.current_thread()
     assert Allowance(600.0).spend(threading.current_thread).daemon
@@ -181,7 +229,7 @@ def test_time_in_which_the_process_was_stopped_does_not_count(monkeypatch: pytes
             return 10_001.0
         return now
 
-    monkeypatch.setattr("evoclaims.trials.allowance.time.monotonic", clock)
+    monkeypatch.setattr("evoclaims.core.waiting.time.monotonic", clock)
     monkeypatch.setattr(allowances, "LOOK_SECONDS", 0.01)
     allowance = Allowance(1.0)
     assert allowance.spend(release.wait)

@@ -43,12 +43,12 @@ IN_EVERY_WAY = condition(toy_loops.in_every_way)
 def all_ends(tmp_path_factory: pytest.TempPathFactory, cpus: list[Any]) -> tuple[Store, list[TrialResult], list[Any]]:
     """Trials of a loop that ends in every way, and what was told meanwhile."""
     store, told = Store(tmp_path_factory.mktemp("ends") / "store"), list[RunProgress]()
-    return store, run(IN_EVERY_WAY, range(4), store, cpus, told.append), told
+    return store, run(IN_EVERY_WAY, range(5), store, cpus, told.append), told
 
 
 def test_each_trial_ends_as_its_process_does_and_the_others_go_on(all_ends: Any) -> None:
     _, results, told = all_ends
-    assert [result.status for result in results] == ["done", "crashed", "crashed", "diverged"]
+    assert [result.status for result in results] == ["done", "crashed", "crashed", "diverged", "diverged"]
     good = results[0]
     assert good.metrics["last_fitness"] == 7.5
     assert good.metrics["found"] == math.inf
@@ -56,7 +56,7 @@ def test_each_trial_ends_as_its_process_does_and_the_others_go_on(all_ends: Any)
     assert math.isnan(good.metrics["mean_success"])
     assert good.provenance["scored_by"] == "training function"
     assert good.provenance["trained_by"] == "toy_loops:in_every_way"
-    assert told[-1].ended == told[-1].trials == 4
+    assert told[-1].ended == told[-1].trials == 5
     assert told[-1].total_steps == 100
 
 
@@ -76,10 +76,11 @@ def test_what_is_reported_becomes_curves_of_as_many_points_as_the_budget_says(al
     assert good.curves["environment_steps"] == good.curves["steps"] == steps
     assert good.curves["fitness"] == tuple(step / 100 for step in steps)
     assert crashed.curves["fitness"] == tuple(1 + step / 100 for step in steps)
+    assert all(map(math.isfinite, all_ends[1][4].curves["fitness"]))  # it has diverged by what no point shows
 
 
 def test_a_crash_tells_the_last_words_of_its_process_safely(all_ends: Any) -> None:
-    _, (_, raised, killed, _), told = all_ends
+    _, (_, raised, killed, *_), told = all_ends
     assert crashes.why(raised) == "ValueError: the reactor is \\x1b[31mred"
     assert "in in_every_way" in raised.provenance["crash"]
     assert crashes.why(killed) == "its process ended with SIGSEGV"
@@ -96,10 +97,10 @@ def test_the_same_seed_gives_the_same_digest_and_another_process_tries_a_crash_a
     run(IN_EVERY_WAY, range(1), store, cpus)
     assert store.get(results[0].id).digest == results[0].digest  # type: ignore[union-attr]
     told = list[RunProgress]()
-    run(IN_EVERY_WAY, range(4), first, cpus, told.append)
+    run(IN_EVERY_WAY, range(5), first, cpus, told.append)
     assert told == []
     monkeypatch.setattr(crashes, "_seen", set())  # as another process has it
-    run(IN_EVERY_WAY, range(4), first, cpus, told.append)
+    run(IN_EVERY_WAY, range(5), first, cpus, told.append)
     assert {one.trials for one in told if not one.remark} == {2}
 
 

@@ -55,7 +55,8 @@ def test_a_record_answers_for_its_own_versions_alone(store: Store, make_result: 
 
 
 def test_every_record_of_a_trial_stays_whichever_comes_first(store: Store, make_result: Make, tmp_path: Path) -> None:
-    made = [_made(make_result, versions, score) for versions, score in ((OLD, 0.0), (NEW, 0.5), (OTHER, 1.0))]
+    scores = ((OLD, 0.0), (NEW, 0.5), (OTHER, 1.0))
+    made = [_made(make_result, versions, score, champion={}) for versions, score in scores]
     for number, order in enumerate(permutations(made)):
         one = Store(tmp_path / str(number))
         assert [one.put(result, {}) for result in order] == ["stored"] * 3
@@ -104,7 +105,8 @@ def test_of_other_versions_the_newest_is_judged(store: Store, make_result: Make)
 
 
 def test_a_record_of_an_older_release_answers_by_what_its_provenance_says(store: Store, make_result: Make) -> None:
-    old, new = _made(make_result, OLD, 1.0), _made(make_result, NEW, 0.0)
+    old = _made(make_result, OLD, 1.0, champion={"w": np.zeros(1)})
+    new = _made(make_result, NEW, 0.0, champion={"w": np.ones(1)})
     path = _as_before(store, old, {"w": np.zeros(1)})
     assert path.name == f"{old.id}.json"
     found = store.made_with(old.id, OLD)
@@ -138,7 +140,7 @@ def test_each_record_keeps_its_own_champion(store: Store, make_result: Make) -> 
 
 
 def test_a_torn_record_is_told_where_it_counts_and_leaves_the_others_alone(store: Store, make_result: Make) -> None:
-    old, new = _made(make_result, OLD, 0.5), _made(make_result, NEW, 0.5)
+    old, new = _made(make_result, OLD, 0.5), _made(make_result, NEW, 0.5, champion={"w": np.ones(3)})
     store.put(old, {"w": np.zeros(3)})
     store.put(new, {"w": np.ones(3)})
     torn = store.home(old)

@@ -28,7 +28,7 @@ OLD = AcceptedVerdict(
     trials="1",
 )
 NEW = replace(OLD, outcome=Outcome.SUPPORTED, p=0.06, versions={"jax": "0.10.2"}, device="cpu", trials="2")
-FINE = DriftRow("a on t (smoke)", "reward", 10, 10, "no drift", p=0.5)
+FINE = DriftRow("a on t (smoke)", "reward", 10, 10, "no drift", 0.5, 0.7, a12=0.6, median_new=2.0, median_ref=1.0)
 ELSEWHERE = replace(FINE, label="b on t (smoke)", status="drift")
 SAME = DigestCheck(10, ())
 
@@ -36,20 +36,29 @@ SAME = DigestCheck(10, ())
 def _why(
     new: AcceptedVerdict = NEW, rows: tuple[DriftRow, ...] = (FINE, ELSEWHERE), digests: DigestCheck = SAME
 ) -> str:
-    return reason(REPORT, OLD, new, DriftReport(rows, 0.01), digests)
+    return reason(REPORT, OLD, new, DriftReport(rows, 0.01, detectable={"a (smoke)": 1.8}), digests)
 
 
-def test_other_draws_that_have_not_drifted_are_no_sign_of_a_mistake() -> None:
+def test_other_draws_without_drift_come_with_the_nearest_comparison_and_what_was_detectable() -> None:
     assert _why() == (
-        "its trials are other draws of the same experiment (jax 0.11.2 -> 0.10.2, device H200 -> cpu); none has "
-        "drifted, so that this is no sign of a mistake: with 10 trials a side a verdict near its bound falls one way "
-        "or the other by chance (p was 0.04, and is 0.06); `--claims-trials N` looks at more"
+        "its trials are other draws (jax 0.11.2 -> 0.10.2, device H200 -> cpu); no drift shown; nearest: "
+        "a on t (smoke): reward is higher now: median 1 -> 2, A12 = 0.60, p = 0.7 (Holm); found would have been "
+        "with probability 0.95 a shift of all conditions by 1.8 SD in a (smoke). With 10 trials a side a verdict "
+        "near its bound can fall either way by chance (p was 0.04, and is 0.06); `--claims-trials N` looks at more"
     )
 
 
-@pytest.mark.parametrize("rows", [(), (replace(FINE, status="no reference", p=None),), (ELSEWHERE,)])
-def test_without_a_check_for_drift_nothing_is_said_to_be_no_mistake(rows: tuple[DriftRow, ...]) -> None:
+@pytest.mark.parametrize("rows", [(), (replace(FINE, status="no reference", p=None, p_holm=None),), (ELSEWHERE,)])
+def test_without_a_check_nothing_is_known_of_drift(rows: tuple[DriftRow, ...]) -> None:
     assert "whether they drifted is not known" in _why(rows=rows)
+
+
+def test_drift_of_other_versions_and_of_the_method_elsewhere_is_said() -> None:
+    upgraded = DriftReport((replace(FINE, status="drift"),), 0.01)
+    found = reason(REPORT, OLD, NEW, DriftReport((FINE,), 0.01), SAME, upgraded)
+    assert found == "the trials of a on t (smoke) have drifted from those of other versions, as said above"
+    other = replace(FINE, label="a on another (smoke)", status="drift")
+    assert "but trials of the same method have drifted: a on another (smoke)" in _why(rows=(FINE, other))
 
 
 def test_a_change_of_what_is_computed_is_told_from_chance() -> None:

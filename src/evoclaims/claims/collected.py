@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
 
 import pytest
 
@@ -18,10 +18,34 @@ TIER: Final = "claim_tier"
 """The parameter that makes a claim test run once per tier; the plugin makes it the last one."""
 
 
+_REPETITION: Final = re.compile(r"(^|-)run\d+of\d+(?=-|$)")
+"""The id of a parameter that only repeats a test, within the ids of all."""
+
+
 def tier_id(claim: object, tier: str) -> str:
     """Return how a test's id ends, such as "G9-smoke": in characters that pytest never escapes."""
     named = claim.id if isinstance(claim, Claim) else ""
     return "-".join(filter(None, (re.sub(r"[^A-Za-z0-9_.-]+", "_", named), tier)))
+
+
+def note_repetitions(metafunc: pytest.Metafunc) -> list[str]:
+    """Return a list that fills with the parameters of a claim's test by which plugins only repeat it.
+
+    Neither the test nor a fixture of it asks for such a parameter, so that it makes no other case of the claim. Its
+    ids become those of `_REPETITION`.
+    """
+    asked, repeats, parametrize = frozenset(metafunc.fixturenames), list[str](), metafunc.parametrize
+
+    def noting(argnames: str | Sequence[str], argvalues: Iterable[Any], *rest: Any, **options: Any) -> None:
+        names = [name.strip() for name in argnames.split(",")] if isinstance(argnames, str) else [*argnames]
+        if asked.isdisjoint(names):
+            repeats.extend(names)
+            sets = [value if isinstance(value, type(pytest.param())) else pytest.param(value) for value in argvalues]
+            argvalues = [one._replace(id=f"run{at}of{len(sets)}") for at, one in enumerate(sets, start=1)]
+        parametrize(argnames, argvalues, *rest, **options)
+
+    metafunc.parametrize = noting  # type: ignore[method-assign, assignment]
+    return repeats
 
 
 @dataclass(frozen=True)
@@ -54,7 +78,10 @@ class ClaimTest:
         if not isinstance(claim, Claim):
             raise UserError(f"{item.nodeid} has the mark pytest.mark.claim but no claim: use @claim(...) of evoclaims.")
         tier: str = callspec.params[TIER]
-        return ClaimTest(claim, tier, callspec.id.removesuffix(tier_id(claim, tier)).removesuffix("-"))
+        case: str = callspec.id.removesuffix(tier_id(claim, tier)).removesuffix("-")
+        if item.get_closest_marker("claim_repeated"):
+            case = _REPETITION.sub("", case).removeprefix("-")
+        return ClaimTest(claim, tier, case)
 
     @property
     def key(self) -> tuple[str, str]:
@@ -65,6 +92,8 @@ class ClaimTest:
 def claim_tests(items: Iterable[pytest.Item]) -> dict[pytest.Item, ClaimTest]:
     """Return what every claim test among `items` judges, after checking that their names are unique.
 
+    A test that plugins repeat is there several times.
+
     Raises:
         UserError: as `ClaimTest.of` does, when two tests have the same name and tier, or when one test without
             parameters has the id of others with some.
@@ -73,7 +102,7 @@ def claim_tests(items: Iterable[pytest.Item]) -> dict[pytest.Item, ClaimTest]:
     first: dict[tuple[str, str], pytest.Item] = {}
     for item, test in tests.items():
         other = first.setdefault(test.key, item)
-        if other is not item:
+        if _call(other) != _call(item):
             tier, name = test.key
             raise UserError(
                 f"Two claim tests are called {name} at the {tier} tier, {other.nodeid} and {item.nodeid}, so that the "
@@ -89,3 +118,16 @@ def claim_tests(items: Iterable[pytest.Item]) -> dict[pytest.Item, ClaimTest]:
                 "of them another claim id, or both parameters."
             )
     return tests
+
+
+def _call(item: pytest.Item) -> tuple[object, ...]:
+    """Return which function an item calls with which parameters; equal for repetitions of a test."""
+    repeated = item.get_closest_marker("claim_repeated")
+    params: dict[str, object] = item.callspec.params  # type: ignore[attr-defined]
+    own = {
+        name: value if isinstance(value, str | int | float) else id(value)  # some values cannot be compared
+        for name, value in params.items()
+        if not (repeated and name in repeated.args)
+    }
+    parent = item.parent.nodeid if item.parent else ""
+    return item.path, parent, getattr(item, "originalname", item.name), own

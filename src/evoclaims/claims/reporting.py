@@ -12,6 +12,7 @@ from evoclaims.judging.assertion import Assertion
 from evoclaims.judging.design import Design
 from evoclaims.judging.judge import attainability
 from evoclaims.judging.verdict import Outcome, Verdict
+from evoclaims.paper.pilots import read_of
 from evoclaims.paper.trial_group import TrialGroup
 from evoclaims.trials.spec import TrialSpec
 from evoclaims.verdicts.claim_report import Attainable, ClaimReport
@@ -29,9 +30,10 @@ def judged(
         unjudged(test, verdict.outcome, verdict.reason),
         verdict=verdict,
         asserts=content_hash(assertion.plain()),
-        sources=tuple(_source(group, seeds, again.get(group.fingerprint, ())) for group in groups),
+        sources=tuple(_source(group, seeds, again.get(group.fingerprint, ()), assertion) for group in groups),
         attainable=tuple(
-            Attainable(look.n, look.alpha, p.supported, p.refuted) for look, p in attainability(assertion, design)
+            Attainable(look.n, look.alpha, p.supported, p.refuted, p.smaller)
+            for look, p in attainability(assertion, design)
         ),
     )
 
@@ -58,10 +60,12 @@ def expecting(report: ClaimReport, expectation: Expectation | None) -> ClaimRepo
     return replace(report, expected=expectation.outcome, because=expectation.because)
 
 
-def _source(group: TrialGroup, seeds: Sequence[int], again: Collection[int]) -> SourceTrials:
+def _source(group: TrialGroup, seeds: Sequence[int], again: Collection[int], assertion: Assertion) -> SourceTrials:
     """Describe one condition of a report."""
     condition = group.condition
     trials = group.fetch(seeds) if seeds else ()
+    readings = [reading for reading in assertion.readings() if reading.source.fingerprint == group.fingerprint]
+    finished = [trial for trial in trials if trial.status == "done"]
     return SourceTrials(
         method=group.method,
         task=group.task,
@@ -70,4 +74,5 @@ def _source(group: TrialGroup, seeds: Sequence[int], again: Collection[int]) -> 
         versions=found_in(trials, condition.packages) if seeds else {},
         again=tuple(sorted(again)),
         edited=condition.edited_since(trials),
+        reads=read_of(finished[0], readings) if finished else (),
     )

@@ -10,7 +10,7 @@ from typing import Any
 from evoclaims.claims.as_published import AsPublished
 from evoclaims.claims.claim import Expectation
 from evoclaims.claims.collected import ClaimTest
-from evoclaims.claims.fetching import NotStoredError, StoredOnly
+from evoclaims.claims.fetching import NotStoredError, RunMissing, StoredOnly
 from evoclaims.claims.null_agents import satisfied_by
 from evoclaims.claims.reporting import expecting, judged
 from evoclaims.core.errors import UserError
@@ -19,21 +19,24 @@ from evoclaims.judging.assertion import Assertion
 from evoclaims.judging.design import Design, Look
 from evoclaims.judging.drift import DriftReport
 from evoclaims.judging.fingerprint import fingerprint
-from evoclaims.judging.judge import judge
+from evoclaims.judging.judge import decide, judge
 from evoclaims.judging.measure import Event, Measure, Profile
+from evoclaims.judging.power import Draws
 from evoclaims.judging.tripwire import DigestCheck
 from evoclaims.judging.verdict import Outcome, Verdict
-from evoclaims.paper import references
+from evoclaims.paper import pilots, references
 from evoclaims.paper.archive import Archive
 from evoclaims.paper.reproduction import Reproduction
 from evoclaims.paper.trial_group import Fetch, TrialGroup
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.spec import Condition, TrialSpec
 from evoclaims.trials.store import Store
-from evoclaims.verdicts import mutation_matrix
+from evoclaims.verdicts import history, mutation_matrix
 from evoclaims.verdicts.claim_report import CONTROL, ClaimReport, located, named, save, succeeding
+from evoclaims.verdicts.history import key_of
 from evoclaims.verdicts.mutation_matrix import Matrix
 from evoclaims.verdicts.readings import ReadAs, moment
+from evoclaims.verdicts.repeated_runs import following
 from evoclaims.verdicts.upgrade import Succession, Upgrade, predecessors, upgrade
 
 
@@ -47,6 +50,7 @@ class _Used:
     condition: Condition
     ids: set[str] = field(default_factory=set)
     again: set[int] = field(default_factory=set)
+    reads: set[str] = field(default_factory=set)
 
 
 @dataclass(frozen=True)
@@ -70,6 +74,7 @@ class Session:
         trials: a fixed number of trials in place of the tier's looks; None keeps the tier's design.
         variant: name of a variant of the protocol; empty for the protocol itself.
         again: seeds that were run again, since stored trials were made with other versions, by the condition's id.
+        runs: the newest report of each claim, by tier and name: a plugin may run its test again.
     """
 
     reproduction: Reproduction
@@ -78,6 +83,7 @@ class Session:
     trials: int | None = None
     variant: str = ""
     again: Mapping[str, Collection[int]] = field(default_factory=dict)
+    runs: dict[tuple[str, str], ClaimReport] = field(default_factory=dict, compare=False)
 
     @cached_property
     def mutants(self) -> Matrix:
@@ -112,15 +118,14 @@ class Session:
         """
         verdict = self._verdict(test, assertion)
         report = judged(test, assertion, self.design(test.tier), verdict, self.again)
-        report = replace(report, satisfied_by=self._satisfied_by(test, assertion, verdict))
+        by, chance = self._satisfied_by(test, assertion, verdict), self._chance(report, assertion)
+        report = replace(report, satisfied_by=by, chance=chance)
         if self.variant or not isinstance(self.fetch, StoredOnly) or not test.claim.is_read_at(test.tier):
             return report
-        first = Reading(test.claim.read, assertion, "the test's own assertion", test.claim.since)
-        read = [
-            self._read(test.tier, first, verdict),
-            *(self._read(test.tier, one, self._verdict(test, one.assertion)) for one in others),
-        ]
-        return replace(report, readings=tuple(read))
+        design, claim = self.design(test.tier), test.claim
+        first = Reading(claim.read, assertion, "the assertion that the claim judges", claim.since)
+        read = (_judged(first, design, verdict.outcome), *(_judged(one, design) for one in others))
+        return replace(report, readings=read)
 
     def _verdict(self, test: ClaimTest, assertion: Assertion) -> Verdict:
         """Return the verdict on an assertion; "not run" where trials may not be run."""
@@ -133,21 +138,6 @@ class Session:
             mark = fingerprint(assertion, design, claim=name, tier=tier)
             of = next((f"{one.label}: " for one in assertion.sources() if one.fingerprint == error.condition), "")
             return Verdict(Outcome.NOT_RUN, f"{of}{error}", assertion.describe(), mark)
-
-    def _read(self, tier: str, reading: Reading, verdict: Verdict) -> ReadAs:
-        """Return a reading with its verdict, and when the first of its trials started."""
-        seeds = self.design(tier).seeds(verdict.n)
-        trials = [trial for source in reading.assertion.sources() for trial in source.fetch(seeds)] if seeds else []
-        started = min((str(trial.timing["started"]) for trial in trials if "started" in trial.timing), default="")
-        return ReadAs(
-            reading.name,
-            reading.because,
-            reading.since,
-            verdict.describe,
-            verdict.outcome,
-            verdict.reason,
-            started,
-        )
 
     def _satisfied_by(self, test: ClaimTest, assertion: Assertion, verdict: Verdict) -> tuple[str, ...]:
         """Return the null agents that satisfy a claim of the paper; controls are about such agents themselves.
@@ -166,6 +156,29 @@ class Session:
 
         return satisfied_by(agents, assertion, look, design, others if reads else None)
 
+    def _chance(self, report: ClaimReport, assertion: Assertion) -> float | None:
+        """Return how often an inconclusive claim ends so in draws from its pilots, if it was accepted as supported."""
+        design = self.design(report.tier)
+        if report.outcome is not Outcome.INCONCLUSIVE or self.variant or self.trials is not None:
+            return None
+        found: dict[str, tuple[TrialResult, ...]] = {}
+        try:
+            accepted = history.load(self.reproduction.folder / history.FILE).get(history.key_of(report), ())
+            if not accepted or accepted[-1].outcome is not Outcome.SUPPORTED:
+                return None
+            for group in assertion.sources():
+                if not isinstance(group, TrialGroup):
+                    return None
+                path = pilots.path_of(self.reproduction.folder, report.tier, group.method, group.task)
+                readings = [one for one in assertion.readings() if one.source.fingerprint == group.fingerprint]
+                found[group.fingerprint] = pilots.load(path)
+                if pilots.unfit(found[group.fingerprint], group.condition, design, readings):
+                    return None
+        except UserError:  # whoever compares with the damaged file says so
+            return None
+        outcomes = list(Draws(found).outcomes(assertion, design))
+        return outcomes.count(Outcome.INCONCLUSIVE) / len(outcomes)
+
     def complete(self, report: ClaimReport, expectation: Expectation | None) -> ClaimReport:
         """Return a report with the variant, an accepted outcome, what mutants showed, and the file that holds it.
 
@@ -177,9 +190,18 @@ class Session:
         complete, root = expecting(replace(report, variant=self.variant), expectation), self.store.root
         if not self.variant:  # mutants are tried on the protocol itself
             complete = replace(complete, tried=mutation_matrix.tried(self.mutants, complete))
-        if isinstance(self.fetch, StoredOnly):
-            return located(complete, root)
-        return save(succeeding(complete, root), root)
+        last, reads = self.runs.get(key_of(complete)), isinstance(self.fetch, StoredOnly)
+        if last is not None:
+            complete = following(complete, last)
+        elif not reads:
+            complete = succeeding(complete, root)
+        complete = located(complete, root) if reads else save(complete, root)
+        self.runs[key_of(complete)] = complete
+        return complete
+
+    def save(self, report: ClaimReport) -> ClaimReport:
+        """Write a report's file again, with runs of other processes; only a session that runs trials does."""
+        return save(report, self.store.root) if report.evidence and isinstance(self.fetch, RunMissing) else report
 
     def leaves(self, tier: str, assertion: Assertion) -> bool:
         """Whether there is a variant, and the protocol itself has all conditions that an assertion is about."""
@@ -192,7 +214,14 @@ class Session:
     def drift(self, reports: Sequence[ClaimReport]) -> tuple[DriftReport, DigestCheck]:
         """Compare the trials behind `reports` with the committed reference trials of their tiers."""
         cases = [
-            references.paired(f"{used.method} on {used.task} ({used.tier})", trials, self._reference(used))
+            references.paired(
+                f"{used.method} on {used.task} ({used.tier})",
+                trials,
+                self._reference(used),
+                method=f"{used.method} ({used.tier})",
+                reads=used.reads,
+                pilot=self._pilot(used),
+            )
             for used in self._used(reports)
             if (trials := self._trials(used))
         ]
@@ -215,7 +244,8 @@ class Session:
             if now and before and len(now) == len(trials):
                 old = recorded(before[0].provenance, condition.packages)
                 label = f"{used.method} on {used.task} ({used.tier})"
-                successions.append(Succession(label, old, here, before, now, len(used.again)))
+                method, reads = f"{used.method} ({used.tier})", tuple(sorted(used.reads))
+                successions.append(Succession(label, old, here, before, now, len(used.again), method, reads))
         return upgrade(successions)
 
     def _used(self, reports: Sequence[ClaimReport]) -> list[_Used]:
@@ -231,6 +261,7 @@ class Session:
                     found[names] = _Used(*names, tier.condition(*names[1:]))
                 found[names].ids.update(source.trials)
                 found[names].again.update(source.again)
+                found[names].reads.update(source.reads)
         return [used for _, used in sorted(found.items())]
 
     def _reference(self, used: _Used) -> tuple[TrialResult, ...]:
@@ -241,11 +272,31 @@ class Session:
             return own
         return references.of_condition(self.reproduction.references, *names, used.condition.id) or own
 
+    def _pilot(self, used: _Used) -> tuple[TrialResult, ...]:
+        """Return the committed pilot of a condition; empty if there is none."""
+        found = pilots.load(pilots.path_of(self.reproduction.folder, used.tier, used.method, used.task))
+        return found if found and found[0].condition == used.condition.id else ()
+
     def _trials(self, used: _Used) -> list[TrialResult]:
         """Return the stored trials that a condition's claims were judged from."""
         get = self.fetch.archive.stored if isinstance(self.fetch, StoredOnly) else self.store.get
         stored = (get(trial, used.condition.versions) for trial in sorted(used.ids))
         return [trial for trial in stored if trial is not None]
+
+
+def _judged(reading: Reading, design: Design, outcome: Outcome | None = None) -> ReadAs:
+    """Judge a reading by the trials at hand; its outcome is given if it has been judged already."""
+    started: list[str] = []
+    try:
+        ending = decide(reading.assertion, design)
+        if ending is not None:
+            trials = [trial for several in ending.trials.values() for trial in several]
+            started = [str(trial.timing["started"]) for trial in trials if "started" in trial.timing]
+        found = Outcome.INCONCLUSIVE if ending is None else ending.outcome
+    except NotStoredError:
+        found = Outcome.NOT_RUN
+    asserts, since = reading.assertion.describe(), min(started, default="")
+    return ReadAs(reading.name, reading.because, reading.since, asserts, outcome or found, since)
 
 
 @dataclass

@@ -81,7 +81,8 @@ def workload(session: Session, tests: Mapping[pytest.Item, ClaimTest]) -> Worklo
         return None
     platform = devices.choose(session.fetch.device)[0].platform
     claims, works = dict[str, tuple[str, ...]](), dict[str, Work]()
-    for item, test in tests.items():
+    once = {test.key: (item, test) for item, test in reversed(tests.items())}  # plugins may repeat tests
+    for item, test in reversed(once.values()):
         claims[item.nodeid] = ()
         with suppress(Exception):  # an error of a method or a task is reported when the claim is judged
             groups = {group.fingerprint: group for group in _needed(session, item, test)}

@@ -134,9 +134,10 @@ def _stores(project: Project, tiers: Sequence[str], old: Store, new: Store) -> t
 def _drift_lines(drift: DriftReport, digests: DigestCheck, new: Side) -> Iterator[str]:
     """Yield what the comparison of trials found."""
     names = {trials[0].condition: name for name, trials in new.trials.items() if trials}
-    drifted = sum(row.drifted for row in drift.rows)
-    yield f"trials: {drift.tested} comparisons, {drifted} drifted (exact rank tests, Holm, α = {drift.alpha:g})"
+    yield f"trials: {drift.counts}"
     yield from (f"  {line}" for line in drift.lines)
+    if drift.nearest is not None and not drift.drifted:
+        yield f"  {drift.undecided}"
     yield f"to the bit: {digests.compared} trials compared, {len(digests.changed)} changed"
     seeds: dict[str, list[int]] = {}
     for change in digests.changed:

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import argparse
 import os
+import re
 import subprocess
 import tempfile
 import time
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -15,7 +17,7 @@ from evoclaims.claims.selection import selected
 from evoclaims.cli.project import open_project
 from evoclaims.cli.store_folder import open_store
 from evoclaims.cli.terminal import terminal
-from evoclaims.core.environments import Environment, NotInstallableError, Recipe, make, reason
+from evoclaims.core.environments import Environment, NotInstallableError, Recipe, ending, make, reason
 from evoclaims.core.errors import UnknownNameError, UserError
 from evoclaims.core.files import at_once, read_json
 from evoclaims.core.printable import printable
@@ -60,22 +62,27 @@ class Elsewhere:
 
     def judge(self, recipe: Recipe) -> Judged:
         """Make an environment, or take the kept one, and judge the claims in it; say what is done meanwhile."""
-        began, label = time.monotonic(), printable(recipe.label)
+        began, label, notes = time.monotonic(), printable(recipe.label), ""
         # The name of a record's file has no version of Python, so that another Python needs a store of its own.
         store = Store(self.store.root / f"python{recipe.python}") if recipe.python else self.store
         try:
             begins = partial(print, f"{label}: making its environment", flush=True)
             environment = make(recipe, self.store.root / KEPT, self.root, begins)
+            moved = environment.moved(recipe.package) if recipe.is_layer else {}
+            also = ", ".join(f"{name} {was or 'none'} -> {now}" for name, (was, now) in moved.items())
+            notes = f"its installation changed {also}, too" if also else ""
+            if notes:
+                print(f"{label}: {notes}", flush=True)
+            if below := environment.below(recipe.package, self.root):
+                raise NotJudgedError(_too_old(below))
             log = os.path.relpath(environment.folder / LOG)
             print(f"{label}: judging claims; what pytest says is in {log}", flush=True)
             reports = self._run(environment, store)
         except (NotInstallableError, NotJudgedError) as error:
             print(f"{label}: {error}", flush=True)
-            return Judged(recipe.label, {}, {}, trouble=str(error))
+            return Judged(recipe.label, {}, {}, trouble=str(error), notes=notes)
         print(f"{label}: {totals(reports)} in {duration(time.monotonic() - began)}", flush=True)
-        moved = environment.moved(recipe.package) if recipe.is_layer else {}
-        also = ", ".join(f"{name} {was or 'none'} -> {now}" for name, (was, now) in moved.items())
-        return judged(recipe.label, reports, store, f"its installation changed {also}, too" if also else "")
+        return judged(recipe.label, reports, store, notes)
 
     def _run(self, environment: Environment, store: Store) -> list[ClaimReport]:
         """Run the claims in an environment and return their reports.
@@ -94,7 +101,7 @@ class Elsewhere:
         except OSError as error:  # a full disk
             raise NotJudgedError(f"pytest cannot be run there ({error})") from error
         if not reports or status not in (0, 1, 5):  # pytest's: all well, failures, and nothing measured
-            raise NotJudgedError(f"pytest ended with {status}: {printable(reason(output))}")
+            raise NotJudgedError(f"pytest {ending(status)}{_last_words(status, output)}")
         return reports
 
     def _command(self, environment: Environment, store: Store, verdicts: Path) -> list[str]:
@@ -109,6 +116,23 @@ class Elsewhere:
             *(f"--claims-storage={store.root.absolute()}", f"--claims-json={verdicts}"),
             *([] if self.only is None else [f"--claims-only={self.only}"]),
         ]
+
+
+def _too_old(below: Mapping[str, tuple[str, str]]) -> str:
+    """Return why claims are not judged in an environment with these packages."""
+    found = ", ".join(f"{name} {version} (oldest supported: {oldest})" for name, (version, oldest) in below.items())
+    return f"it has {found}; name a release that works with supported ones"
+
+
+def _last_words(status: int, output: str) -> str:
+    """Return the last lines of a process; where a signal killed it, the innermost function of a dump of its stack."""
+    if status >= 0:
+        return f": {printable(reason(output))}"
+    _, _, stack = output.partition("(most recent call first):")
+    frame = re.search(r'File "(?P<file>[^"]+)", line (?P<line>\d+) in (?P<name>\S+)', stack)
+    if frame is None:
+        return ""
+    return printable(f" in {frame['name']} ({'/'.join(Path(frame['file']).parts[-3:])}, line {frame['line']})")
 
 
 def _reports(verdicts: Path) -> list[ClaimReport]:

@@ -22,6 +22,7 @@ from evoclaims.plugin.run_session import SESSION
 from evoclaims.plugin.summary import ATTRIBUTE
 from evoclaims.verdicts import history
 from evoclaims.verdicts.claim_report import ClaimReport
+from evoclaims.verdicts.repeated_runs import last_runs
 
 _ENVIRONMENT: Final = ("PYTEST_ADDOPTS", "PYTEST_PLUGINS", "PYTEST_DISABLE_PLUGIN_AUTOLOAD")
 """Variables that change which tests a run of pytest collects, and when it stops."""
@@ -75,7 +76,7 @@ def judge(config: SuiteConfig, asked: Sequence[tuple[Session, str]]) -> list[lis
             "@claim(...)."
         )
     run.check_complete()
-    return run.reports
+    return [last_runs(reports) for reports in run.reports]
 
 
 class _Run:

@@ -101,7 +101,7 @@ def main(options: argparse.Namespace) -> int:
             line = f"{' on '.join(names)}: nothing to run: {where_from(condition)}{few}"
             console.print(line)
     _print_spent(console, tier, {names: costs[names] for names in used})
-    ends = ", ".join(f"{outcome.symbol} {outcome}" for outcome in (Outcome.SUPPORTED, Outcome.REFUTED))
+    ends = ", ".join(f"{end.symbol} {end}" for end in (Outcome.SUPPORTED, Outcome.REFUTED, Outcome.SMALLER))
     console.print(
         f"\nClaims: the smallest p that the design allows (n trials a side, α {tier.design.alpha:g}), and how each "
         f"look can end them: {ends}, or neither (no)"
@@ -239,8 +239,8 @@ def _claims(reports: Sequence[ClaimReport], costs: Costs) -> Table:
     for report in reports:
         used = [names for names in _read([report]) if names in costs]
         for look in report.attainable:
-            smallest = {Outcome.SUPPORTED: look.supported, Outcome.REFUTED: look.refuted}
-            reach = [outcome.symbol for outcome, p in smallest.items() if p <= look.alpha]
+            smallest = {Outcome.SUPPORTED: look.supported, Outcome.REFUTED: look.refuted, Outcome.SMALLER: look.smaller}
+            reach = [outcome.symbol for outcome, p in smallest.items() if p is not None and p <= look.alpha]
             table.add_row(
                 report.name,
                 str(look.n),

@@ -101,7 +101,7 @@ def _print(reports: Sequence[ClaimReport], tier: str, why: bool) -> None:
     console = Console(file=styled())
     width = terminal_table.columns(console.width, console.is_terminal)
     for part in (
-        terminal_table.verdict_table(reports, width, console.is_terminal),
+        terminal_table.verdict_table(reports, width, console.is_terminal, console.encoding),
         terminal_table.explanations(explained, width, console.is_terminal),
         "--why says why verdicts are accepted, inconclusive or not run" if unexplained and not why else "",
         table_cells.faults(reports),

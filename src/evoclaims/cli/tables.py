@@ -22,7 +22,8 @@ from __future__ import annotations
 import argparse
 import re
 import tempfile
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from functools import cached_property
 from pathlib import Path
 from typing import Final
 
@@ -56,11 +57,26 @@ _TABLE: Final = re.compile(
 _BEGIN: Final = re.compile(r"^<!-- evoclaims: (?!end -->).*-->$", re.MULTILINE)
 
 
+class _JudgedOnce(Project):
+    """A project whose verdicts are made once for all tables: nothing runs in between."""
+
+    @cached_property
+    def _known(self) -> dict[tuple[str, str], list[ClaimReport]]:
+        return {}
+
+    def judge_variants(self, asked: Sequence[tuple[str, str]]) -> list[list[ClaimReport]]:
+        """Judge what no table before has asked for; as `Project.judge_variants` does."""
+        missing = [one for one in dict.fromkeys(asked) if one not in self._known]
+        self._known.update(zip(missing, super().judge_variants(missing) if missing else (), strict=True))
+        return [self._known[one] for one in asked]
+
+
 def main(options: argparse.Namespace) -> int:
     """Write the tables of each file anew; 1 when that changed one."""
     changed = 0
     with tempfile.TemporaryDirectory() as folder:
-        project = open_project(str(Path(folder) / "no-store"))
+        opened = open_project(str(Path(folder) / "no-store"))
+        project = _JudgedOnce(opened.config, opened.reproduction, opened.storage)
         for name in options.files:
             path = Path(name)
             try:

@@ -13,6 +13,7 @@ import json
 import os
 import re
 import shutil
+import signal
 import subprocess
 import sys
 import sysconfig
@@ -26,6 +27,7 @@ from urllib.parse import urlsplit
 from urllib.request import url2pathname
 
 from filelock import FileLock
+from packaging.requirements import InvalidRequirement, Requirement
 from packaging.utils import InvalidName, canonicalize_name
 from packaging.version import InvalidVersion, Version
 
@@ -47,6 +49,9 @@ _LIST: Final = (
     "print(json.dumps({d.name: d.version for d in [*m.distributions()][::-1] if d.name}))"
 )
 """Prints the versions of all distributions; of several of one name, that which Python imports."""
+
+MACHINE_CODE: Final = frozenset({"jax", "jaxlib", "llvmlite"})
+"""Packages that kernels call in machine code: with older ones than declared, the process may be killed."""
 
 LONGEST: Final = 300
 """Most characters of a reason."""
@@ -120,6 +125,19 @@ class Environment:
             if name not in left_out and ours.get(name) != version
         }
 
+    def below(self, package: str, project: Path) -> dict[str, tuple[str, str]]:
+        """Return what is older than evoclaims or the project asks for: its version, and the oldest supported one.
+
+        The release on trial may be older, unless the process would die by it: kernels call `MACHINE_CODE` in its own.
+        """
+        oldest = _oldest(project)
+        exempt = {canonicalize_name(package)} - MACHINE_CODE
+        return {
+            name: (version, str(oldest[name]))
+            for name, version in sorted(self.versions.items())
+            if name not in exempt and name in oldest and Version(version) < oldest[name]
+        }
+
 
 def make(recipe: Recipe, kept: Path, project: Path, begins: Callable[[], None]) -> Environment:
     """Return the environment of a recipe: the one that an earlier call has made, or a new one.
@@ -184,6 +202,23 @@ def installed_here() -> dict[str, str]:
     return _normalized({name: version for name, version in reversed(found) if name})
 
 
+def _oldest(project: Path) -> dict[str, Version]:
+    """Return the oldest version of each package that evoclaims and the project declare to work, by normalized name."""
+    found: dict[str, Version] = {}
+    for text in (*(importlib.metadata.requires(PROGRAM) or ()), *_described(project).get("dependencies", ())):
+        try:
+            requirement = Requirement(text)
+        except InvalidRequirement:
+            continue
+        if requirement.marker is not None and not requirement.marker.evaluate({"extra": ""}):
+            continue
+        lowest = [Version(one.version) for one in requirement.specifier if one.operator in (">=", "~=", ">")]
+        name = canonicalize_name(requirement.name)
+        if lowest:
+            found[name] = max(lowest if name not in found else [*lowest, found[name]])
+    return found
+
+
 def _made(recipe: Recipe, empty: Environment, project: Path, pins: str) -> Environment:
     """Make an environment in a folder that is not there yet."""
     if recipe.is_layer:
@@ -229,12 +264,18 @@ def _begin_apart(recipe: Recipe, empty: Environment) -> tuple[list[str], bool]:
 
 def _requirements(project: Path) -> list[str]:
     """Return what an environment apart from this one needs: this program, and the project where it can be installed."""
-    try:
-        described = tomllib.loads(read_text(project / "pyproject.toml")).get("project", {})
-    except (OSError, ValueError, RecursionError):
-        described = {}
+    described = _described(project)
     own = [] if described.get("name") == PROGRAM else _this_program()
     return [*own, "--editable", str(project.resolve())] if described else own
+
+
+def _described(project: Path) -> dict[str, Any]:
+    """Return the `[project]` table of a project's pyproject.toml; empty without one."""
+    try:
+        described: dict[str, Any] = tomllib.loads(read_text(project / "pyproject.toml")).get("project", {})
+        return described
+    except (OSError, ValueError, RecursionError):
+        return {}
 
 
 def _this_program() -> list[str]:
@@ -269,8 +310,16 @@ def _run(command: Sequence[str]) -> str:
     environment = {name: value for name, value in os.environ.items() if name != "PYTHONHOME"}
     done = subprocess.run(command, capture_output=True, text=True, errors="replace", env=environment, check=False)
     if done.returncode:
-        raise NotInstallableError(reason(done.stdout + done.stderr) or f"{command[0]} ended with {done.returncode}")
+        said = "" if done.returncode < 0 else reason(done.stdout + done.stderr)
+        raise NotInstallableError(said or f"{Path(command[0]).name} {ending(done.returncode)}")
     return done.stdout
+
+
+def ending(status: int) -> str:
+    """Return how a process ended, such as "was killed by SIGSEGV" or "ended with 2"."""
+    if status < 0 and -status in set(signal.Signals):
+        return f"was killed by {signal.Signals(-status).name}"
+    return f"ended with {status}"
 
 
 def reason(output: str) -> str:

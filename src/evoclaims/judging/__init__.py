@@ -1,1 +1,1 @@
-"""Judging claims: exact tests, attainable p values first, and exactly one of five outcomes."""
+"""Judging claims: exact tests, attainable p values first, and exactly one of six outcomes."""

@@ -102,6 +102,16 @@ class Assertion(ABC):
         """
         return self.attainable(n, design), PValues(1.0, 1.0)
 
+    def highest(self, trials: Trials, n: int, design: Design) -> PValues:
+        """Bound p over all results that missing trials could have had: the highest, for and against.
+
+        Args:
+            trials: those with a result, at most `n` a condition.
+            n: trials a side.
+            design: as in `find`.
+        """
+        return self.bounds(trials, n, design)[1]
+
     def found(
         self,
         p: PValues,
@@ -136,6 +146,8 @@ class Assertion(ABC):
                 attainable_p=attainable.supported if tested else None,
                 p_refuted=p.refuted if tested else None,
                 attainable_p_refuted=attainable.refuted if tested else None,
+                p_smaller=p.smaller,
+                attainable_p_smaller=attainable.smaller,
                 a12=a12(first, last) if effect else None,
                 cliffs_delta=cliffs_delta(first, last) if effect else None,
                 intervals=of_effect or intervals(),
@@ -209,10 +221,14 @@ class Compound(Assertion):
         is that of some part, with Holm's correction: each more part is one more chance to err.
         """
         some = smallest if corrected else min
-        supported, refuted = [part.supported for part in parts], [part.refuted for part in parts]
-        if self.weakest is Direction.FOR:
-            return PValues(max(supported), some(refuted))
-        return PValues(some(supported), max(refuted))
+        every = max
+        support, refute = (every, some) if self.weakest is Direction.FOR else (some, every)
+        sized = any(part.smaller is not None for part in parts)
+        return PValues(
+            support([part.supported for part in parts]),
+            refute([part.refuted for part in parts]),
+            refute([part.size for part in parts]) if sized else None,
+        )
 
     def describe(self) -> str:
         """Join the parts' sentences."""
@@ -243,6 +259,10 @@ class Compound(Assertion):
         lows, highs = zip(*(part.bounds(trials, n, design) for part in self.parts), strict=True)
         return self.combine(lows, corrected=False), self.combine(highs)
 
+    def highest(self, trials: Trials, n: int, design: Design) -> PValues:
+        """Combine the parts' highest p."""
+        return self.combine([part.highest(trials, n, design) for part in self.parts])
+
     def find(self, trials: Trials, design: Design, alpha: float) -> Finding:
         """Judge every part; one that contradicts itself, significant both ways, decides nothing."""
         findings = [part.find(trials, design, alpha) for part in self.parts]
@@ -257,7 +277,7 @@ class Compound(Assertion):
 
     def _deciding(self, findings: Sequence[Finding], ps: Sequence[PValues], direction: Direction) -> int:
         """Return the index, among all parts' evidence, of the entry that gives the compound's p."""
-        choose = max if direction is self.weakest else min
+        choose = max if (direction is Direction.FOR) is (self.weakest is Direction.FOR) else min
         chosen = choose(range(len(findings)), key=lambda index: ps[index].toward(direction))
         before = sum(len(finding.evidence) for finding in findings[:chosen])
         return before + findings[chosen].deciding(direction)

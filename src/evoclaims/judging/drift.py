@@ -1,11 +1,15 @@
-"""Drift: new trials compared with committed reference trials of the same condition."""
+"""Drift: new trials compared with earlier ones of the same condition, by method, then condition, then measure."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import Any, Literal
+import re
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, Final, Literal
+
+import numpy as np
+from numpy.typing import NDArray
 
 from evoclaims.core.canonical import as_plain
 from evoclaims.judging.effect import a12, median
@@ -19,6 +23,21 @@ MIN_REFERENCES = 10
 RESOLUTION = 1e-6
 """Relative difference up to which two trials' numbers count as equal: eight times the precision of float32."""
 
+PERMUTATIONS: Final = 4999
+"""Of a joint test; its smallest p is 1 / 5000."""
+
+SEED: Final = 20251126
+"""Fixed, so that the same trials always give the same p."""
+
+FOUND: Final = 0.95
+"""Probability with which a shift is called detectable."""
+
+LOWER: Final = ("environment_steps", "steps")
+"""Measures that are better when they are lower, so that the sum over conditions knows what "better" is."""
+
+_LEVEL: Final = re.compile(r"(\w+) at level (\d+)")
+_CURVE: Final = re.compile(r"mean (\w+) while training")
+
 DriftStatus = Literal["no drift", "drift", "underpowered", "no reference", "not run", "error"]
 """Only "no drift" is a pass; "underpowered": no values could have shown drift after the correction."""
 
@@ -31,9 +50,12 @@ class DriftCase:
         label: a short name, such as "cma_es on n_parity".
         condition: the condition's id; references of another id are ignored (their code or budget differs).
         new: new trials.
-        reference: committed trials.
-        metrics: names in `TrialResult.metrics`.
+        reference: earlier trials.
+        pilot: more of them, of other seeds, which have some of the measures alone.
+        metrics: names of measures (see `measured`).
         edited: what is not the same in the table that the trials were imported from, as a clause; empty if nothing.
+        method: conditions of one method are tested together; the label where it is empty.
+        group: what may have changed, such as "evosax 0.3.2 -> 0.3.3"; each group is corrected for itself.
     """
 
     label: str
@@ -42,6 +64,9 @@ class DriftCase:
     reference: tuple[TrialResult, ...]
     metrics: tuple[str, ...]
     edited: str = ""
+    method: str = ""
+    group: str = ""
+    pilot: tuple[TrialResult, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -54,7 +79,7 @@ class DriftRow:
         n_new, n_ref: numbers of new trials and of reference trials.
         status: result of the comparison.
         p: two-sided; None if not tested.
-        p_holm: the same, Holm-adjusted.
+        p_holm: of its method's joint test, Holm-adjusted over the methods: what decides.
         detail: why there was no test, or what the test could not have shown.
         a12: Vargha and Delaney's effect: the chance that a new trial is above a reference, ties counting half; None if
             not tested.
@@ -92,11 +117,20 @@ class DriftRow:
 
 @dataclass(frozen=True)
 class DriftReport:
-    """One row per condition and metric, judged together at `alpha`, and edited tables, which need no test."""
+    """One row per condition and measure, judged together at `alpha`, and edited tables, which need no test.
+
+    Attributes:
+        rows: those of a method that drifted have the status "drift" where the drift shows most.
+        alpha: familywise error of each group of cases.
+        edited: a clause for each edited table.
+        detectable: by method that was tested, the shift of all its conditions, in standard deviations, that this
+            check finds with a probability of 0.95.
+    """
 
     rows: tuple[DriftRow, ...]
     alpha: float
     edited: tuple[str, ...] = ()
+    detectable: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def drifted(self) -> bool:
@@ -117,6 +151,38 @@ class DriftReport:
         return [*drifted, *edited, *dict.fromkeys(unchecked)]
 
     @property
+    def counts(self) -> str:
+        """How many measures and methods were tested, how many of these drifted, and how."""
+        drifted = sum(row.drifted for row in self.rows)
+        how = f"by method, permutation tests, Holm, α = {self.alpha:g}"
+        return f"{self.tested} comparisons, {drifted} drifted ({how})"
+
+    @property
+    def nearest(self) -> DriftRow | None:
+        """The tested row with the smallest p of its method, and then of its own; None if nothing was tested."""
+        tested = [row for row in self.rows if row.p_holm is not None and row.p is not None]
+        return min(tested, key=lambda row: (row.p_holm, row.p), default=None)
+
+    @property
+    def limits(self) -> str:
+        """What this check could have found, in words; empty if nothing was tested."""
+        shifts: dict[str, list[str]] = {}
+        for method, shift in sorted(self.detectable.items(), key=lambda one: one[1]):
+            shifts.setdefault(f"{shift:.1f} SD", []).append(method)
+        found = ", ".join(f"{shift} in {', '.join(methods)}" for shift, methods in shifts.items())
+        return f"with probability {FOUND:g} a shift of all conditions by {found}" if found else ""
+
+    @property
+    def undecided(self) -> str:
+        """Where no drift is shown: the nearest comparison, and what could have been found. No drift is never shown."""
+        near = f"no drift shown; nearest: {self.nearest.in_words}" if self.nearest else "no drift shown"
+        return f"{near}; found would have been {self.limits}" if self.limits else near
+
+    def about(self, labels: Collection[str]) -> DriftReport:
+        """Return the part about some conditions."""
+        return replace(self, rows=tuple(row for row in self.rows if row.label in labels))
+
+    @property
     def unchecked(self) -> tuple[DriftRow, ...]:
         """Rows that show neither drift nor no drift; they do not pass."""
         return tuple(row for row in self.rows if row.status not in ("no drift", "drift"))
@@ -128,53 +194,236 @@ class DriftReport:
 
 
 def check_drift(cases: Sequence[DriftCase], alpha: float = ALPHA) -> DriftReport:
-    """Test every metric of every case: exact two-sided rank test, Holm over all rows that could be tested.
+    """Test whether trials have drifted: methods first, then their conditions and measures.
 
-    A failed trial ranks below all others. If the code is unchanged, new trials with seeds of references repeat them;
-    such ties only make the test more conservative. `alpha` is the familywise error of the whole report.
+    A method is tested by all measures of all its conditions jointly (see `_joint`), with Holm's correction over the
+    methods of a group of cases. Conditions of a method that drifted, and their measures, are only told from each other:
+    by Holm over them, or else the one with the smallest p is named.
+
+    A failed trial ranks below all others. Cases whose trials are the references' own, to the bit, need no test, and
+    count for no correction. `alpha` is the familywise error of each group.
     """
-    rows = [_test(case, metric) for case in cases for metric in case.metrics]
-    tested = [row.p for row in rows if row.p is not None]
-    adjusted = iter(holm(tested))
-    corrected = (row if row.p is None else _corrected(row, next(adjusted), len(tested), alpha) for row in rows)
+    rows: list[DriftRow] = []
+    detectable: dict[str, float] = {}
+    for group in dict.fromkeys(case.group for case in cases):
+        mine = [case for case in cases if case.group == group]
+        prepared = [_prepared(case) for case in mine]
+        families: dict[str, list[_Columns]] = {}
+        for case, (conditions, _) in zip(mine, prepared, strict=True):
+            if conditions:
+                families.setdefault(case.method or case.label, []).extend(conditions)
+        adjusted = dict(zip(families, holm([_by_blocks(those) for those in families.values()]), strict=True))
+        places = {name: _places(those) for name, those in families.items() if adjusted[name] <= alpha}
+        for name, those in families.items():
+            detectable[name] = max(detectable.get(name, 0.0), _detectable(those, alpha / len(families)))
+        for case, (conditions, without) in zip(mine, prepared, strict=True):
+            name = case.method or case.label
+            for row in (row for one in conditions for row in one.rows):
+                shown = (row.label, row.metric) in places.get(name, ())
+                rows.append(_decided(row, adjusted[name], shown, alpha, len(families)))
+            rows += without
     edited = tuple(f"{case.label}: {case.edited}" for case in cases if case.edited)
-    return DriftReport(tuple(corrected), alpha, edited)
+    return DriftReport(tuple(rows), alpha, edited, detectable)
 
 
-def _test(case: DriftCase, metric: str) -> DriftRow:
-    """Run the rank test of one metric, without Holm's correction, or return a row that says why it cannot run."""
+@dataclass(frozen=True, eq=False)
+class _Columns:
+    """What is tested of a condition: measures that the same trials have.
+
+    Attributes:
+        rows: of its measures that are not constant, each with its own exact two-sided p; at least one.
+        centred: mid-ranks minus their mean, by trial, new ones first, and measure; shape [n_new + n_ref, measures].
+        n: number of new trials.
+        wide: whether the pilot's trials are among the earlier ones.
+    """
+
+    rows: tuple[DriftRow, ...]
+    centred: NDArray[np.float64]
+    n: int
+    wide: bool
+
+    @property
+    def spread(self) -> NDArray[np.float64]:
+        """The standard deviation of the sum of the new trials' ranks, shape [measures]."""
+        total = len(self.centred)
+        variance = (self.centred**2).sum(axis=0) * self.n * (total - self.n) / (total * (total - 1))
+        return np.asarray(np.sqrt(np.where(variance > 0, variance, 1.0)))
+
+
+def measured(trial: TrialResult, name: str) -> float:
+    """Return a measure of a finished trial: a metric, "success at level 2", or "mean fitness while training".
+
+    Raises:
+        KeyError: when the trial lacks it.
+    """
+    if name in trial.metrics:
+        return trial.metrics[name]
+    if curve := _CURVE.fullmatch(name):
+        values = trial.curves[curve[1]]
+        return math.fsum(values) / max(len(values), 1)
+    if level := _LEVEL.fullmatch(name):
+        values = trial.levels[level[1]]
+        if int(level[2]) < len(values):
+            return values[int(level[2])]
+    raise KeyError(name)
+
+
+def _prepared(case: DriftCase) -> tuple[list[_Columns], list[DriftRow]]:
+    """Return what is tested of a condition, and rows that say why there is no test."""
     new = [trial for trial in case.new if trial.condition == case.condition]
     reference = [trial for trial in case.reference if trial.condition == case.condition]
 
-    def row(status: DriftStatus, detail: str) -> DriftRow:
+    def row(metric: str, status: DriftStatus, detail: str = "") -> DriftRow:
         return DriftRow(case.label, metric, len(new), len(reference), status, detail=detail)
 
+    def every(status: DriftStatus, detail: str) -> list[DriftRow]:
+        return [row(metric, status, detail) for metric in case.metrics]
+
     if not new:
-        return row("not run", "no new trial of this condition")
+        return [], every("not run", "no new trial of this condition")
     if len(reference) < MIN_REFERENCES:
         others = len(case.reference) - len(reference)
-        return row(
-            "no reference",
-            f"{len(reference)} reference trials of this condition, {MIN_REFERENCES} needed"
-            + (f" ({others} of another fingerprint left out)" if others else ""),
-        )
+        left_out = f" ({others} of another fingerprint left out)" if others else ""
+        few = f"{len(reference)} reference trials of this condition, {MIN_REFERENCES} needed{left_out}"
+        return [], every("no reference", few)
     crashed = [trial.seed for trial in (*new, *reference) if trial.status == "crashed"]
     if crashed:
-        return row("error", f"trials crashed: seeds {', '.join(map(str, crashed))}")
-    if any(trial.status == "done" and metric not in trial.metrics for trial in (*new, *reference)):
-        return row("error", f"a finished trial has no metric {metric!r}")
+        return [], every("error", f"trials crashed: seeds {', '.join(map(str, crashed))}")
+    before = {trial.seed: trial.digest for trial in reference if trial.digest}
+    if all(trial.digest and before.get(trial.seed) == trial.digest for trial in new):
+        return [], every("no drift", "the same trials to the bit")
+    pilot = [trial for trial in case.pilot if trial.status == "done"]
+    known = [metric for metric in case.metrics if pilot and all(_has(trial, metric) for trial in pilot)]
+    rest = [metric for metric in case.metrics if metric not in known]
+    blocks = [(known, (*reference, *case.pilot), True), (rest, tuple(reference), False)]
+    read = [_columns(case.label, metrics, new, earlier, wide) for metrics, earlier, wide in blocks if metrics]
+    conditions, without = [one for one, _ in read if one], [row for _, rows in read for row in rows]
+    constant = [row for row in without if row.status == "no drift"]
+    if conditions or len(constant) < len(without):
+        return conditions, [row for row in without if row.status != "no drift"]
+    return [], constant[:1]
+
+
+def _has(trial: TrialResult, metric: str) -> bool:
+    """Whether a trial has a measure."""
     try:
-        values, stored = (
-            [read_number(trial, f"{case.label}: {metric}", lambda t: t.metrics[metric], -math.inf) for trial in side]
-            for side in (new, reference)
-        )
-    except UnreadableTrialError as error:
-        return row("error", str(error))
-    values, stored = _as_exact_as_float32(values, stored)
-    p = min(1.0, 2 * min(rank_test(values, stored).p, rank_test(stored, values).p))
-    return replace(
-        row("no drift", ""), p=p, a12=a12(values, stored), median_new=median(values), median_ref=median(stored)
+        measured(trial, metric)
+    except KeyError:
+        return False
+    return True
+
+
+def _columns(
+    label: str, metrics: Sequence[str], new: Sequence[TrialResult], earlier: Sequence[TrialResult], wide: bool
+) -> tuple[_Columns | None, list[DriftRow]]:
+    """Return those of some measures that vary, and rows of those that do not or that cannot be read."""
+    from scipy.stats import rankdata  # as in `judging.exact`
+
+    tested: list[DriftRow] = []
+    without: list[DriftRow] = []
+    ranks: list[NDArray[np.float64]] = []
+    for metric in metrics:
+        row = DriftRow(label, metric, len(new), len(earlier), "no drift")
+        try:
+            sides = [[_number(trial, label, metric) for trial in side] for side in (new, earlier)]
+        except (UnreadableTrialError, KeyError) as error:
+            lacking = isinstance(error, KeyError)
+            detail = f"a finished trial has no metric {metric!r}" if lacking else str(error)
+            without.append(replace(row, status="error", detail=detail))
+            continue
+        values, stored = _as_exact_as_float32(*sides)
+        p = min(1.0, 2 * min(rank_test(values, stored).p, rank_test(stored, values).p))
+        found = replace(row, p=p, a12=a12(values, stored), median_new=median(values), median_ref=median(stored))
+        ranked = rankdata([*values, *stored])
+        ranked = (ranked - ranked.mean()) * (-1 if metric in LOWER else 1)
+        if np.any(ranked):
+            tested.append(found)
+            ranks.append(ranked)
+        else:
+            without.append(replace(found, p_holm=1.0))
+    return (_Columns(tuple(tested), np.stack(ranks, axis=1), len(new), wide) if tested else None), without
+
+
+def _number(trial: TrialResult, label: str, metric: str) -> float:
+    """Return a measure of a trial; the lowest number for one that failed."""
+    return read_number(trial, f"{label}: {metric}", lambda one: measured(one, metric), -math.inf)
+
+
+def _by_blocks(conditions: Sequence[_Columns]) -> float:
+    """Return the p that nothing changed: the smaller of two, doubled, where some measures alone are in pilots."""
+    blocks = [those for wide in (True, False) if (those := [one for one in conditions if one.wide is wide])]
+    return min(1.0, len(blocks) * min(map(_joint, blocks)))
+
+
+def _joint(conditions: Sequence[_Columns]) -> float:
+    """Return the p of the hypothesis that nothing changed in some conditions.
+
+    A single measure of a single condition has its exact p. Else new and earlier trials are exchanged at random, whole
+    trials within each condition, `PERMUTATIONS` times with a fixed seed. Three statistics of the measures' rank sums z
+    look for three kinds of change: the sum over conditions (all better, or all worse), the sum of squares (anything),
+    and the largest (one alone). Their smallest p is itself compared with its distribution over the permutations, so
+    that p is valid for any dependence of measures.
+    """
+    if len(conditions) == 1 and len(conditions[0].rows) == 1:
+        return conditions[0].rows[0].p or 1.0
+    rng = np.random.default_rng(SEED)
+    sums = np.zeros(PERMUTATIONS + 1)
+    squares, largest = np.zeros_like(sums), np.zeros_like(sums)
+    for one in conditions:
+        chosen = np.argsort(rng.random((PERMUTATIONS, len(one.centred))), axis=1)[:, : one.n]
+        observed = one.centred[: one.n].sum(axis=0)[None]
+        z = np.concatenate([observed, one.centred[chosen].sum(axis=1)]) / one.spread
+        together = z.sum(axis=1)
+        sums += together / max(float(together.std()), 1e-12)
+        squares += (z**2).mean(axis=1)
+        largest = np.maximum(largest, np.abs(z).max(axis=1))
+    statistics = np.round([np.abs(sums), squares, largest], 9)  # equal ones, whatever the order of their sums
+    smallest = np.min([_share_above(statistic) for statistic in statistics], axis=0)
+    return float(np.mean(smallest <= smallest[0]))
+
+
+def _share_above(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return for each value the share of values that are at least as large."""
+    order = np.sort(values)
+    return np.asarray(1 - np.searchsorted(order, values, side="left") / len(values))
+
+
+def _places(conditions: Sequence[_Columns]) -> set[tuple[str, str]]:
+    """Return where a method's drift shows, by label and measure: what Holm's correction finds, at least one."""
+    joint = [_joint([one]) for one in conditions]
+    found = [one for one, p in zip(conditions, holm(joint), strict=True) if p <= ALPHA]
+    found = found or [conditions[int(np.argmin(joint))]]
+    rows = [row for one in found for row in one.rows]
+    ps = holm([row.p or 1.0 for row in rows])
+    sure = {(row.label, row.metric) for row, p in zip(rows, ps, strict=True) if p <= ALPHA}
+    return sure | {min((row.p or 1.0, row.label, row.metric) for row in one.rows)[1:] for one in found}
+
+
+def _detectable(conditions: Sequence[_Columns], alpha: float) -> float:
+    """Return the shift of all measures, in standard deviations, that is found with probability `FOUND`.
+
+    The normal approximation of the sum over conditions, at a third of alpha for each of three statistics; of normal
+    values, a rank sum loses 1 - 3/π of the information.
+    """
+    from scipy.stats import norm  # as in `judging.exact`
+
+    sides = {one.wide for one in conditions}
+    conditions = [one for one in conditions if one.wide is max(sides)]
+    z = float(norm.isf(alpha / (2 * 3 * len(sides))) + norm.ppf(FOUND))
+    means = [math.sqrt(3 / math.pi * one.n * (len(one.centred) - one.n) / (len(one.centred) + 1)) for one in conditions]
+    return z * math.sqrt(len(conditions)) / math.fsum(means)
+
+
+def _decided(row: DriftRow, p_holm: float, shown: bool, alpha: float, families: int) -> DriftRow:
+    """Return a tested row with its status, given its method's adjusted p, and whether its drift shows there."""
+    smallest = 2 * rank_attainable(row.n_new, row.n_ref) * families
+    if p_holm <= alpha or smallest <= alpha:
+        return replace(row, status="drift" if shown else "no drift", p_holm=p_holm)
+    detail = (
+        f"the smallest p that {row.n_new} against {row.n_ref} trials allow is {smallest:.3g} "
+        f"after correction for {families} methods"
     )
+    return replace(row, status="underpowered", p_holm=p_holm, detail=detail)
 
 
 def _as_exact_as_float32(*sides: Sequence[float]) -> list[list[float]]:
@@ -190,15 +439,3 @@ def _as_exact_as_float32(*sides: Sequence[float]) -> list[list[float]]:
         exact[value] = exact[last] if near else value
         last = value
     return [[exact[value] for value in side] for side in sides]
-
-
-def _corrected(row: DriftRow, p_holm: float, tests: int, alpha: float) -> DriftRow:
-    """Return a tested row with its status, given its adjusted p."""
-    smallest = 2 * rank_attainable(row.n_new, row.n_ref) * tests
-    if p_holm <= alpha or smallest <= alpha:
-        return replace(row, status="drift" if p_holm <= alpha else "no drift", p_holm=p_holm)
-    detail = (
-        f"the smallest p that {row.n_new} against {row.n_ref} trials allow is {smallest:.3g} "
-        f"after correction for {tests} tests"
-    )
-    return replace(row, status="underpowered", p_holm=p_holm, detail=detail)

@@ -13,7 +13,7 @@ class Entry:
         syntax: how it is written in a claim, where `a` and `b` are trials of a method on a task.
         null: what is rejected for the claim to be supported, or why nothing is.
         supported: when the claim is.
-        refuted: when the claim is.
+        refuted: when the claim is, or is smaller than claimed.
         source: where the test is published.
     """
 

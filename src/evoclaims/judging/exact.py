@@ -1,4 +1,4 @@
-"""The two exact primitives that decide claims: the rank test and the binomial test. Float64 on the host."""
+"""What decides claims: the exact rank and binomial tests, and a bound for all pairs of trials. Float64 on the host."""
 
 from __future__ import annotations
 
@@ -106,6 +106,24 @@ def binomial_test(k: int, n: int, p0: float, alternative: Alternative = "greater
         p=float(binomtest(k, n, p0, alternative).pvalue),
         attainable_p=float(binomtest(extreme, n, p0, alternative).pvalue),
     )
+
+
+def pairs_test(wins: float, n: int, share: float) -> float:
+    """Return a p value against "A is at least B with a probability of at least `share`", by all pairs of trials.
+
+    Hoeffding's bound (1963, section 5): the share of winning pairs is the mean, over all ways to pair trials, of the
+    mean of `n` independent wins, so that P(share <= wins) <= exp(-n KL(wins || share)). Seeds are labels, and decide
+    nothing.
+
+    Args:
+        wins: share of all pairs that A wins or ties, from 0 to 1.
+        n: trials of the smaller side.
+        share: strictly between 0 and 1.
+    """
+    if wins >= share:
+        return 1.0
+    lost = (1 - wins) * math.log((1 - wins) / (1 - share))
+    return math.exp(-n * (lost + (wins * math.log(wins / share) if wins else 0.0)))
 
 
 def sign_test(k: int, n: int) -> ExactTest:

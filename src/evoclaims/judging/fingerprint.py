@@ -7,7 +7,11 @@ from evoclaims.judging.assertion import Assertion
 from evoclaims.judging.design import Design
 
 JUDGING_REVISION = 2
-"""Raised when a kind's tests change, so that old verdicts do not count as new ones."""
+"""Raised when what a kind's tests are about changes, so that old verdicts do not count as new ones.
+
+Not for another test of the same hypotheses, α and margin: changed verdicts are then entered under their fingerprint,
+such as those of 2026-11-26, when pairs of seeds gave way to all pairs (docs/judging.md lists them).
+"""
 
 
 def fingerprint(assertion: Assertion, design: Design, *, claim: str = "", tier: str = "") -> str:

@@ -29,6 +29,7 @@ class Ending:
         finding: what they say; None where trials crashed or cannot be read.
         note: why judging ended without a decision or before it, if it did; without a finding, the reason.
         copies: which trials are copies of each other.
+        doubt: why a decision of the tests does not count: it hangs on trials that ran out of time.
     """
 
     outcome: Outcome
@@ -37,6 +38,7 @@ class Ending:
     finding: Finding | None
     note: str = ""
     copies: str = ""
+    doubt: str = ""
 
 
 def judge(assertion: Assertion, design: Design, *, claim: str = "", tier: str = "") -> Verdict:
@@ -55,7 +57,7 @@ def judge(assertion: Assertion, design: Design, *, claim: str = "", tier: str = 
     tested = any(entry.p is not None for entry in finding.evidence)  # a fact has no p
     return Verdict(
         outcome=outcome,
-        reason=ending.note + _reason(finding, look, assertion, design),
+        reason=ending.note + (ending.doubt or _reason(finding, look, assertion, design)),
         describe=assertion.describe(),
         fingerprint=mark,
         n=look.n,
@@ -69,6 +71,8 @@ def judge(assertion: Assertion, design: Design, *, claim: str = "", tier: str = 
         overspent=overspent(assertion, ending.trials)[0],
         copies=ending.copies,
         deciding=finding.deciding(outcome.direction),
+        p_smaller=finding.p.smaller,
+        attainable_p_smaller=finding.attainable.smaller,
     )
 
 
@@ -90,7 +94,9 @@ def decide(
     Each look first checks the smallest attainable p: if neither direction can be decided, no trial is fetched. Nor is
     any where a source cannot have as many trials as the look asks for.
     Judging ends at the first decisive look, or when no outcome of the remaining trials could change the verdict
-    (curtailment). `fetch` gets the trials of a source for some seeds, in their order.
+    (curtailment). An effect that is smaller than claimed stays so, but later looks may refute the claim. Trials that
+    ran out of time decide nothing by that alone: they could have had any result. `fetch` gets the trials of a source
+    for some seeds, in their order.
 
     Returns:
         The end; None if no look can decide.
@@ -98,12 +104,12 @@ def decide(
     Raises:
         Exception: whatever a source raises when it is asked for trials.
     """
-    looks, ending = assertion.looks(design), None
+    looks, ending, smaller = assertion.looks(design), None, None
     for index, look in enumerate(looks):
         if not _decidable(assertion.attainable(look.n, design), look.alpha):
             continue
         if short := _shortage(assertion, look, design):
-            return ending and replace(ending, note=f"{ending.note}{short}; ")
+            return smaller or (ending and replace(ending, note=f"{ending.note}{short}; "))
         trials = {source.fingerprint: fetch(source, design.seeds(look.n)) for source in assertion.sources()}
         crashed = _crashed(assertion, trials)
         if crashed:
@@ -115,7 +121,7 @@ def decide(
             return Ending(Outcome.INCONCLUSIVE, look, trials, None, _all_copies(found.alone, look.n))
         try:
             if found.sentence:
-                ending = _counted_once(assertion, design, look, trials, found)
+                ending = _with_any_result(_counted_once(assertion, design, look, trials, found), assertion, design)
                 if ending.outcome is not Outcome.INCONCLUSIVE:
                     return ending
                 continue  # what later trials could change is not bounded: these may be copies, too
@@ -123,12 +129,44 @@ def decide(
         except UnreadableTrialError as error:
             return Ending(Outcome.ERROR, look, trials, None, str(error))
         outcome, note = finding.p.outcome(look.alpha), ""
+        known = _in_time(trials)
+        doubt = _doubt(assertion, outcome, look, design, known) if known != trials else ""
+        if doubt:
+            outcome, doubt = Outcome.INCONCLUSIVE, f"{_ended(assertion, trials, 'timeout')}; {doubt}"
         if outcome is Outcome.INCONCLUSIVE:
-            outcome, note = _settled(assertion, trials, looks[index + 1 :], design) or (outcome, note)
-        ending = Ending(outcome, look, trials, finding, note)
-        if outcome is not Outcome.INCONCLUSIVE or note:
+            outcome, note = _settled(assertion, known, looks[index + 1 :], design) or (outcome, note)
+        ending = Ending(outcome, look, trials, finding, note, doubt)
+        if outcome is Outcome.SMALLER and look is not looks[-1]:  # a later look may refute it, and cannot save it
+            smaller = smaller or replace(ending, note=f"more trials do not refute it: of n = {look.n}, ")
+        elif outcome is Outcome.REFUTED or (smaller is None and (outcome is not Outcome.INCONCLUSIVE or note)):
             return ending
-    return ending
+    return smaller or ending
+
+
+def _in_time(trials: Trials) -> Trials:
+    """Return the trials that did not run out of time."""
+    return {mark: tuple(trial for trial in of if trial.status != "timeout") for mark, of in trials.items()}
+
+
+def _with_any_result(ending: Ending, assertion: Assertion, design: Design) -> Ending:
+    """Return a decision only where it would be the same with any result of the trials that ran out of time."""
+    known = _in_time(ending.trials)
+    doubt = "" if known == ending.trials else _doubt(assertion, ending.outcome, ending.look, design, known)
+    if not doubt:
+        return ending
+    return replace(
+        ending, outcome=Outcome.INCONCLUSIVE, doubt=f"{_ended(assertion, ending.trials, 'timeout')}; {doubt}"
+    )
+
+
+def _doubt(assertion: Assertion, outcome: Outcome, look: Look, design: Design, known: Trials) -> str:
+    """Return why an outcome hangs on trials that ran out of time; empty if it would be the same with any result."""
+    if outcome is Outcome.INCONCLUSIVE:
+        return ""
+    p = assertion.highest(known, look.n, design).toward(outcome.direction)
+    if p <= look.alpha:
+        return ""
+    return f"with other results of theirs it need not be {outcome} (p up to {p:.3g}): give them more time"
 
 
 def attainability(assertion: Assertion, design: Design) -> tuple[tuple[Look, PValues], ...]:
@@ -148,7 +186,7 @@ def needed_trials(assertion: Assertion, design: Design) -> int | None:
 
 def _decidable(attainable: PValues, alpha: float) -> bool:
     """Whether at least one direction can be decided."""
-    return attainable.supported <= alpha or attainable.refuted <= alpha
+    return min(attainable.supported, attainable.size) <= alpha
 
 
 def _shortage(assertion: Assertion, look: Look, design: Design) -> str:
@@ -208,11 +246,16 @@ def _counted_once(assertion: Assertion, design: Design, look: Look, trials: Tria
 
 def _without_result(assertion: Assertion, trials: Trials) -> str:
     """Return a clause that names the trials which diverged or ran out of time, or nothing."""
+    return _ended(assertion, trials, "diverged", "timeout")
+
+
+def _ended(assertion: Assertion, trials: Trials, *statuses: str) -> str:
+    """Return a clause that names the trials which ended so, or nothing."""
     words = {"diverged": "diverged", "timeout": "ran out of time"}
     found = [
         f"{len(seeds)} of {len(trials[mark])} trials of {label} {words[status]} (seeds {', '.join(seeds)})"
         for mark, label in {source.fingerprint: source.label for source in assertion.sources()}.items()
-        for status in words
+        for status in statuses
         if (seeds := [trial.seed_in_words for trial in trials[mark] if trial.status == status])
     ]
     return "; ".join(found)
@@ -224,7 +267,7 @@ def _settled(
     """Return the verdict that every completion of the trials would give, or None while it is open."""
     for look in later:
         low, high = assertion.bounds(trials, look.n, design)
-        for_open, against_open = low.supported <= look.alpha, low.refuted <= look.alpha
+        for_open, against_open = low.supported <= look.alpha, low.size <= look.alpha
         if high.supported <= look.alpha and not against_open:
             return Outcome.SUPPORTED, _stopped(look)
         if high.refuted <= look.alpha and not for_open:
@@ -250,12 +293,16 @@ def _reason(finding: Finding, look: Look, assertion: Assertion, design: Design) 
         return f"p = {p.supported:.3g} <= {at}"
     if outcome is Outcome.REFUTED:
         return f"p = {p.refuted:.3g} against it <= {at}"
+    if outcome is Outcome.SMALLER:
+        shown = f", though it is above (p = {p.supported:.3g})" if p.supported <= look.alpha else ""
+        return f"p = {p.size:.3g} against an effect as large as claimed <= {at}{shown}"
     if p.supported <= look.alpha:
         return f"the evidence contradicts itself: p = {p.supported:.3g} for and {p.refuted:.3g} against, {at}"
     if not _decidable(attainable, look.alpha):
-        smallest = min(attainable.supported, attainable.refuted)
+        smallest = min(attainable.supported, attainable.size)
         return f"underpowered: with these ties the smallest attainable p is {smallest:.3g} > {at}"
-    evidence = f"the evidence: p = {p.supported:.3g} for and {p.refuted:.3g} against, {at}"
+    size = "" if p.smaller is None else f" ({p.size:.3g} against its size)"
+    evidence = f"the evidence: p = {p.supported:.3g} for and {p.refuted:.3g} against{size}, {at}"
     if assertion.attainable(look.n, design).supported > look.alpha:
         return f"{evidence}; underpowered for support: {_needs(assertion, design)}"
     if attainable.supported > look.alpha:

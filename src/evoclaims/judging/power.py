@@ -33,8 +33,6 @@ ENOUGH: Final = 0.95
 SEED: Final = 20250714
 """Fixed, so that the same pilot always gives the same power."""
 
-_OPPOSITE: Final = {Outcome.SUPPORTED: Outcome.REFUTED, Outcome.REFUTED: Outcome.SUPPORTED}
-
 
 class Draws:
     """Trials drawn from a pilot, whole and with replacement, independently for each condition.
@@ -112,8 +110,10 @@ class Power:
 
     @property
     def flips(self) -> float:
-        """The share of draws that end supported where refuted is expected, or refuted where supported is."""
-        return self.share(_OPPOSITE.get(self.expected))
+        """The share of draws that end the other way: with something against it where it is expected to be supported."""
+        if self.expected is Outcome.SUPPORTED:
+            return sum(self.share(outcome) for outcome in Outcome if outcome.is_against)
+        return self.share(Outcome.SUPPORTED if self.expected.is_against else None)
 
     @property
     def suffices(self) -> bool:
@@ -128,7 +128,7 @@ def power(assertion: Assertion, design: Design, draws: Draws, expected: Outcome 
         UnreadableTrialError: when a trial of the pilot crashed, or lacks a number that the assertion reads.
     """
     found = Power(expected, Counter(draws.outcomes(assertion, design)), None, draws.size(assertion))
-    if expected not in _OPPOSITE:
+    if expected is Outcome.INCONCLUSIVE:
         return found
     return replace(found, needed=_needed(assertion, design, draws, found))
 

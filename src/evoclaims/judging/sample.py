@@ -177,7 +177,7 @@ def sample(label: str, trials: Sequence[TrialResult], values: Sequence[float]) -
         label=label,
         seeds=tuple(trial.seed for trial in trials),
         values=tuple(float(value) for value in values),
-        median=median(values),
+        median=median(values) if values else math.nan,
         failed=tuple(trial.seed for trial in failed),
         endings=tuple(trial.status for trial in failed),
     )

@@ -10,17 +10,23 @@ from evoclaims.judging.sample import Sample
 
 
 class Direction(StrEnum):
-    """What a p value is evidence for: the claim, or its opposite."""
+    """What a p value is evidence for: the claim, its opposite, or only a smaller effect than the claim needs."""
 
     FOR = "for"
     AGAINST = "against"
+    SIZE = "against its size"
 
 
 class Outcome(StrEnum):
-    """The five possible outcomes of a claim."""
+    """The six possible outcomes of a claim.
+
+    A comparison is *refuted* where the opposite is shown, or equality within the margin; it is *smaller than claimed*
+    where only an effect below the margin is shown.
+    """
 
     SUPPORTED = "supported"
     REFUTED = "refuted"
+    SMALLER = "smaller than claimed"
     INCONCLUSIVE = "inconclusive"
     ERROR = "error"
     NOT_RUN = "not run"
@@ -37,13 +43,19 @@ class Outcome(StrEnum):
 
     @property
     def direction(self) -> Direction:
-        """The p value to show first: against the claim if refuted, else for it."""
-        return Direction.AGAINST if self is Outcome.REFUTED else Direction.FOR
+        """The p value to show first: against the claim or its size if these are shown, else for it."""
+        return {Outcome.REFUTED: Direction.AGAINST, Outcome.SMALLER: Direction.SIZE}.get(self, Direction.FOR)
+
+    @property
+    def is_against(self) -> bool:
+        """Whether something against the claim is shown."""
+        return self in (Outcome.REFUTED, Outcome.SMALLER)
 
 
 _SYMBOLS = {
     Outcome.SUPPORTED: "✓",
     Outcome.REFUTED: "✗",
+    Outcome.SMALLER: "↓",
     Outcome.INCONCLUSIVE: "?",
     Outcome.ERROR: "E",
     Outcome.NOT_RUN: "-",
@@ -52,30 +64,51 @@ _SYMBOLS = {
 
 @dataclass(frozen=True)
 class PValues:
-    """A pair of p values: for the claim (`supported`) and against it (`refuted`)."""
+    """The p values of an assertion.
+
+    Attributes:
+        supported: for the claim.
+        refuted: against the claim.
+        smaller: against an effect of the claimed size; None for kinds that claim no size.
+    """
 
     supported: float
     refuted: float
+    smaller: float | None = None
 
     def __post_init__(self) -> None:
         """Reject an invalid probability, for example from a custom kind."""
-        if not (0.0 <= self.supported <= 1.0 and 0.0 <= self.refuted <= 1.0):
-            raise UserError(f"A p value lies between 0 and 1, unlike {self.supported} or {self.refuted}.")
+        for p in (self.supported, self.refuted, self.size):
+            if not 0.0 <= p <= 1.0:
+                raise UserError(f"A p value lies between 0 and 1, unlike {p}.")
+
+    @property
+    def size(self) -> float:
+        """The p value against the claim or its size, whichever is smaller."""
+        return self.refuted if self.smaller is None else min(self.refuted, self.smaller)
 
     def outcome(self, alpha: float) -> Outcome:
-        """Return the outcome at `alpha`; if both directions are significant, neither is decided."""
-        supported, refuted = self.supported <= alpha, self.refuted <= alpha
-        if supported == refuted:
-            return Outcome.INCONCLUSIVE
-        return Outcome.SUPPORTED if supported else Outcome.REFUTED
+        """Return the outcome at `alpha`.
+
+        An effect that is shown, and shown to be below the claimed size, is smaller than claimed. Other evidence both
+        ways decides nothing.
+        """
+        smaller = self.smaller is not None and self.smaller <= alpha
+        if self.supported <= alpha:
+            if smaller:
+                return Outcome.SMALLER
+            return Outcome.INCONCLUSIVE if self.refuted <= alpha else Outcome.SUPPORTED
+        if self.refuted <= alpha:
+            return Outcome.REFUTED
+        return Outcome.SMALLER if smaller else Outcome.INCONCLUSIVE
 
     def contradict(self, alpha: float) -> bool:
-        """Whether both directions are significant at `alpha`."""
-        return max(self.supported, self.refuted) <= alpha
+        """Whether both directions are significant at `alpha`, so that nothing is decided."""
+        return max(self.supported, self.refuted) <= alpha and self.outcome(alpha) is Outcome.INCONCLUSIVE
 
     def toward(self, direction: Direction) -> float:
         """Return the p value of one direction."""
-        return self.supported if direction is Direction.FOR else self.refuted
+        return {Direction.FOR: self.supported, Direction.AGAINST: self.refuted, Direction.SIZE: self.size}[direction]
 
 
 @dataclass(frozen=True)
@@ -114,7 +147,7 @@ class Decision:
     """The p value that decides a verdict.
 
     Attributes:
-        direction: whether it is for or against the claim.
+        direction: whether it is for the claim, against it, or against its size.
         p: of the whole assertion.
         attainable_p: the smallest p that n and the ties allowed in this direction.
     """
@@ -139,6 +172,8 @@ class Evidence:
         attainable_p: the smallest p that n and the ties allowed.
         p_refuted: against the claim.
         attainable_p_refuted: the smallest p against it that n and the ties allowed.
+        p_smaller: against an effect of the claimed size; None if the kind claims none.
+        attainable_p_smaller: the smallest of these that n and the ties allowed.
         a12: Vargha and Delaney's effect size; None without two samples.
         cliffs_delta: Cliff's delta; None without two samples.
         intervals: description only.
@@ -163,6 +198,8 @@ class Evidence:
     detail: str = ""
     bounds: tuple[Bound, ...] = ()
     events: bool = False
+    p_smaller: float | None = None
+    attainable_p_smaller: float | None = None
 
     @property
     def direction(self) -> Direction:
@@ -175,7 +212,7 @@ class Verdict:
     """The verdict on one claim.
 
     Attributes:
-        outcome: exactly one of five.
+        outcome: exactly one of six.
         reason: why, in a sentence.
         describe: the assertion in plain English.
         fingerprint: hash of everything that was fixed beforehand.
@@ -185,6 +222,8 @@ class Verdict:
         attainable_p: the smallest p that n and the ties allowed.
         p_refuted: against the whole assertion.
         attainable_p_refuted: the smallest p against it that n and the ties allowed.
+        p_smaller: against an effect of the claimed size; None if no part claims one.
+        attainable_p_smaller: the smallest of these that n and the ties allowed.
         evidence: one entry for each part of the assertion.
         without_result: which trials ended without a result, and how; they got the worst rank.
         overspent: which trials spent more than their budgets.
@@ -207,13 +246,18 @@ class Verdict:
     deciding: int | None = None
     overspent: str = ""
     copies: str = ""
+    p_smaller: float | None = None
+    attainable_p_smaller: float | None = None
 
     @property
     def decision(self) -> Decision | None:
         """The p value that decides the outcome; None if nothing was tested."""
         direction = self.outcome.direction
-        against = direction is Direction.AGAINST
-        p, attainable_p = (self.p_refuted, self.attainable_p_refuted) if against else (self.p, self.attainable_p)
+        p, attainable_p = {
+            Direction.FOR: (self.p, self.attainable_p),
+            Direction.AGAINST: (self.p_refuted, self.attainable_p_refuted),
+            Direction.SIZE: (self.p_smaller, self.attainable_p_smaller),
+        }[direction]
         return None if p is None else Decision(direction, p, attainable_p)
 
     @property

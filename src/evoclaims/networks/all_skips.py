@@ -14,7 +14,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from evoclaims.core.errors import UserError
-from evoclaims.kernels.call import by_platform
+from evoclaims.kernels import by_platform
 
 
 @dataclass(frozen=True)

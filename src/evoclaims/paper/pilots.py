@@ -124,6 +124,12 @@ class _Noting(UserDict[str, Any]):
         return self.asked[name]
 
 
+def read_of(trial: TrialResult, readings: Iterable[TrialReading]) -> tuple[str, ...]:
+    """Return the names of what some readings read of a trial, such as "metrics.stones" and "levels.success"."""
+    kept = _kept(trial, readings)
+    return tuple(f"{of}.{name}" for of in ("metrics", "levels", "curves") for name in sorted(getattr(kept, of)))
+
+
 def _kept(trial: TrialResult, readings: Iterable[TrialReading]) -> TrialResult:
     """Return a trial with only those numbers that are read."""
     metrics, levels, curves = map(_Noting, (trial.metrics, trial.levels, trial.curves))

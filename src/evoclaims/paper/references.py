@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import errno
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import replace
 from itertools import takewhile
 from pathlib import Path
 
 from evoclaims.core.errors import UserError
 from evoclaims.core.files import read_file, write_atomically
-from evoclaims.core.packages import agree, recorded
+from evoclaims.core.packages import agree, depends_on, differences, recorded
 from evoclaims.core.provenance import what_fixes_bits
 from evoclaims.judging.drift import DriftCase, DriftReport, check_drift
 from evoclaims.judging.tripwire import DigestCheck, compare_digests
@@ -21,7 +21,7 @@ from evoclaims.trials.spec import Condition
 from evoclaims.trials.time_limit import is_final
 
 METRICS = ("mean_success", "last_fitness", "environment_steps")
-"""Metrics that the drift check compares: final success, final reward, and environment steps."""
+"""Metrics that the drift check compares besides what claims read: final success, final reward, environment steps."""
 
 OF_TABLE = {"file", "sha256", "by"}
 """What a specification of imported trials says of their table, and not of how it is read."""
@@ -116,14 +116,35 @@ def of_one_environment(
     return next((run for run in runs if len(run) >= needed), max(runs, key=len))
 
 
-def paired(label: str, new: Sequence[TrialResult], reference: Sequence[TrialResult]) -> DriftCase:
+def paired(
+    label: str,
+    new: Sequence[TrialResult],
+    reference: Sequence[TrialResult],
+    *,
+    method: str = "",
+    reads: Collection[str] = (),
+    pilot: Sequence[TrialResult] = (),
+) -> DriftCase:
     """Pair new trials of one condition (at least one) with earlier ones.
 
     Imported trials are compared in all their metrics, and with those of an earlier table that was read alike.
+
+    Args:
+        label: names the condition.
+        new: its new trials.
+        reference: its earlier trials.
+        method: what its conditions share (see `DriftCase`).
+        reads: what claims read of each trial (`SourceTrials.reads`), which is compared besides `METRICS`.
+        pilot: earlier trials of other seeds, which count with `reference` if made with the same versions.
     """
     condition = new[0].condition
     if "imported" not in new[0].spec:
-        return DriftCase(label, condition, tuple(new), tuple(reference), METRICS)
+        metrics = measures(new, reads)
+        mine = [trial for trial in reference if trial.condition == condition]
+        moved = _moved(mine[0], new[0]) if mine else ""
+        fits = bool(mine and pilot) and not _moved(mine[0], pilot[0])
+        case = DriftCase(label, condition, tuple(new), tuple(reference), metrics, method=method, group=moved)
+        return replace(case, pilot=tuple(pilot)) if fits else case
     alike = [old for old in reference if _read_alike(old, new[0])]
     others = [old for old in reference if not _read_alike(old, new[0])]
     earlier = (*(replace(old, condition=condition) for old in alike), *others)
@@ -132,6 +153,27 @@ def paired(label: str, new: Sequence[TrialResult], reference: Sequence[TrialResu
     return DriftCase(
         label + ", another table" * changed, condition, tuple(new), earlier, tuple(metrics), _edited(new, alike)
     )
+
+
+def measures(trials: Sequence[TrialResult], reads: Collection[str]) -> tuple[str, ...]:
+    """Return the measures (`drift.measured`) of what claims read of trials, and `METRICS`."""
+    done = next((trial for trial in trials if trial.status == "done"), None)
+    found: list[str] = []
+    for of, _, name in (read.partition(".") for read in sorted(set(reads))):
+        if of == "metrics":
+            found.append(name)
+        elif of == "levels" and done is not None:
+            found += [f"{name} at level {level}" for level in range(len(done.levels.get(name, ())))]
+        elif of == "curves" and name not in ("steps", "environment_steps", "level"):
+            found.append(f"mean {name} while training")
+    return tuple(dict.fromkeys([*found, *METRICS]))
+
+
+def _moved(was: TrialResult, now: TrialResult) -> str:
+    """Return which versions differ between two trials, of the packages that both depend on; empty if none does."""
+    shared = set(depends_on(was.provenance) or ()) & set(depends_on(now.provenance) or ())
+    moved = differences(*(recorded(trial.provenance, tuple(sorted(shared))) for trial in (was, now)))
+    return ", ".join(f"{name} {old or 'none'} -> {new or 'none'}" for name, (old, new) in moved.items())
 
 
 def _edited(new: Sequence[TrialResult], earlier: Sequence[TrialResult]) -> str:

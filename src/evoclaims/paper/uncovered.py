@@ -1,4 +1,4 @@
-"""A paper's testable sentences that no claim judges: `sentences.toml` beside a reproduction, with the reasons why not."""
+"""A paper's testable sentences that no claim judges, and why: `sentences.toml` beside a reproduction."""
 
 from __future__ import annotations
 

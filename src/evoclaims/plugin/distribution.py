@@ -9,7 +9,6 @@ Nothing heavy is imported here at the top: pytest loads this file in every run o
 from __future__ import annotations
 
 import shutil
-import tempfile
 from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -18,6 +17,7 @@ import pytest
 
 from evoclaims.core.errors import UserError
 from evoclaims.core.files import read_file
+from evoclaims.core.temporary import temporary_folder
 from evoclaims.plugin.progress import progress_of
 
 if TYPE_CHECKING:
@@ -69,14 +69,15 @@ def in_order(items: list[pytest.Item], load: Workload) -> list[pytest.Item]:
     """Return tests in the order for one process: the claims change places among themselves, all others stay."""
     from evoclaims.claims.order import Order
 
-    order, claims = Order[str](load, 1), {item.nodeid: item for item in items if item.nodeid in load.claims}
+    order, claims = Order[str](load, 1), dict[str, pytest.Item]()
+    first = {id(claims.setdefault(item.nodeid, item)) for item in items if item.nodeid in load.claims}
     ordered = []
     for item in items:
-        if order.knows(item.nodeid):
+        if id(item) in first:
             chosen = order.next("", list(claims))
             order.ended(chosen)
             ordered.append(claims.pop(chosen))
-        else:
+        else:  # a plugin's repetition of a claim, too
             ordered.append(item)
     return ordered
 
@@ -93,7 +94,7 @@ class Distribution:
     def pytest_configure_node(self, node: Any) -> None:
         """Tell a worker where to leave what the claims need."""
         if self._folder is None:
-            self._folder = Path(tempfile.mkdtemp(prefix="evoclaims-"))
+            self._folder = temporary_folder()
         node.workerinput[FILE] = str(self._folder / "workload.json")
 
     @pytest.hookimpl(optionalhook=True)

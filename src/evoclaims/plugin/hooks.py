@@ -46,6 +46,7 @@ def pytest_configure(config: pytest.Config) -> None:
         "full: claims at the paper's budgets; only run when asked for",
         "claim(claim): the claim that a test checks (set by @claim)",
         "claim_expect(expectation): an accepted outcome (set by expected(...))",
+        "claim_repeated(names): parameters by which a plugin repeats a claim's test (set by evoclaims)",
         "claim_without_smoke(because): no smoke test (set by smoke=None and without_smoke(...))",
     ):
         config.addinivalue_line("markers", line)
@@ -61,20 +62,22 @@ def pytest_configure(config: pytest.Config) -> None:
 @pytest.hookimpl(wrapper=True, tryfirst=True)
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> Generator[None, object, object]:
     """Run each claim once per tier; a test ends with both, after all other parameters: test_x[n_parity-G1-smoke]."""
-    made = yield
-    if metafunc.definition.get_closest_marker("claim") is not None:
-        if "claim_tier" not in metafunc.fixturenames:
-            raise pytest.UsageError(
-                f"{metafunc.definition.nodeid} is a claim but takes neither the fixture `trials` nor `verdict`."
-            )
-        from evoclaims.claims.claim import claim_of
-        from evoclaims.claims.collected import tier_id
+    if metafunc.definition.get_closest_marker("claim") is None:
+        return (yield)
+    from evoclaims.claims.claim import claim_of
+    from evoclaims.claims.collected import TIER, note_repetitions, tier_id
 
-        claim = claim_of(metafunc.definition)
-        metafunc.parametrize(
-            "claim_tier",
-            [pytest.param(tier, marks=getattr(pytest.mark, tier), id=tier_id(claim, tier)) for tier in TIERS],
+    repeats = note_repetitions(metafunc)
+    made = yield
+    if TIER not in metafunc.fixturenames:
+        raise pytest.UsageError(
+            f"{metafunc.definition.nodeid} is a claim but takes neither the fixture `trials` nor `verdict`."
         )
+    claim, repeated = claim_of(metafunc.definition), [pytest.mark.claim_repeated(*repeats)] if repeats else []
+    metafunc.parametrize(
+        TIER,
+        [pytest.param(tier, marks=[getattr(pytest.mark, tier), *repeated], id=tier_id(claim, tier)) for tier in TIERS],
+    )
     return made
 
 

@@ -42,7 +42,8 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         "--claims-compare-fail",
         metavar="CHANGES",
         help="end with status 1 when a verdict differs from the accepted one like this: 'supported->refuted', "
-        "'*->error,supported->*'",
+        "'*->error,supported->*'; a lost support (supported->inconclusive) then fails, too, unless draws from the "
+        "claim's pilots lose it in more than 1 of 100",
     )
     group.addoption("--claims-stored", action="store_true", help="judge from stored trials alone; run nothing")
     group.addoption(

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Generator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import pytest
 
@@ -29,15 +29,17 @@ VERDICTS: pytest.StashKey[Verdicts] = pytest.StashKey()
 
 @dataclass
 class _State:
-    """How far a claim's test is.
+    """How far one run of a claim's test is; a plugin may run it several times.
 
     Attributes:
         called: whether the test's function has ended.
-        reported: whether the claim has its report.
+        raised: what it has raised.
+        claimed: the claim's report of this run as JSON; None if it has none yet.
     """
 
     called: bool = False
-    reported: bool = False
+    raised: pytest.ExceptionInfo[BaseException] | None = None
+    claimed: dict[str, Any] | None = None
 
 
 _state: pytest.StashKey[_State] = pytest.StashKey()
@@ -64,11 +66,17 @@ def _gap(item: pytest.Item) -> str:
 
 @pytest.hookimpl(wrapper=True, tryfirst=True)
 def pytest_runtest_call(item: pytest.Item) -> Generator[None, None, None]:
-    """Note that a claim's test has ended: what is reported before is of a part of it."""
+    """Note how a claim's test has ended: what is reported before is of a part of it."""
+    state = item.stash[_state] = _State()  # a plugin may call it again without setting it up again
+    if VERDICTS in item.stash:
+        item.stash[VERDICTS].report = None
     try:
         return (yield)
+    except BaseException as error:
+        state.raised = pytest.ExceptionInfo.from_exception(error)
+        raise
     finally:
-        item.stash.setdefault(_state, _State()).called = True
+        state.called = True
 
 
 @pytest.hookimpl(wrapper=True)
@@ -77,34 +85,64 @@ def pytest_runtest_makereport(
 ) -> Generator[None, pytest.TestReport, pytest.TestReport]:
     """Turn a claim's report into the test's outcome, without a traceback."""
     report = yield
-    if item.get_closest_marker("claim") is None or (report.when != "call" and report.passed):
+    if item.get_closest_marker("claim") is None:
+        return report
+    state = item.stash.setdefault(_state, _State())  # another plugin may have kept it from being set up
+    if report.when == "teardown":
+        _add_to_teardown(item, call, report, state)
+        return report
+    if report.when == "setup" and report.passed:
         return report
     if call.excinfo and call.excinfo.errisinstance(KeyboardInterrupt):
         return report
-    state = item.stash.setdefault(_state, _State())  # another plugin may have kept it from being set up
     if report.when == "call" and not state.called:  # of a part of the test, by pytest's fixture subtests
         return report
-    if report.when == "teardown" and (report.skipped or state.reported):  # one verdict a claim
-        return report
-    claimed = _claim_report(item, call, report)
-    setattr(report, ATTRIBUTE, claimed.to_json())
-    state.reported = True
-    if report.skipped:
-        return report
+    claimed = _claim_report(item, call.excinfo, report)
+    state.claimed = claimed.to_json()
+    setattr(report, ATTRIBUTE, state.claimed)
+    if not report.skipped:
+        _give_outcome(item, call.excinfo, report, claimed)
+    return report
+
+
+def _add_to_teardown(item: pytest.Item, call: pytest.CallInfo[None], report: pytest.TestReport, state: _State) -> None:
+    """Let the last report of a run carry the claim's report, too: plugins that run tests again hide other reports.
+
+    `flaky` does not log the report of a failed call. pytest-retry calls a test again and makes no report of that.
+    """
+    if state.claimed is None:
+        excinfo = call.excinfo or state.raised
+        ran_again = state.called and not (excinfo and excinfo.errisinstance(KeyboardInterrupt))
+        if report.skipped or not (report.failed or ran_again):
+            return
+        claimed = _claim_report(item, excinfo, report)
+        state.claimed = claimed.to_json()
+        if claimed.outcome != "not run":
+            _give_outcome(item, excinfo, report, claimed)
+    setattr(report, ATTRIBUTE, state.claimed)
+
+
+def _give_outcome(
+    item: pytest.Item,
+    excinfo: pytest.ExceptionInfo[BaseException] | None,
+    report: pytest.TestReport,
+    claimed: ClaimReport,
+) -> None:
+    """Turn the outcome of a test into that of its claim."""
     vars(report).pop("wasxfail", None)  # only expect=... accepts a verdict, and no mark of pytest's
     sentence = f"{claimed.name} ({claimed.tier}) is {claimed.outcome}: {claimed.reason}"
     undecided = claimed.outcome == "inconclusive" and item.config.getoption("claims_undecided") == "fail"
     failed = claimed.failed or (undecided and not claimed.as_expected)
     # By pytest itself: what xfail(strict=True) expects to fail has not, or a part of the test has.
-    failed_by_pytest = report.failed and not (call.excinfo or failed)
+    failed_by_pytest = report.failed and not (excinfo or failed)
     if report.when == "setup" and not failed:  # or the test would be called without its fixtures
         report.outcome, report.longrepr = "skipped", (item.location[0], item.location[1] or 0, sentence)
     elif not failed_by_pytest:
         report.outcome = "failed" if failed else "passed"
-        if call.excinfo is None or call.excinfo.errisinstance(UserError):
+        if excinfo is None or excinfo.errisinstance(UserError):
             report.longrepr = shown(sentence) if failed else None
         else:
-            report.longrepr = shortened(call.excinfo, item) or report.longrepr
+            report.longrepr = shortened(excinfo, item) or report.longrepr
     properties: list[tuple[str, object]] = [
         ("claim", claimed.claim),
         ("tier", claimed.tier),
@@ -114,12 +152,14 @@ def pytest_runtest_makereport(
         ("p", claimed.p),
         ("evidence", claimed.evidence),
     ]
-    item.user_properties += properties  # JUnit's file takes them from the report of the teardown
-    report.user_properties += properties
-    return report
+    for kept in (item.user_properties, report.user_properties):  # JUnit's file takes those of the teardown's report
+        names = dict(properties)
+        kept[:] = [one for one in kept if one[0] not in names] + properties  # in place of an earlier run's
 
 
-def _claim_report(item: pytest.Item, call: pytest.CallInfo[None], report: pytest.TestReport) -> ClaimReport:
+def _claim_report(
+    item: pytest.Item, excinfo: pytest.ExceptionInfo[BaseException] | None, report: pytest.TestReport
+) -> ClaimReport:
     """Return the report of a claim test: its verdict, the error that prevented one, or why it was skipped."""
     from evoclaims.claims.claim import expectation_of
     from evoclaims.claims.collected import ClaimTest
@@ -135,8 +175,10 @@ def _claim_report(item: pytest.Item, call: pytest.CallInfo[None], report: pytest
         )
         why = sentence.removeprefix("Skipped: ") or "no reason given"
         return unjudged(test, Outcome.NOT_RUN, f"its test was skipped ({why})")
-    if call.excinfo is not None:
-        claimed = unjudged(test, Outcome.ERROR, _sentence(call.excinfo, item.config.rootpath))
+    if excinfo is not None and excinfo.errisinstance(pytest.skip.Exception):
+        return unjudged(test, Outcome.NOT_RUN, f"its test was skipped ({excinfo.value})")
+    if excinfo is not None:
+        claimed = unjudged(test, Outcome.ERROR, _sentence(excinfo, item.config.rootpath))
     elif verdicts is None or verdicts.report is None:
         claimed = unjudged(test, Outcome.ERROR, "the test ended without calling verdict(...), so it judged nothing")
     else:
@@ -157,13 +199,17 @@ def pytest_report_teststatus(
 ) -> tuple[str, str, str | tuple[str, dict[str, bool]]] | None:
     """Show a claim's verdict in place of passed and failed."""
     plain = getattr(report, ATTRIBUTE, None)
-    if plain is None:
+    if plain is None or report.outcome not in ("passed", "failed", "skipped"):  # "rerun" has a word of its plugin
+        return None
+    if report.when == "teardown" and report.passed:  # the claim's outcome is shown already
         return None
     from evoclaims.judging.verdict import Outcome
     from evoclaims.verdicts.claim_report import ClaimReport
 
     claimed = ClaimReport.from_json(plain)
     outcome = claimed.outcome
+    if claimed.failed and report.passed:  # a plugin has run the test again, and the next report has that outcome
+        return None
     failed_by_pytest = report.failed and (claimed.as_expected or outcome == Outcome.SUPPORTED)
     if outcome == Outcome.NOT_RUN or failed_by_pytest:  # in pytest's own words
         return None

@@ -47,7 +47,7 @@ class Summary:
         self._regression: Regression | None = None
         self._reasons: Mapping[tuple[str, str], str] = {}
         self._troubles: list[str] = []
-        self._died: list[str] = []
+        self._died: dict[str, str] = {}
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
         """Keep a claim's report."""
@@ -56,6 +56,7 @@ class Summary:
             from evoclaims.verdicts.claim_report import ClaimReport
 
             self.reports.append(ClaimReport.from_json(plain))
+            self._died.pop(report.nodeid, None)  # another process has judged it
 
     @pytest.hookimpl(optionalhook=True)
     def pytest_testnodedown(self, node: Any, error: object) -> None:
@@ -68,7 +69,7 @@ class Summary:
     def pytest_handlecrashitem(self, crashitem: str) -> None:
         """Note that an xdist worker died on a claim, which has no report then but must be mentioned."""
         if crashitem.endswith(tuple(f"-{tier}]" for tier in TIERS)):  # pytest's own summary has all other tests
-            self._died.append(
+            self._died[crashitem] = (
                 f"The process that judged {crashitem} died (it was killed, crashed, or found no memory), so that this "
                 "claim has no verdict here. Its trials are kept as far as they are, and the same command goes on from "
                 "there."
@@ -87,7 +88,7 @@ class Summary:
         if self.reports:  # they come in the order in which they were judged
             from evoclaims.verdicts import history
 
-            self.reports = history.ordered(self.reports)
+            self.reports = history.ordered(self._last_runs())
             with self._telling():
                 self._drift = make_session(self._config).drift(self.reports)
             with self._telling():
@@ -102,6 +103,17 @@ class Summary:
             session.exitstatus = pytest.ExitCode.USAGE_ERROR
         elif session.exitstatus == pytest.ExitCode.OK:
             session.exitstatus = self._status()
+
+    def _last_runs(self) -> list[ClaimReport]:
+        """Return one report for each claim: of its last run, whatever ran it again."""
+        from evoclaims.verdicts.repeated_runs import last_runs
+
+        known, last = self.reports, last_runs(self.reports)
+        for at, report in enumerate(last):
+            if report.earlier and report not in known:  # runs in several processes know nothing of each other
+                with self._telling():
+                    last[at] = make_session(self._config).save(report)
+        return last
 
     @contextmanager
     def _telling(self) -> Iterator[None]:
@@ -124,6 +136,7 @@ class Summary:
         unjudged = self.reports and not self._judged
         if (
             self._troubles
+            or any(report.failed for report in self.reports)  # a plugin may have hidden it from pytest
             or (self._drift and self._drift[0].drifted)
             or (self._upgrade and self._upgrade.drifted)
             or (self._regression and self._regression.matched)
@@ -142,7 +155,7 @@ class Summary:
     def pytest_terminal_summary(self, terminalreporter: Any, exitstatus: int) -> None:
         """Print the verdict table and its details."""
         if not self.reports:
-            for trouble in [*self._troubles, *self._died]:
+            for trouble in [*self._troubles, *self._died.values()]:
                 terminalreporter.write_line(self._safe(f"ERROR: {trouble}"), red=True)
             if exitstatus == pytest.ExitCode.NO_TESTS_COLLECTED and self._config.stash.get(KNOWN, ()):
                 terminalreporter.write_line(self._safe(self._choices()), yellow=True)
@@ -154,7 +167,8 @@ class Summary:
         width, colour = writer.fullwidth, writer.hasmarkup
         terminalreporter.section("claims")
         room = terminal_table.columns(width, terminalreporter.isatty)
-        terminalreporter.write_line(self._drawn(terminal_table.verdict_table(self.reports, room, colour)))
+        table = terminal_table.verdict_table(self.reports, room, colour, self._encoding)
+        terminalreporter.write_line(self._drawn(table))
         terminalreporter.write_line("")
         with_test = [report for report in self.reports if report.has_test]
         explained = terminal_table.explanations(with_test, width, colour)
@@ -164,7 +178,7 @@ class Summary:
         notes = self._notes()
         for note in notes:
             terminalreporter.write_line(self._safe(note))
-        for trouble in [*self._troubles, *self._died]:
+        for trouble in [*self._troubles, *self._died.values()]:
             terminalreporter.write_line(self._safe(f"error: {trouble}"), red=True)
         unsaved = sorted({report.unsaved for report in self.reports} - {""})
         warnings = [f"The files of evidence could not be written. {reason}" for reason in unsaved[:1]]
@@ -216,15 +230,21 @@ class Summary:
 
     def _drawn(self, text: str) -> str:
         """Return rich's output in characters that the terminal has."""
+        return spelled(text, self._encoding)
+
+    @property
+    def _encoding(self) -> str | None:
+        """The terminal's encoding, if it is known."""
         file: Any = getattr(self._config.get_terminal_writer(), "_file", None)
-        return spelled(text, getattr(file, "encoding", None))
+        return getattr(file, "encoding", None)
 
     def _notes(self) -> list[str]:
         """Return lines on what comparisons found: with reference trials, trials of other versions, and verdicts."""
         from evoclaims.report import terminal_table
+        from evoclaims.verdicts.repeated_runs import changed_by_repetition
         from evoclaims.verdicts.upgrade import verdict_changes
 
-        notes = []
+        notes = [line for report in self.reports if (line := changed_by_repetition(report))]
         if self._drift is not None:
             drift, digests = self._drift
             labels = {source.condition: source.label for report in self.reports for source in report.sources}
@@ -246,8 +266,9 @@ class Summary:
 
         judged_from = make_session(self._config).judged_from
         judged = {key_of(report): report for report in self.reports if report.n}
+        upgraded = self._upgrade.drift if self._upgrade else None
         return {
-            key: reason(judged[key], old, entry_of(judged[key], judged_from, ""), *self._drift)
+            key: reason(judged[key], old, entry_of(judged[key], judged_from, ""), *self._drift, upgraded)
             for key, old in changed.items()
             if key in judged
         }
@@ -279,7 +300,7 @@ class Summary:
             return ""
         try:
             with open(name, "a", encoding="utf-8") as page:
-                page.write(run_summary(self.reports, [*notes, *self._troubles, *self._died]))
+                page.write(run_summary(self.reports, [*notes, *self._troubles, *self._died.values()]))
         except OSError as error:
             return f"Cannot write the verdicts to GitHub's summary {name}: {error.strerror or error}."
         return ""

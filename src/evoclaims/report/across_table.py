@@ -7,6 +7,7 @@ from typing import Final
 
 from rich.table import Table
 
+from evoclaims.report.console import SpelledTable
 from evoclaims.report.formatting import p_value, plural
 from evoclaims.report.markdown_text import literal, table
 from evoclaims.report.table_cells import NONE
@@ -20,7 +21,7 @@ COLUMN: Final = 22
 
 LEGEND: Final = (
     "Against the first environment: A12 is the chance that a trial is higher than there, and p the drift check's "
-    "(exact rank test, Holm), both of the metric that differs most; then how many trials differ in a bit."
+    "(of the method, Holm), with the measure that differs most; then how many trials differ in a bit."
 )
 
 
@@ -34,7 +35,7 @@ def terminal(found: Across, width: int) -> list[Table]:
 
 def _part(found: Across, labels: Sequence[str]) -> Table:
     """Return the columns of some environments."""
-    shown = Table(pad_edge=False, box=None)
+    shown = SpelledTable(pad_edge=False, box=None)
     shown.add_column("claim", no_wrap=True)
     for label in labels:
         shown.add_column(label, max_width=COLUMN - 1)

@@ -1,4 +1,4 @@
-"""What verdicts rest on: which are vacuous, depend on the reading, are younger than their trials, or one result twice."""
+"""What verdicts rest on: which are vacuous, depend on the reading, are younger than their trials, or count twice."""
 
 from __future__ import annotations
 

@@ -13,7 +13,7 @@ from evoclaims.report import table_cells
 from evoclaims.verdicts.claim_report import ClaimReport
 from evoclaims.verdicts.sensitivity import Tally
 
-GREEN, BLUE, RED, GREY = "#2e7d32", "#1565c0", "#c62828", "#616161"
+GREEN, BLUE, RED, ORANGE, GREY = "#2e7d32", "#1565c0", "#c62828", "#a04000", "#616161"
 _NARROW: Final = frozenset("fijlrtI.,:;|!'()[]{}/ ")
 _WIDTHS: Final = {"narrow": 4.2, "usual": 7.0, "wide": 12.0}
 """Width of a character at font size 11, in units; `textLength` makes the text fit this estimate."""

@@ -5,6 +5,7 @@ Rich itself drops five control characters and lets all others through, including
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterable, Sequence
 from typing import Any, Final
 
@@ -14,7 +15,7 @@ from rich.measure import Measurement
 from rich.segment import Segment
 from rich.table import Table
 
-from evoclaims.core.printable import shown
+from evoclaims.core.printable import shown, spelled
 
 GAP: Final = 2
 """Columns of the terminal between those of a table."""
@@ -56,9 +57,26 @@ def _parts(text: str, whole: bool) -> list[str]:
     return (text.splitlines() if whole else text.split()) or [""]
 
 
+class SpelledTable(Table):
+    """A table whose texts are spelled in the characters of standard output before they are laid out."""
+
+    def add_column(self, header: RenderableType = "", *rest: Any, **settings: Any) -> None:
+        """Add a column."""
+        super().add_column(_spelled(header), *rest, **settings)
+
+    def add_row(self, *cells: RenderableType | None, **settings: Any) -> None:
+        """Add a row."""
+        super().add_row(*map(_spelled, cells), **settings)
+
+
+def _spelled(cell: Any) -> Any:
+    """Return a cell; a text in characters that standard output has."""
+    return spelled(cell, getattr(sys.stdout, "encoding", None)) if isinstance(cell, str) else cell
+
+
 def plain_table(headings: Sequence[str], rows: Iterable[Sequence[str]], names: int = 1) -> Table:
     """Return a table without lines; the first columns hold `names`, which alone are broken on a narrow terminal."""
-    made = Table(box=None, pad_edge=False)
+    made = SpelledTable(box=None, pad_edge=False)
     for place, heading in enumerate(headings):
         name = place < names
         made.add_column(heading, justify="left" if name else "right", no_wrap=not name, overflow="fold")

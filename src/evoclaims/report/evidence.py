@@ -168,9 +168,10 @@ def _numbers(evidence: Evidence) -> tuple[tuple[str, str], ...]:
     tests = [
         ("p for", evidence.p, evidence.attainable_p),
         ("p against", evidence.p_refuted, evidence.attainable_p_refuted),
+        ("p against its size", evidence.p_smaller, evidence.attainable_p_smaller),
     ]
-    if evidence.direction is Direction.AGAINST:
-        tests.reverse()
+    first = list(Direction).index(evidence.direction)
+    tests.insert(0, tests.pop(first))
     samples = () if evidence.events else evidence.samples
     names = in_short([clean(sample.label) for sample in samples])
     effects = (("A12", evidence.a12), ("Cliff’s δ", evidence.cliffs_delta))

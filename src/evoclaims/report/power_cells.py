@@ -11,7 +11,7 @@ from evoclaims.judging.verdict import Outcome
 from evoclaims.report.formatting import number, plural
 from evoclaims.report.table_cells import NONE
 
-_OUTCOMES: Final = (Outcome.SUPPORTED, Outcome.REFUTED, Outcome.INCONCLUSIVE)
+_OUTCOMES: Final = tuple(outcome for outcome in Outcome if outcome.judged)
 
 HEADINGS: Final = ("claim", "expected", "power", "95%", *(one.symbol for one in _OUTCOMES), "flips", "needs")
 

@@ -16,8 +16,8 @@ from evoclaims.verdicts.readings import ReadAs
 YOUNGER: Final = "†"
 HOW: Final = (
     "The first reading of a sentence is the one that its claim judges; the others are judged from the same trials, and "
-    f"decide nothing. {YOUNGER}: the reading is younger than the first of its trials, so that it may have been chosen by "
-    "their result."
+    f"decide nothing. {YOUNGER}: the reading is younger than the first of its trials, and may have been chosen by what "
+    "they show."
 )
 """How to read the table."""
 
@@ -27,9 +27,9 @@ def readings(reports: Iterable[ClaimReport]) -> str:
     papers = [report for report in ordered(reports) if report.readings and not report.is_control]
     papers.sort(key=lambda one: math.inf if one.line is None else one.line)
     rows: dict[tuple[str, str, str], list[tuple[ClaimReport, ReadAs]]] = defaultdict(list)
-    for place, report in sorted(enumerate(papers), key=lambda one: (_first(papers, one[1]), one[0])):
+    for report in papers:
         for one in report.readings:
-            rows[report.claim, report.statement, one.name].append((papers[place], one))
+            rows[report.claim, report.statement, one.name].append((report, one))
     shown: set[tuple[str, str]] = set()
     lines = []
     for (claim, sentence, name), found in rows.items():
@@ -46,11 +46,6 @@ def without_claims(sentences: Sequence[Uncovered]) -> str:
     """Return a table of the sentences that no claim judges."""
     lines = [(str(one.line), literal(one.says), literal(one.because)) for one in sentences]
     return table(("line", "the paper says", "no claim, because"), lines) if lines else "Every sentence has a claim."
-
-
-def _first(papers: Sequence[ClaimReport], report: ClaimReport) -> int:
-    """Return the place of the first case of a report's claim."""
-    return next(place for place, one in enumerate(papers) if one.claim == report.claim)
 
 
 def _since(found: Sequence[tuple[ClaimReport, ReadAs]]) -> str:

@@ -55,7 +55,7 @@ def power(report: ClaimReport) -> str:
         return ", ".join(f"{event_power(looks, p0, rate):.2f}" for rate in RATES)
 
     return "; ".join(
-        f"“{part.describe}” would be supported with probability {at_rates(part.bounds[0].value)} at true rates of {rates}"
+        f"“{part.describe}” is supported with probability {at_rates(part.bounds[0].value)} at true rates of {rates}"
         for part in open_
     )
 
@@ -79,6 +79,8 @@ def effect(report: ClaimReport) -> str:
 def p(report: ClaimReport, *, attainable: bool = True) -> str:
     """Return the p value that the verdict rests on, such as "0.0054 (6e-05)", or "against 0.001 (0.0006)".
 
+    Against an effect of the claimed size it is "against its size 0.001 (0.0006)".
+
     Args:
         report: of the claim.
         attainable: whether to add, in parentheses, the smallest p that the trials could have given.
@@ -86,7 +88,7 @@ def p(report: ClaimReport, *, attainable: bool = True) -> str:
     decision = report.verdict.decision if report.verdict else None
     if decision is None:
         return NONE
-    against = "against " if decision.direction is Direction.AGAINST else ""
+    against = "" if decision.direction is Direction.FOR else f"{decision.direction} "
     smallest = f" ({p_value(decision.attainable_p)})" if attainable and decision.attainable_p is not None else ""
     return f"{against}{p_value(decision.p)}{smallest}"
 

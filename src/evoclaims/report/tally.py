@@ -44,6 +44,7 @@ def by_sentence(found: Sequence[Sentence]) -> str:
 _SENTENCE = {
     Tally.SUPPORTED: "supported in every case",
     Tally.REFUTED: "refuted in some case",
+    Tally.SMALLER: "smaller than claimed in some case",
     Tally.INCONCLUSIVE: "undecided",
 }
 """How a sentence's outcome is written, where a case's is written otherwise."""

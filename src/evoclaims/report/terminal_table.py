@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+import functools
 import io
 import os
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Final, Literal
 
 from rich.cells import cell_len, set_cell_size
 from rich.text import Text
 
-from evoclaims.core.printable import printable
+from evoclaims.core.printable import printable, spelled
 from evoclaims.core.provenance import changing_flags
 from evoclaims.judging.drift import DriftReport
 from evoclaims.judging.verdict import Outcome
@@ -34,6 +35,7 @@ _GAP: Final = "  "
 _COLOURS = {
     Outcome.SUPPORTED: "green",
     Outcome.REFUTED: "red",
+    Outcome.SMALLER: "magenta",
     Outcome.INCONCLUSIVE: "yellow",
     Outcome.ERROR: "bold red",
     Outcome.NOT_RUN: "dim",
@@ -45,18 +47,21 @@ def columns(width: int, is_terminal: bool) -> int:
     return width if is_terminal or os.environ.get("COLUMNS") else PIPE
 
 
-def verdict_table(reports: Sequence[ClaimReport], width: int, colour: bool) -> str:
+def verdict_table(reports: Sequence[ClaimReport], width: int, colour: bool, encoding: str | None = None) -> str:
     """Return a table, one line for each claim: id, sentence, verdict, n, effect, p beside the attainable p, evidence.
 
     The sentence is shortened to the terminal's width, never the id. Where that leaves it little room, columns are left
-    out, the evidence first.
+    out, the evidence first. Characters that the terminal's `encoding` lacks are spelled before the layout.
     """
     ordered = history.ordered(reports)
-    names = _column("claim", [printable(report.name) for report in ordered], most=width // 2)
-    verdicts = _column("verdict", [table_cells.verdict_of_versions(report) for report in ordered])
-    columns = next((found for found in _choices(ordered) if _room(width, names, verdicts, *found) >= SENTENCE), ())
+    column = functools.partial(_padded, encoding=encoding)
+    names = column("claim", [printable(report.name) for report in ordered], most=width // 2)
+    verdicts = column("verdict", [table_cells.verdict_of_versions(report) for report in ordered])
+    columns = next(
+        (found for found in _choices(ordered, column) if _room(width, names, verdicts, *found) >= SENTENCE), ()
+    )
     room = max(_room(width, names, verdicts, *columns), len(_CLAIMED))
-    sentences = _column(_CLAIMED, [_shortened(f"{one.statement} ({one.where})", room) for one in ordered])
+    sentences = column(_CLAIMED, [_shortened(f"{one.statement} ({one.where})", room, encoding) for one in ordered])
     heading, *rows = zip(names, sentences, verdicts, *columns, strict=True)
     lines = [Text(_GAP.join(heading), style="bold")]
     for report, (name, sentence, verdict, *rest) in zip(ordered, rows, strict=True):
@@ -77,24 +82,26 @@ def verdict_table(reports: Sequence[ClaimReport], width: int, colour: bool) -> s
     return "\n".join([*(_rendered(line, width, colour).rstrip() for line in lines), *map(str.rstrip, below)])
 
 
-def _column(heading: str, cells: Sequence[str], *, right: bool = False, most: int = 10_000) -> list[str]:
+def _padded(
+    heading: str, cells: Sequence[str], *, right: bool = False, most: int = 10_000, encoding: str | None = None
+) -> list[str]:
     """Return a heading and the cells below it, padded to one width, at the left where they end at the `right`.
 
     A cell longer than `most` columns of a terminal pushes the rest of its line to the right.
     """
-    texts = [heading, *cells]
+    texts = [spelled(text, encoding) for text in (heading, *cells)]
     wide = min(max(map(cell_len, texts)), max(most, len(heading)))
     padded = ((text, " " * (wide - cell_len(text))) for text in texts)
     return [spaces + text if right else text + spaces for text, spaces in padded]
 
 
-def _choices(reports: Sequence[ClaimReport]) -> Iterator[tuple[list[str], ...]]:
+def _choices(reports: Sequence[ClaimReport], column: Callable[..., list[str]]) -> Iterator[tuple[list[str], ...]]:
     """Yield the columns that may follow the verdict, all of them first, then fewer and shorter ones."""
-    n = _column("n", [table_cells.trials(report) for report in reports], right=True)
-    effect = _column("A12", [table_cells.effect(report) for report in reports], right=True)
-    attainable = _column("p (attainable)", [table_cells.p(report) for report in reports])
-    p = _column("p", [table_cells.p(report, attainable=False) for report in reports])
-    evidence = _column("evidence", [printable(Path(report.evidence).name) for report in reports])
+    n = column("n", [table_cells.trials(report) for report in reports], right=True)
+    effect = column("A12", [table_cells.effect(report) for report in reports], right=True)
+    attainable = column("p (attainable)", [table_cells.p(report) for report in reports])
+    p = column("p", [table_cells.p(report, attainable=False) for report in reports])
+    evidence = column("evidence", [printable(Path(report.evidence).name) for report in reports])
     if any(report.evidence for report in reports):
         yield n, effect, attainable, evidence
     yield n, effect, attainable
@@ -108,10 +115,10 @@ def _room(width: int, *columns: list[str]) -> int:
     return width - sum(cell_len(column[0]) + len(_GAP) for column in columns)
 
 
-def _shortened(text: str, room: int) -> str:
+def _shortened(text: str, room: int, encoding: str | None) -> str:
     """Return a text on one line that is no wider than `room`."""
-    plain = printable(" ".join(text.split()))
-    return plain if cell_len(plain) <= room else set_cell_size(plain, room - 1).rstrip() + "…"
+    plain, end = spelled(printable(" ".join(text.split())), encoding), spelled("…", encoding)
+    return plain if cell_len(plain) <= room else set_cell_size(plain, room - len(end)).rstrip() + end
 
 
 def explanations(reports: Sequence[ClaimReport], width: int, colour: bool) -> str:
@@ -134,10 +141,8 @@ def explanations(reports: Sequence[ClaimReport], width: int, colour: bool) -> st
 
 def drift_lines(drift: DriftReport, changed: Sequence[str], compared: int) -> str:
     """Return what the comparison with the committed reference trials found; `changed` has a label for each trial."""
-    drifted = sum(row.drifted for row in drift.rows)
-    head = (
-        f"reference trials: {drift.tested} comparisons, {drifted} drifted (exact rank tests, Holm, α = {drift.alpha:g})"
-    )
+    head = f"reference trials: {drift.counts}"
+    undecided = [drift.undecided] if drift.nearest is not None and not drift.drifted else []
     where = ": " * bool(changed) + ", ".join(f"{label} ({count})" for label, count in Counter(changed).items())
     flags = changing_flags()
     because = (
@@ -150,7 +155,7 @@ def drift_lines(drift: DriftReport, changed: Sequence[str], compared: int) -> st
         if compared
         else f"to the bit: no trial could be compared, {because}"
     )
-    return "\n".join([head, *drift.lines, bits])
+    return "\n".join([head, *drift.lines, *undecided, bits])
 
 
 def _rendered(content: Text | str, width: int, colour: bool) -> str:

@@ -9,9 +9,9 @@ from typing import Final
 
 from evoclaims.core.printable import printable
 from evoclaims.judging.verdict import Outcome
-from evoclaims.report.badge import BLUE, GREEN, GREY, RED
+from evoclaims.report.badge import BLUE, GREEN, GREY, ORANGE, RED
 
-ROW, FLAT_ROW, COLUMN, LEFT, TOP, KEY = 56, 22, 150, 220, 58, 95
+ROW, FLAT_ROW, COLUMN, LEFT, TOP, KEY = 56, 22, 150, 220, 58, 145
 """Sizes in units: height of a row, also where all marks are on its line, width of a column, room left of and above the
 marks, width of a part of the key."""
 
@@ -21,6 +21,7 @@ LEVEL: Final = 0.5
 _COLOURS: Final = {
     Outcome.SUPPORTED: GREEN,
     Outcome.REFUTED: RED,
+    Outcome.SMALLER: ORANGE,
     Outcome.INCONCLUSIVE: BLUE,
     Outcome.ERROR: "#000000",
     Outcome.NOT_RUN: GREY,

@@ -11,16 +11,18 @@ import math
 import os
 import sys
 import threading
-import time
 import weakref
 from collections.abc import Callable
 from concurrent.futures import Future, wait
 from typing import Any, Final, TypeVar
 
+from evoclaims.core.waiting import working_time
+
 T = TypeVar("T")
 
 LOOK_SECONDS: Final = 1.0
-"""Time between two looks at the clock; more than twice this is not counted: the process was stopped."""
+"""Time between two looks at the clock; more than twice this is not counted: the process was stopped. Nor is it counted
+when the process waits for another one that compiles the same kernel."""
 
 _working: weakref.WeakSet[Future[Any]] = weakref.WeakSet()
 """What all threads make; known before they start, since several interrupts may come at any time.
@@ -72,9 +74,9 @@ class Allowance:
     def _wait(self, made: Future[Any]) -> None:
         """Wait until the work is done or the time is over."""
         while not made.done() and self.left > 0:
-            began = time.monotonic()
+            began = working_time()
             wait([made], min(LOOK_SECONDS, self.left))
-            self.left -= min(time.monotonic() - began, 2 * LOOK_SECONDS)
+            self.left -= min(working_time() - began, 2 * LOOK_SECONDS)
 
 
 def end_without(status: int) -> None:

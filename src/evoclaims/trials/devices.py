@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import gc
 import os
 from contextlib import AbstractContextManager
@@ -12,7 +13,10 @@ import jax
 from threadpoolctl import threadpool_limits
 
 from evoclaims.core.errors import UserError, require_known
+from evoclaims.core.forked import refuse_forked
 from evoclaims.core.private_files import doubt, make_private, say_refused
+from evoclaims.trials.compiled_cache import sweep
+from evoclaims.trials.jax_options import refuse_changed
 
 DEVICE_NAMES: Final = ("auto", "cpu", "gpu")
 MATMUL_PRECISION: Final = "highest"
@@ -21,8 +25,11 @@ _COLLECTIONS: Final = (100_000, 20, 20)
 """Thresholds of Python's garbage collector: tracing makes a hundred thousand objects, nearly all of which live on."""
 
 
+_sweep_once: Final = functools.cache(sweep)
+
+
 def configure() -> None:
-    """Prepare jax before its first use: set a persistent compilation cache, and collect garbage less often.
+    """Prepare jax before its first use: set and sweep a persistent compilation cache, and collect garbage less often.
 
     A cache that the user has set (JAX_COMPILATION_CACHE_DIR) stays.
 
@@ -37,6 +44,10 @@ def configure() -> None:
         config.update("jax_persistent_cache_min_compile_time_secs", 0.2)
         # jax would otherwise evict nothing and warn about nothing; a broken cache must not break a run.
         config.update("jax_raise_persistent_cache_errors", False)
+        if folder:
+            _sweep_once(folder)
+    else:
+        _sweep_once(Path(config.jax_compilation_cache_dir), most=None)
     choose("auto")  # fail here with a clear error, not with a traceback in a later import
 
 
@@ -81,9 +92,12 @@ def choose(name: str) -> list[jax.Device]:
     """Return the devices called `name`: "auto" takes GPUs if there are any.
 
     Raises:
-        UserError: when a GPU is requested, here or by JAX_PLATFORMS, and jax sees none.
+        UserError: when a GPU is requested, here or by JAX_PLATFORMS, and jax sees none, in a forked process where
+            jax cannot compute, and where an option of jax would change trials (see `jax_options`).
     """
     require_known("device", name, DEVICE_NAMES)
+    refuse_forked()
+    refuse_changed()
     try:
         return list(jax.devices(None if name == "auto" else name))
     except (RuntimeError, AssertionError) as error:  # jax asserts that a platform in JAX_PLATFORMS has a plugin

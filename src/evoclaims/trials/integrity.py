@@ -92,8 +92,11 @@ def _records(store: Store) -> Iterator[Problem]:
         if result is None:
             continue
         try:
-            store.champion_of(result)
+            store.whole_champion(path, result)
         except DamagedFileError as error:
+            if error.path == path:
+                yield Problem(path, "record", error.reason)
+                continue
             yield Problem(path, "record", "its champion cannot be used, so the trial has to be run again")
             if error.path.exists():
                 yield Problem(error.path, "champion", error.reason)

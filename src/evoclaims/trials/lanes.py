@@ -7,7 +7,6 @@ time as there are cores; on accelerators each device runs its share of the lanes
 from __future__ import annotations
 
 import dataclasses
-import time
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -19,6 +18,7 @@ import jax
 import numpy as np
 from jax.sharding import SingleDeviceSharding
 
+from evoclaims.core.waiting import working_time
 from evoclaims.trials.devices import MATMUL_PRECISION, layout_on, usable_cores
 from evoclaims.trials.program import Program, Report, Score, TrialState, over_trials
 from evoclaims.trials.spec import Condition
@@ -93,9 +93,9 @@ class Lanes:
         size, homes = self._size(width), self._homes(width)
         missing = [home for home in dict.fromkeys(homes) if (size, home) not in self._compiled]
         if missing:
-            began = time.perf_counter()
+            began = working_time()
             self._compiled.update({(size, home): made for home, made in self._compile(size, missing).items()})
-            self.seconds += time.perf_counter() - began
+            self.seconds += working_time() - began
         return [self._compiled[size, home] for home in homes]
 
     def shapes(self, lanes: int) -> Any:
@@ -122,11 +122,11 @@ class Lanes:
         known = np.array([0 if seed is None else seed for seed in seeds], np.int32)
         idle = np.array([seed is None for seed in seeds])
         size, homes = self._size(width), self._homes(width)
-        began = time.perf_counter()
+        began = working_time()
         with self._settings():
             lowered = [self._lowered(self._program.start, home, _seeds(size)) for home in dict.fromkeys(homes)]
             starts = dict(zip(homes, self._side_by_side(self._finished, lowered), strict=False))
-        self.seconds += time.perf_counter() - began
+        self.seconds += working_time() - began
         return tuple(starts[home](*share) for home, share in zip(homes, self.place((known, idle), width), strict=True))
 
     def advance(self, state: Shares, until: int, width: int) -> tuple[Shares, Report]:

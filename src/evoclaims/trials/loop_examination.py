@@ -15,6 +15,7 @@ from evoclaims.core.keys import EVALUATION, trial_key
 from evoclaims.envs.base import Episode, Task
 from evoclaims.kernels import kernel_prng
 from evoclaims.trials.devices import MATMUL_PRECISION
+from evoclaims.trials.jax_options import refuse_changed
 from evoclaims.trials.loop_messages import Scores
 from evoclaims.trials.rollout import score_every_level
 
@@ -23,7 +24,11 @@ def examined(task: Task, policy: Callable[[Any], Any], seed: int) -> Scores:
     """Return the scores of a policy on a built-in task (metrics of the last level), with keys unknown to training.
 
     It is examined as all methods' policies are: observations [observation_size] in, actions [action_size] out.
+
+    Raises:
+        UserError: when the training function has left jax with options that change the examination.
     """
+    refuse_changed()
     fitted = _fitted(task, policy)
 
     def score(number: Int[Array, ""]) -> Episode:

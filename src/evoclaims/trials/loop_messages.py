@@ -55,6 +55,7 @@ class Trained(msgspec.Struct, frozen=True, tag=True):
         step: of its last report; None if it reported nothing.
         actions: hash of the policy's actions on fixed starts; empty without a policy.
         graded: whether one of these is no whole number.
+        finite: whether all reported numbers were finite, also those that are no point of the curve.
     """
 
     metrics: dict[str, float]
@@ -62,6 +63,7 @@ class Trained(msgspec.Struct, frozen=True, tag=True):
     step: int | None
     actions: str = ""
     graded: bool = False
+    finite: bool = True
 
 
 class Failed(msgspec.Struct, frozen=True, tag=True):

@@ -48,6 +48,7 @@ class Reporter:
 
     Attributes:
         last: step of the last report, passed on or not; None before the first.
+        finite: whether all reported numbers were.
     """
 
     def __init__(self, every: int, answer: Callable[[Answer], None]) -> None:
@@ -57,6 +58,7 @@ class Reporter:
         self._next = 0
         self._told = -math.inf
         self.last: int | None = None
+        self.finite = True
 
     def __call__(self, step: int, **values: Any) -> None:
         """Tell how far training is, in the budget's unit, and numbers such as `fitness=12.5`.
@@ -68,6 +70,7 @@ class Reporter:
         if not 0 <= step <= MOST_STEPS:
             raise UserError(f"A training function reports a number of steps, and not {step}.")
         given = numbers(values)
+        self.finite = self.finite and all(map(math.isfinite, given.values()))
         check_success("A training loop", given.get("success", 0.0), solves=False, advice="report such a share")
         kept = step >= self._next
         if not kept and time.monotonic() - self._told < TOLD_SECONDS:
@@ -117,11 +120,11 @@ def train(request: LoopRequest, answer: Callable[[Answer], None]) -> Trained:
         raise UserError(f"A policy is a function from an observation to an action, and not {policy!r}.")
     if policy is None:
         check_shares("A training loop", told_metrics, "return such a share, or give the metric another name")
-        return Trained(told_metrics, None, report.last)
+        return Trained(told_metrics, None, report.last, finite=report.finite)
     actions, graded = actions_of(task, policy)  # before the examination, which may change what a policy draws from
     scores = examined(task, policy, request.seed)
     check_success("The examination of a training loop's policy", *scores.success, advice="make the task's such a share")
-    return Trained(told_metrics, scores, report.last, actions, graded)
+    return Trained(told_metrics, scores, report.last, actions, graded, report.finite)
 
 
 def actions_of(task: Any, policy: Callable[[Any], Any]) -> tuple[str, bool]:

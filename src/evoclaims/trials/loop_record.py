@@ -29,13 +29,13 @@ def trained_record(
     """Return the record of a trial whose function has returned.
 
     The metrics are those of the function, those of every method (see `result_making.make_result`) and the task's own.
-    The examination's numbers count, not the function's. Without one, those that the function does not return
-    are NaN: a claim that reads such a number is an error. A trial has diverged when its function returned a NaN, or its
-    policy's scores are not finite.
+    What an examination says counts, whatever the function said. Without one, those that the function does not return
+    are NaN: a claim that reads such a number is an error. A trial has diverged when its function returned a NaN, or
+    reported a number that is not finite, or its policy's scores are not.
     """
     assert isinstance(spec.condition.method, TrainingLoop)
     returned, scores = trained.metrics, trained.scores
-    broken = any(map(math.isnan, returned.values()))
+    broken = not trained.finite or any(map(math.isnan, returned.values()))
     if scores is None:  # the last level at most is known
         unknown = (math.nan,) * (spec.condition.task.levels - 1)
         levels = {name: (*unknown, returned.get(f"last_{name}", math.nan)) for name in ("success", "fitness")}

@@ -49,8 +49,7 @@ def merge_trials(source: Store, into: Store, dry_run: bool = False) -> Iterator[
             result = source.read(path)
             if result is None:
                 continue
-            source.champion_of(result)  # whole, and its arrays can be read
-            packed = source.packed_champion(result)
+            packed = source.whole_champion(path, result)
         except DamagedFileError as error:
             yield Merged(error.path, "damaged", f"it is left out: {error.reason}")
             continue

@@ -29,6 +29,9 @@ REFRESH_SECONDS: Final = 15.0
 _CONTAINER: Final = "?pidns-"
 """What filelock adds to the host name in its own PID namespace, as in a container; a number follows."""
 
+_INITIAL: Final = 0xEFFFFFFC
+"""The number of the host's own PID namespace, fixed by Linux; filelock adds nothing there."""
+
 
 def notice_path(store_root: Path, condition_id: str) -> Path:
     """Return the path of a condition's notice; raise a `UserError` for a text that is not an id."""
@@ -129,13 +132,26 @@ def _refreshed(path: Path) -> int:
 def _has_ended(owner: filelock.OwnerRecord | None) -> bool:
     """Whether a process of this machine has ended, according to Linux; zombies count as ended."""
     try:
-        namespace = f"{os.stat('/proc/self/ns/pid').st_ino:x}"  # in another container, PIDs mean other processes
+        namespace = os.stat("/proc/self/ns/pid").st_ino
     except OSError:
         return False
-    if owner is None or owner.hostname not in (socket.gethostname(), f"{socket.gethostname()}{_CONTAINER}{namespace}"):
+    # In another container PIDs mean other processes, also where its host name is the same: only the exact owner counts.
+    here = socket.gethostname() + ("" if namespace == _INITIAL else f"{_CONTAINER}{namespace:x}")
+    if owner is None or owner.hostname != here:
         return False
     try:
         state = Path(f"/proc/{owner.pid}/stat").read_text(errors="replace").rpartition(")")[2].split()[0]
     except OSError:
-        return True
+        return not _exists(owner.pid)
     return state in ("Z", "X")
+
+
+def _exists(pid: int) -> bool:
+    """Whether a process exists, even if /proc hides other users' processes (hidepid)."""
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return False
+    except (PermissionError, OverflowError):
+        pass
+    return True

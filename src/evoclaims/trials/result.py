@@ -72,6 +72,15 @@ class TrialResult:
         return {**plain, "seal": content_hash(plain)}
 
 
+def matches_digest(result: TrialResult, packed: bytes) -> bool:
+    """Whether a record's digest is that of its contents; `packed` is the champion's file, empty without one.
+
+    A seal and a digest show that a record was not changed by accident. Whoever writes both can write any record.
+    """
+    champion = packed or str(result.provenance.get("crash") or "").encode()  # see `result_making.make_unfinished`
+    return digest(result.status, result.metrics, result.levels, result.curves, champion) == result.digest
+
+
 def digest(
     status: str,
     metrics: Mapping[str, float],

@@ -13,6 +13,7 @@ from msgspec import Meta, Struct, ValidationError, convert
 from evoclaims.core.errors import UserError
 from evoclaims.core.printable import printable
 from evoclaims.trials.result import COMPLETE, Status
+from evoclaims.trials.success import SHARES, is_share
 
 DEEPEST: Final = 64
 """Maximum nesting of objects and lists in the free JSON parts of a record."""
@@ -145,9 +146,21 @@ def check(plain: dict[str, Any]) -> Record:
     if record.status in COMPLETE and "imported" not in record.spec:  # another program has its own metrics
         _fitted(record.metrics, Metrics, "metrics")
         _fitted(record.levels, Levels, "levels")
+    _check_successes(record)
     if len({len(curve) for curve in record.curves.values()}) > 1:
         raise RecordError("its curves are not equally long")
     return record
+
+
+def _check_successes(record: Record) -> None:
+    """Reject successes that are no shares: no run and no import stores such a record."""
+    found: dict[str, Vector] = {name: (record.metrics[name],) for name in SHARES if name in record.metrics}
+    for name, vectors in (("levels", record.levels), ("curves", record.curves)):
+        found |= {f"{name} success": vectors["success"]} if "success" in vectors else {}
+    for name, values in found.items():
+        for value in values:
+            if not isinstance(value, str) and not is_share(value):  # what is not finite is a word
+                raise RecordError(f"its {name} of {value:g} is no success, a share from 0 to 1")
 
 
 def _fitted(value: Any, kind: Any, name: str) -> Any:

@@ -14,6 +14,7 @@ import numpy as np
 
 from evoclaims.core.errors import UserError
 from evoclaims.core.packages import absent
+from evoclaims.core.waiting import working_time
 from evoclaims.methods.training_loop import TrainingLoop
 from evoclaims.trials import checkpoint
 from evoclaims.trials.allowance import Allowance, OutOfTimeError
@@ -24,6 +25,7 @@ from evoclaims.trials.halving import halved, is_exhausted
 from evoclaims.trials.imported import into_store
 from evoclaims.trials.lanes import Lanes, picked
 from evoclaims.trials.loop_trials import LoopTrials
+from evoclaims.trials.memory import give_back
 from evoclaims.trials.notice import announced
 from evoclaims.trials.pacing import Rhythm, Strides
 from evoclaims.trials.program import Report
@@ -108,8 +110,11 @@ def _maker(stored: StoredTrials, devices: Sequence[jax.Device], checkpoint_secon
         """Run batches until all trials are stored, or one turns out too large for the device's memory."""
         nonlocal most
         one = Run(Lanes(stored.condition, devices), stored, tell, checkpoint_seconds, most)
-        with single_threaded_linear_algebra():
-            too_large = _finish_all(one, owed)
+        try:
+            with single_threaded_linear_algebra():
+                too_large = _finish_all(one, owed)
+        finally:
+            give_back()
         if too_large is not None:
             most = halved(one, too_large)
 
@@ -189,10 +194,10 @@ def _advance(run: Run, batch: Batch, allowance: Allowance, strides: Strides) -> 
     cost = run.condition.cost
     end = min((batch.header.chunks + 1) * run.condition.budget.chunk(cost), run.condition.steps)
     until = strides.after(batch.steps, end)
-    began, used, compiled = time.perf_counter(), time.process_time(), run.lanes.seconds
+    began, used, compiled = working_time(), time.process_time(), run.lanes.seconds
     state, report = allowance.spend(lambda: run.lanes.advance(batch.state, until, len(batch.header.lanes)))
     compiling = run.lanes.seconds - compiled
-    seconds, processor = time.perf_counter() - began - compiling, max(time.process_time() - used - compiling, 0.0)
+    seconds, processor = working_time() - began - compiling, max(time.process_time() - used - compiling, 0.0)
     strides.took(until - batch.steps, seconds)
     header = replace(
         batch.header,

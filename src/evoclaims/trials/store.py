@@ -25,7 +25,7 @@ from evoclaims.core.errors import StorageError
 from evoclaims.core.files import read_file, write_atomically, write_once
 from evoclaims.core.packages import Versions, agree, depends_on, recorded, without_flags
 from evoclaims.trials.arrays import pack, unpack
-from evoclaims.trials.result import TrialResult
+from evoclaims.trials.result import TrialResult, matches_digest
 from evoclaims.trials.result_codec import dump, parse
 from evoclaims.trials.result_schema import RecordError
 from evoclaims.trials.store_files import DEFAULT_ROOT, StoreFiles, record_id
@@ -233,6 +233,18 @@ class Store(StoreFiles):
             return unpack(data) if result.champion else {}
         except ValueError as error:
             raise DamagedFileError(self.champion_file(result), f"it is {error}") from error
+
+    def whole_champion(self, path: Path, result: TrialResult) -> bytes:
+        """Return the champion's file for the record in `path`, after checking that both are what the digest says.
+
+        Raises:
+            DamagedFileError: for the champion, as `champion_of` does; for the record when its digest is another's.
+        """
+        self.champion_of(result)
+        packed = self.packed_champion(result)
+        if not matches_digest(result, packed):
+            raise DamagedFileError(path, "its digest is not that of its contents, so it was edited")
+        return packed
 
     def packed_champion(self, result: TrialResult) -> bytes:
         """Return the champion's file for a record read from this store, empty without one; raises as `champion_of`."""

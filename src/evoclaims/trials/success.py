@@ -15,6 +15,11 @@ _ROUNDING: Final = 1e-6
 """What is so close to 1 and not 1 is a mean of ones, rounded."""
 
 
+def is_share(number: float) -> bool:
+    """Whether a finite number is a success: a share from 0 to 1, which a mean of ones may exceed by rounding."""
+    return 0.0 <= number <= 1.0 + _ROUNDING
+
+
 def check_success(
     what: str,
     *successes: float,
@@ -40,7 +45,7 @@ def check_success(
             f"{what} reports a {name} of {rounded[0]!r}, which is 1 but for rounding, and a level is solved at exactly "
             "1: average episodes by evoclaims.envs.averaged, or shares by evoclaims.envs.share."
         )
-    wrong = [success for success in successes if math.isfinite(success) and not 0.0 <= success <= 1.0 + _ROUNDING]
+    wrong = [success for success in successes if math.isfinite(success) and not is_share(success)]
     if wrong:
         raise UserError(
             f"{what} reports a {name} of {wrong[0]:g}. A success is a share from 0 to 1, and a level is solved at "

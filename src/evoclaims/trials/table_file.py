@@ -1,30 +1,20 @@
-"""Tables in files of other programs, read column by column: CSV, JSON and Parquet."""
+"""Tables in files of other programs, read column by column: columns that nobody asks for refuse no table."""
 
 from __future__ import annotations
 
-import csv
 import functools
 import hashlib
-import importlib
-import io
-import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
 from evoclaims.core.errors import UserError, guess, require_known
 from evoclaims.core.files import read_file
-
-Columns = Mapping[str, Sequence[Any]]
-"""Equally long columns by name; cells are texts (CSV) or what the format has: None, numbers, texts."""
+from evoclaims.trials.table_formats import READERS, Columns, NoTableError
 
 MOST_LISTED: Final = 30
 """Most values of a column that an error lists."""
-
-
-class NoTableError(Exception):
-    """The content of a file is no table; the text is a clause that says why."""
 
 
 @dataclass(frozen=True)
@@ -45,10 +35,13 @@ class TableFile:
         """Return a column; `role` says in an error what it was wanted for.
 
         Raises:
-            UnknownNameError: for an unknown name.
+            UserError: when there is none of this name, or two, or it cannot be read.
         """
-        require_known(f"column in {self.name} ({role})", name, self.columns)
-        return self.columns[name]
+        require_known(f"column in {self.name} ({role})", name, self.columns.names)
+        try:
+            return self.columns.cells(name)
+        except NoTableError as error:
+            raise UserError(f"{self.name} is no table that can be read: {error}.") from error
 
     def rows_where(self, where: Mapping[str, object]) -> list[int]:
         """Return the rows, counted from 0, that have these values in these columns.
@@ -56,7 +49,7 @@ class TableFile:
         Raises:
             UserError: when a column or a value in it is unknown, or no row has all.
         """
-        rows = list(range(len(next(iter(self.columns.values())))))
+        rows = list(range(self.columns.rows))
         for name, value in where.items():
             cells = self.column(name, "a filter of where=")
             if not any(_is(cell, value) for cell in cells):
@@ -113,7 +106,7 @@ def _read(path: Path, modified: int, size: int) -> TableFile:
         columns = READERS[path.suffix.lower()](data)
     except NoTableError as error:
         raise UserError(f"{path.name} is no table that can be read: {error}.") from error
-    if not columns:
+    if not columns.names:
         raise UserError(f"{path.name} is a table without columns.")
     return TableFile(path.name, hashlib.sha256(data).hexdigest(), columns)
 
@@ -128,82 +121,3 @@ def _is(cell: Any, value: object) -> bool:
         return isinstance(value, int | float) and float(cell) == value
     except (TypeError, ValueError):
         return False
-
-
-def _text(data: bytes) -> str:
-    """Return the text of a file."""
-    try:
-        return data.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise NoTableError("it is no UTF-8 text") from error
-
-
-def _csv(data: bytes, delimiter: str = ",") -> Columns:
-    """Read comma-separated values, whose first line names the columns."""
-    try:
-        head, *rows = [row for row in csv.reader(io.StringIO(_text(data), newline=""), delimiter=delimiter) if row]
-    except csv.Error as error:
-        raise NoTableError(str(error)) from error
-    except ValueError as error:
-        raise NoTableError("it has no first line with the columns' names") from error
-    _unlike(head)
-    for number, row in enumerate(rows, start=1):
-        if len(row) != len(head):
-            raise NoTableError(f"row {number} has {len(row)} cells, and its first line names {len(head)} columns")
-    return {name: [row[place] for row in rows] for place, name in enumerate(head)}
-
-
-def _json(data: bytes) -> Columns:
-    """Read a list of objects, or one object a line."""
-    text = _text(data)
-    try:
-        try:
-            rows = json.loads(text, object_pairs_hook=_object)
-        except ValueError:
-            lines = text.split("\n")  # a text may hold other separators of lines
-            rows = [json.loads(line, object_pairs_hook=_object) for line in lines if line.strip()]
-    except (ValueError, RecursionError):
-        rows = None
-    rows = [rows] if isinstance(rows, dict) else rows  # a file of one line
-    if not isinstance(rows, list) or not rows or not all(isinstance(row, dict) for row in rows):
-        raise NoTableError("it is neither a JSON list of objects nor one object a line, each a row")
-    names = dict.fromkeys(name for row in rows for name in row)
-    return {name: [row.get(name) for row in rows] for name in names}
-
-
-def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    """Return a JSON object."""
-    _unlike([name for name, _ in pairs])
-    return dict(pairs)
-
-
-def _unlike(names: Sequence[str]) -> None:
-    """Reject columns of one name, of which a reader would see one."""
-    if len(set(names)) < len(names):
-        raise NoTableError(f"two of its columns have one name ({', '.join(names)})")
-
-
-def _parquet(data: bytes) -> Columns:
-    """Read an Apache Parquet file; a null stays None, which is not NaN."""
-    try:
-        arrow: Any = importlib.import_module("pyarrow")
-        parquet: Any = importlib.import_module("pyarrow.parquet")
-    except ImportError as error:
-        raise NoTableError("pyarrow, which reads Parquet, is not installed: pip install evoclaims[parquet]") from error
-    try:
-        file = parquet.ParquetFile(io.BytesIO(data))
-        _unlike(file.schema_arrow.names)
-        columns: Columns = file.read().to_pydict()
-    except (arrow.ArrowException, OSError) as error:
-        raise NoTableError("it is no Parquet file") from error
-    return columns
-
-
-READERS: Final[Mapping[str, Callable[[bytes], Columns]]] = {
-    ".csv": _csv,
-    ".tsv": functools.partial(_csv, delimiter="\t"),
-    ".json": _json,
-    ".jsonl": _json,
-    ".parquet": _parquet,
-}
-"""Readers by the ends of files' names."""

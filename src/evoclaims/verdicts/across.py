@@ -114,6 +114,8 @@ class Across:
                     lines.append(f"{one.label}: {claim}: {cell.was} -> {cell.outcome}")
             drift = self.upgrades[one.label].drift if one.label in self.upgrades else DriftReport((), 0)
             lines += [f"{one.label}: {line}" for line in drift.lines]
+            if drift.nearest is not None and not drift.drifted:
+                lines.append(f"{one.label}: {drift.undecided}")
         return lines
 
 
@@ -170,7 +172,14 @@ def _successions(first: Judged, now: Judged) -> Iterable[Succession]:
         if not before or old is None or before == trials:
             continue
         was, is_now = ({name: those[0] for name, those in one.versions.items()} for one in (old, source))
-        yield Succession(label, was, is_now, before, trials, len(trials))
+        reads = {
+            name
+            for report in now.reports.values()
+            for one in report.sources
+            if one.label == label
+            for name in one.reads
+        }
+        yield Succession(label, was, is_now, before, trials, len(trials), source.method, tuple(sorted(reads)))
 
 
 def _cell(report: ClaimReport, before: ClaimReport | None, found: Upgrade | None) -> Cell:
@@ -186,5 +195,5 @@ def _cell(report: ClaimReport, before: ClaimReport | None, found: Upgrade | None
         repeated=bool(own),
         compared=sum(len(one.pairs) for one in own),
         changed=sum(one.changed for one in own),
-        drift=min(rows, key=lambda row: row.p_holm or 0.0, default=None),
+        drift=min(rows, key=lambda row: (not row.drifted, row.p_holm, row.p or 1.0), default=None),
     )

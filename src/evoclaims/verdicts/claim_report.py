@@ -26,12 +26,13 @@ CONTROL: Final = "control"
 
 @dataclass(frozen=True)
 class Attainable:
-    """One look at the data, and the smallest p that it can give for and against the claim."""
+    """One look at the data, and the smallest p that it can give for the claim, against it, and against its size."""
 
     n: int
     alpha: float
     supported: float
     refuted: float
+    smaller: float | None = None
 
 
 @dataclass(frozen=True)
@@ -47,6 +48,20 @@ class LastVerdict:
     outcome: Outcome
     fingerprint: str | None
     versions: Several
+
+
+@dataclass(frozen=True)
+class EarlierRun:
+    """How a claim's test ended before it ran again in the same run of pytest: it no longer counts.
+
+    Attributes:
+        outcome, reason: the verdict in short.
+        p: of the whole assertion; None if nothing was tested.
+    """
+
+    outcome: Outcome
+    reason: str
+    p: float | None
 
 
 @dataclass(frozen=True)
@@ -74,6 +89,9 @@ class ClaimReport:
         asserts: hash of the assertion alone, which two claims with one assertion share; empty where none was judged.
         readings: of the sentence, the judged one first; empty where only that one was judged.
         satisfied_by: names of the null agents that satisfy the assertion.
+        earlier: how its test ended before a plugin ran it again, oldest first; the last run counts.
+        chance: of a claim that is inconclusive and was accepted as supported, how often draws from its pilots end so;
+            None where that is not known.
     """
 
     claim: str
@@ -98,6 +116,8 @@ class ClaimReport:
     asserts: str = ""
     readings: tuple[ReadAs, ...] = ()
     satisfied_by: tuple[str, ...] = ()
+    earlier: tuple[EarlierRun, ...] = ()
+    chance: float | None = None
 
     @property
     def name(self) -> str:
@@ -134,9 +154,12 @@ class ClaimReport:
 
     @property
     def failed(self) -> bool:
-        """Whether this ends the run with status 1: refuted or broken, and not accepted; for a variant, only broken."""
-        failures = (Outcome.ERROR,) if self.variant else (Outcome.REFUTED, Outcome.ERROR)
-        return self.outcome in failures and not self.as_expected
+        """Whether this ends the run with status 1, if it is not accepted: something against it is shown, or it broke.
+
+        For a variant only if it broke.
+        """
+        failed = self.outcome is Outcome.ERROR or (self.outcome.is_against and not self.variant)
+        return failed and not self.as_expected
 
     @property
     def n(self) -> int:

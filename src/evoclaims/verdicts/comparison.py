@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path, PurePosixPath
 
 from evoclaims.core.errors import UserError
@@ -38,12 +38,14 @@ class Side:
         verdicts: by tier and claim.
         trials: by condition.
         troubles: a line for each file that could not be read.
+        reads: what claims read of each trial, by condition, where that is known.
     """
 
     name: str
     verdicts: Standings
     trials: Trials
     troubles: tuple[str, ...] = ()
+    reads: Mapping[str, frozenset[str]] = field(default_factory=dict)
 
     def of(self, tiers: Iterable[str]) -> Side:
         """Return the part of this side that belongs to some tiers."""
@@ -100,7 +102,7 @@ def store(reproduction: Reproduction, archive: Archive, reports: Iterable[ClaimR
         archive: the store, and what else the verdicts come from; trials that are judged from there are left out.
         reports: verdicts judged from `archive`.
     """
-    names, damaged = names_of(reproduction), list[DamagedFileError]()
+    names, damaged, reports = names_of(reproduction), list[DamagedFileError](), list(reports)
     trials: dict[str, list[TrialResult]] = defaultdict(list)
     versions = {
         condition: reproduction.tier(known[0].tier, known[0].variant).condition(known[0].method, known[0].task).versions
@@ -113,7 +115,15 @@ def store(reproduction: Reproduction, archive: Archive, reports: Iterable[ClaimR
             path = references.path_of(folder, name.tier, name.method, name.task)
             trials[_named(path.relative_to(reproduction.references))].append(trial)
     troubles = tuple(f"not read: {error}" for error in damaged)
-    return Side(f"the store {archive.store.root}", transitions.standings(reports), trials, troubles)
+    reads: dict[str, set[str]] = defaultdict(set)
+    for report in reports:
+        for source in report.sources:
+            path = references.path_of(
+                reproduction.references_of(report.variant), report.tier, source.method, source.task
+            )
+            reads[_named(path.relative_to(reproduction.references))].update(source.reads)
+    known = {name: frozenset(those) for name, those in reads.items()}
+    return Side(f"the store {archive.store.root}", transitions.standings(reports), trials, troubles, known)
 
 
 def _judged(archive: Archive, trials: Mapping[str, Versions]) -> Iterator[TrialResult]:
@@ -130,7 +140,18 @@ def _judged(archive: Archive, trials: Mapping[str, Versions]) -> Iterator[TrialR
 def compare_trials(old: Side, new: Side) -> tuple[DriftReport, DigestCheck]:
     """Check the conditions that both sides have for drift, and CPU trials for bit-identical results."""
     both = sorted(name for name in old.trials.keys() & new.trials.keys() if new.trials[name])
-    return references.compare([references.paired(name, new.trials[name], old.trials[name]) for name in both])
+    return references.compare(
+        [
+            references.paired(
+                name,
+                new.trials[name],
+                old.trials[name],
+                method=name.partition("-")[0],
+                reads=new.reads.get(name, ()) or old.reads.get(name, ()),
+            )
+            for name in both
+        ]
+    )
 
 
 def version_changes(old: Side, new: Side) -> list[str]:

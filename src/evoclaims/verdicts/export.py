@@ -52,7 +52,10 @@ def verdict_rows(reports: Iterable[ClaimReport]) -> list[Row]:
             "n": report.n,
             **{
                 name: getattr(report.verdict, name, None)
-                for name in ("p", "attainable_p", "p_refuted", "attainable_p_refuted", "alpha", "fingerprint")
+                for name in (
+                    *("p", "attainable_p", "p_refuted", "attainable_p_refuted"),
+                    *("p_smaller", "attainable_p_smaller", "alpha", "fingerprint"),
+                )
             },
             "expected": report.expected,
             "because": report.because,

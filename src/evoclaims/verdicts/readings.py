@@ -20,7 +20,6 @@ class ReadAs:
         since: when the reading was written (ISO 8601, UTC); empty where nobody says.
         asserts: the assertion in plain English.
         outcome: of it.
-        reason: why.
         trials_since: when the first of its trials started (ISO 8601); empty where no record says.
     """
 
@@ -29,7 +28,6 @@ class ReadAs:
     since: str
     asserts: str
     outcome: Outcome
-    reason: str
     trials_since: str = ""
 
     @property

@@ -10,7 +10,12 @@ from evoclaims.verdicts.history import AcceptedVerdict
 
 
 def reason(
-    report: ClaimReport, old: AcceptedVerdict, new: AcceptedVerdict, drift: DriftReport, digests: DigestCheck
+    report: ClaimReport,
+    old: AcceptedVerdict,
+    new: AcceptedVerdict,
+    drift: DriftReport,
+    digests: DigestCheck,
+    upgraded: DriftReport | None = None,
 ) -> str:
     """Return in a sentence why a claim's verdict may have changed.
 
@@ -20,14 +25,16 @@ def reason(
         new: the current verdict.
         drift: the comparison of its trials, among others, with the reference trials.
         digests: the comparison to the bit of those that the same kind of machine made with the same versions.
+        upgraded: the comparison of its trials, among others, with stored ones of other versions, as `across` makes it.
     """
     if old.trials == new.trials:
         return "from the same trials to the bit, so that the code which judges or reads them has changed"
     labels = {f"{source.label} ({report.tier})" for source in report.sources}
-    rows = [row for row in drift.rows if row.label in labels]
-    drifted = sorted({row.label for row in rows if row.drifted})
-    if drifted:
-        return f"the trials of {', '.join(drifted)} have drifted from the reference trials (see above)"
+    mine = drift.about(labels)
+    for found, those in ((upgraded, "those of other versions"), (drift, "the reference trials")):
+        drifted = sorted({row.label for row in found.about(labels).rows if row.drifted}) if found else []
+        if drifted:
+            return f"the trials of {', '.join(drifted)} have drifted from {those} (see above)"
     if {change.condition for change in digests.changed} & {source.condition for source in report.sources}:
         return (
             "the same seeds gave other trials with the same versions on a machine of the same name: the code which "
@@ -35,10 +42,20 @@ def reason(
         )
     moved = ", ".join([*changes(old, new), *([f"n {old.n} -> {new.n}"] if old.n != new.n else [])])
     by = f" ({moved})" if moved else ""
-    checked = "none has drifted" if rows and labels == {row.label for row in rows if row.p is not None} else ""
-    seen = f"; {checked}, so that this is no sign of a mistake" if checked else "; whether they drifted is not known"
+    checked = upgraded.about(labels) if upgraded and upgraded.about(labels).nearest else mine
+    methods = sorted({source.method for source in report.sources})
+    elsewhere = sorted(
+        {
+            row.label
+            for found in (upgraded, drift)
+            for row in (found.rows if found else ())
+            if row.drifted and row.label.partition(" on ")[0] in methods
+        }
+    )
+    seen = f"; {checked.undecided}" if checked.nearest else "; whether they drifted is not known"
+    seen += f"; but trials of the same method have drifted: {', '.join(elsewhere)}" if elsewhere else ""
     ps = f" (p was {old.p:.2g}, and is {new.p:.2g})" if old.p is not None and new.p is not None else ""
     return (
-        f"its trials are other draws of the same experiment{by}{seen}: with {new.n} trials a side a verdict near its "
-        f"bound falls one way or the other by chance{ps}; `--claims-trials N` looks at more"
+        f"its trials are other draws{by}{seen}. With {new.n} trials a side a verdict near its bound can fall either "
+        f"way by chance{ps}; `--claims-trials N` looks at more"
     )

@@ -3,14 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Final
 
 from evoclaims.core.errors import UserError
+from evoclaims.judging.verdict import Outcome
 from evoclaims.verdicts import history, transitions
 from evoclaims.verdicts.claim_report import ClaimReport
-from evoclaims.verdicts.history import AcceptedVerdict
-from evoclaims.verdicts.transitions import Kind, Transition
+from evoclaims.verdicts.history import AcceptedVerdict, key_of
+from evoclaims.verdicts.transitions import Kind, Pattern, Transition
+
+LOST: Final = Pattern(Outcome.SUPPORTED, Outcome.INCONCLUSIVE)
+
+SELDOM: Final = 0.01
+"""Share of draws up to which a lost support is no chance."""
 
 
 @dataclass(frozen=True)
@@ -21,11 +28,14 @@ class Regression:
         transitions: one for each claim of the run; empty if nothing has been accepted yet.
         matched: those that make the run fail.
         accepted: the last accepted verdict of each claim.
+        chances: of each claim that lost its support to *inconclusive*, how often that happens by chance (see
+            `ClaimReport.chance`).
     """
 
     transitions: tuple[Transition, ...]
     matched: tuple[Transition, ...]
     accepted: Mapping[tuple[str, str], AcceptedVerdict]
+    chances: Mapping[tuple[str, str], float | None] = field(default_factory=dict)
 
     @property
     def changed(self) -> dict[tuple[str, str], AcceptedVerdict]:
@@ -46,9 +56,20 @@ class Regression:
             *(
                 f"{'REGRESSION ' * (one in self.matched)}{transitions.describe(one)}"
                 + (f": {reasons[one.tier, one.claim]}" if (one.tier, one.claim) in reasons else "")
+                + self._by_chance(one)
                 for one in changes
             ),
         ]
+
+    def _by_chance(self, transition: Transition) -> str:
+        """Say how often a claim loses its support by chance, if it did."""
+        key = transition.tier, transition.claim
+        if key not in self.chances:
+            return ""
+        chance = self.chances[key]
+        if chance is None:
+            return "; how often this happens by chance is not known without pilots (`evoclaims power --run` makes them)"
+        return f"; by chance this happens in {chance:.1%} of draws from its pilots"
 
 
 def regression(folder: Path, reports: Sequence[ClaimReport], changes: str | None) -> Regression:
@@ -57,7 +78,9 @@ def regression(folder: Path, reports: Sequence[ClaimReport], changes: str | None
     Args:
         folder: of the reproduction.
         reports: of the run.
-        changes: the changes of verdicts to fail on (see `transitions.parse_patterns`); None for none.
+        changes: the changes of verdicts to fail on (see `transitions.parse_patterns`); None for none. Where there are
+            some, support that is lost to *inconclusive* fails, too, unless it happens by chance in more than `SELDOM`
+            of the draws from the claim's pilots.
 
     Raises:
         UserError: when the accepted verdicts are damaged, or missing although the run should fail on their changes.
@@ -76,4 +99,10 @@ def regression(folder: Path, reports: Sequence[ClaimReport], changes: str | None
     now = transitions.standings(reports)
     found = transitions.compare({key: accepted[key] for key in accepted.keys() & now.keys()}, now)
     last = {key: entries[-1] for key, entries in kept.items() if key in now}
-    return Regression(found, transitions.matched(found, patterns), last)
+    lost = {(one.tier, one.claim) for one in found if LOST.matches(one)}
+    chances = {key_of(report): report.chance for report in reports if key_of(report) in lost}
+    failing = transitions.matched(found, patterns)
+    if patterns:
+        rare = {key for key, chance in chances.items() if chance is None or chance <= SELDOM}
+        failing = tuple(one for one in found if one in failing or (one.tier, one.claim) in rare)
+    return Regression(found, failing, last, chances)

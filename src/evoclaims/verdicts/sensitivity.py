@@ -23,6 +23,7 @@ class Tally(StrEnum):
     INSENSITIVE = "supported but insensitive"
     VACUOUS = "supported but vacuous"
     REFUTED = "refuted"
+    SMALLER = "smaller than claimed"
     INCONCLUSIVE = "inconclusive"
     ERROR = "error"
     NOT_RUN = "not run"

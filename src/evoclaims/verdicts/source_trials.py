@@ -21,6 +21,7 @@ class SourceTrials:
         versions: the different versions that the trials were made with, by package that it depends on.
         again: seeds that this run repeated because the store's trials were made with other versions.
         edited: the project's classes whose code the trials ran otherwise than it is now.
+        reads: what the claim reads of each trial, such as "metrics.stones" and "levels.success".
     """
 
     method: str
@@ -30,6 +31,7 @@ class SourceTrials:
     versions: Several
     again: tuple[int, ...]
     edited: tuple[str, ...] = ()
+    reads: tuple[str, ...] = ()
 
     @property
     def label(self) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 from evoclaims.core.packages import Versions, agree, recorded
@@ -11,7 +11,7 @@ from evoclaims.core.printable import printable
 from evoclaims.core.provenance import what_fixes_bits
 from evoclaims.judging.drift import DriftCase, DriftReport, check_drift
 from evoclaims.judging.verdict import Outcome
-from evoclaims.paper.references import METRICS
+from evoclaims.paper import references
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.store import newest
 from evoclaims.verdicts import versions
@@ -28,6 +28,8 @@ class Succession:
         old, new: versions of the packages that it depends on.
         before, now: its trials, of the newest older environment and of this one.
         again: how many trials this run repeated because of their versions.
+        method: what its conditions share.
+        reads: what claims read of each trial.
     """
 
     label: str
@@ -36,6 +38,8 @@ class Succession:
     before: tuple[TrialResult, ...]
     now: tuple[TrialResult, ...]
     again: int
+    method: str = ""
+    reads: tuple[str, ...] = ()
 
     @property
     def change(self) -> str:
@@ -82,10 +86,12 @@ class Upgrade:
             lines.append(f"versions changed: {change}")
             lines += [f"  {_line(one)}" for one in those]
             labels = [one.label for one in those]
-            drift = replace(self.drift, rows=tuple(row for row in self.drift.rows if row.label in labels))
+            drift = self.drift.about(labels)
             drifted = sum(row.drifted for row in drift.rows)
             lines += [f"  {line}" for line in drift.lines]
             lines.append(f"  {drift.tested} comparisons with the trials made before, {drifted} drifted")
+            if not drifted and drift.nearest is not None:
+                lines.append(f"  {drift.undecided}")
         return [printable(line) for line in lines]
 
     def to_json(self) -> dict[str, Any]:
@@ -105,8 +111,18 @@ class Upgrade:
 
 
 def upgrade(successions: Sequence[Succession]) -> Upgrade:
-    """Check all successions for drift, with one correction over all."""
-    cases = [DriftCase(one.label, one.now[0].condition, one.now, one.before, METRICS) for one in successions]
+    """Check all successions for drift, with one correction over all: nothing else can have changed."""
+    cases = [
+        DriftCase(
+            one.label,
+            one.now[0].condition,
+            one.now,
+            one.before,
+            references.measures(one.now, one.reads),
+            method=one.method,
+        )
+        for one in successions
+    ]
     return Upgrade(tuple(successions), check_drift(cases))
 
 

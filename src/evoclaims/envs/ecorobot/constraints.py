@@ -1,4 +1,4 @@
-"""MuJoCo's constrained dynamics for few constraints: one Newton step with an exact line search.
+"""MuJoCo's constrained dynamics for few constraints: Newton steps with an exact line search.
 
 The accelerations a minimize ½ (a - a₀)ᵀ M (a - a₀) + ½ Σᵢ Dᵢ min(0, (J a - r)ᵢ)² (MuJoCo's documentation,
 "Computation", primal problem, pyramidal friction cones). MJX's line search brackets the root, in a loop of several
@@ -44,8 +44,9 @@ def constrained_acceleration(
     jacobian: Float[Array, "rows nv"],
     reference: Float[Array, " rows"],
     stiffness: Float[Array, " rows"],
+    steps: int = 1,
 ) -> Float[Array, " nv"]:
-    """Return the acceleration after one Newton step.
+    """Return the acceleration after some Newton steps.
 
     Args:
         mass: M.
@@ -54,6 +55,8 @@ def constrained_acceleration(
         jacobian: J, of constraints that only push.
         reference: r.
         stiffness: D.
+        steps: how many. One is what the paper's robots take; the minimum needs a few, since after a step as many
+            constraints push as before it in most cases, and then the next step is exact.
     """
     free = cholesky_solve(mass, force)
     if not jacobian.shape[0]:
@@ -70,12 +73,20 @@ def constrained_acceleration(
     a, off, shift = (
         jnp.where(warmer, *pair) for pair in ((warm, free), (off_warm, off_free), (shift_warm, shift_free))
     )
-    active = jnp.where(off < 0, stiffness, 0.0)
-    gradient = shift + (active * off) @ jacobian
-    hessian = mass + jnp.einsum("ri,r,rj->ij", jacobian, active, jacobian)
-    search = -cholesky_solve(hessian, gradient)
-    along = jacobian @ search
-    return a + _root(search @ shift, search @ (mass @ search), stiffness, off, along) * search
+
+    def newton(a: Array, off: Array, shift: Array) -> Array:
+        active = jnp.where(off < 0, stiffness, 0.0)
+        gradient = shift + (active * off) @ jacobian
+        hessian = mass + jnp.einsum("ri,r,rj->ij", jacobian, active, jacobian)
+        search = -cholesky_solve(hessian, gradient)
+        along = jacobian @ search
+        return a + _root(search @ shift, search @ (mass @ search), stiffness, off, along) * search
+
+    def again(a: Array, _: None) -> tuple[Array, None]:
+        return newton(a, jacobian @ a - reference, mass @ (a - free)), None
+
+    first = newton(a, off, shift)
+    return first if steps == 1 else jax.lax.scan(again, first, None, length=steps - 1)[0]
 
 
 def _root(

@@ -36,7 +36,7 @@ def reach(model: mujoco.MjModel) -> float:
         unbound = parent == 0 or mujoco.mjtJoint.mjJNT_SLIDE in kinds
         furthest[body] = furthest[parent] + (np.inf if unbound else arm)
         pivots[body] = anchors[-1]
-    touching = np.flatnonzero((model.geom_bodyid > 0) & (model.geom_contype & 1 > 0))
+    touching = np.flatnonzero((model.geom_bodyid > 0) & ((model.geom_contype | model.geom_conaffinity) != 0))
     bodies = model.geom_bodyid[touching]
     arms = np.linalg.norm(model.geom_pos[touching] - pivots[bodies], axis=1) + model.geom_rbound[touching]
     return float(np.max(furthest[bodies] + arms, initial=0.0))

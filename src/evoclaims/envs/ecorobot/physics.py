@@ -11,10 +11,11 @@ from jaxtyping import Array, Bool, Float, Int
 
 from evoclaims.core.foreign import implicit_promotions
 from evoclaims.core.pytree import pytree
-from evoclaims.envs.ecorobot.constraints import constrained_acceleration
+from evoclaims.envs.ecorobot.constraints import cholesky_solve, constrained_acceleration
+from evoclaims.envs.ecorobot.contact_frames import as_in_c
 from evoclaims.envs.ecorobot.pose import torso
 from evoclaims.envs.ecorobot.scene import GEOMS, Places, Scene, box_geoms, mjx, on_device
-from evoclaims.kernels.trace import seldom
+from evoclaims.kernels import seldom
 
 APART: Final = 1.0
 """Distance of contacts that do not touch, m."""
@@ -76,7 +77,10 @@ def _frame(scene: Scene, body: Body, control: Float[Array, " nu"], places: Place
         data = mjx.kinematics(model, data)
         data = mjx.com_pos(model, data)
         data = mjx.crb(model, data)
-        data = _seldom_crowded(mjx.collision(model, data), scene.robot.touching)
+        data = mjx.collision(model, data)
+        if not scene.robot.is_built_in:
+            data = as_in_c(jnp.asarray(scene.model.geom_type), model, data)
+        data = _seldom_crowded(data, scene.robot.touching)
         data = mjx.make_constraint(model, data)
         data = mjx.transmission(model, data)
         data = mjx.fwd_velocity(model, data)
@@ -84,9 +88,13 @@ def _frame(scene: Scene, body: Body, control: Float[Array, " nu"], places: Place
         mass = mjx.full_m(model, data)
         force = data.qfrc_passive - data.qfrc_bias + data.qfrc_actuator
         acceleration = constrained_acceleration(
-            mass, force, body.acceleration, data._impl.efc_J, data._impl.efc_aref, data._impl.efc_D
+            mass, force, body.acceleration, data._impl.efc_J, data._impl.efc_aref, data._impl.efc_D, scene.newton_steps
         )
-        data = mjx.euler(model, data.replace(qacc=acceleration))
+        used = acceleration
+        if scene.damps_implicitly:  # (M + h B) a' = M a: MuJoCo's documentation, "Computation", numerical integration
+            damping = model.opt.timestep * model.dof_damping
+            used = acceleration - cholesky_solve(mass + jnp.diag(damping), damping * acceleration)
+        data = mjx.euler(model, data.replace(qacc=used))
     return Body(position=data.qpos, velocity=data.qvel, acceleration=acceleration)
 
 

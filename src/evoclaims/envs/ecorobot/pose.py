@@ -39,7 +39,7 @@ class Pose:
 
 
 def torso(scene: Scene, position: Float[Array, " nq"]) -> Pose:
-    """Return the pose of the first body: its joints (free, slides, hinges) applied in order."""
+    """Return the pose of the first body: its joints applied in order."""
     model = scene.model
     place = jnp.asarray(model.body_pos[1], position.dtype)
     rotation = _of_quaternion(jnp.asarray(model.body_quat[1], position.dtype))
@@ -50,6 +50,10 @@ def torso(scene: Scene, position: Float[Array, " nq"]) -> Pose:
         if kind == mujoco.mjtJoint.mjJNT_FREE:
             quaternion = position[at + 3 : at + 7]
             place, rotation = position[at : at + 3], _of_quaternion(quaternion / jnp.linalg.norm(quaternion))
+        elif kind == mujoco.mjtJoint.mjJNT_BALL:
+            quaternion = position[at : at + 4]
+            turn = _of_quaternion(quaternion / jnp.linalg.norm(quaternion))
+            place, rotation = _turned(place, rotation, turn, jnp.asarray(model.jnt_pos[joint], position.dtype))
         else:
             moved = position[at] - jnp.asarray(model.qpos0[at], position.dtype)
             if kind == mujoco.mjtJoint.mjJNT_SLIDE:
@@ -57,10 +61,13 @@ def torso(scene: Scene, position: Float[Array, " nq"]) -> Pose:
             else:
                 half = moved / 2
                 turn = _of_quaternion(jnp.concatenate([jnp.cos(half)[None], jnp.sin(half) * axis]))
-                anchor = jnp.asarray(model.jnt_pos[joint], position.dtype)
-                place = place + rotation @ (anchor - turn @ anchor)
-                rotation = rotation @ turn
+                place, rotation = _turned(place, rotation, turn, jnp.asarray(model.jnt_pos[joint], position.dtype))
     return Pose(place=place, rotation=rotation)
+
+
+def _turned(place: Array, rotation: Array, turn: Array, anchor: Array) -> tuple[Array, Array]:
+    """Return place and rotation after a turn about a point of the torso."""
+    return place + rotation @ (anchor - turn @ anchor), rotation @ turn
 
 
 def _of_quaternion(quaternion: Float[Array, 4]) -> Float[Array, "3 3"]:

@@ -11,20 +11,23 @@ from typing import Any, ClassVar, Final
 
 import jax
 import jax.numpy as jnp
+import mujoco
+import numpy as np
 from jaxtyping import Array, Bool, Float, Int, PRNGKeyArray
 
-from evoclaims.core.errors import require_at_least
+from evoclaims.core.errors import UserError, require_at_least
 from evoclaims.core.keys import streams
 from evoclaims.core.pytree import select, strong
 from evoclaims.envs.base import Episode, PolicyFn, TaskState, averaged, fitting, played
 from evoclaims.envs.ecorobot import physics
 from evoclaims.envs.ecorobot.boxes import Box
+from evoclaims.envs.ecorobot.fidelity import require_fidelity
 from evoclaims.envs.ecorobot.outing import Outing, Ruling
 from evoclaims.envs.ecorobot.pose import Pose, torso
-from evoclaims.envs.ecorobot.robots import SIMPLE_ROB, Robot
+from evoclaims.envs.ecorobot.robots import SIMPLE_ROB, Robot, fits_as_built_in
 from evoclaims.envs.ecorobot.scene import Places, Scene, scene
 from evoclaims.envs.ecorobot.sensors import Sensor
-from evoclaims.kernels.call import one_kernel
+from evoclaims.kernels import one_kernel
 
 ROBOT_PACKAGES: Final = ("llvmlite", "mujoco", "mujoco-mjx")
 """Packages that every robot task depends on; a task declares these and any others it needs."""
@@ -56,9 +59,35 @@ class RobotTask(ABC):
     places: Places | None = field(default=None, compare=False, repr=False, kw_only=True, metadata={"canonical": False})
 
     def __post_init__(self) -> None:
-        """Check the counts."""
+        """Check the counts, and a custom robot among the boxes."""
         counts = {"episode_steps": self.episode_steps, "examined_episodes": self.examined_episodes}
         require_at_least(1, f"{self.name}'s", **counts)
+        if not isinstance(self.robot, Robot):
+            raise UserError(f"{self.name}'s robot must be a Robot, such as ANT, not {self.robot!r}.")
+        if self.sensor is not None and not callable(getattr(self.sensor, "read", None)):
+            raise UserError(f"{self.name}'s sensor must be Rangefinders(…), PieSlices(…) or None, not {self.sensor!r}.")
+        # The built-in robots fit; to compile them takes longer than to load a paper.
+        if not fits_as_built_in(self.robot):
+            self._require_fit()
+
+    def _require_fit(self) -> None:
+        """Compile the robot among the boxes, and check that it can act and starts where the task says."""
+        model, robot = self.scene.whole, self.robot
+        if not model.nu:
+            raise UserError(f"The model of the robot {robot.name} has no actuators, so that it cannot act: write some.")
+        if self.start is None:
+            return
+        data = mujoco.MjData(model)
+        data.qpos[:] = self.scene.start
+        data.qpos[:2] = self.start[: model.nq]
+        mujoco.mj_kinematics(model, data)
+        place = data.xpos[1][:2]
+        if not np.allclose(place, self.start, atol=1e-5):
+            raise UserError(
+                f"{self.name} starts its robots at x {self.start[0]:g} and y {self.start[1]:g}, and the first two positions "
+                f"of {robot.name} put it at x {place[0]:g} and y {place[1]:g}: its torso needs a free joint, or slides along "
+                "x and y as its first joints, at x 0 and y 0."
+            )
 
     @property
     @abstractmethod
@@ -154,6 +183,7 @@ class RobotTask(ABC):
 
     def plain_start(self, position: Float[Array, " nq"], velocity: Float[Array, " nv"]) -> TaskState:
         """Return the state at the start of an episode."""
+        require_fidelity(self.scene)
         pose = torso(self.scene, position)
         outing = strong(
             Outing(
@@ -180,6 +210,7 @@ class RobotTask(ABC):
 
         A step in which the simulation diverges (`physics.is_stable`) is undone: no reward, and the episode ends.
         """
+        require_fidelity(self.scene)
         outing: Outing = state.inner
         control = action
         if self.robot.scales_actions:

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
-from importlib import resources
-from typing import Final
+from typing import Any, Final
+
+import mujoco
+import numpy as np
 
 from evoclaims.core.errors import UserError
-
-OURS: Final = "evoclaims.envs.ecorobot:assets/"
-BRAX: Final = "brax:envs/assets/"
+from evoclaims.envs.ecorobot import model_files
+from evoclaims.envs.ecorobot.features import require_simulated
+from evoclaims.envs.ecorobot.model_files import BRAX, OURS
 
 
 @dataclass(frozen=True)
@@ -38,6 +40,11 @@ class Robot:
         velocity_limit: shown velocities are clipped to it.
         contacts: most contacts kept, the nearest ones.
         touching: contacts of which seldom more touch at a time. Steps with more take longer; results are the same.
+        body: a hash of what it is made of, part of the ids of its trials; None for the built-in robots, whose files do not
+            change.
+
+    A built-in robot's file is simulated as the paper's code does: with one iteration of the solver and explicit damping.
+    Any other is simulated as it says, or refused.
     """
 
     name: str
@@ -59,25 +66,120 @@ class Robot:
     velocity_limit: float = math.inf
     contacts: int = 8
     touching: int = field(default=4, metadata={"canonical": False})
+    body: str | None = field(init=False, default=None, repr=False, metadata={"canonical": "if set"})
+
+    def __post_init__(self) -> None:
+        """Check the numbers and the model, and name what it is made of: with an edited file it is another robot.
+
+        Raises:
+            UserError: when there is no such file, it is no model that can be simulated, or the numbers do not fit.
+        """
+        self._require_numbers()
+        if self.is_built_in:
+            return
+        model = model_files.own_model(self.name, self.xml)
+        require_simulated(self.name, model)
+        self.require_fit(model)
+        object.__setattr__(self, "body", model_files.body_hash(model))
+
+    def require_fit(self, model: mujoco.MjModel) -> None:
+        """Check the numbers that depend on the robot's model.
+
+        Raises:
+            UserError: naming the number.
+        """
+        sizes = {
+            "free_coordinates": (self.free_coordinates, model.nq),
+            "seen_velocities": (self.seen_velocities, model.nv),
+        }
+        for name, (given, most) in sizes.items():
+            if given is not None and given > most:
+                raise UserError(
+                    f"The robot {self.name} has {name}={given}, and its model has {most}: write at most {most}."
+                )
+        if self.start is not None:
+            if len(self.start) != model.nq:
+                raise UserError(
+                    f"The robot {self.name} starts at {len(self.start)} positions, and its model has {model.nq}: write "
+                    f"{model.nq} numbers as its start."
+                )
+            for joint in np.flatnonzero(
+                np.isin(model.jnt_type, (mujoco.mjtJoint.mjJNT_FREE, mujoco.mjtJoint.mjJNT_BALL))
+            ):
+                at = model.jnt_qposadr[joint] + 3 * (model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_FREE)
+                if not any(self.start[at : at + 4]):
+                    raise UserError(
+                        f"The robot {self.name} starts with the orientation 0 0 0 0 (positions {at} to {at + 3}), which is "
+                        "none: write 1 0 0 0 for upright."
+                    )
+        low, high = model.actuator_ctrlrange.T
+        if self.scales_actions and not np.all(low < high):
+            motor = model.actuator(int(np.argmin(low < high)))
+            raise UserError(
+                f"The robot {self.name} has scales_actions=True, and its actuator {motor.name or motor.id} has the ctrlrange "
+                f"{motor.ctrlrange[0]:g} {motor.ctrlrange[1]:g}, so that actions span nothing: write a ctrlrange whose "
+                "first number is below its second, or leave out scales_actions."
+            )
+
+    def _require_numbers(self) -> None:
+        """Check types, signs and order of what does not depend on the model."""
+        for name in ("name", "xml"):
+            if not isinstance(getattr(self, name), str) or not getattr(self, name):
+                raise UserError(f"A robot's {name} is a text that is not empty, not {getattr(self, name)!r}.")
+        least = {"frames": 1, "contacts": 1, "touching": 0, "free_coordinates": 0, "seen_velocities": 0}
+        for name, lowest in least.items():
+            given = getattr(self, name)
+            if given is None and name == "seen_velocities":
+                continue
+            if not isinstance(given, int) or isinstance(given, bool) or given < lowest:
+                raise UserError(
+                    f"The robot {self.name} has {name}={given!r}: write a whole number of at least {lowest}."
+                )
+        for name in ("normal_velocity", "scales_actions"):
+            if not isinstance(getattr(self, name), bool):
+                raise UserError(f"The robot {self.name} has {name}={getattr(self, name)!r}: write True or False.")
+        for name in (
+            "torso_radius",
+            "forward_reward",
+            "control_cost",
+            "healthy_reward",
+            "position_noise",
+            "velocity_noise",
+        ):
+            given = getattr(self, name)
+            signed = name in ("forward_reward", "control_cost", "healthy_reward")
+            if not _is_number(given) or math.isinf(given) or (given < 0 and not signed):
+                allowed = "a finite number" if signed else "a finite number of at least 0"
+                raise UserError(f"The robot {self.name} has {name}={given!r}: write {allowed}.")
+        for name in ("healthy_pitch", "velocity_limit"):
+            given = getattr(self, name)
+            if not _is_number(given) or given <= 0:
+                raise UserError(f"The robot {self.name} has {name}={given!r}: write a number above 0, or math.inf.")
+        heights = self.healthy_height
+        if not _are_numbers(heights) or len(heights) != 2 or not heights[0] < heights[1]:
+            raise UserError(
+                f"The robot {self.name} has healthy_height={heights!r}: write the lowest height and the highest, in m."
+            )
+        if self.start is not None and (not _are_numbers(self.start) or not all(map(math.isfinite, self.start))):
+            raise UserError(f"The robot {self.name} has start={self.start!r}: write a tuple of finite numbers.")
 
     @property
     def file(self) -> str:
-        """The path of the model's file.
+        """The path of the model's file."""
+        return model_files.path_of(self.name, self.xml)
 
-        Raises:
-            UserError: when there is no such package, or no such file in it.
-        """
-        package, _, path = self.xml.partition(":")
-        try:
-            found = resources.files(package) / path
-        except (ImportError, TypeError, ValueError) as error:
-            raise UserError(
-                f"The robot {self.name!r} has its model in {self.xml!r}, and there is no package {package!r}: write "
-                "PACKAGE:PATH, of a package that can be imported."
-            ) from error
-        if not found.is_file():
-            raise UserError(f"The robot {self.name!r} has its model in {self.xml!r}, and there is no file {found}.")
-        return str(found)
+    @property
+    def is_built_in(self) -> bool:
+        """Whether its file is that of a built-in robot, with which the paper's trials are made."""
+        return self.xml in model_files.BUILT_IN
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and not math.isnan(value)
+
+
+def _are_numbers(values: Any) -> bool:
+    return isinstance(values, tuple) and all(map(_is_number, values))
 
 
 SIMPLE_ROB: Final = Robot(
@@ -132,3 +234,9 @@ WALKER2D: Final = replace(
 )
 
 ROBOTS: Final = {robot.name: robot for robot in (SIMPLE_ROB, ANT, HALF_CHEETAH, HOPPER, HUMANOID, WALKER2D)}
+
+
+def fits_as_built_in(robot: Robot) -> bool:
+    """Whether a robot is a built-in one in all that depends on the model."""
+    names = ("xml", "start", "free_coordinates", "seen_velocities", "scales_actions")
+    return any(all(getattr(robot, name) == getattr(one, name) for name in names) for one in ROBOTS.values())

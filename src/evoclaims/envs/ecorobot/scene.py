@@ -6,6 +6,7 @@ import contextlib
 import io
 import math
 from collections.abc import Mapping
+from copy import copy
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import Any, Final
@@ -17,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evoclaims.core.errors import UserError
+from evoclaims.envs.ecorobot import model_files
 from evoclaims.envs.ecorobot.boxes import Box
 from evoclaims.envs.ecorobot.crowding import touched_at_once
 from evoclaims.envs.ecorobot.robots import Robot
@@ -24,9 +26,19 @@ from evoclaims.envs.ecorobot.robots import Robot
 # MJX prints two lines when NVIDIA's warp is not installed; nothing here uses warp.
 with contextlib.redirect_stdout(io.StringIO()):
     from mujoco import mjx as mjx
+    from mujoco.mjx._src.collision_driver import geom_pairs
 
 WORLD_GROUP: Final = 1
 """The geom group of the scene's own geoms; sensors see it."""
+NEWTON_STEPS: Final = 8
+"""Most steps of the constraints' solver in a frame; it reaches the minimum, within rounding, in four or fewer mostly."""
+CONTACTS: Final = frozenset(
+    {
+        *(("plane", kind) for kind in ("sphere", "capsule", "ellipsoid", "cylinder", "box", "mesh")),
+        *(("sphere", kind) for kind in ("sphere", "capsule", "box")),
+    }
+)
+"""Types of geoms between which a step finds the contacts that MuJoCo in C finds."""
 Places = Mapping[str, Any]
 """What differs between boxes: arrays of MuJoCo's model by name, each [boxes, …]."""
 GEOMS: Final = ("geom_pos", "geom_size", "geom_quat")
@@ -68,8 +80,10 @@ class Scene:
     @cached_property
     def mjx(self) -> Any:
         """The model that is simulated, in MJX's form; its arrays are on the host, so that programs embed them."""
+        explicit = copy(self.model)
+        explicit.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_EULERDAMP  # `physics` integrates damping
         with jax.ensure_compile_time_eval():
-            model = jax.device_get(mjx.put_model(self.model, impl="jax"))
+            model = jax.device_get(mjx.put_model(explicit, impl="jax"))
         # Erase the boxes that happen to come first, or programs would depend on them.
         geoms = box_geoms(self.model)
         blank = {name: np.array(getattr(model, name)) for name in self.turns}
@@ -82,6 +96,17 @@ class Scene:
         """MJX's data for the model at the start; arrays on the host."""
         with jax.ensure_compile_time_eval():
             return jax.device_get(mjx.make_data(self.model, impl="jax"))
+
+    @property
+    def newton_steps(self) -> int:
+        """Steps of the constraints' solver in a frame."""
+        return min(int(self.model.opt.iterations), NEWTON_STEPS)
+
+    @property
+    def damps_implicitly(self) -> bool:
+        """Whether a frame integrates the joints' damping implicitly, as MuJoCo does unless a file asks for less."""
+        explicit = self.model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_EULERDAMP
+        return not explicit and bool(self.model.dof_damping.any())
 
     @cached_property
     def start(self) -> NDArray[np.float32]:
@@ -121,18 +146,16 @@ def _compiled(robot: Robot, boxes: tuple[Box, ...]) -> mujoco.MjModel:
     Raises:
         UserError: when there is no such model, or it has what `physics.act` does not simulate.
     """
-    try:
-        spec = mujoco.MjSpec.from_file(robot.file)
-    except (ValueError, FileNotFoundError) as error:
-        raise UserError(f"The model of the robot {robot.name} cannot be read: {error}") from error
+    spec = model_files.read(robot.name, robot.xml)
     if any(geom.group == WORLD_GROUP for geom in spec.worldbody.geoms):
         raise UserError(
             f"The robot {robot.name} has a geom of the world in group {WORLD_GROUP}, which is that of a task's boxes: "
             "give its floor another group."
         )
-    option = spec.option
-    option.solver, option.iterations, option.ls_iterations = mujoco.mjtSolver.mjSOL_NEWTON, 1, 4
-    option.disableflags |= mujoco.mjtDisableBit.mjDSBL_EULERDAMP
+    if robot.is_built_in:
+        option = spec.option
+        option.solver, option.iterations, option.ls_iterations = mujoco.mjtSolver.mjSOL_NEWTON, 1, 4
+        option.disableflags |= mujoco.mjtDisableBit.mjDSBL_EULERDAMP
     # Remove Brax's own numbers: MJX (3.17) looks up its setting by the index of its name, not of its data, and would
     # read one of Brax's (the ant lost all contacts).
     for numeric in list(spec.numerics):
@@ -145,8 +168,9 @@ def _compiled(robot: Robot, boxes: tuple[Box, ...]) -> mujoco.MjModel:
             pos=box.place,
             size=box.size,
             quat=[math.cos(half), 0.0, 0.0, math.sin(half)],
-            contype=0,
-            conaffinity=1,
+            # All bits: whatever collides with anything collides with boxes. The built-in robots need the first one.
+            contype=0 if robot.is_built_in else -1,
+            conaffinity=1 if robot.is_built_in else -1,
             friction=box.surface.friction,
             solref=box.surface.solref,
             solimp=box.surface.solimp,
@@ -154,32 +178,30 @@ def _compiled(robot: Robot, boxes: tuple[Box, ...]) -> mujoco.MjModel:
             group=WORLD_GROUP,
             rgba=[0.55, 0.5, 0.45, 1.0],
         )
-    # As MuJoCo (3.17) advises instead of the deprecated attribute `settotalmass`, which the half-cheetah has.
-    total, spec.compiler.settotalmass = spec.compiler.settotalmass, -1.0
-    model = spec.compile()
-    if total > 0:
-        mujoco.mj_setTotalmass(model, total)
-        mujoco.mj_setConst(model, mujoco.MjData(model))
-    if beyond := _not_simulated(model):
-        raise UserError(
-            f"The model of the robot {robot.name} has {', '.join(beyond)}, which is not simulated here: a step knows "
-            "joints with limits, springs and damping, motors without a state of their own, and contacts with pyramidal "
-            "friction cones, and integrates as MuJoCo's Euler does."
-        )
+    model = model_files.compiled(robot.name, spec)
+    robot.require_fit(model)
+    if not robot.is_built_in:
+        model_files.require_unedited(robot.name, robot.xml, robot.body)
+        _require_contacts(robot.name, model)
     return model
 
 
-def _not_simulated(model: mujoco.MjModel) -> list[str]:
-    """Return what a model has that `physics.act` leaves out."""
-    found = {
-        "equality constraints": model.neq > 0,
-        "tendons": model.ntendon > 0,
-        "actuators with a state": model.na > 0,
-        "friction loss in joints": bool((model.dof_frictionloss > 0).any()),
-        "elliptic friction cones": model.opt.cone != mujoco.mjtCone.mjCONE_PYRAMIDAL,
-        "another integrator than Euler": model.opt.integrator != mujoco.mjtIntegrator.mjINT_EULER,
-    }
-    return [name for name, there in found.items() if there]
+def _require_contacts(name: str, model: mujoco.MjModel) -> None:
+    """Check that MJX finds the contacts of all geoms of a custom robot that can touch, as MuJoCo in C does.
+
+    Raises:
+        UserError: naming the two kinds of geoms.
+    """
+    geoms = {int(kind): kind.name.removeprefix("mjGEOM_").lower() for kind in mujoco.mjtGeom.__members__.values()}
+    for one, other, _ in geom_pairs(model):
+        pair = tuple(geoms[int(model.geom_type[geom])] for geom in (one, other))
+        if pair not in CONTACTS:
+            names = [model.geom(int(geom)).name or "without a name" for geom in (one, other)]
+            raise UserError(
+                f"The robot {name} has a {pair[0]} ({names[0]}) and a {pair[1]} ({names[1]}) that can touch, of which "
+                "MJX computes no contacts, or other ones than MuJoCo. Write another type of geom, such as spheres, or "
+                "contype and conaffinity with which they do not meet."
+            )
 
 
 def on_device(tree: Any) -> Any:

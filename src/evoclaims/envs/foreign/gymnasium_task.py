@@ -11,6 +11,7 @@ from typing import Any, ClassVar, NoReturn
 import numpy as np
 
 from evoclaims.core.errors import UserError
+from evoclaims.envs.foreign.native_actions import native_action
 from evoclaims.envs.foreign.scoring import ForeignTask, Scored
 
 
@@ -94,7 +95,8 @@ class GymnasiumTask(ForeignTask):
                 observation, _ = environment.reset(seed=int(start))
                 total = 0.0
                 for step in range(1, self.horizon + 1):
-                    observation, reward, terminated, truncated, _ = environment.step(policy(observation))
+                    action = native_action(environment.action_space, policy(observation), self.name)
+                    observation, reward, terminated, truncated, _ = environment.step(action)
                     total += float(reward)
                     if terminated or truncated:
                         return total, step

@@ -21,6 +21,7 @@ from evoclaims.core.keys import EVALUATION, streams, trial_key
 from evoclaims.core.pytree import pytree, select, strong
 from evoclaims.envs.base import Episode, PolicyFn, TaskState, averaged, fitting, played
 from evoclaims.envs.foreign.actions import Choice, Range
+from evoclaims.envs.foreign.native_actions import choice
 from evoclaims.envs.foreign.scoring import ForeignTask, Scored
 
 
@@ -212,14 +213,17 @@ class JaxTask(ForeignTask):
 
     def examine_natively(self, policy: Callable[[Any], Any], seed: int) -> Scored:
         """Run `examined_episodes` of a policy that acts as the environment wants it, on the host, and average."""
-        begin, advance = jax.jit(self.begin), jax.jit(self.advance)
+        begin, advance, actions = jax.jit(self.begin), jax.jit(self.advance), self.actions
+
+        def native(action: Any) -> Array:
+            return jnp.asarray(choice(action, 0, actions.size, self.name) if isinstance(actions, Choice) else action)
 
         def one(key: Array) -> tuple[float, int]:
             key, begin_key = jax.random.split(key)
             moment, total = begin(begin_key), 0.0
             for step in range(1, self.episode_steps + 1):
                 key, step_key = jax.random.split(key)
-                moment = advance(step_key, moment.state, jnp.asarray(policy(np.asarray(moment.observation))))
+                moment = advance(step_key, moment.state, native(policy(np.asarray(moment.observation))))
                 total += float(moment.reward)
                 if moment.terminated:
                     return total, step

@@ -43,6 +43,10 @@ class EveryTrial(Assertion):
         """Return zeros: a fact can be true or false at any n."""
         return PValues(0.0, 0.0)
 
+    def highest(self, trials: Trials, n: int, design: Design) -> PValues:
+        """Return whether a trial that is known fails it: then no other result changes that."""
+        return PValues(1.0, 1.0 if all(self.event.sample(trials).values) else 0.0)
+
     def find(self, trials: Trials, design: Design, alpha: float) -> Finding:
         """Check whether it holds."""
         sample = self.event.sample(trials)

@@ -15,6 +15,7 @@ from filelock import FileLock
 from evoclaims.core.errors import UserError
 from evoclaims.core.files import write_atomically
 from evoclaims.core.private_files import ForeignFileError, doubt, make_private, read_private, say_refused
+from evoclaims.core.waiting import waiting
 from evoclaims.kernels.unsupported import Unsupported
 
 try:
@@ -133,6 +134,6 @@ def _alone(path: Path) -> Iterator[None]:
     """Let one process at a time compile what `path` will hold; where no lock can be had in time, all do."""
     lock = FileLock(path.with_suffix(".lock"), timeout=PATIENCE)
     with contextlib.ExitStack() as stack:
-        with contextlib.suppress(OSError):  # filelock's Timeout is one: its owner may be stopped, or hang
+        with contextlib.suppress(OSError), waiting():  # filelock's Timeout is one: its owner may be stopped, or hang
             stack.enter_context(lock)
         yield

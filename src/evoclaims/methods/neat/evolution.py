@@ -13,7 +13,7 @@ from jaxtyping import Array, Float, Int, PRNGKeyArray
 from evoclaims.core.keys import streams
 from evoclaims.core.pytree import pytree, select
 from evoclaims.envs.base import Episode, Task
-from evoclaims.kernels.call import take_rows
+from evoclaims.kernels import take_rows
 from evoclaims.methods.base import Policy, Progress
 from evoclaims.methods.champion import no_episode
 from evoclaims.methods.neat.capacity import capacities, in_capacity

@@ -11,8 +11,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int
 
 from evoclaims.core.pytree import pytree
-from evoclaims.kernels import GroupKernel
-from evoclaims.kernels.call import one_kernel
+from evoclaims.kernels import GroupKernel, one_kernel
 from evoclaims.kernels.genomes.homology import write_look_up, write_search
 from evoclaims.networks.genome import Connections, Genome, Nodes
 

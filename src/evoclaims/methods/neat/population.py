@@ -11,7 +11,7 @@ from jaxtyping import Array, Float, Int, PRNGKeyArray
 
 from evoclaims.core.keys import streams
 from evoclaims.core.pytree import pytree, select
-from evoclaims.kernels.call import take_rows
+from evoclaims.kernels import take_rows
 from evoclaims.methods.neat.capacity import capacities, in_capacity
 from evoclaims.methods.neat.crossover import crossover
 from evoclaims.methods.neat.reproduction import Parents, choose_parents, survive

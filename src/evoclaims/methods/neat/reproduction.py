@@ -8,7 +8,7 @@ from jaxtyping import Array, Bool, Float, Int, PRNGKeyArray
 
 from evoclaims.core.keys import streams
 from evoclaims.core.pytree import pytree
-from evoclaims.kernels.call import take_rows
+from evoclaims.kernels import take_rows
 from evoclaims.methods.neat.settings import Species
 from evoclaims.methods.neat.species import SpeciesState
 

@@ -1,0 +1,164 @@
+"""Whether a robot is simulated as its file says: frames of our step beside frames of MuJoCo in C.
+
+A custom robot's model may have what a step does not simulate, or what MJX computes in another way. The robot is
+refused then, before anything is trained.
+"""
+
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Final
+
+import jax
+import jax.numpy as jnp
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from evoclaims.core.errors import UserError
+from evoclaims.envs.ecorobot import physics
+from evoclaims.envs.ecorobot.physics import Body
+from evoclaims.envs.ecorobot.pose import torso
+from evoclaims.envs.ecorobot.scene import Scene
+
+Numbers = NDArray[np.float64]
+
+TOLERANCE: Final = 1e-8
+"""Largest difference of a velocity after one frame, and of a position, in float64: a share of 1 plus the largest."""
+RUNS: Final = 12
+"""Runs with random motors from which frames are taken."""
+FRAMES: Final = 240
+"""Frames of a run."""
+EVERY: Final = 10
+"""How often a frame is compared, and the motors change."""
+FASTEST: Final = 1e3
+"""Beyond such velocities a run has diverged, m/s or rad/s."""
+
+
+@dataclass(frozen=True)
+class Frames:
+    """What frames of MuJoCo in C started from, and where they led; the leading axis counts frames.
+
+    `pose` is the torso's place and rotation at the start of the frame; `contacts` counts the points that touch.
+    """
+
+    position: Numbers
+    velocity: Numbers
+    acceleration: Numbers
+    control: Numbers
+    next_position: Numbers
+    next_velocity: Numbers
+    pose: Numbers
+    contacts: NDArray[np.int64]
+
+
+@lru_cache(maxsize=64)
+def require_fidelity(scene: Scene) -> None:
+    """Check a custom robot among its boxes, in float64, once in a process, before it is simulated.
+
+    Raises:
+        UserError: when a frame differs from MuJoCo's by more than `TOLERANCE`.
+    """
+    if scene.robot.is_built_in:
+        return
+    # A thread of its own, since this is called while a program is traced.
+    with ThreadPoolExecutor(1) as own:
+        off, made = own.submit(_differences, scene).result()
+    wrong = ~(off <= TOLERANCE)  # NaN is wrong, too
+    if not wrong.any():
+        return
+    robot = scene.robot
+    worst = int(np.nanargmax(np.where(wrong, np.nan_to_num(off, nan=np.inf), -1.0)))
+    crowded = wrong & (made.contacts > robot.contacts)
+    if crowded.any() and not (wrong & ~crowded).any():
+        raise UserError(
+            f"The robot {robot.name} touches at {made.contacts[crowded].max()} points at a time, and contacts="
+            f"{robot.contacts} of them are simulated: write Robot(…, contacts={made.contacts.max()}) or more."
+        )
+    raise UserError(
+        f"The robot {robot.name} is not simulated here as its file says: in {np.sum(wrong)} of {len(wrong)} random "
+        f"states a frame differs from MuJoCo's own by up to {off[worst]:.2g} of 1 plus the largest velocity "
+        f"({TOLERANCE:g} is allowed), with {made.contacts[worst]} contacts. Remove from the file what MJX computes in another "
+        "way, such as contacts of boxes, cylinders or meshes."
+    )
+
+
+def _differences(scene: Scene) -> tuple[Numbers, Frames]:
+    """Return how far each frame of our step is from MuJoCo's, and MuJoCo's."""
+    made = frames_of(scene)
+    try:
+        cpu = jax.local_devices(backend="cpu")[0]
+    except RuntimeError:
+        cpu = jax.local_devices()[0]
+    with jax.enable_x64(True), jax.default_device(cpu):
+        world = Scene(scene.robot, scene.boxes)  # with arrays of float64
+        body = _stepped(world, made)
+        pose = jax.device_get(jax.vmap(lambda position: torso(world, position))(jnp.array(made.position.copy())))
+    count = len(made.position)
+    ours = np.concatenate([body.position, body.velocity, pose.place, pose.rotation.reshape(count, 9)], axis=1)
+    theirs = np.concatenate([made.next_position, made.next_velocity, made.pose], axis=1)
+    scale = 1.0 + np.max(np.abs(theirs), axis=1)
+    return np.max(np.abs(ours - theirs), axis=1) / scale, made
+
+
+def _stepped(world: Scene, made: Frames) -> Body:
+    """Return where one frame of our step leads from each start."""
+
+    def frame(position: jax.Array, velocity: jax.Array, acceleration: jax.Array, control: jax.Array) -> Body:
+        body = Body(position=position, velocity=velocity, acceleration=acceleration)
+        return physics._frame(world, body, control, world.turns)
+
+    states = [jnp.array(x.copy()) for x in (made.position, made.velocity, made.acceleration, made.control)]
+    quick = {"xla_backend_optimization_level": 0}  # it runs once
+    body: Body = jax.device_get(jax.jit(jax.vmap(frame), compiler_options=quick)(*states))
+    return body
+
+
+def frames_of(scene: Scene) -> Frames:
+    """Return frames of MuJoCo in C, with the file's options, from runs with random motors."""
+    model, random = scene.whole, np.random.default_rng(0)
+    data = mujoco.MjData(model)
+    limited = model.actuator_ctrllimited.astype(bool)[:, None]
+    low, high = np.where(limited, model.actuator_ctrlrange, np.array([-1.0, 1.0])).T
+    rows = []
+    for run in range(RUNS):
+        mujoco.mj_resetData(model, data)
+        data.qpos[:] = scene.start + 0.1 * random.standard_normal(model.nq)
+        mujoco.mj_normalizeQuat(model, data.qpos)
+        if scene.boxes:
+            _beside(scene, data, random)
+        data.qvel[:] = random.standard_normal(model.nv)
+        for frame in range(FRAMES):
+            if frame % EVERY == 0:
+                # Half of the runs ask for more than the motors' range.
+                data.ctrl[:] = (low + high) / 2 + (1 + run % 2) * random.uniform(-0.5, 0.5, model.nu) * (high - low)
+            before = [data.qpos.copy(), data.qvel.copy(), data.qacc_warmstart.copy(), data.ctrl.copy()]
+            mujoco.mj_step(model, data)
+            if not (np.isfinite(data.qvel).all() and np.abs(data.qvel).max(initial=0.0) < FASTEST):
+                break
+            if frame % EVERY == 0:
+                touching = sum(contact.efc_address >= 0 for contact in data.contact)
+                # A step computes the pose before it integrates.
+                pose = np.concatenate([data.xpos[1], data.xmat[1]])
+                rows.append([*before, data.qpos.copy(), data.qvel.copy(), pose, touching])
+    return Frames(*(np.array(column) for column in zip(*rows, strict=True)))
+
+
+def _beside(scene: Scene, data: mujoco.MjData, random: np.random.Generator) -> None:
+    """Move a robot beside one of the boxes, as far as its torso's joints allow."""
+    model, robot = scene.whole, scene.robot
+    box = scene.boxes[random.integers(len(scene.boxes))]
+    side = random.uniform(-1.0, 1.0, 2)
+    side /= np.max(np.abs(side))
+    outside = side * (np.array(box.half_size) + robot.torso_radius * random.uniform(0.5, 1.5))
+    target = np.array(box.centre) + box.rotation[:2, :2] @ outside
+    mujoco.mj_kinematics(model, data)
+    gap = target - data.xpos[1][:2]
+    for joint in range(model.body_jntadr[1], model.body_jntadr[1] + model.body_jntnum[1]):
+        at = model.jnt_qposadr[joint]
+        if model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_FREE:
+            data.qpos[at : at + 2] += gap
+        elif model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_SLIDE:
+            data.qpos[at] += gap @ data.xaxis[joint][:2]

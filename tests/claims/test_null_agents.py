@@ -1,0 +1,95 @@
+"""Assertions put to null agents: which agent satisfies which, and in whose place."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from evoclaims.claims.claim import Claim
+from evoclaims.claims.collected import ClaimTest
+from evoclaims.claims.session import Session
+from evoclaims.core.errors import UserError
+from evoclaims.judging.assertion import Assertion
+from evoclaims.paper.null_agent import NullAgent
+from evoclaims.paper.reproduction import Reproduction
+from evoclaims.trials.spec import Condition
+from evoclaims.trials.store import Store
+from evoclaims.verdicts.claim_report import CONTROL
+
+Put = Callable[..., tuple[str, ...]]
+
+
+def _still(condition: Condition) -> Any:
+    """Numbers of an agent that solves nothing; it cannot stand for the large task."""
+    if condition.task.levels != 2:
+        return None
+    return {"metrics": {"mean_success": 0.4, "furthest_solved": -1.0, "last_success": 0.5}}
+
+
+def _value(condition: Condition, seed: int) -> float:
+    return seed / 100 if condition.method.negated else 0.5 + seed / 100  # type: ignore[attr-defined]
+
+
+@pytest.fixture
+def put(reproduction: Reproduction, store: Store, says: Claim, served: Any) -> Put:
+    """A function that puts an assertion to agents, beside trials of which "better" has 0.5 to 0.59, "worse" to 0.09."""
+
+    def judge(asserted: Callable[[Any], Assertion], where: str = "§1", **agents: NullAgent) -> tuple[str, ...]:
+        paper = replace(reproduction, null_agents=agents or {"still": NullAgent("solves nothing", _still)})
+        session = Session(paper, store, served(_value))
+
+        def group(method: str, on: str = "small") -> Any:
+            return session.group(method, on, "full")
+
+        test = ClaimTest(replace(says, where=where), "full", "")
+        return session.settle(test, asserted(group)).satisfied_by
+
+    return judge
+
+
+def _stays(trials: Any, on: str = "small") -> Any:
+    return trials("worse", on).does_not_solve_the_last_level.stays()
+
+
+@pytest.mark.parametrize(
+    ("asserted", "satisfied"),
+    [
+        (_stays, True),
+        (lambda trials: trials("better").solves_the_last_level.in_most_trials(), False),
+        # It takes the place of the side that is claimed to be better, and not of the other one alone.
+        (lambda trials: trials("better").mean_success > trials("worse").mean_success, True),
+        (lambda trials: trials("worse").mean_success > trials("better").mean_success, False),
+        (lambda trials: trials("worse").mean_success < trials("better").mean_success, True),
+        # A control that the agent cannot pass: it would have to be better than itself.
+        (lambda trials: _stays(trials) & (trials("better").mean_success > trials("worse").mean_success), False),
+        (lambda trials: trials("better").mean_success.equivalent_to(trials("worse").mean_success, margin=0.1), True),
+        # It has no number of that name, or cannot stand for the task.
+        (lambda trials: trials("better").reward > -5, False),
+        (lambda trials: _stays(trials, "large"), False),
+    ],
+)
+def test_an_agent_satisfies_what_asks_for_nothing_learnt(put: Put, asserted: Any, satisfied: bool) -> None:
+    assert put(asserted) == (("still",) if satisfied else ())
+
+
+def test_an_agent_everywhere_is_never_put_beside_trials(put: Put) -> None:
+    agent = NullAgent("solves nothing", _still, everywhere=True)
+    assert put(lambda trials: trials("better").mean_success > trials("worse").mean_success, full=agent) == ()
+    assert put(_stays, full=agent) == ("full",)
+
+
+def test_controls_are_put_to_no_agent(put: Put) -> None:
+    assert put(_stays, where=CONTROL) == ()
+
+
+def test_an_agent_that_is_a_method_is_not_run_for_it(put: Put) -> None:
+    assert put(_stays, chance=NullAgent("the worse one", method="worse")) == ()
+
+
+@pytest.mark.parametrize("fields", [{}, {"method": "worse", "numbers": _still}])
+def test_an_agent_has_numbers_or_a_method(fields: Any) -> None:
+    with pytest.raises(UserError, match=r"The null agent 'x' has numbers=\.\.\. or method=\.\.\., and not both"):
+        NullAgent("x", **fields)

@@ -1,0 +1,55 @@
+"""The margin of a comparison is the effect that the paper's own design detects with power 1/3."""
+
+from __future__ import annotations
+
+from itertools import permutations
+
+import numpy as np
+import pytest
+from scipy.stats import mannwhitneyu, norm
+
+from evoclaims.core.errors import UserError
+from evoclaims.judging.design import FIXED_10, SEQUENTIAL
+from evoclaims.judging.fingerprint import fingerprint
+from evoclaims.judging.telescope import _u_distribution, detectable_a12
+
+
+def test_ten_against_ten_give_the_margin_of_all_committed_fingerprints() -> None:
+    assert detectable_a12(10) == FIXED_10.a12_margin == 0.71
+    assert SEQUENTIAL.for_paper(10) == SEQUENTIAL
+
+
+@pytest.mark.parametrize("n", [5, 8, 10, 15])
+def test_a_rank_test_of_normal_trials_detects_it_with_power_a_third(n: int) -> None:
+    """Another family of alternatives, another implementation of the test, simulation instead of the closed form."""
+    rng = np.random.default_rng(n)
+    a, b = rng.normal(2**0.5 * norm.ppf(detectable_a12(n)), 1, (4000, n)), rng.normal(0, 1, (4000, n))
+    power = (mannwhitneyu(a, b, axis=1, method="exact").pvalue <= 0.05).mean()
+    assert power == pytest.approx(1 / 3, abs=0.05)
+
+
+@pytest.mark.parametrize("odds", [1.0, 2.5])
+def test_the_distribution_of_u_is_that_of_all_orders(odds: float) -> None:
+    """Of three against three: an order's probability is the product of that of each largest value (Savage 1956)."""
+    expected = np.zeros(10)
+    for order in permutations(range(6)):  # from the largest down; 0 to 2 are of A
+        chance, weights, wins, above = 1.0, [odds] * 3 + [1.0] * 3, 0, 0
+        for at, one in enumerate(order):
+            chance *= weights[one] / sum(weights[other] for other in order[at:])
+            wins, above = (wins, above + 1) if one < 3 else (wins + above, above)
+        expected[wins] += chance
+    assert _u_distribution(3, odds) == pytest.approx(expected)
+
+
+def test_larger_designs_detect_less_and_too_small_ones_nothing() -> None:
+    margins = [detectable_a12(n) for n in (4, 5, 7, 10, 15, 20)]
+    assert margins == sorted(margins, reverse=True)
+    with pytest.raises(ValueError, match="never reaches"):
+        detectable_a12(3)
+    with pytest.raises(UserError, match="4 to 100 trials"):
+        FIXED_10.for_paper(3)
+
+
+def test_a_paper_with_other_trials_has_other_fingerprints(source) -> None:
+    claim = source("a", []).score() > source("b", []).score()
+    assert fingerprint(claim, SEQUENTIAL.for_paper(20)) != fingerprint(claim, SEQUENTIAL.for_paper(10))

@@ -1,0 +1,173 @@
+"""Tables as other programs export them: the columns that are asked for are read, whatever else there is."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pyarrow
+import pyarrow.parquet
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from evoclaims.core.errors import UserError
+from evoclaims.trials.imported import Imported
+from evoclaims.trials.table_formats import READERS
+
+pytestmark = pytest.mark.oldest
+
+FRAME = pd.DataFrame({"seed": [4, 7, 9], "return": [1.5, -2.0, 300.25], "note": ["a", "b", "c"]})
+VALUES = [1.5, -2.0, 300.25]
+
+
+@pytest.fixture
+def values(tmp_path: Path) -> Callable[..., list[float]]:
+    """A function that writes a table and returns the metric of its trials."""
+
+    def read(text: str | bytes, name: str = "runs.csv", **settings: Any) -> list[float]:
+        (tmp_path / name).write_bytes(text if isinstance(text, bytes) else text.encode())
+        settings = {"seed": "seed", "metric": "return", **settings}
+        return [trial.metrics["return"] for trial in Imported(name, folder=tmp_path, **settings).existing]
+
+    return read
+
+
+LAYOUTS = {
+    "columns": FRAME.to_json(),
+    "columns of some rows": FRAME.set_index(pd.Index([10, 3, 8])).to_json(),
+    "index": FRAME.to_json(orient="index"),
+    "records": FRAME.to_json(orient="records"),
+    "split": FRAME.to_json(orient="split"),
+    "table": FRAME.to_json(orient="table"),
+    "lines": FRAME.to_json(orient="records", lines=True),
+    "lists": json.dumps(FRAME.to_dict("list")),
+}
+
+
+@pytest.mark.parametrize("ending", ["json", "jsonl"])
+@pytest.mark.parametrize("layout", LAYOUTS)
+def test_json_of_pandas_is_read_in_every_layout_with_names(
+    values: Callable[..., list[float]], layout: str, ending: str
+) -> None:
+    assert values(LAYOUTS[layout], f"runs.{ending}") == VALUES
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (FRAME.to_json(orient="values"), r"row 1 is \[4,1.5,'a'\]|row 1 is \[4, 1.5, 'a'\]"),
+        (FRAME.set_index("note").to_json(), "which may be its columns or its rows: write it by to_json"),
+        (FRAME.T.to_json(orient="split").replace("7,", ""), "not all of its rows have 3 cells, as many as its columns"),
+        ('{"seed": [1, 2], "return": [3]}', r"its columns have different lengths \(1, 2\)"),
+        ('{"seed": 1, "return": 2}\n# the end', "its line 2 is '# the end'"),
+        ('"runs"', "and this is 'runs'"),
+    ],
+)
+def test_json_without_names_or_with_doubt_is_refused(values: Callable[..., list[float]], text: str, said: str) -> None:
+    with pytest.raises(UserError, match=rf"runs\.json is no table that can be read: .*({said})"):
+        values(text, "runs.json")
+
+
+MONITOR = '#{"t_start": 1690000000.5, "env_id": "CartPole-v1"}\n'
+TABLE = FRAME.to_csv(index=False)
+
+
+@pytest.mark.parametrize(
+    "before",
+    [MONITOR, "# exported on Monday\n", "# lr,0.1,adam\n#\n\n# second\n", "\n\n", "\ufeff", "#a\r\n"],
+)
+def test_lines_before_the_names_are_passed_over(values: Callable[..., list[float]], before: str) -> None:
+    assert values(before + TABLE) == VALUES
+    assert values(before + TABLE.replace(",", "\t"), "runs.tsv") == VALUES
+
+
+def test_monitor_file_is_read(values: Callable[..., list[float]]) -> None:
+    text = MONITOR + "r,l,t\n9.0,9,0.1\n12.0,12,0.3\n"
+    assert values(text, seed="l", metric={"return": "r"}) == [9.0, 12.0]
+
+
+def test_names_behind_a_number_sign_are_names(values: Callable[..., list[float]]) -> None:
+    file = io.StringIO()
+    np.savetxt(file, FRAME[["seed", "return"]].to_numpy(), delimiter=",", header="seed,return")
+    assert file.getvalue().startswith("# seed,return")
+    assert values(file.getvalue(), seed="# seed") == VALUES
+    with pytest.raises(UserError, match="named 'seed'. Did you mean '# seed'"):
+        values(file.getvalue())
+
+
+@pytest.mark.parametrize("delimiter", [";", "|", "\t"])
+def test_other_delimiters_are_named(values: Callable[..., list[float]], delimiter: str) -> None:
+    with pytest.raises(UserError, match="its first line has no ',' between names, but .*: 'seed"):
+        values(FRAME.to_csv(index=False, sep=delimiter))
+
+
+def test_quote_that_is_never_closed_swallows_no_rows(values: Callable[..., list[float]]) -> None:
+    with pytest.raises(UserError, match="a cell begins with a quote that is never closed"):
+        values('seed,return,note\n4,1,a\n7,2,"b\n9,3,c\n')
+
+
+def test_text_in_another_encoding_is_named(values: Callable[..., list[float]]) -> None:
+    with pytest.raises(UserError, match="it is UTF-16 text: save it as UTF-8"):
+        values(TABLE.encode("utf-16"))
+
+
+ODD = {
+    "a long text": "x" * 200_000,
+    "lines": 'one\n"two"\r\nthree, four',
+    "an object": {"a": [1, {"b": None}]},
+    "a list": [[1, 2], []],
+    "a large number": 10**5000,
+    "no number": math.nan,
+    "nothing": None,
+    "a truth": True,
+}
+
+
+@pytest.mark.parametrize("odd", ODD)
+def test_column_that_nobody_reads_refuses_no_table(values: Callable[..., list[float]], odd: str) -> None:
+    cell = json.dumps(ODD[odd]) if odd != "a large number" else "1" + "0" * 5000
+    rows = [(seed, value) for seed, value in zip(FRAME["seed"], VALUES, strict=True)]
+    records = [f'{{"seed": {seed}, "odd": {cell}, "odd": 1, "return": {value}}}' for seed, value in rows]
+    assert values(f"[{','.join(records)}]", "runs.json") == VALUES
+    assert values("\n".join(records), "runs.jsonl") == VALUES
+    file = io.StringIO()
+    csv.writer(file).writerows([("odd", "seed", "odd", "return"), *((cell, seed, "", value) for seed, value in rows)])
+    assert values(file.getvalue()) == VALUES
+    assert csv.field_size_limit() == 131_072
+
+
+def test_bytes_of_another_encoding_in_a_column_that_nobody_reads_refuse_no_table(
+    values: Callable[..., list[float]],
+) -> None:
+    assert values(TABLE.replace("b\n", "M\u00fcller\n").encode("latin-1")) == VALUES
+    assert values(FRAME.replace("b", "M\u00fcller").to_json(force_ascii=False).encode("latin-1"), "runs.json") == VALUES
+
+
+def test_parquet_types_that_python_has_not_are_refused_only_where_they_are_read(
+    values: Callable[..., list[float]], tmp_path: Path
+) -> None:
+    far = pyarrow.array([2**60] * 3, pyarrow.timestamp("ms"))  # a year that Python's dates do not have
+    columns = {"far": far, "seed": pyarrow.array([4, 7, 9]), "return": pyarrow.array(VALUES)}
+    pyarrow.parquet.write_table(pyarrow.table(columns), tmp_path / "made.parquet")
+    data = (tmp_path / "made.parquet").read_bytes()
+    assert values(data, "runs.parquet") == VALUES
+    with pytest.raises(UserError, match="its column 'far' cannot be read"):
+        values(data, "runs.parquet", metric={"return": "far"})
+
+
+@given(st.lists(st.tuples(st.text(max_size=20), st.text(max_size=20)), min_size=1, max_size=5), st.sampled_from(",\t"))
+def test_every_table_that_python_writes_is_read_as_written(rows: list[tuple[str, str]], delimiter: str) -> None:
+    """Or refused: only its first lines may be taken for comments."""
+    rows = [(one.replace("\x00", ""), other.replace("\x00", "")) for one, other in rows]
+    file = io.StringIO(newline="")
+    csv.writer(file, delimiter=delimiter, quoting=csv.QUOTE_ALL).writerows([("a", "b"), *rows])
+    columns = READERS[".csv" if delimiter == "," else ".tsv"](file.getvalue().encode("utf-8", "surrogatepass"))
+    assert list(zip(columns.cells("a"), columns.cells("b"), strict=True)) == rows

@@ -1,0 +1,43 @@
+"""Every committed verdict is what an independent program, which has nothing but NumPy, makes of the records."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from verdicts_by_numpy import Records, judge, load
+
+from evoclaims.claims.fetching import StoredOnly
+from evoclaims.claims.power import Listening
+from evoclaims.cli.project import open_project
+from evoclaims.verdicts import history
+
+LOOKS = {"full": [(5, 0.01), (10, 0.04)], "smoke": [(10, 0.05)]}
+
+
+@pytest.mark.parametrize("tier", LOOKS)
+def test_every_committed_verdict_is_that_of_the_independent_program(
+    tier: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(Path(__file__).parents[2])
+    project = open_project(str(tmp_path))
+    listening = Listening(project.reproduction, project.archive.store, StoredOnly(project.archive))
+    project.judge_sessions([(listening, tier)])
+    tasks = {one.id: one.task for one in project.reproduction.tier(tier).conditions.values()}
+    ends = {mark: task.observation_size + task.action_size for mark, task in tasks.items()}
+    records = Records(load(project.reproduction.folder / "reference" / tier), ends)
+    committed = {
+        claim: entries[-1]
+        for (of, claim), entries in history.load(project.reproduction.folder / history.FILE).items()
+        if of == tier
+    }
+    found = {}
+    for claim, entry in committed.items():
+        outcome, n, (p, *_) = judge(listening.assertions[claim].plain(), records, LOOKS[tier])
+        found[claim] = outcome
+        if outcome != "inconclusive":  # what more trials could not change ends earlier
+            assert n == entry.n, claim
+        if n == entry.n and entry.p is not None:
+            assert p == pytest.approx(entry.p, rel=1e-9), claim
+    assert found == {claim: str(entry.outcome) for claim, entry in committed.items()}
+    assert len(found) > 30
