@@ -66,9 +66,7 @@ def _running(add: _Add) -> None:
     plan.add_argument("--like", metavar="KIND", help="times as of trials made on such a device, such as 'NVIDIA H200'")
     plan.add_argument("--measure", action="store_true", help="time a few steps of conditions never run here")
 
-    text = (
-        "run missing trials, and judge none; with --variant those that it changes, and show which verdicts change"
-    )
+    text = "run missing trials, and judge none; with --variant those that it changes, and show which verdicts change"
     run = add("run", text)
     run.add_argument("method", nargs="?", help="only this method")
     run.add_argument("--on", metavar="TASK", help="only this task")
@@ -229,7 +227,8 @@ def _comparing(add: _Add) -> None:
     across = add(
         "across",
         "judge claims with several releases of a package, files of pins or Pythons; each has an environment, "
-        "and is compared with the first; exit status 1 when a verdict changed, trials drifted, or an environment has no verdicts",
+        "and is compared with the first; exit status 1 when a verdict changed, trials drifted, or an "
+        "environment has no verdicts",
         ".evoclaims-releases",
     )
     across.add_argument(
