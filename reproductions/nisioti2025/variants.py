@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import fields, replace
-from typing import Any
+from typing import Any, Literal
 
 from evoclaims import Condition, Variant, changed
 from evoclaims.envs import CumulativeParity, NParity, Obstacles, RobotTask, SimpleAlu
 from evoclaims.methods import CmaEs, HandBuilt, HyperNeat, LevelTest, Neat, Ppo, SeldomDecomposedCmaEs
 from evoclaims.networks import AllSkips, Mlp
-from reproductions.nisioti2025 import ecorobot, stepping_gates
+from reproductions.nisioti2025 import ecorobot, stepping_gates, stones_details, submission
 from reproductions.nisioti2025.first_level_ppo import FirstLevelPpo
 from reproductions.nisioti2025.published_course import PublishedObstacles
 
@@ -185,6 +185,22 @@ def _published_rows_so_far(method: str, task: str, condition: Condition) -> Cond
     return _published(method, task, now) or (None if now is condition else now)
 
 
+def _submission(pays: Literal["each", "once"], within: float) -> stones_details.Change:
+    """Return the change to a member of `submission`; on the gates the members are one."""
+    robots = submission.robots(pays, within, (_published_course, _perceptron, _published_value_network))
+
+    def change(method: str, task: str, condition: Condition) -> Condition | None:
+        if isinstance(condition.task, RobotTask):
+            return robots(method, task, condition)
+        now = condition
+        for one in (_rows_so_far, _published_alu, _perceptron, _published_neat, submission.gates, _first_level):
+            now = one(method, task, now) or now
+        now = stones_details.other_ppo(frozen_noise=True)(method, task, now) or now
+        return None if now is condition else now
+
+    return change
+
+
 def _variant(says: str, change: Any) -> Variant:
     """Apply a change to both tiers."""
     sizes = {
@@ -261,4 +277,66 @@ VARIANTS = {
         "Figure 3 comes out",
         _published_rows_so_far,
     ),
+    "fixed_start": _variant(
+        "Among stones every start is the same: an upper bound, which no commit of the authors has",
+        stones_details.start_noise(0.0),
+    ),
+    "quarter_noise": _variant("Starts among stones have a quarter of the noise", stones_details.start_noise(0.25)),
+    "half_noise": _variant("Starts among stones have half of the noise", stones_details.start_noise(0.5)),
+    "common_starts": _variant(
+        "CMA-ES with robots runs two episodes of each individual, from two starts that a generation shares",
+        stones_details.common_starts,
+    ),
+    "one_start_map": _variant(
+        "All of a trial's individuals of MAP-Elites have one start", stones_details.one_start_map
+    ),
+    "best_ever": _variant(
+        "The champion of evolution with robots is the first whose training episode was the best of all generations",
+        stones_details.best_ever,
+    ),
+    "pay_once": _variant(
+        "Stones pay in the 999th of 1,000 steps alone (for all stones: 1,000)", stones_details.other_stones(pays="once")
+    ),
+    "within_0.32": _variant(
+        "A stone counts from 0.32 m, where published stones are touched", stones_details.within(0.32)
+    ),
+    "within_0.5": _variant(
+        "A stone counts from 0.5 m, as in a debugging step of the authors", stones_details.within(0.5)
+    ),
+    "after_next": _variant(
+        "Reward among stones rises towards the stone after the next", stones_details.other_stones(toward="after_next")
+    ),
+    "metres": _variant("Ranges among stones are metres", stones_details.metres),
+    "near_target": _variant(
+        "Episodes among stones end 1.1 m from the target, for no bonus, crossed what may be",
+        stones_details.other_stones(ends="near_target"),
+    ),
+    "walls_0.3": _variant("The stones' maze has walls of 0.6 m, not 0.2", stones_details.other_stones(walls=0.3)),
+    "layered_16": _variant(
+        "HyperNEAT's substrate for the simplest robot is layered, as for others, with 16 hidden neurons",
+        stones_details.layered_16,
+    ),
+    "paper_time_budgets": _variant(
+        "Robots are trained for as long as the scripts of April 2025 say", stones_details.paper_time_budgets
+    ),
+    "big_maze_ant": _variant("The ant crosses stones in a larger maze", stones_details.big_maze_ant),
+    "torso_only": _variant("The ant among stones sees its torso's place, and no joint", stones_details.torso_only),
+    "first_state": _variant(
+        "Each of PPO's environments with robots returns to its own first state",
+        stones_details.other_ppo(first_state=True),
+    ),
+    "kept_counters": _variant(
+        "The same, and stones once crossed stay crossed when an episode ends",
+        stones_details.other_ppo(first_state=True, kept_counters=True),
+    ),
+    "frozen_noise": _variant(
+        "PPO is examined with noise, the same draw in every step", stones_details.other_ppo(frozen_noise=True)
+    ),
+    "submission": _variant(
+        "The protocol at the time of the paper; stones pay in every step and count from 0.32 m",
+        _submission("each", 0.32),
+    ),
+    "submission_once": _variant("The same; stones pay once, and count from 0.32 m", _submission("once", 0.32)),
+    "submission_0.5": _variant("The same; stones pay in every step, and count from 0.5 m", _submission("each", 0.5)),
+    "submission_once_0.5": _variant("The same; stones pay once, and count from 0.5 m", _submission("once", 0.5)),
 }

@@ -1,5 +1,6 @@
 from evoclaims.claims.claim import claim as claim
 from evoclaims.claims.claim import expected as expected
+from evoclaims.claims.claim import third_look as third_look
 from evoclaims.claims.claim import without_smoke as without_smoke
 from evoclaims.core.errors import UserError as UserError
 from evoclaims.judging.design import FIXED_10 as FIXED_10

@@ -16,6 +16,7 @@ from evoclaims.claims.session import Session, Verdicts
 from evoclaims.core.errors import UnknownNameError, UserError
 from evoclaims.core.packages import without_flags
 from evoclaims.core.provenance import changing_flags
+from evoclaims.judging.design import SEQUENTIAL
 from evoclaims.judging.verdict import Outcome
 from evoclaims.paper import pilots, references
 from evoclaims.paper.archive import Archive
@@ -299,3 +300,18 @@ def test_a_lost_support_comes_with_how_often_draws_from_the_pilots_lose_it(
         assert low <= found <= high
     path.write_text(history.dump({("smoke", "T1"): (replace(before, outcome=Outcome.REFUTED),)}))
     assert chance() is None
+
+
+def test_a_third_look_follows_the_first_two_and_is_another_design(session: Session, says: Claim) -> None:
+    tiers = session.reproduction.tiers
+    full = replace(tiers["full"], design=SEQUENTIAL)
+    session = replace(session, reproduction=replace(session.reproduction, tiers={**tiers, "full": full}))
+    better, worse = _pair(session, "full")
+    assertion = better.mean_success > worse.mean_success
+    two, three = (session.settle(ClaimTest(says, "full", "", third), assertion) for third in (False, True))
+    assert [(look.n, look.alpha) for look in three.attainable] == [(5, 0.01), (10, 0.04), (30, 0.0095)]
+    assert [look.n for look in two.attainable] == [5, 10]
+    assert (three.outcome, three.n, three.reason) == (two.outcome, two.n, two.reason)
+    assert three.fingerprint != two.fingerprint
+    smoke = session.settle(ClaimTest(says, "smoke", "", True), _pair(session)[0].solves_every_level.in_most_trials())
+    assert [look.n for look in smoke.attainable] == [10]  # its α is spent

@@ -38,9 +38,12 @@ def test_each_number_has_a_line_with_ours_and_the_interval(evoclaims: Evoclaims)
         "published ours 95% of repetitions",
         "✓ right 1 1 ± 0 (10) 7–10 trials at 1: ours 10",
         "✗ wrong 0.6 ± 0.05 0 ± 0 (10) 0.5494–0.6506 SD ✗, 0.44–0.76 SE ✗",
-        "? coin 0.5 ± 0.2 – 0.2977–0.7023 SD",  # a standard error would be too large
+        "- coin 0.5 ± 0.2 – 0.2977–0.7023 SD",  # a standard error would be too large
     ]
-    assert "the protocol: 1 inside, 1 outside, 1 cannot be said" in out
+    assert (
+        "the protocol: 1 consistent, 1 contradicted, 1 cannot be said; by condition: 1 consistent, 1 contradicted"
+        in out
+    )
 
 
 def test_assertions_are_put_to_the_published_numbers(evoclaims: Evoclaims, project: Project) -> None:
@@ -62,11 +65,11 @@ def test_a_variant_shows_the_numbers_that_it_changes(evoclaims: Evoclaims) -> No
     out = evoclaims("replicate", "--tier=smoke", "--variant=traded")[1]
     assert "the protocol" not in out
     assert "\nparity: mean success over levels, traded\n" in out
-    assert "traded: 1 outside" in out
+    assert "traded: 1 contradicted" in out
     both = evoclaims("replicate", "--tier=smoke", "--variant=all")[1]
     assert both.count("\nparity: mean success over levels, the protocol\n") == 1
-    assert "the protocol: 1 inside" in both
-    assert "traded: 1 outside" in both
+    assert "the protocol: 1 consistent" in both
+    assert "traded: 1 contradicted" in both
 
 
 def test_files_have_the_same_numbers(evoclaims: Evoclaims) -> None:
@@ -77,10 +80,10 @@ def test_files_have_the_same_numbers(evoclaims: Evoclaims) -> None:
             "",
         )
     rows = json.loads(Path("report/replication.json").read_text())["rows"]
-    assert [(row["method"], row["ours.mean"], row["answer"]) for row in rows] == [
-        ("right", 1.0, "inside"),
-        ("wrong", 0.0, "outside"),
-        ("coin", None, "cannot be said"),
+    assert [(row["method"], row["ours.mean"], row["answer"], row["agreement"]) for row in rows] == [
+        ("right", 1.0, "inside", "consistent"),
+        ("wrong", 0.0, "outside", "contradicted"),
+        ("coin", None, "cannot be said", "cannot be said"),
     ]
     with Path("report/replication.csv").open() as file:
         assert [row["answer"] for row in csv.DictReader(file)] == [row["answer"] for row in rows]

@@ -10,14 +10,19 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.stats import binom, fisher_exact
+from scipy.stats import t as student
 
 from evoclaims.judging.repetition import (
     FEWEST,
+    Agreement,
     Answer,
     Prediction,
     PublishedMean,
     Repetition,
     Spread,
+    detectable_share,
+    detectable_shift,
     repetition,
 )
 
@@ -151,3 +156,64 @@ def test_without_enough_trials_the_interval_is_for_as_many_as_planned(
     found = repetition(PublishedMean(3.0, 1.0, 10), ours, 10, broken)
     assert (found.answer, found.reason) == (Answer.UNKNOWN, reason)
     assert _of(found, Spread.DEVIATION).high == pytest.approx(3.0 + 2.262157 * math.sqrt(0.2), abs=1e-6)
+
+
+def _agreement(mean: float, ours: list[float], trials: int = 10, error: float | None = 1.0) -> Agreement:
+    found = repetition(PublishedMean(mean, error, trials), ours, 10)
+    return found.agreement
+
+
+@pytest.mark.parametrize("true", [0.0, 0.4, detectable_shift(10)])
+@pytest.mark.parametrize("n", [10, 50])
+def test_a_mean_at_the_margin_is_seldom_found_consistent(true: float, n: int) -> None:
+    """At the margin at most 5 of 100, by the reading that is true; ten trials of ours never suffice."""
+    rng = np.random.default_rng(40)
+    consistent = 0
+    for theirs, ours in zip(rng.normal(0, 1, (DRAWN, 10)), rng.normal(true, 1, (DRAWN, n)), strict=True):
+        found = repetition(PublishedMean(float(theirs.mean()), statistics.stdev(theirs), 10), [*map(float, ours)], 10)
+        needed = _of(found, Spread.DEVIATION).needed
+        consistent += needed is not None and needed <= n
+    share = consistent / DRAWN
+    assert share == 0 if n == 10 else share <= (0.06 if true == detectable_shift(10) else 1.0)
+
+
+def test_the_trials_that_would_show_equivalence_just_do() -> None:
+    found = repetition(PublishedMean(0.0, 1.0, 10), [0.1] * 10, 10)
+    needed = _of(found, Spread.DEVIATION).needed
+    assert needed is not None
+    for n, enough in ((needed, True), (needed - 1, False)):
+        half = student.ppf(0.95, 9) * math.sqrt(1 / 10 + 1 / n)
+        assert (0.1 + half <= detectable_shift(10)) is enough
+
+
+@pytest.mark.parametrize(("there", "agreement"), [(10, "consistent"), (8, "uninformative"), (6, "contradicted")])
+def test_a_mean_at_the_end_of_its_scale_is_consistent_where_a_detectable_share_is_excluded(
+    there: int, agreement: str
+) -> None:
+    ours = [1.0] * there + [0.5] * (10 - there)
+    assert repetition(PublishedMean(1.0, 0.0, 10, UNIT), ours, 10).agreement == agreement
+
+
+def test_the_detectable_share_is_what_fishers_test_of_ten_against_ten_finds_one_time_in_three() -> None:
+    rejected = [k for k in range(11) if fisher_exact([[10, 0], [k, 10 - k]]).pvalue <= 0.05]
+    assert binom.pmf(rejected, 10, detectable_share(10)).sum() == pytest.approx(1 / 3)
+
+
+def test_several_numbers_are_inside_together_in_95_of_100_repetitions() -> None:
+    rng = np.random.default_rng(5)
+    outside = 0
+    for theirs, ours in zip(*rng.normal(0, 1, (2, 500, 5, 10)), strict=True):
+        outside += any(
+            _of(
+                repetition(PublishedMean(float(x.mean()), statistics.stdev(x), 10), [*map(float, y)], 10, among=5),
+                Spread.DEVIATION,
+            ).answer
+            is Answer.OUTSIDE
+            for x, y in zip(theirs, ours, strict=True)
+        )
+    assert outside / 500 <= 0.05 + 3 * math.sqrt(0.05 * 0.95 / 500)
+
+
+def test_without_enough_published_trials_nothing_is_consistent() -> None:
+    assert _agreement(0.0, [0.0, 0.1] * 5, trials=3) is Agreement.UNINFORMATIVE
+    assert _agreement(0.0, [], trials=10) is Agreement.OPEN

@@ -33,19 +33,19 @@ NUMBERS = (_number([700.0, 900.0] * 5), _number([900.0] * 10, variant="rows"), _
 PAGE = Page(title="A Paper", name="paper", boards=(), numbers=NUMBERS, put_to_the_paper=("G2 <would> not pass",))
 
 
-def test_cells_say_what_is_published_what_is_ours_and_whether_it_is_inside() -> None:
+def test_cells_say_what_is_published_what_is_ours_and_whether_it_repeats() -> None:
     first, second, third = map(replication_cells.cells, NUMBERS)
     assert first == (
         "<neat> on maze: reward",
         "the protocol",
         "900 ± 20",
         "800 ± 110 (10)",
-        "✗ outside",
+        "✗ contradicted",
         "879.8 to 920.2 (SD: outside); 836 to 964 (SE: outside)",
     )
-    assert (second[1], second[4]) == ("rows", "✓ inside")
-    assert third[3:] == ("–", "? cannot be said", "879.8 to 920.2 (SD); 836 to 964 (SE)")
-    assert replication_cells.answer(_number([], error=None)) == "? cannot be said: not run"
+    assert (second[1], second[4]) == ("rows", "? uninformative (13)")
+    assert third[3:] == ("–", "- cannot be said", "879.8 to 920.2 (SD); 836 to 964 (SE)")
+    assert replication_cells.answer(_number([], error=None)) == "- cannot be said: not run"
 
 
 def _levels(count: int, variant: str = "") -> list[Replication]:
@@ -87,14 +87,18 @@ def test_a_measure_may_have_at_in_its_name(name: str) -> None:
 def test_a_block_says_why_a_number_has_no_interval() -> None:
     ((heading, table),) = replication_blocks.blocks([_number([], error=None)], 80)
     assert heading == "maze: reward"
-    assert [[*column.cells] for column in table.columns] == [["?"], ["<neat>"], ["900"], ["–"], ["not run"]]
+    assert [[*column.cells] for column in table.columns] == [["-"], ["<neat>"], ["900"], ["–"], ["not run"]]
 
 
 def test_the_page_has_a_line_for_each_number_and_escapes_it() -> None:
     text = html(PAGE)
     assert "Do the numbers replicate?" in text
     assert "&lt;neat&gt; on maze: reward" in text
-    for colour, answer in (("supported", "✓ inside"), ("refuted", "✗ outside"), ("inconclusive", "? cannot be said")):
+    for colour, answer in (
+        ("inconclusive", "? uninformative (13)"),
+        ("refuted", "✗ contradicted"),
+        ("not_run", "- cannot be said"),
+    ):
         assert f'<td class="is-{colour}">{answer}</td>' in text
     assert "G2 &lt;would&gt; not pass" in text
     assert replication_cells.HOW.split(",")[0] in text
@@ -105,7 +109,7 @@ def test_markdown_has_the_same_table() -> None:
     assert "## Do the numbers replicate?" in lines
     assert "| number | protocol | published | ours | replicates | 95% of repetitions |" in lines
     assert sum("&lt;neat&gt; on maze: reward" in line for line in lines) == 3
-    assert "the protocol: 1 outside, 1 cannot be said" in lines
+    assert "the protocol: 1 contradicted, 1 cannot be said; by condition: 1 contradicted" in lines
 
 
 def test_without_numbers_nothing_is_said_of_them() -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, TypeVar
+from typing import Any, Final, TypeVar
 
 import pytest
 
@@ -14,6 +14,12 @@ from evoclaims.judging.verdict import Outcome
 from evoclaims.verdicts.readings import moment
 
 F = TypeVar("F", bound=Callable[..., Any])
+
+third_look: Final = pytest.mark.claim_third_look
+"""Mark of a claim, or of one `pytest.param(..., marks=...)` of it: thirty trials decide what ten leave open.
+
+Its α is paid for whichever claims have it, so that it may be chosen after ten trials (see `Design.with_third_look`).
+"""
 
 
 @dataclass(frozen=True)

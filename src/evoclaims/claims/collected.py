@@ -56,11 +56,13 @@ class ClaimTest:
         claim: the paper's sentence.
         tier: "smoke" or "full".
         case: the ids of its parameters other than the tier, such as "n_parity"; empty without any.
+        third_look: whether thirty trials decide what ten leave open.
     """
 
     claim: Claim
     tier: str
     case: str
+    third_look: bool = False
 
     @staticmethod
     def of(item: pytest.Item) -> ClaimTest:
@@ -81,7 +83,7 @@ class ClaimTest:
         case: str = callspec.id.removesuffix(tier_id(claim, tier)).removesuffix("-")
         if item.get_closest_marker("claim_repeated"):
             case = _REPETITION.sub("", case).removeprefix("-")
-        return ClaimTest(claim, tier, case)
+        return ClaimTest(claim, tier, case, item.get_closest_marker("claim_third_look") is not None)
 
     @property
     def key(self) -> tuple[str, str]:

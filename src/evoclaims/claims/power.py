@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from evoclaims.claims.collected import ClaimTest
 from evoclaims.claims.reporting import judged
 from evoclaims.claims.selection import selected
 from evoclaims.claims.session import Reading, Session
 from evoclaims.judging.assertion import Assertion
+from evoclaims.judging.design import Look
 from evoclaims.judging.fingerprint import fingerprint
 from evoclaims.judging.power import Draws, Power, power
 from evoclaims.judging.reading import TrialReading
@@ -35,7 +36,8 @@ class Listening(Session):
 
     def settle(self, test: ClaimTest, assertion: Assertion, others: Sequence[Reading] = ()) -> ClaimReport:
         """Keep an assertion."""
-        design, name = self.design(test.tier), named(test.claim.id, test.case)
+        name = named(test.claim.id, test.case)
+        design = self.design(test.tier, third_look=test.third_look)
         self.assertions[name] = assertion
         mark = fingerprint(assertion, design, claim=name, tier=test.tier)
         verdict = Verdict(Outcome.NOT_RUN, "it is not judged", assertion.describe(), mark)
@@ -162,4 +164,5 @@ class Pilots:
         without = [f"{' on '.join(names)} ({self._unfit[names]})" for names in one.groups if self._unfit[names]]
         if without:
             return ClaimPower(name, expected, None, f"no pilot of {', '.join(without)}")
-        return ClaimPower(name, expected, power(one.assertion, self._design, draws, expected))
+        looks = tuple(Look(look.n, look.alpha) for look in one.report.attainable)
+        return ClaimPower(name, expected, power(one.assertion, replace(self._design, looks=looks), draws, expected))

@@ -104,11 +104,11 @@ class Session:
         condition = self.reproduction.tier(tier, self.variant).condition(method, on)
         return self.reproduction.trials(method, on, condition, self.fetch)
 
-    def design(self, tier: str) -> Design:
+    def design(self, tier: str, *, third_look: bool = False) -> Design:
         """Return a tier's design; with a fixed number of trials, it has one look with the whole α."""
         design = self.reproduction.tier(tier).design
         if self.trials is None:
-            return design
+            return design.with_third_look() if third_look else design
         return replace(design, looks=(Look(self.trials, design.alpha),))
 
     def settle(self, test: ClaimTest, assertion: Assertion, others: Sequence[Reading] = ()) -> ClaimReport:
@@ -116,20 +116,20 @@ class Session:
 
         A session that only reads trials judges `others`, too, the further readings of the sentence.
         """
-        verdict = self._verdict(test, assertion)
-        report = judged(test, assertion, self.design(test.tier), verdict, self.again)
-        by, chance = self._satisfied_by(test, assertion, verdict), self._chance(report, assertion)
+        design, claim = self.design(test.tier, third_look=test.third_look), test.claim
+        verdict = self._verdict(test, assertion, design)
+        report = judged(test, assertion, design, verdict, self.again)
+        by, chance = self._satisfied_by(test, assertion, design, verdict), self._chance(report, assertion, design)
         report = replace(report, satisfied_by=by, chance=chance)
-        if self.variant or not isinstance(self.fetch, StoredOnly) or not test.claim.is_read_at(test.tier):
+        if self.variant or not isinstance(self.fetch, StoredOnly) or not claim.is_read_at(test.tier):
             return report
-        design, claim = self.design(test.tier), test.claim
         first = Reading(claim.read, assertion, "the assertion that the claim judges", claim.since)
         read = (_judged(first, design, verdict.outcome), *(_judged(one, design) for one in others))
         return replace(report, readings=read)
 
-    def _verdict(self, test: ClaimTest, assertion: Assertion) -> Verdict:
+    def _verdict(self, test: ClaimTest, assertion: Assertion, design: Design) -> Verdict:
         """Return the verdict on an assertion; "not run" where trials may not be run."""
-        design, name, tier = self.design(test.tier), named(test.claim.id, test.case), test.tier
+        name, tier = named(test.claim.id, test.case), test.tier
         try:
             if self.leaves(tier, assertion):
                 raise NotStoredError(f"the variant {self.variant} changes none of its trials")
@@ -139,12 +139,12 @@ class Session:
             of = next((f"{one.label}: " for one in assertion.sources() if one.fingerprint == error.condition), "")
             return Verdict(Outcome.NOT_RUN, f"{of}{error}", assertion.describe(), mark)
 
-    def _satisfied_by(self, test: ClaimTest, assertion: Assertion, verdict: Verdict) -> tuple[str, ...]:
+    def _satisfied_by(self, test: ClaimTest, assertion: Assertion, design: Design, verdict: Verdict) -> tuple[str, ...]:
         """Return the null agents that satisfy a claim of the paper; controls are about such agents themselves.
 
         Only trials that were looked at are asked for again, so that nothing runs for it.
         """
-        agents, design = self.reproduction.null_agents, self.design(test.tier)
+        agents = self.reproduction.null_agents
         if not agents or not verdict.n or test.claim.where == CONTROL or isinstance(self.fetch, AsPublished):
             return ()
         look, reads = Look(verdict.n, design.alpha), isinstance(self.fetch, StoredOnly)
@@ -156,9 +156,8 @@ class Session:
 
         return satisfied_by(agents, assertion, look, design, others if reads else None)
 
-    def _chance(self, report: ClaimReport, assertion: Assertion) -> float | None:
+    def _chance(self, report: ClaimReport, assertion: Assertion, design: Design) -> float | None:
         """Return how often an inconclusive claim ends so in draws from its pilots, if it was accepted as supported."""
-        design = self.design(report.tier)
         if report.outcome is not Outcome.INCONCLUSIVE or self.variant or self.trials is not None:
             return None
         found: dict[str, tuple[TrialResult, ...]] = {}

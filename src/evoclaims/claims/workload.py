@@ -86,8 +86,8 @@ def workload(session: Session, tests: Mapping[pytest.Item, ClaimTest]) -> Worklo
         claims[item.nodeid] = ()
         with suppress(Exception):  # an error of a method or a task is reported when the claim is judged
             groups = {group.fingerprint: group for group in _needed(session, item, test)}
-            for condition_id in groups.keys() - works.keys():
-                works[condition_id] = _work(session, session.fetch, test.tier, groups[condition_id], platform)
+            for condition_id in groups if test.third_look else groups.keys() - works.keys():
+                works[condition_id] = _work(session, session.fetch, test, groups[condition_id], platform)
             claims[item.nodeid] = tuple(groups)
     return Workload(str(session.store.root.resolve()), claims, works)
 
@@ -170,9 +170,10 @@ def _never(condition: Condition, seeds: Sequence[int]) -> Sequence[TrialResult]:
     raise NotStoredError(f"{condition.label} is not run yet")
 
 
-def _work(session: Session, fetch: RunMissing, tier: str, group: TrialGroup, platform: str) -> Work:
+def _work(session: Session, fetch: RunMissing, test: ClaimTest, group: TrialGroup, platform: str) -> Work:
     """Look up what is known of a condition."""
-    condition, versions, design = group.condition, group.condition.versions, session.design(tier)
+    condition, versions, tier = group.condition, group.condition.versions, test.tier
+    design = session.design(tier, third_look=test.third_look)
     seeds = design.seeds(design.last.n)
     stored = StoredTrials(session.store, condition, fetch.any_version, fetch.time_limit)
     missing = stored.missing(seeds) if condition.existing is None else []

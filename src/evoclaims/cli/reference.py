@@ -34,9 +34,15 @@ def main(options: argparse.Namespace) -> int:
         used = [names for names in used if names in changes]
     # A claim is judged after each look; the drift check needs MIN_REFERENCES trials.
     looks = [look.n for look in tier.design.looks[:-1]]
-    sizes = [*looks, max(tier.design.last.n, MIN_REFERENCES)]
+    third = {
+        (source.method, source.task): report.attainable[-1].n
+        for report in reports
+        for source in report.sources
+        if report.attainable and report.attainable[-1].n > tier.design.last.n
+    }
     written, shared = 0, 0
     for method, task in used:
+        sizes = [*looks, max(tier.design.last.n, MIN_REFERENCES), *filter(None, [third.get((method, task))])]
         condition = tier.condition(method, task)
         places = references.by_variant(reproduction.references, options.tier, method, task, condition.id)
         if options.variant and places and options.variant not in places:
@@ -74,10 +80,10 @@ def main(options: argparse.Namespace) -> int:
             + (f", made with other versions than are installed: {upgraded}" if upgraded else "")
         )
     if not (written or (used and shared == len(used))):
-        variant = options.variant
+        variant, smallest = options.variant, [*looks, max(tier.design.last.n, MIN_REFERENCES)][0]
         of, named = (f" that {variant} changes", f" --variant {variant}") if variant else ("", "")
         raise UserError(
-            f"No {'other ' * bool(shared)}condition of the {options.tier} tier{of} has {sizes[0]} stored trials; run "
+            f"No {'other ' * bool(shared)}condition of the {options.tier} tier{of} has {smallest} stored trials; run "
             f"them first with `evoclaims run --tier {options.tier}{named}`."
         )
     return 0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -10,7 +11,7 @@ from evoclaims.core.errors import UnknownNameError
 from evoclaims.figures.figure import Scope
 from evoclaims.figures.readings import Readings, read
 from evoclaims.judging.measure import Profile
-from evoclaims.judging.repetition import Answer, PublishedMean, Repetition, repetition
+from evoclaims.judging.repetition import Agreement, Answer, PublishedMean, Repetition, repetition
 from evoclaims.paper.archive import Archive
 from evoclaims.paper.reported import Published, Reported
 from evoclaims.paper.reproduction import Reproduction
@@ -27,6 +28,7 @@ class Replication:
         readings: ours, from each trial; of a profile's level, named as the profile is.
         repetition: whether ours are what a repetition of the published trials would give.
         level: of a profile, counted from 0; None for a measure without levels.
+        jointly: the same, where all numbers of the condition have to be inside together; None for a single number.
     """
 
     tier: str
@@ -35,6 +37,7 @@ class Replication:
     readings: Readings
     repetition: Repetition
     level: int | None = None
+    jointly: Repetition | None = None
 
     @property
     def measure(self) -> str:
@@ -47,9 +50,22 @@ class Replication:
         return f"{self.readings.method} on {self.readings.task}: {self.measure}"
 
     @property
-    def answer(self) -> Answer:
+    def agreement(self) -> Agreement:
         """Whether the number replicates."""
-        return self.repetition.answer
+        return self.repetition.agreement
+
+    @property
+    def condition(self) -> tuple[str, str, str]:
+        """What a curve is one result of: method, task and measure."""
+        return self.readings.method, self.readings.task, self.readings.name
+
+    @property
+    def holds_null(self) -> bool:
+        """Whether some interval holds the value of an agent that does nothing, so that being inside says little."""
+        null = self.reported.null
+        return null is not None and any(
+            one.low <= null <= one.high for one in self.repetition.predictions if one.of == "mean"
+        )
 
     def row(self) -> dict[str, Any]:
         """Return it as one row of a table for other programs."""
@@ -67,7 +83,11 @@ class Replication:
             "ours.deviation": self.readings.deviation if len(self.readings.values) > 1 else None,
             "ours.trials": len(self.readings.values),
             "ours.values": list(self.readings.values),
-            "answer": self.answer,
+            "answer": self.repetition.answer,
+            "agreement": self.agreement,
+            "needed": self.repetition.needed,
+            "null": self.reported.null,
+            "holds_null": self.holds_null,
             "reason": self.repetition.reason,
         }
         predictions = [
@@ -105,18 +125,49 @@ def replications(
                 continue
             readings, level = _ours(scope, quantity, method, task, at)
             if not scope.variant or readings.values:
-                judged = _judged(reported, readings, len(scope.seeds))
-                found.append(Replication(tier, scope.variant, reported, readings, judged, level))
+                many = len(published.plots[task][quantity]["methods"][method]["mean"])
+                judged, jointly = (_judged(reported, readings, len(scope.seeds), among) for among in (1, many))
+                found.append(Replication(tier, scope.variant, reported, readings, judged, level, jointly))
     return tuple(found)
 
 
-def counts(found: Sequence[Replication]) -> Mapping[str, Mapping[Answer, int]]:
+def counts(found: Sequence[Replication]) -> Mapping[str, Mapping[Agreement, int]]:
     """Return, by variant, how many numbers have each answer."""
-    variants = dict.fromkeys(one.variant for one in found)
-    return {
-        name: {answer: sum(one.answer is answer for one in found if one.variant == name) for answer in Answer}
-        for name in variants
-    }
+    return {name: Counter(one.agreement for one in of) for name, of in _by_variant(found).items()}
+
+
+def counts_by_condition(found: Sequence[Replication]) -> Mapping[str, Mapping[Agreement, int]]:
+    """Return, by variant, how many conditions have each answer; a curve is one condition, and one result.
+
+    Contradicted where a level is outside the interval that all levels together are inside with 0.95 (Bonferroni);
+    consistent where each level is.
+    """
+    totals: dict[str, Mapping[Agreement, int]] = {}
+    for name, of in _by_variant(found).items():
+        conditions: dict[tuple[str, str, str], list[Replication]] = {}
+        for one in of:
+            conditions.setdefault(one.condition, []).append(one)
+        totals[name] = Counter(map(_together, conditions.values()))
+    return totals
+
+
+def _together(levels: Sequence[Replication]) -> Agreement:
+    """Return the answer of a condition."""
+    joint = {(one.jointly or one.repetition).agreement for one in levels}
+    if Agreement.CONTRADICTED in joint:
+        return Agreement.CONTRADICTED
+    alone = {one.agreement for one in levels}
+    if len(alone) == 1 and alone <= {Agreement.CONSISTENT, Agreement.OPEN}:
+        return alone.pop()
+    return Agreement.UNINFORMATIVE
+
+
+def _by_variant(found: Sequence[Replication]) -> Mapping[str, list[Replication]]:
+    """Return the numbers by variant."""
+    by_variant: dict[str, list[Replication]] = {}
+    for one in found:
+        by_variant.setdefault(one.variant, []).append(one)
+    return by_variant
 
 
 def _numbers(published: Published) -> Iterator[tuple[str, str, str, int, Reported]]:
@@ -153,9 +204,9 @@ def _ours(scope: Scope, quantity: str, method: str, task: str, at: int) -> tuple
     return replace(readings, name=found.name), at
 
 
-def _judged(reported: Reported, readings: Readings, planned: int) -> Repetition:
+def _judged(reported: Reported, readings: Readings, planned: int, among: int) -> Repetition:
     """Put our readings to the published number."""
     if reported.trials is None:
         return Repetition((), Answer.UNKNOWN, "reported.toml does not say of how many trials the number is the mean")
     mean = PublishedMean(reported.value, reported.error, reported.trials, reported.scale, reported.precision)
-    return repetition(mean, readings.values, planned, readings.broken)
+    return repetition(mean, readings.values, planned, readings.broken, among)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import Final
@@ -32,7 +33,7 @@ class Look:
 THREE_LOOKS: Final = (Look(5, 0.01), Look(10, 0.04), Look(30, 0.0095))
 """A verdict at five or ten trials is the same as by the first two looks alone; see `COMPUTED` for the third."""
 
-COMPUTED: Final = {THREE_LOOKS: 0.05}
+COMPUTED: Final[Mapping[tuple[Look, ...], float]] = {THREE_LOOKS: 0.05}
 """Rates of looks that their union bound overstates.
 
 The trials of a look are among those of the next, so errors coincide. For normal statistics, each with its whole α, the

@@ -44,6 +44,12 @@ class Interaction:
         fresh = Interaction.start(task, key, level, self.states.reward.shape[0])
         return select(level != self.level, fresh, self)
 
+    def after(self, task: Task, key: PRNGKeyArray, reached: TaskState) -> Interaction:
+        """Return the episodes after a step to the states `reached`, with a fresh one for each that ended."""
+        fresh = Interaction.start(task, key, self.level, self.states.reward.shape[0])
+        ended = reached.terminated | reached.truncated
+        return Interaction(states=jax.vmap(select)(ended, fresh.states, reached), level=self.level)
+
 
 def collect(
     task: Task, act: Act, key: PRNGKeyArray, interaction: Interaction, rounds: int, unroll_length: int
@@ -71,10 +77,7 @@ def collect(
                 "state_extras": {"truncation": reached.truncated.astype(jnp.float32)},
             },
         )
-        fresh = Interaction.start(task, reset_key, interaction.level, interaction.states.reward.shape[0])
-        ended = reached.terminated | reached.truncated
-        states = jax.vmap(select)(ended, fresh.states, reached)
-        return Interaction(states=states, level=interaction.level), transition
+        return interaction.after(task, reset_key, reached), transition
 
     keys = jax.random.split(key, rounds * unroll_length)
     interaction, data = jax.lax.scan(one_step, interaction, keys)

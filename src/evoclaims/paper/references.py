@@ -149,9 +149,9 @@ def paired(
     others = [old for old in reference if not _read_alike(old, new[0])]
     earlier = (*(replace(old, condition=condition) for old in alike), *others)
     changed = any(old.condition != condition for old in alike)
-    metrics = sorted({name for trial in new for name in trial.metrics})
+    everything = tuple(sorted({name for trial in new for name in trial.metrics}))
     return DriftCase(
-        label + ", another table" * changed, condition, tuple(new), earlier, tuple(metrics), _edited(new, alike)
+        label + ", another table" * changed, condition, tuple(new), earlier, everything, _edited(new, alike)
     )
 
 

@@ -27,6 +27,7 @@ class Reported:
         trials: how many trials it is the mean of; None where the file does not say.
         scale: the smallest and the largest value that a trial can have; None for no limits.
         precision: how far the number may be from the mean that was measured: 0.5 for a text's "five".
+        null: what an agent that does nothing gets; None where the file does not say.
     """
 
     value: float
@@ -35,6 +36,7 @@ class Reported:
     trials: int | None = None
     scale: tuple[float, float] | None = None
     precision: float = 0.0
+    null: float | None = None
 
 
 @dataclass(frozen=True)
@@ -43,7 +45,8 @@ class Published:
 
     Attributes:
         plots: by task and quantity (a measure of `TrialGroup`): "place", and for each of its "methods" a "mean", one
-            number for each place on the axis, and an "error" if it has error bars; if known, "scale" and "precision".
+            number for each place on the axis, and an "error" if it has error bars; if known, "scale", "precision",
+            "null".
         tables: by name: "place" and "values" of each table.
         trials: how many trials each number of a plot is the mean of; None where the file does not say.
     """
@@ -62,7 +65,9 @@ class Published:
         low, high = found.get("scale", (None, None))
         scale = None if low is None else (float(low), float(high))
         precision = float(found.get("precision", 0.0))
-        return Reported(float(numbers["mean"][at]), error, found["place"], self.trials, scale, precision)
+        return Reported(
+            float(numbers["mean"][at]), error, found["place"], self.trials, scale, precision, found.get("null")
+        )
 
     def table(self, name: str) -> Mapping[str, Any]:
         """Return a table's "place" and "values"; an `UnknownNameError` lists the known tables."""
@@ -83,8 +88,8 @@ def load_published(path: Path) -> Published:
     if wrong := [*_wrong_plots(plain.get("plots", {})), *_wrong_tables(plain.get("tables", {})), *_wrong_rest(plain)]:
         raise UserError(
             f"{path} holds [plots.TASK.QUANTITY] with a place and methods (each with a list mean, and an error of the "
-            "same length where known; scale = [lowest, highest] and precision), [tables.NAME] with a place and values, "
-            f"and trials = how many each mean is of, at least 2; these are neither: {', '.join(wrong)}."
+            "same length where known; scale = [lowest, highest], precision and null), [tables.NAME] with a place and "
+            f"values, and trials = how many each mean is of, at least 2; these are neither: {', '.join(wrong)}."
         )
     return Published(plain.get("plots", {}), plain.get("tables", {}), plain.get("trials"))
 
@@ -117,7 +122,9 @@ def _is_plot(plot: Any) -> bool:
     if not (isinstance(plot, dict) and plot.get("place") and plot.get("methods") and isinstance(plot["methods"], dict)):
         return False
     scale = plot.get("scale", [-math.inf, math.inf])
-    if not (_are_numbers([plot.get("precision", 0.0)]) and _are_numbers(scale) and len(scale) == 2):
+    if not (
+        _are_numbers([plot.get("precision", 0.0), plot.get("null", 0.0)]) and _are_numbers(scale) and len(scale) == 2
+    ):
         return False
     low, high = scale
     return all(

@@ -47,6 +47,7 @@ def pytest_configure(config: pytest.Config) -> None:
         "claim(claim): the claim that a test checks (set by @claim)",
         "claim_expect(expectation): an accepted outcome (set by expected(...))",
         "claim_repeated(names): parameters by which a plugin repeats a claim's test (set by evoclaims)",
+        "claim_third_look: judged by thirty trials where ten leave it open (third_look)",
         "claim_without_smoke(because): no smoke test (set by smoke=None and without_smoke(...))",
     ):
         config.addinivalue_line("markers", line)

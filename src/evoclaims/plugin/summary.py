@@ -193,7 +193,7 @@ class Summary:
             terminalreporter.write_line(f"{what}: nothing was measured.", red=True)
         elif not self._config.getoption("claims_variant"):  # whose verdicts nobody accepts
             for line in self._closing_lines():
-                terminalreporter.write_line(self._said(line))
+                terminalreporter.write_line(self._safe(line))
 
     def _closing_lines(self) -> list[str]:
         """Return what failed, what changed, and what to do next."""
@@ -202,7 +202,7 @@ class Summary:
         changed = None
         if self._regression and self._regression.transitions:
             changed = [f"{name} ({tier})" for tier, name in self._regression.changed]
-        drifted = dict.fromkeys(row.condition for row in self._drift[0].rows if row.drifted) if self._drift else ()
+        drifted = dict.fromkeys(row.label for row in self._drift[0].rows if row.drifted) if self._drift else ()
         return closing_lines(self.reports, changed, list(drifted))
 
     def _choices(self) -> str:

@@ -34,7 +34,7 @@ def blocks(found: Sequence[Replication], width: int) -> Iterator[tuple[str, Tabl
     made: dict[str, list[tuple[tuple[str, ...], list[str]]]] = {}
     for one in found:
         heading, label = _place(one, varied)
-        cells = SYMBOLS[one.answer], label, published(one), ours(one)
+        cells = SYMBOLS[one.agreement], label, published(one), ours(one)
         made.setdefault(heading, []).append((cells, _intervals(one)))
     rows = [_HEADINGS, *((*cells, ", ".join(intervals)) for block in made.values() for cells, intervals in block)]
     widths = [max(map(cell_len, column)) for column in zip(*rows, strict=True)]
@@ -68,5 +68,5 @@ def _interval(prediction: Prediction) -> str:
     if prediction.spread is Spread.NONE:
         got = "" if prediction.ours is None else f": ours {number(prediction.ours)}"
         return f"{ends} {prediction.of}{got}"
-    mark = "" if prediction.answer is Answer.UNKNOWN else f" {SYMBOLS[prediction.answer]}"
+    mark = {Answer.INSIDE: " ✓", Answer.OUTSIDE: " ✗"}.get(prediction.answer, "")
     return f"{ends} {prediction.spread.short}{mark}"

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Final
 
-from evoclaims.figures.replication import Replication, counts
-from evoclaims.judging.repetition import Answer, Prediction, Spread
+from evoclaims.figures.replication import Replication, counts, counts_by_condition
+from evoclaims.judging.repetition import Agreement, Answer, Prediction, Spread
 from evoclaims.judging.verdict import Outcome
 from evoclaims.report.formatting import listed, number, plural
 from evoclaims.report.table_cells import NONE
@@ -17,18 +17,28 @@ HEADINGS: Final = ("number", "protocol", "published", "ours", "replicates", "95%
 PROTOCOL: Final = "the protocol"
 """The protocol itself, without a variant."""
 
-SYMBOLS: Final = {Answer.INSIDE: "✓", Answer.OUTSIDE: "✗", Answer.UNKNOWN: "?"}
+SYMBOLS: Final = {
+    Agreement.CONSISTENT: "✓",
+    Agreement.CONTRADICTED: "✗",
+    Agreement.UNINFORMATIVE: "?",
+    Agreement.OPEN: "-",
+}
 _COLOURS: Final = {
-    Answer.INSIDE: Outcome.SUPPORTED,
-    Answer.OUTSIDE: Outcome.REFUTED,
-    Answer.UNKNOWN: Outcome.INCONCLUSIVE,
+    Agreement.CONSISTENT: Outcome.SUPPORTED,
+    Agreement.CONTRADICTED: Outcome.REFUTED,
+    Agreement.UNINFORMATIVE: Outcome.INCONCLUSIVE,
+    Agreement.OPEN: Outcome.NOT_RUN,
 }
 
 HOW: Final = (
     "95% of repetitions: where the mean of as many trials as ours lies in 95 of 100 repetitions of the published ones, "
     "if the error bar, which is not explained, is a standard deviation (SD), and if it is a standard error (SE); for a "
     "number without a spread, by that of our trials (our SD); for a mean at the end of its scale, how many trials are "
-    "at that end (exact). A number replicates if ours is inside by every reading that its scale allows."
+    "at that end (exact). Contradicted: ours is outside by every reading that its scale allows. Consistent: inside by "
+    "every one, and shown to differ by less than the paper's own n detects with power 1/3 (two one-sided tests at "
+    "0.05). Uninformative: neither; in parentheses how many trials like ours would be consistent. A curve is one "
+    "condition: contradicted where a level is outside the interval that all levels share (Bonferroni), consistent "
+    "where each is."
 )
 """How to read the table."""
 
@@ -36,6 +46,11 @@ HOW: Final = (
 def cells(one: Replication) -> tuple[str, ...]:
     """Return a row, a cell per heading: "0.857 ± 0.08" is published, and "0.7742 ± 0.19 (10)" ours, of 10 trials."""
     predicted = "; ".join(map(_interval, one.repetition.predictions)) or NONE
+    predicted += (
+        f"; holds {number(one.reported.null)}, what doing nothing gets"
+        if one.holds_null and one.reported.null is not None
+        else ""
+    )
     return (one.name, one.variant or PROTOCOL, published(one), ours(one), answer(one), predicted)
 
 
@@ -54,22 +69,30 @@ def ours(one: Replication) -> str:
 
 
 def answer(one: Replication) -> str:
-    """Return whether the number replicates, such as "✗ outside"."""
-    unknown = f": {one.repetition.reason}" if one.answer is Answer.UNKNOWN and not one.repetition.predictions else ""
-    return f"{SYMBOLS[one.answer]} {one.answer}{unknown}"
+    """Return whether the number replicates, such as "✗ contradicted" or "? uninformative (13)"."""
+    why = f": {one.repetition.reason}" if one.repetition.reason and not one.repetition.predictions else ""
+    if one.agreement is Agreement.UNINFORMATIVE and not why:
+        why = " (no n)" if one.repetition.needed is None else f" ({one.repetition.needed})"
+    return f"{SYMBOLS[one.agreement]} {one.agreement}{why}"
 
 
 def colour(one: Replication) -> str:
     """Return the verdict whose colour the answer takes."""
-    return _COLOURS[one.answer].name.lower()
+    return _COLOURS[one.agreement].name.lower()
 
 
 def totals(found: Sequence[Replication]) -> list[str]:
-    """Return one line for each variant, such as "the protocol: 15 inside, 20 outside, 7 cannot be said"."""
+    """Return one line a variant: "the protocol: 5 contradicted, 1 uninformative; by condition: 2 contradicted"."""
+    conditions = counts_by_condition(found)
     return [
-        f"{variant or PROTOCOL}: " + ", ".join(f"{count} {name}" for name, count in by_answer.items() if count)
-        for variant, by_answer in counts(found).items()
+        f"{variant or PROTOCOL}: {_counted(numbers)}; by condition: {_counted(conditions[variant])}"
+        for variant, numbers in counts(found).items()
     ]
+
+
+def _counted(by_answer: Mapping[Agreement, int]) -> str:
+    """Return how many have each answer."""
+    return ", ".join(f"{by_answer[one]} {one}" for one in Agreement if by_answer.get(one))
 
 
 def put_to_the_paper(reports: Sequence[ClaimReport]) -> list[str]:

@@ -136,9 +136,9 @@ class Greater(Assertion):
 
     def highest(self, trials: Trials, n: int, design: Design) -> PValues:
         """Return the p of results of the missing trials that are all against it: beyond all others, without ties."""
-        a, b = self.above.sample(trials).values, self.below.sample(trials).values
-        place = {value: float(at) for at, value in enumerate(sorted({*a, *b}))}
-        a, b = [place[value] for value in a], [place[value] for value in b]
+        above, below = self.above.sample(trials).values, self.below.sample(trials).values
+        place = {value: float(at) for at, value in enumerate(sorted({*above, *below}))}
+        a, b = [place[value] for value in above], [place[value] for value in below]
         low = [-1.0 - at for at in range(2 * n)]
         high = [len(place) + at for at in range(2 * n)]
         more, less = n - len(a), n - len(b)
