@@ -19,8 +19,7 @@ EVOLVED = [
         marks=expected(
             Outcome.REFUTED,
             tier="full",
-            because="champions whose one episode in training collects 1,800 to 2,700 cross 0.0 to 1.1 stones (mean "
-            "0.5) in ten other episodes (docs/protocol.md)",
+            because="champions of one lucky episode in training cross few stones in other episodes (docs/protocol.md)",
         ),
     ),
     pytest.param(
@@ -28,17 +27,14 @@ EVOLVED = [
         marks=expected(
             Outcome.REFUTED,
             tier="full",
-            because="its champions cross 1.0 to 2.6 stones (mean 1.6) in ten episodes other than those that made them "
-            "champions, in one trial more than two",
+            because="its champions cross fewer stones in ten episodes other than those that made them champions",
         ),
     ),
 ]
 A_LATER_SENTENCE = (
     "it was made a claim after all trials had run; smoke has no instance that was chosen for it, and S4 to S7 have"
 )
-LUCKY = (
-    "NEAT's champions are those of one lucky episode: it collects 2,700 to 5,000, ten others 600 to 2,400 on average"
-)
+LUCKY = "NEAT's champions are those of one lucky episode: in others they collect less than half of that on average"
 LEARNED = [
     "ppo",
     pytest.param(
@@ -46,8 +42,8 @@ LEARNED = [
         marks=expected(
             Outcome.INCONCLUSIVE,
             tier="full",
-            because="shown the next stone, PPO crosses 0 to 6.6 stones (mean 3.7), and in three trials of ten reaches "
-            "the target in most episodes; in the published code no stone pays (docs/protocol.md)",
+            because="shown the next stone, PPO crosses several stones, and in some trials reaches the target in most "
+            "episodes; in the published code no stone pays (docs/protocol.md)",
         ),
     ),
 ]
@@ -65,8 +61,7 @@ LEARNED = [
 @expected(
     Outcome.REFUTED,
     tier="full",
-    because="champions whose one episode in training collects 2,700 to 5,000 cross 0 to 1.8 stones (mean 0.8) in ten "
-    "other episodes (docs/protocol.md)",
+    because="champions of one lucky episode in training cross few stones in ten other episodes (docs/protocol.md)",
 )
 def test_neat_reaches_five_stones(trials, verdict, claim_tier):
     neat = trials("neat", on="stones")
@@ -143,12 +138,10 @@ def test_ppo_stays_at_the_first_stone(trials, verdict, claim_tier, method):
     "other",
     [
         "hyperneat",
-        pytest.param(
-            "cma_es", marks=expected(Outcome.REFUTED, tier="full", because=f"{LUCKY}; CMA-ES, 1,700 to 2,900")
-        ),
+        pytest.param("cma_es", marks=expected(Outcome.REFUTED, tier="full", because=LUCKY)),
         "map_elites",
         "ppo",
-        pytest.param("goal_ppo", marks=expected(Outcome.REFUTED, tier="full", because=f"{LUCKY}; PPO, 900 to 4,200")),
+        pytest.param("goal_ppo", marks=expected(Outcome.REFUTED, tier="full", because=LUCKY)),
     ],
 )
 def test_neat_collects_more_reward(trials, verdict, claim_tier, other):
@@ -243,7 +236,7 @@ def test_map_elites_explores_the_maze(trials, verdict, claim_tier):
 @expected(
     Outcome.REFUTED,
     tier="full",
-    because="100,000 policies fill 58 to 88% of the cells that can be reached, and in three trials of ten the target's",
+    because="the policies fill most cells that can be reached, but the target's in few trials",
 )
 def test_map_elites_finds_the_target_without_stones(trials, verdict, claim_tier):
     plain = trials("map_elites", on="deceptive_maze_difficult")
@@ -270,7 +263,7 @@ def test_map_elites_finds_the_target_without_stones(trials, verdict, claim_tier)
     since=FIRST,
     smoke="CMA-ES collects less reward than NEAT in the room with three stones, but more than a random policy",
 )
-@expected(Outcome.REFUTED, tier="full", because=f"{LUCKY}; CMA-ES, 1,700 to 2,900")
+@expected(Outcome.REFUTED, tier="full", because=LUCKY)
 def test_cma_es_is_below_neat(trials, verdict, claim_tier):
     cma_es = trials("cma_es", on="stones")
     neat = trials("neat", on="stones")

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import argparse
+import re
 import shutil
 from pathlib import Path
 
 import pytest
 from tiny_project import Evoclaims, Project
 
+from evoclaims.cli.arguments import parser
 from evoclaims.trials.store import Store
 
 PAGE = """# Title
@@ -51,6 +54,65 @@ def test_a_table_is_written_between_its_marks_once(committed: Evoclaims, project
     committed("tables", "page.md")
     assert "not run" not in Path("page.md").read_text()
     assert "variant" not in Path("page.md").read_text()
+
+
+MARKS = """<!-- evoclaims: marks small=smoke smoke:traded full -->
+
+| claim | the paper says |
+| --- | --- |
+| a | A, in short |
+
+<!-- evoclaims: end -->
+"""
+
+
+def test_marks_are_one_for_each_sentence_and_short_sentences_stay(committed: Evoclaims, project: Project) -> None:
+    project.write(
+        """
+@says("a")
+@pytest.mark.parametrize("method", ["right", "wrong", "coin"])
+def test_a(trials, verdict, method):
+    verdict(trials(method, on="parity").solves_every_level.in_most_trials())
+
+@says("b is a sentence of many more words than ten, so that")
+def test_b(trials, verdict):
+    verdict(trials("wrong", on="parity").solves_every_level.in_most_trials())
+
+@claim("c", says="c", where="control", smoke="c")
+def test_c(trials, verdict):
+    verdict(trials("right", on="parity").solves_every_level.in_most_trials())
+"""
+    )
+    Path("page.md").write_text(MARKS)
+    committed("tables", "page.md")
+    lines = [line for line in Path("page.md").read_text().splitlines() if line.startswith("| ")]
+    long = "b is a sentence of many more words than ten, so that"
+    assert lines == [
+        "| claim | the paper says | small | smoke, traded | full |",
+        "| --- | --- | --- | --- | --- |",
+        "| a | A, in short | ✓1 ✗1 | ✗ | – |",
+        f"| {long} | b is a sentence of many more words than ten, … | ✗ | – | – |",
+    ]
+
+
+def test_refutations_that_end_otherwise_are_listed_by_variant(committed: Evoclaims) -> None:
+    Path("page.md").write_text(PAGE.replace("verdicts full smoke smoke:traded", "refutations smoke"))
+    committed("tables", "page.md")
+    text = Path("page.md").read_text()
+    assert "0 refuted cases of the smoke tier end otherwise under a variant:" in text
+
+
+def test_commands_are_a_section_each_with_every_argument(committed: Evoclaims) -> None:
+    Path("page.md").write_text(PAGE.replace("verdicts full smoke smoke:traded", "commands"))
+    committed("tables", "page.md")
+    text = Path("page.md").read_text()
+    sections = dict(re.findall(r"^## (\S+)\n(.*?)(?=^## |<!--)", text, re.MULTILINE | re.DOTALL))
+    (chosen,) = (action for action in parser()._actions if isinstance(action, argparse._SubParsersAction))
+    assert sections.keys() == chosen.choices.keys()
+    for name, command in chosen.choices.items():
+        options = {option for action in command._actions for option in action.option_strings} - {"-h", "--help"}
+        assert set(re.findall(r"^\| `(--[\w-]+)", sections[name], re.MULTILINE)) == options, name
+        assert f"[`{name}`](#{name})" in text
 
 
 def test_a_table_of_details_has_the_claims_that_a_variant_touches(committed: Evoclaims) -> None:

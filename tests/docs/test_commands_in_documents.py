@@ -25,7 +25,7 @@ def _commands(text: str) -> set[str]:
     return {command.partition("#")[0].partition("&&")[0].strip() for command in found}
 
 
-@pytest.mark.parametrize("name", sorted(DOCUMENTS))
+@pytest.mark.parametrize("name", sorted(DOCUMENTS.keys() - {"commands.md"}))  # which the parser writes itself
 def test_each_command_is_one_that_the_command_line_takes(name: str) -> None:
     for command in sorted(_commands(DOCUMENTS[name])):
         words = shlex.split(command)

@@ -1,4 +1,4 @@
-"""The command line of `evoclaims`: its commands, and their options and what they say of themselves."""
+"""The command line of `evoclaims`: its commands, their options and their help."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def parser() -> argparse.ArgumentParser:
     commands = made.add_subparsers(dest="command", required=True, metavar="command")
 
     def add(name: str, text: str, kept: str = ".evoclaims") -> argparse.ArgumentParser:
-        command = commands.add_parser(name, help=text, description=text)
+        command = commands.add_parser(name, help=text.partition("; ")[0], description=text)
         command.set_defaults(refuse=command.error)
         command.add_argument("--storage", metavar="DIR", help=f"folder of trials ({kept} in the project's root)")
         if name not in _WITHOUT_TIER:
@@ -48,8 +48,8 @@ def parser() -> argparse.ArgumentParser:
             command.add_argument("--numprocesses", metavar="N", default="1", help=_PROCESSES)
         return command
 
-    text = "write a project that runs, with a method, a task and two claims; or, with --from, that of a paper"
-    new = commands.add_parser("new", help=text, description=text)
+    text = "write a project that runs; it has a method, a task and two claims, or, with --from, those of a paper"
+    new = commands.add_parser("new", help=text.partition("; ")[0], description=text)
     new.set_defaults(storage=None, refuse=new.error)  # it reads no trials
     new.add_argument("folder", metavar="DIR", help="where to: a folder that is new or empty")
     new.add_argument("--from", dest="project", metavar="PAPER", default="skeleton", help="a paper, such as nisioti2025")
@@ -60,13 +60,13 @@ def parser() -> argparse.ArgumentParser:
 
 
 def _running(add: _Add) -> None:
-    """Add what runs trials, or says what running them takes."""
-    plan = add("plan", "say what a tier would run, what it costs here, and what its verdicts can show")
+    """Add what runs trials, or shows what running them takes."""
+    plan = add("plan", "show what a tier would run, what it costs here, and what its verdicts can show")
     plan.add_argument("--variant", metavar="NAME", default="", help="what this variant of the protocol changes")
     plan.add_argument("--like", metavar="KIND", help="times as of trials made on such a device, such as 'NVIDIA H200'")
     plan.add_argument("--measure", action="store_true", help="time a few steps of conditions never run here")
 
-    text = "run missing trials and judge none; with --variant those that it changes, and say which verdicts it changes"
+    text = "run missing trials, and judge none; with --variant those that it changes, and show which verdicts change"
     run = add("run", text)
     run.add_argument("method", nargs="?", help="only this method")
     run.add_argument("--on", metavar="TASK", help="only this task")
@@ -103,7 +103,7 @@ def _running(add: _Add) -> None:
     mutants.add_argument("--stored", action="store_true", help="run nothing: judge the trials that have run")
 
     power = add(
-        "power", "say from a pilot how often each claim ends as expected; exit status 1 when one does less than 0.95"
+        "power", "estimate from a pilot how often each claim ends as expected; exit status 1 if one does below 0.95"
     )
     power.add_argument("--only", metavar="CLAIMS", help="only these claims, by id or name, such as G1,S2[cma_es]")
     made = power.add_mutually_exclusive_group()
@@ -132,7 +132,7 @@ def _reading(add: _Add) -> None:
         "--variant", metavar="NAME", default="", help="the verdicts that this variant of the protocol may change"
     )
     status.add_argument(
-        "--why", action="store_true", help="also say why verdicts are accepted, inconclusive or not run"
+        "--why", action="store_true", help="also print why verdicts are accepted, inconclusive or not run"
     )
     status.add_argument("--as", dest="form", metavar="FORM", help="print csv, json or markdown instead of a table")
 
@@ -192,14 +192,14 @@ def _keeping(add: _Add) -> None:
     """Add what checks, joins and accepts what is stored."""
     verify = add(
         "verify",
-        "read every stored trial, champion and checkpoint back, and move bad ones aside so that their trials run again "
-        "(verdicts are not read: `evoclaims status` judges the trials anew)",
+        "check every stored trial, champion and checkpoint; bad files are moved aside, and their trials run again; "
+        "verdicts are not read, since `evoclaims status` judges the trials anew",
     )
     verify.add_argument("--dry-run", action="store_true", help="list bad files and leave them where they are")
 
     merge = add("merge", "copy trials, champions and verdicts of other stores into one; what is there already stays")
     merge.add_argument("stores", nargs="+", metavar="STORE", help="a folder of trials, such as another machine's")
-    merge.add_argument("--dry-run", action="store_true", help="say what would be copied, and copy nothing")
+    merge.add_argument("--dry-run", action="store_true", help="list what would be copied, and copy nothing")
 
     reference = add("reference", "write the stored trials of a tier as the committed reference trials")
     reference.add_argument("--variant", metavar="NAME", default="", help="those that only this variant has")
@@ -216,8 +216,8 @@ def _comparing(add: _Add) -> None:
     """Add what compares verdicts, of dates or of environments."""
     compare = add(
         "compare",
-        "show what changed: current verdicts against the accepted ones; or a git revision against the working tree; or "
-        "a store (OLD) against --storage; or two revisions, or two stores, against each other; run nothing",
+        "compare the current verdicts with the accepted ones; or a git revision with the working tree; or a store "
+        "(OLD) with --storage; or two revisions, or two stores; run nothing",
     )
     compare.add_argument("places", nargs="*", metavar="OLD [NEW]", help="a git revision or a folder of trials")
     compare.add_argument("--fail", metavar="CHANGES", help="end with 1 on these, such as 'supported->refuted,*->error'")
@@ -229,8 +229,9 @@ def _comparing(add: _Add) -> None:
 
     across = add(
         "across",
-        "judge claims in an environment for each release of a package, file of pins or Python, and compare with the "
-        "first; exit status 1 when a verdict changed, trials drifted, or an environment has no verdicts",
+        "judge claims with several releases of a package, files of pins or Pythons; each has an environment, "
+        "and is compared with the first; exit status 1 when a verdict changed, trials drifted, or an "
+        "environment has no verdicts",
         ".evoclaims-releases",
     )
     across.add_argument(
@@ -268,7 +269,7 @@ def _exporting(add: _Add) -> None:
     export.add_argument("--out", metavar="FILE", help="where to (report/trials.FORM, report/verdicts.FORM)")
 
     tables = add(
-        "tables", "write the tables in Markdown files anew from the reference trials; exit status 1 when one changed"
+        "tables", "write the tables in Markdown files anew, from the reference trials; exit status 1 when one changed"
     )
     tables.add_argument("files", nargs="+", metavar="FILE", help="such as README.md")
 

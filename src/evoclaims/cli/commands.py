@@ -13,7 +13,7 @@ def reference() -> str:
     """Return a list of all commands, and a section for each with its usage and its options."""
     commands = _commands(parser())
     index = table(("command", "purpose"), ((f"[`{name}`](#{name})", literal(says)) for name, says, _ in commands))
-    return "\n\n".join([index, *(_section(name, says, command) for name, says, command in commands)])
+    return "\n\n".join([index, *(_section(name, command) for name, _, command in commands)])
 
 
 def _commands(whole: argparse.ArgumentParser) -> list[tuple[str, str, argparse.ArgumentParser]]:
@@ -22,9 +22,10 @@ def _commands(whole: argparse.ArgumentParser) -> list[tuple[str, str, argparse.A
     return [(str(one.dest), str(one.help), chosen.choices[one.dest]) for one in chosen._choices_actions]
 
 
-def _section(name: str, says: str, command: argparse.ArgumentParser) -> str:
+def _section(name: str, command: argparse.ArgumentParser) -> str:
     """Return what there is to know about one command."""
-    return f"## {name}\n\n{literal(_sentence(says))}\n\n{table(('argument', 'meaning'), _rows(command))}"
+    says = literal(_sentence(str(command.description)))
+    return f"## {name}\n\n{says}\n\n{table(('argument', 'meaning'), _rows(command))}"
 
 
 def _rows(command: argparse.ArgumentParser) -> Iterator[tuple[str, str]]:

@@ -3,8 +3,9 @@
 A table is between two comments, the first of which says what it shows:
 
     <!-- evoclaims: verdicts full full:published smoke -->    verdicts by tier, or by tier and variant of the protocol
-    <!-- evoclaims: marks text=full smoke -->                verdicts as marks; sentences in the file stay
-    <!-- evoclaims: tally full -->                            how many sentences and cases of a tier ended how
+    <!-- evoclaims: marks text=full smoke -->                verdicts as marks, of the sentences that are there
+    <!-- evoclaims: sentences full -->                        how many sentences of a tier ended how
+    <!-- evoclaims: tally full -->                            the same, by case too, and what chance may have decided
     <!-- evoclaims: numbers full all -->                      published numbers and ours, under all variants
     <!-- evoclaims: details full -->                          verdicts that variants of the protocol may change
     <!-- evoclaims: refutations full -->                     which refuted claims end otherwise under a variant
@@ -39,12 +40,13 @@ from evoclaims.report.formatting import plural
 from evoclaims.report.markdown import numbers, robustness
 from evoclaims.report.markdown_text import literal, table
 from evoclaims.report.table_cells import NONE
-from evoclaims.report.tally import tally
+from evoclaims.report.tally import by_sentence, tally
 from evoclaims.report.trial_summary import Reader
 from evoclaims.report.verdict_marks import marks, short_sentences
 from evoclaims.report.verdict_overview import overview
 from evoclaims.verdicts.claim_report import ClaimReport
 from evoclaims.verdicts.robustness import Robustness, matrix
+from evoclaims.verdicts.sentences import sentences
 
 _TABLE: Final = re.compile(
     r"(?P<begin>^<!-- evoclaims: (?P<kind>\w+) (?P<words>[^>]*?) ?-->\n)"
@@ -120,7 +122,7 @@ def _verdicts(project: Project, words: list[str], *_: str) -> str:
 
 
 def _marks(project: Project, words: list[str], before: str) -> str:
-    """Return the verdicts as marks; a sentence that somebody shortened in the table `before` stays."""
+    """Return the verdicts as marks: of the sentences chosen and shortened in the table `before`, or of all."""
     return marks(*_columns(project, words), short_sentences(before))
 
 
@@ -138,14 +140,20 @@ def _columns(project: Project, words: list[str]) -> tuple[dict[str, list[ClaimRe
         asked[heading or ", ".join(filter(None, (tier, variant)))] = tier, variant
     every = list(dict.fromkeys((*asked.values(), (tiers[0], ""))))
     judged = dict(zip(every, project.judge_variants(every), strict=True))
-    sentences = {report.name: report.statement for report in judged[tiers[0], ""]}
-    return {heading: judged[column] for heading, column in asked.items()}, sentences
+    says = {report.name: report.statement for report in judged[tiers[0], ""]}
+    return {heading: judged[column] for heading, column in asked.items()}, says
 
 
 def _tally(project: Project, words: list[str], *_: str) -> str:
     """Return how many verdicts of a tier ended how."""
     (reports,) = project.judge_variants([(_tier(project, words), "")])
     return tally(reports)
+
+
+def _sentences(project: Project, words: list[str], *_: str) -> str:
+    """Return how many of the paper's sentences ended how."""
+    (reports,) = project.judge_variants([(_tier(project, words), "")])
+    return by_sentence(sentences([report for report in reports if not report.is_control]))
 
 
 def _readings(project: Project, words: list[str], *_: str) -> str:
@@ -206,6 +214,7 @@ def _numbers(project: Project, words: list[str], *_: str) -> str:
 _KINDS: Final[Mapping[str, Callable[[Project, list[str], str], str]]] = {
     "verdicts": _verdicts,
     "marks": _marks,
+    "sentences": _sentences,
     "tally": _tally,
     "details": _details,
     "refutations": _refutations,

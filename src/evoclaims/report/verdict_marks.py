@@ -26,7 +26,7 @@ def marks(
     Args:
         columns: reports by heading.
         sentences: the paper's own by claim and case, such as "G1[n_parity]".
-        short: sentences in the author's own short form, by the first column; others are cut after `WORDS` words.
+        short: the sentences to show, in a short form, by the first column; without any all, cut after `WORDS` words.
     """
     cases: dict[tuple[str, str], dict[str, list[ClaimReport]]] = {}
     for heading, reports in columns.items():
@@ -39,8 +39,9 @@ def marks(
     for (claim, sentence), found in cases.items():
         named_cases = dict.fromkeys(report.case for reports in found.values() for report in reports)
         name = literal(named(claim, ", ".join(named_cases) if claim in several else ""))
-        text = (short or {}).get(name) or literal(_cut(sentence))
-        rows.append((name, text, *(mark(found[heading]) for heading in columns)))
+        if not short or name in short:
+            text = short[name] if short else literal(_cut(sentence))
+            rows.append((name, text, *(mark(found[heading]) for heading in columns)))
     return table((*HEADINGS, *map(literal, columns)), rows)
 
 
