@@ -116,7 +116,7 @@ class Board:
     def counts(self) -> Mapping[Tally, int]:
         """The number of the paper's claims by what they count as; of outcomes that no claim has, too."""
         found = table_cells.counts(section.report for section in self.papers)
-        return {tally: found.get(tally, 0) for tally in Tally if tally in found or tally not in APART}
+        return {tally: found.get(tally, 0) for tally in Tally if tally in found or tally not in (*APART, Tally.SMALLER)}
 
     @property
     def accepted(self) -> int:
