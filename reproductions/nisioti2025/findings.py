@@ -1,0 +1,74 @@
+"""The tables of docs/findings.md, from the committed trials: `python -m reproductions.nisioti2025.findings` writes them."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from statistics import fmean
+from typing import Final
+
+from evoclaims.paper import references
+from evoclaims.trials.result import TrialResult
+from reproductions.nisioti2025 import REPRODUCTION
+
+PAGE: Final = Path(__file__).parents[2] / "docs" / "findings.md"
+FRESH: Final = Path(__file__).parent / "fresh"
+"""Trials of fresh seeds (100 to 109), by variant; no verdict reads them."""
+METHODS: Final = ("neat", "hyperneat", "cma_es", "map_elites", "ppo", "goal_ppo")
+NOISE: Final = {"fixed_start": 0, "quarter_noise": 0.25, "half_noise": 0.5, "": 1}
+COMPOSITES: Final = ("submission", "submission_once", "submission_0.5", "submission_once_0.5")
+
+
+def trials(variant: str, method: str, fresh: bool = False) -> Sequence[TrialResult]:
+    """Return the committed trials of a method among stones under a variant, where it changes them; else none."""
+    tier = REPRODUCTION.tier("full", variant)
+    names = method, "stones"
+    if variant and names not in REPRODUCTION.changed_by(variant, "full"):
+        return ()
+    if fresh:
+        return references.committed(FRESH / variant, "full", *names)
+    return references.of_condition(REPRODUCTION.references, "full", *names, tier.condition(*names).id)
+
+
+def cell(found: Sequence[TrialResult]) -> str:
+    """Return mean stones, and the mean reward of the best training episode divided by 1,000; – without trials."""
+    if not found:
+        return "–"
+    stones = fmean(trial.metrics["stones"] for trial in found)
+    best = fmean(trial.curves["fitness"][-1] for trial in found) / 1_000
+    return f"{stones:.1f} ({best:.1f})" if best > 0.1 else f"{stones:.1f}"
+
+
+def stones() -> Iterator[str]:
+    """Yield a line for each variant that changes trials of NEAT, HyperNEAT or CMA-ES among stones, and has some."""
+    yield "| | " + " | ".join(METHODS).replace("_", "\\_") + " |"
+    yield "| --- " * (len(METHODS) + 1) + "|"
+    for variant in ("", *REPRODUCTION.variants):
+        for fresh in (False, True) if variant else (False,):
+            cells = [cell(trials(variant, method, fresh)) for method in METHODS]
+            if set(cells) != {"–"}:
+                name = variant.replace("_", "\\_") or "the text's protocol"
+                yield f"| {name}{', fresh seeds' * fresh} | {' | '.join(cells)} |"
+
+
+def noise() -> Iterator[str]:
+    """Yield NEAT's stones against the noise on starts, as far as it has run."""
+    yield "| share of the code's noise on starts | NEAT's stones (training's best / 1,000) |"
+    yield "| --- | --- |"
+    for variant, share in NOISE.items():
+        if found := trials(variant, "neat"):
+            yield f"| {share:g} | {cell(found)} |"
+
+
+def filled(page: str) -> str:
+    """Return the page with its tables written anew, each between `<!-- findings: NAME -->` and `<!-- findings: end -->`."""
+    for name, lines in {"stones": stones, "noise": noise}.items():
+        block = re.compile(rf"(<!-- findings: {name} -->\n\n).*?(\n\n<!-- findings: end -->)", re.DOTALL)
+        table = "\n".join(lines())
+        page = block.sub(lambda found, table=table: f"{found[1]}{table}{found[2]}", page)  # type: ignore[misc]
+    return page
+
+
+if __name__ == "__main__":
+    PAGE.write_text(filled(PAGE.read_text(encoding="utf-8")), encoding="utf-8")
