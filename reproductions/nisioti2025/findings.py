@@ -1,4 +1,4 @@
-"""The tables of docs/findings.md, from the committed trials: `python -m reproductions.nisioti2025.findings` writes them."""
+"""The tables of docs/findings.md from committed trials; `python -m reproductions.nisioti2025.findings` writes them."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def noise() -> Iterator[str]:
 
 
 def filled(page: str) -> str:
-    """Return the page with its tables written anew, each between `<!-- findings: NAME -->` and `<!-- findings: end -->`."""
+    """Return the page with new tables, each between `<!-- findings: NAME -->` and `<!-- findings: end -->`."""
     for name, lines in {"stones": stones, "noise": noise}.items():
         block = re.compile(rf"(<!-- findings: {name} -->\n\n).*?(\n\n<!-- findings: end -->)", re.DOTALL)
         table = "\n".join(lines())
