@@ -1,4 +1,4 @@
-"""Stepping stones with other details, against the protocol's and against rewards computed by hand from the authors' maze."""
+"""Stepping stones with other details, against the protocol's and against rewards computed by hand."""
 
 from __future__ import annotations
 
