@@ -1,6 +1,7 @@
 """README's sentence on how many refutations depend on a detail is what the protocol's table of variants says.
 
-That table is written from the reference trials, and another test compares it with them (test_generated_tables.py).
+That table is written from the reference trials, and another test compares it with them (test_generated_tables.py). What
+older commits have otherwise, and starts without noise, are told by docs/findings.md instead: their columns come last.
 """
 
 from __future__ import annotations
@@ -20,7 +21,9 @@ def _rows(page: str) -> list[dict[str, str]]:
     (block,) = re.findall(r"<!-- evoclaims: details full -->\n(.*?)<!-- evoclaims: end -->", page, re.DOTALL)
     heading, _, *lines = [line.strip("|").split(" | ") for line in block.splitlines() if line.startswith("|")]
     names = [name.strip() for name in heading]
-    return [dict(zip(names, (cell.strip() for cell in line), strict=True)) for line in lines]
+    told = names[: names.index(BOTH) + 1]
+    assert len(told) == 18
+    return [dict(zip(told, (cell.strip() for cell in line), strict=False)) for line in lines]
 
 
 def _are(number: int) -> str:
