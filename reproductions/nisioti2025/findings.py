@@ -1,4 +1,4 @@
-"""The tables of docs/findings.md from committed trials; `python -m reproductions.nisioti2025.findings` writes them."""
+"""The tables of docs/findings.md, from the committed trials; run as a module, it writes them into the page."""
 
 from __future__ import annotations
 
@@ -8,6 +8,9 @@ from pathlib import Path
 from statistics import fmean
 from typing import Final
 
+from evoclaims.core.errors import UserError
+from evoclaims.judging.exact import rank_test
+from evoclaims.judging.repetition import PublishedMean, repetition
 from evoclaims.paper import references
 from evoclaims.trials.result import TrialResult
 from reproductions.nisioti2025 import REPRODUCTION
@@ -17,6 +20,8 @@ FRESH: Final = Path(__file__).parent / "fresh"
 """Trials of fresh seeds (100 to 109), by variant; no verdict reads them."""
 METHODS: Final = ("neat", "hyperneat", "cma_es", "map_elites", "ppo", "goal_ppo")
 NOISE: Final = {"fixed_start": 0, "quarter_noise": 0.25, "half_noise": 0.5, "": 1}
+TRIED: Final = 8
+"""Composites tried, as the rule counts them (docs/protocol.md)."""
 COMPOSITES: Final = ("submission", "submission_once", "submission_0.5", "submission_once_0.5")
 
 
@@ -61,9 +66,35 @@ def noise() -> Iterator[str]:
             yield f"| {share:g} | {cell(found)} |"
 
 
+def rule() -> Iterator[str]:
+    """Yield, for each composite on fresh seeds, what the rule for a hit asks, as far as it has run."""
+    yield "| composite | NEAT (5) | HyperNEAT (3) | CMA-ES (3) | p, NEAT above HyperNEAT | p, NEAT above CMA-ES | hit |"
+    yield "| --- | --- | --- | --- | --- | --- | --- |"
+    for variant in COMPOSITES:
+        values = {
+            method: [trial.metrics["stones"] for trial in trials(variant, method, fresh=True)]
+            for method in ("neat", "hyperneat", "cma_es")
+        }
+        answers = [_answer(method, found) for method, found in values.items()]
+        above = [rank_test(values["neat"], values[other]).p for other in ("hyperneat", "cma_es")]
+        fails = "outside" in answers or max(above) > 0.05 / TRIED
+        said = [f"{fmean(found):.1f}, {answer}" for found, answer in zip(values.values(), answers, strict=True)]
+        told = [*said, *(f"{p:.2g}" for p in above), "no" if fails else "not decided: PPO has not run"]
+        yield f"| {variant.replace('_', chr(92) + '_')} | {' | '.join(told)} |"
+
+
+def _answer(method: str, ours: Sequence[float]) -> str:
+    """Return whether the published number of stones lies where a repetition of it would be."""
+    published = REPRODUCTION.published.value("stones", "stones", method)
+    if published is None or published.trials is None:
+        raise UserError(f"reported.toml has no number of stones of {method}, or not of how many trials.")
+    mean = PublishedMean(published.value, published.error, published.trials, published.scale, published.precision)
+    return str(repetition(mean, ours, len(ours)).answer)
+
+
 def filled(page: str) -> str:
-    """Return the page with new tables, each between `<!-- findings: NAME -->` and `<!-- findings: end -->`."""
-    for name, lines in {"stones": stones, "noise": noise}.items():
+    """Return the page with each table written anew, from its mark to the next `<!-- findings: end -->`."""
+    for name, lines in {"stones": stones, "noise": noise, "rule": rule}.items():
         block = re.compile(rf"(<!-- findings: {name} -->\n\n).*?(\n\n<!-- findings: end -->)", re.DOTALL)
         table = "\n".join(lines())
         page = block.sub(lambda found, table=table: f"{found[1]}{table}{found[2]}", page)  # type: ignore[misc]
