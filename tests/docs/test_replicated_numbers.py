@@ -1,4 +1,4 @@
-"""How many published numbers replicate, by README and docs/results.md, is what the table in docs/replication.md gives.
+"""How many published numbers are contradicted, by README and docs/results.md, is what docs/replication.md gives.
 
 That table is written from the reference trials, and another test compares it with them (test_generated_tables.py).
 """
@@ -6,45 +6,46 @@ That table is written from the reference trials, and another test compares it wi
 from __future__ import annotations
 
 import re
+from collections import Counter
 from pathlib import Path
 
 import pytest
 
 ROOT = Path(__file__).parents[2]
 RESULTS = (ROOT / "docs" / "results.md").read_text(encoding="utf-8")
+REPLICATION = (ROOT / "docs" / "replication.md").read_text(encoding="utf-8")
+ANSWERS = ("consistent", "contradicted", "uninformative")
 PUBLISHED, WITH_ROWS = "published", r"published\_rows\_so\_far"
 
 
-def _numbers(protocol: str) -> dict[str, str]:
-    """Return whether each published number is inside, outside or unknown with our trials under a reading."""
-    replication = (ROOT / "docs" / "replication.md").read_text(encoding="utf-8")
-    lines = re.findall(r"^\| ([^|]+) \| ([^|]+) \| [^|]+ \| [^|]+ \| . ([^|]+) \|", replication, re.MULTILINE)
-    found = {number: result for number, under, result in lines if under == protocol}
-    assert {"inside", "outside"} <= set(found.values()) <= {"inside", "outside", "cannot be said"}
+def _answers(protocol: str) -> dict[str, str]:
+    """Return the answer about each published number whose trials have run under a reading of the protocol."""
+    lines = re.findall(r"^\| ([^|]+) \| ([^|]+) \| [^|]+ \| [^|]+ \| . (\w+)[^|]* \|", REPLICATION, re.MULTILINE)
+    found = {number: answer for number, under, answer in lines if under == protocol}
+    assert {"consistent", "contradicted"} <= set(found.values()) <= set(ANSWERS)
     return found
 
 
-def _counts(protocol: str) -> tuple[int, int, int]:
-    """Return how many numbers have trials under a reading, how many are inside, and of the same with the text's."""
-    found, text = _numbers(protocol), _numbers("the protocol")
-    return (
-        len(found),
-        sum(result == "inside" for result in found.values()),
-        sum(text[number] == "inside" for number in found),
-    )
+def _contradicted_by_text(protocol: str) -> int:
+    text = _answers("the protocol")
+    return sum(text[number] == "contradicted" for number in _answers(protocol))
 
 
 @pytest.mark.parametrize("protocol", [PUBLISHED, WITH_ROWS])
-def test_the_results_count_the_numbers_that_replicate(protocol: str) -> None:
-    count, inside, with_text = _counts(protocol)
+def test_results_count_the_three_answers(protocol: str) -> None:
+    found = _answers(protocol)
+    count = Counter(found.values())
     (line,) = re.findall(rf"^\| [^|]*\(`{protocol.replace(chr(92), '')}`\)[^|]*(\|.*)$", RESULTS, re.MULTILINE)
-    assert line == f"| {count} | **{inside}** | {with_text} |"
+    assert line == (
+        f"| {len(found)} | {count['consistent']} | **{count['contradicted']}** | {count['uninformative']} | "
+        f"{_contradicted_by_text(protocol)} |"
+    )
 
 
-def test_the_readme_counts_the_numbers_that_replicate() -> None:
-    count, inside, with_text = _counts(PUBLISHED)
+def test_the_readme_counts_contradicted_numbers() -> None:
+    found = _answers(PUBLISHED)
     readme = " ".join((ROOT / "README.md").read_text(encoding="utf-8").split())
     assert (
-        f"Of {count} published numbers {inside} replicate with the published scripts' settings, and {with_text} with "
-        "the text's."
+        f"Of {len(found)} published numbers {list(found.values()).count('contradicted')} are contradicted with the "
+        f"published scripts' settings, and {_contradicted_by_text(PUBLISHED)} with the text's."
     ) in readme
