@@ -12,13 +12,12 @@ from jaxtyping import Array, Float, Int
 
 from evoclaims.core.errors import require_known
 from evoclaims.core.pytree import pytree
-from evoclaims.envs import Box, Rangefinders, SteppingStones, Surface
-from evoclaims.envs.ecorobot.maze import MazePlan
-from evoclaims.envs.ecorobot.outing import Outing, Ruling
+from evoclaims.envs import STONES, Box, MazePlan, Rangefinders, Ruling, SteppingStones, Surface
+from evoclaims.envs.ecorobot.outing import Outing
 from evoclaims.envs.ecorobot.pose import Pose
 from evoclaims.envs.ecorobot.scene import Scene
 from evoclaims.envs.ecorobot.sensors import distances
-from evoclaims.envs.ecorobot.stones import BONUS, PLAN, STONES
+from evoclaims.envs.ecorobot.stones import BONUS, PLAN
 
 Pays = Literal["each", "once"]
 Toward = Literal["next", "after_next"]

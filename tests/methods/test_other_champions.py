@@ -1,0 +1,96 @@
+"""Champions of all training, shared starts, and PPO's environments that return to their first state."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from evoclaims.core.errors import UserError
+from reproductions.nisioti2025 import ecorobot
+from reproductions.nisioti2025.other_champions import OtherCmaEs, with_shared_starts
+from reproductions.nisioti2025.other_ppo import OtherPpo
+from reproductions.nisioti2025.other_stones import OtherStones
+from reproductions.nisioti2025.stones_details import as_kind, best_ever
+
+LEVEL = jnp.int32(0)
+TASK = OtherStones(episode_steps=10, pays="once")
+
+
+def test_neat_keeps_the_first_champion_until_an_episode_beats_it_and_evolves_as_before() -> None:
+    plain = ecorobot.SMOKE["neat", "stones"]
+    kept: Any = best_ever("neat", "stones", plain)
+    task = replace(plain.task, episode_steps=10)
+    states = {
+        name: jax.jit(lambda key, m=m: m.init(key, task))(jax.random.key(0))
+        for name, m in (("plain", plain.method), ("kept", kept.method))
+    }
+    steps = {
+        name: jax.jit(lambda key, state, m=m: m.step(key, task, LEVEL, state))
+        for name, m in (("plain", plain.method), ("kept", kept.method))
+    }
+    best = -np.inf
+    for generation in range(5):
+        for name in states:
+            states[name], progress = steps[name](jax.random.key(generation), states[name])
+        new = float(states["plain"].episode.fitness)
+        if new > best:
+            best, genome = new, states["plain"].champion
+        assert float(states["kept"].episode.fitness) == best
+        assert float(progress.fitness) == new
+        assert all(map(np.array_equal, jax.tree.leaves(states["kept"].champion), jax.tree.leaves(genome)))
+    same = map(np.array_equal, jax.tree.leaves(states["kept"].population), jax.tree.leaves(states["plain"].population))
+    assert all(same)
+
+
+def test_shared_starts_give_every_key_the_mean_of_the_same_episodes() -> None:
+    starts = jax.random.split(jax.random.key(3), 2)
+    shared = with_shared_starts(TASK, starts)
+
+    def policy(observation: jax.Array) -> jax.Array:
+        return jnp.tanh(observation[:4])
+
+    one, other = (float(shared.episode(policy, jax.random.key(seed), LEVEL).fitness) for seed in (0, 1))
+    alone = [float(TASK.episode(policy, start, LEVEL).fitness) for start in starts]
+    assert one == other == pytest.approx(np.mean(alone))
+    assert float(TASK.episode(policy, jax.random.key(0), LEVEL).fitness) != one
+
+
+def test_common_starts_cost_as_many_episodes() -> None:
+    cma_es = OtherCmaEs(population=8, starts=2)
+    assert cma_es.cost(TASK) == 8 * 2 * 10
+    with pytest.raises(UserError, match="0 or more common starts"):
+        OtherCmaEs(starts=-1)
+
+
+@pytest.mark.parametrize("kept", [False, True])
+def test_ended_episodes_return_to_their_first_state_with_or_without_their_counters(kept: bool) -> None:
+    learner = as_kind(OtherPpo, ecorobot.SMOKE["ppo", "stones"].method, first_state=True, kept_counters=kept)
+    begun = jax.jit(lambda key: learner.init(key, TASK))(jax.random.key(0)).interaction
+    reached = replace(begun.states, truncated=jnp.arange(32) < 16)
+    memory = replace(reached.inner.memory, crossed=jnp.full(32, 3).at[0].set(7), steps=jnp.full(32, 9))
+    reached = replace(reached, inner=replace(reached.inner, memory=memory, time=jnp.full(32, 9)), reward=jnp.ones(32))
+    after = begun.after(TASK, jax.random.key(1), reached).states
+    assert np.array_equal(after.inner.time, [0] * 16 + [9] * 16)
+    assert np.array_equal(after.observation, begun.states.observation)
+    assert np.array_equal(after.inner.memory.crossed, [0] + [3 * kept] * 15 + [3] * 16)
+    assert np.array_equal(after.inner.memory.steps, [0] + [9 * kept] * 15 + [9] * 16)
+
+
+def test_counters_are_kept_only_with_first_states() -> None:
+    with pytest.raises(UserError, match="first state"):
+        OtherPpo(kept_counters=True)
+
+
+def test_frozen_noise_is_one_draw_and_is_not_the_mean() -> None:
+    plain = ecorobot.SMOKE["ppo", "stones"].method
+    noisy = as_kind(OtherPpo, plain, frozen_noise=True)
+    state = jax.jit(lambda key: plain.init(key, TASK))(jax.random.key(0))
+    seen = state.interaction.states.observation[0]
+    mean, one, other = (learner.best(TASK, state)(seen) for learner in (plain, noisy, noisy))
+    assert np.array_equal(one, other)
+    assert not np.allclose(one, mean, atol=0.01)
