@@ -136,7 +136,7 @@ def decide(
             outcome, doubt = Outcome.INCONCLUSIVE, f"{_ended(assertion, trials, 'timeout')}; {doubt}"
         if outcome is Outcome.INCONCLUSIVE:
             outcome, note = _settled(assertion, known, looks[index + 1 :], design) or (outcome, note)
-        ending = Ending(outcome, look, trials, finding, note, doubt)
+        ending = Ending(outcome, look, trials, finding, note, doubt=doubt)
         if outcome is Outcome.SMALLER and look is not looks[-1]:  # a later look may refute it, and cannot save it
             smaller = smaller or replace(ending, note=f"more trials do not refute it: of n = {look.n}, ")
         elif outcome is Outcome.REFUTED or (smaller is None and (outcome is not Outcome.INCONCLUSIVE or note)):
@@ -239,14 +239,14 @@ def _counted_once(assertion: Assertion, design: Design, look: Look, trials: Tria
     what = f"{found.sentence}, which count once: n = {found.kept} instead of {look.n}; "
     if not _decidable(assertion.attainable(counted.n, design), counted.alpha):
         note = f"{what}underpowered: {_needs(assertion, design)}"
-        return Ending(Outcome.INCONCLUSIVE, counted, found.trials, None, note, found.sentence)
+        return Ending(Outcome.INCONCLUSIVE, counted, found.trials, None, note, copies=found.sentence)
     of_all = assertion.find(trials, design, look.alpha).p.outcome(look.alpha)
     finding = assertion.find(found.trials, design, counted.alpha)
     outcome = finding.p.outcome(counted.alpha)
     if outcome is not of_all and outcome is not Outcome.INCONCLUSIVE:
         what += f"with all {look.n} trials it would be {of_all}, and decided is what both show; "
     agreed = outcome if outcome is of_all else Outcome.INCONCLUSIVE
-    return Ending(agreed, counted, found.trials, finding, what, found.sentence)
+    return Ending(agreed, counted, found.trials, finding, what, copies=found.sentence)
 
 
 def _without_result(assertion: Assertion, trials: Trials) -> str:
