@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from evoclaims.judging.design import FIXED_10, SEQUENTIAL, Design, Look
@@ -60,6 +62,17 @@ def test_what_the_others_show_is_decided_whatever_they_would_have_been(source) -
     assert judge(source("a", [0.0] * 8 + ["timeout"] * 2).solved().in_most_trials(), FIXED_10).outcome is REFUTED
     assert judge(source("a", [0.0, *["timeout"] * 9]).solved().in_every_trial(), FIXED_10).outcome is REFUTED
     assert judge(source("a", ["timeout", *HIGH[1:]]).score() > 5, FIXED_10).outcome is SUPPORTED
+
+
+def test_copies_beside_them_decide_nothing_either(source) -> None:
+    """Nine distinct trials count, of which eight ran out of time: 0 of 9 would refute."""
+    a = source("a", [0.0, 0.0, *["timeout"] * 8])
+    for seed in (0, 1):
+        a.trials[seed] = replace(a.trials[seed], champion="c" * 64, curves={"fitness": (0.857,)})
+    verdict = judge(a.solved().in_most_trials(), FIXED_10)
+    assert verdict.outcome is INCONCLUSIVE
+    assert "a has copies of the same training (seeds 0, 1)" in verdict.reason
+    assert "8 of 9 trials of a ran out of time" in verdict.reason
 
 
 def test_one_of_two_parts_without_them_refutes_both(source) -> None:

@@ -56,7 +56,7 @@ def test_without_a_check_nothing_is_known_of_drift(rows: tuple[DriftRow, ...]) -
 def test_drift_of_other_versions_and_of_the_method_elsewhere_is_said() -> None:
     upgraded = DriftReport((replace(FINE, status="drift"),), 0.01)
     found = reason(REPORT, OLD, NEW, DriftReport((FINE,), 0.01), SAME, upgraded)
-    assert found == "the trials of a on t (smoke) have drifted from those of other versions, (see above)"
+    assert found == "the trials of a on t (smoke) have drifted from those of other versions (see above)"
     other = replace(FINE, label="a on another (smoke)", status="drift")
     assert "but trials of the same method have drifted: a on another (smoke)" in _why(rows=(FINE, other))
 
