@@ -48,7 +48,7 @@ def test_a_path_after_a_space_that_moves_pytests_root_is_a_sentence(
     there = tmp_path_factory.mktemp("there")
     result = project.run(option, str(there), own_store=True)
     assert result.ret == pytest.ExitCode.USAGE_ERROR
-    sentence(result, f"not {project.path}, where the project is")
+    sentence(result, f"instead of the project {project.path}, because it")
     sentence(result, f"Write {option} with =, as in {option}=PATH.")
     project.run(option, "inside", own_store=True)
     assert project.run(option, "inside", own_store=True).ret == 0  # it exists now, and is below the project's root

@@ -57,7 +57,7 @@ def test_the_table_says_insensitive_beside_the_verdict(width: int) -> None:
     for name, said in (("G2", "✓ supported, insensitive"), ("G3", "✗ refuted, insensitive")):
         assert [said in line for line in lines if line.startswith(name)] == [True]
     assert sum("insensitive" in line for line in lines) == 3
-    assert lines[-1].startswith("insensitive: no fault planted")
+    assert "insensitive: no fault planted" in " ".join(verdict_table(REPORTS, width, False).split())
     assert "insensitive" not in verdict_table([REPORTS[0], REPORTS[3]], width, False)
 
 
@@ -122,12 +122,11 @@ def test_a_scoreboard_counts_insensitive_support_apart(filled: Laboratory) -> No
         Tally.SUPPORTED: 2,
         Tally.INSENSITIVE: 1,
         Tally.REFUTED: 1,
-        Tally.SMALLER: 0,
         Tally.INCONCLUSIVE: 0,
         Tally.ERROR: 0,
         Tally.NOT_RUN: 0,
     }
-    assert Tally.INSENSITIVE not in Board("smoke", sections[:1]).counts
+    assert {Tally.INSENSITIVE, Tally.SMALLER}.isdisjoint(Board("smoke", sections[:1]).counts)
     assert board.controls == ""
     shown = Page(title="A Paper", name="paper", boards=(board,))
     assert "| tier | supported | supported but insensitive | refuted |" in markdown(shown)
@@ -150,6 +149,6 @@ def test_a_scoreboard_counts_controls_of_the_benchmark_apart_from_the_papers_cla
     board = Board("smoke", sections)
     assert (len(board.papers), sum(board.counts.values()), board.controls) == (4, 4, "1 supported")
     shown = Page(title="A Paper", name="paper", boards=(board,))
-    assert "| smoke | 2 | 1 | 1 | 0 | 0 | 0 | 0 | 0 | 1 supported |" in markdown(shown)
+    assert "| smoke | 2 | 1 | 1 | 0 | 0 | 0 | 0 | 1 supported |" in markdown(shown)
     assert "<small>4 claims; controls: 1 supported</small>" in whole(shown)
     assert 'viewBox="0 0 4 1"' in whole(shown)

@@ -57,4 +57,4 @@ def test_hostile_sentences_and_versions_make_no_markup(filled: Laboratory, text:
     assert "<script" not in rendered
     assert 'javascript:alert(1)"' not in rendered
     assert rendered.count("<h1>") == 1
-    assert rendered.count("<td") == 9 + 6
+    assert rendered.count("<td") == 8 + 6
