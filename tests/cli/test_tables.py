@@ -160,9 +160,9 @@ def test_published_numbers_are_a_table_too(committed: Evoclaims) -> None:
     Path("page.md").write_text(PAGE.replace("verdicts full smoke smoke:traded", "numbers smoke all"))
     committed("tables", "page.md")
     text = Path("page.md").read_text()
-    assert "✓ inside | 7 to 10 trials at 1, ours 10" in text
-    assert "✗ outside | 7 to 10 trials at 1, ours 0" in text
-    assert "* traded: 1 outside" in text
+    assert "✓ consistent | 7 to 10 trials at 1, ours 10 (exact: inside)" in text
+    assert "✗ contradicted | 7 to 10 trials at 1, ours 0 (exact: outside)" in text
+    assert "* traded: 1 contradicted; by condition: 1 contradicted" in text
 
 
 @pytest.mark.parametrize(

@@ -43,5 +43,5 @@ def test_the_help_of_verify_says_what_is_read(capsys: pytest.CaptureFixture[str]
     with pytest.raises(SystemExit):
         main(["verify", "--help"])
     text = " ".join(capsys.readouterr().out.split())
-    assert "read every stored trial, champion and checkpoint back" in text
-    assert "verdicts are not read: `evoclaims status` judges the trials anew" in text
+    assert "check every stored trial, champion and checkpoint" in text
+    assert "verdicts are not read, since `evoclaims status` judges the trials anew" in text

@@ -67,7 +67,7 @@ def test_a_wrapper_depends_on_what_it_wraps_depends_on(inner: Any, packages: tup
 @pytest.mark.parametrize("packages", ["optax", None, ["optax"], (1,)])
 def test_a_declaration_of_another_type_is_a_sentence(packages: Any) -> None:
     component = type("Odd", (), {"name": "odd", "packages": packages})()
-    with pytest.raises(UserError, match=r"The packages of odd are .*; write a tuple of their names"):
+    with pytest.raises(UserError, match=r"The packages of odd are .*\. Write a tuple of their names"):
         packages_of(component)
 
 

@@ -31,7 +31,7 @@ def read(tmp_path: Path) -> Any:
 
 def _curve(values: Any) -> dict[str, Any]:
     values = tuple(map(float, values))
-    return {"environment_steps": tuple(10.0 * (i + 1) for i in range(len(values))), "success": values}
+    return {"environment_steps": tuple(10.0 * (i + 1) for i in range(len(values))), "gain": values}
 
 
 def _only(found: tuple[tuple[CurvePanel, ...], str]) -> CurvePanel:
@@ -46,7 +46,7 @@ def test_long_curves_keep_their_ends_and_at_most_a_hundred_points(read: Any) -> 
     assert len(line.y) == POINTS == 100
     assert (line.y[0], line.y[-1], line.x[-1]) == (0.0, 1233.0, 12340.0)
     assert panels(trials)[1] == "At most 100 of 1234 reports are drawn."
-    assert len(read(_curve(range(7)))[0].curves["success"]) == 7
+    assert len(read(_curve(range(7)))[0].curves["gain"]) == 7
 
 
 def test_few_trials_are_drawn_one_by_one_and_many_as_quantiles(read: Any) -> None:
@@ -77,12 +77,12 @@ def test_values_that_are_no_numbers_leave_gaps_and_are_counted(read: Any) -> Non
 def test_what_never_changes_is_said_and_not_drawn(read: Any) -> None:
     trials = read(*({**_curve([0, i]), "level": (2.0, 2.0)} for i in (1, 2)))
     found, says = panels(trials)
-    assert [panel.name for panel in found] == ["success"]
+    assert [panel.name for panel in found] == ["gain"]
     assert says == "Level is 2 throughout training."
 
 
 def test_trials_with_one_point_or_a_broken_axis_have_no_curve(read: Any) -> None:
-    broken = {"environment_steps": (1.0, float("nan")), "success": (0.0, 1.0)}
+    broken = {"environment_steps": (1.0, float("nan")), "gain": (0.0, 1.0)}
     found, says = panels(read(_curve([1]), broken))
     assert (found, says) == ((), "No trial has a curve of more than one point.")
     assert panels(()) == ((), "")

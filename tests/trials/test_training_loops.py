@@ -210,7 +210,7 @@ def test_of_what_a_loop_prints_the_end_is_kept(store: Store, cpus: list[Any], mo
 
     def noted(self: Child) -> str:
         reason = close(self)
-        held.append(len(self._said))
+        held.append(len(self._printed))
         return reason
 
     monkeypatch.setattr(Child, "close", noted)

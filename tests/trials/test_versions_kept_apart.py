@@ -70,7 +70,7 @@ def test_every_record_of_a_trial_stays_whichever_comes_first(store: Store, make_
 
 
 def test_a_record_answers_for_its_own_flags_of_xla_alone(store: Store, make_result: Make) -> None:
-    plain, slow = _made(make_result, OLD, 1.0), _made(make_result, OLD, 0.5)
+    plain, slow = (_made(make_result, OLD, score, champion={}) for score in (1.0, 0.5))
     dumped = {**plain.provenance, "xla_flags": "--xla_dump_to=here"}
     plain = replace(plain, provenance=dumped)  # which changes no trial
     slow = replace(slow, provenance={**slow.provenance, "xla_flags": "--xla_level=0 --xla_dump_to=here"})
@@ -84,7 +84,7 @@ def test_a_record_answers_for_its_own_flags_of_xla_alone(store: Store, make_resu
 
 
 def test_a_record_with_flags_of_a_release_whose_names_had_none_gives_way(store: Store, make_result: Make) -> None:
-    plain, slow = _made(make_result, OLD, 1.0), _made(make_result, OLD, 0.5)
+    plain, slow = (_made(make_result, OLD, score, champion={}) for score in (1.0, 0.5))
     slow = replace(slow, provenance={**slow.provenance, "xla_flags": "--xla_level=0"})
     store.put(slow, {})
     store.home(slow).rename(store.record_path(slow.id, OLD))

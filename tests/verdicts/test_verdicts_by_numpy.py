@@ -10,7 +10,9 @@ from verdicts_by_numpy import Records, judge, load
 from evoclaims.claims.fetching import StoredOnly
 from evoclaims.claims.power import Listening
 from evoclaims.cli.project import open_project
+from evoclaims.envs import Circuit
 from evoclaims.verdicts import history
+from reproductions.nisioti2025.measures import constant_success
 
 LOOKS = {"full": [(5, 0.01), (10, 0.04)], "smoke": [(10, 0.05)]}
 
@@ -25,7 +27,8 @@ def test_every_committed_verdict_is_that_of_the_independent_program(
     project.judge_sessions([(listening, tier)])
     tasks = {one.id: one.task for one in project.reproduction.tier(tier).conditions.values()}
     ends = {mark: task.observation_size + task.action_size for mark, task in tasks.items()}
-    records = Records(load(project.reproduction.folder / "reference" / tier), ends)
+    guesses = {mark: constant_success(task)[-1] for mark, task in tasks.items() if isinstance(task, Circuit)}
+    records = Records(load(project.reproduction.folder / "reference" / tier), ends, guesses)
     committed = {
         claim: entries[-1]
         for (of, claim), entries in history.load(project.reproduction.folder / history.FILE).items()

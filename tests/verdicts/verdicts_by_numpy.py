@@ -30,11 +30,25 @@ METRICS = {
     "success on the last level": "last_success",
     "episode reward": "last_fitness",
     "furthest level reached": "furthest_reached",
+    "obstacles passed": "obstacles",
+    "share of episodes that reach the target": "reached",
 }
 """Measures that are a metric of the record."""
 
 OTHERS: dict[str, Callable[[Any], float]] = {
     "share of the maze with an elite": lambda t: t["curves"]["coverage"][-1],
+    "success beyond guessing on the last level": lambda t: (
+        (t["metrics"]["last_success"] - t["guess"]) / (1 - t["guess"])
+    ),
+    "seldom reaches the target": lambda t: t["metrics"]["reached"] <= 0.5,
+    "whether the target was found": lambda t: t["curves"]["reached"][-1],
+    "m a step": lambda t: t["metrics"]["furthest"] / t["metrics"]["episode_steps"],
+    "reward before costs": lambda t: t["metrics"]["last_fitness"] + t["metrics"]["control_cost"],
+    "reward of training's best episode": lambda t: t["curves"]["fitness"][-1],
+    "neurons and connections of the champion": lambda t: (
+        t["curves"]["champion_nodes"][-1] + t["curves"]["champion_connections"][-1]
+    ),
+    "connections of the champion": lambda t: t["curves"]["champion_connections"][-1],
     "reward gained": lambda t: t["curves"]["fitness"][-1] - t["curves"]["fitness"][0],
     "reaches the target": lambda t: t["metrics"]["reached"] > 0.5,
     "never reaches the target": lambda t: t["metrics"]["reached"] == 0,
@@ -50,6 +64,10 @@ PATTERNS: dict[str, Callable[[Any, float], float]] = {
     r"crosses ([\d.]+) stones": lambda t, x: t["metrics"]["stones"] == x,
     r"crosses at most ([\d.]+) stones": lambda t, x: t["metrics"]["stones"] <= x,
     r"passes at most ([\d.]+) obstacles": lambda t, x: t["metrics"]["obstacles"] <= x,
+    r"upside-down in more than ([\d.]+) of the steps": lambda t, x: t["metrics"]["upside_down"] > x,
+    r"control cost above ([\d.]+) of the reward": lambda t, x: (
+        t["metrics"]["control_cost"] > x * (t["metrics"]["last_fitness"] + t["metrics"]["control_cost"])
+    ),
     r"ends within ([\d.]+) m of the target": lambda t, x: t["metrics"]["distance"] <= x,
     r"solves level (\d+)": lambda t, x: t["metrics"]["furthest_solved"] >= x,
     r"solves no level beyond (\d+)": lambda t, x: t["metrics"]["furthest_solved"] <= x,
@@ -65,10 +83,12 @@ class Records:
     Attributes:
         trials: the lines of the files.
         ends: inputs and outputs of the networks of a condition, which no record has.
+        guesses: success at the last level of the best constant answer, by condition; for circuits.
     """
 
     trials: Mapping[str, Mapping[int, Any]]
     ends: Mapping[str, int]
+    guesses: Mapping[str, float]
 
     def of(self, reading: Mapping[str, Any], n: int) -> list[float]:
         """Read a measure or an event from the first `n` trials; a KeyError says that one is missing."""
@@ -77,8 +97,8 @@ class Records:
         worst = -math.inf if reading.get("better", "higher") == "higher" else math.inf
         if "better" not in reading:
             worst = 0.0
-        ends = self.ends.get(reading["condition"], 0)
-        return [float(read(reading["name"], {**t, "ends": ends})) if t["status"] == "done" else worst for t in found]
+        known = {"ends": self.ends[reading["condition"]], "guess": self.guesses.get(reading["condition"])}
+        return [float(read(reading["name"], {**t, **known})) if t["status"] == "done" else worst for t in found]
 
 
 def load(folder: Path) -> dict[str, dict[int, Any]]:

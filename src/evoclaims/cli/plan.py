@@ -247,7 +247,7 @@ def _claims(reports: Sequence[ClaimReport], costs: Costs) -> Table:
                 f"{look.alpha:g}",
                 f"{look.supported:.2g}",
                 f"{look.refuted:.2g}",
-                " ".join(reach) or "no",
+                "".join(reach) or "no",
                 *(_took(costs, used, kind) for kind in kinds if look is report.attainable[-1]),
             )
     return table

@@ -59,7 +59,8 @@ def mark(reports: Iterable[ClaimReport]) -> str:
 
 def short_sentences(text: str) -> dict[str, str]:
     """Return the sentences of a table that was written before, by the first column."""
-    rows = (line.strip("|\n ").split(" | ") for line in text.splitlines() if line.startswith("|"))
+    _, _, *lines = [line for line in text.splitlines() if line.startswith("|")] or ["", ""]  # two are the heading
+    rows = (line.strip("|\n ").split(" | ") for line in lines)
     return {cells[0]: cells[1] for cells in rows if len(cells) >= len(HEADINGS)}
 
 

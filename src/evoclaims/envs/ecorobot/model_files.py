@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from evoclaims.core.canonical import content_hash
 from evoclaims.core.errors import UserError
+from evoclaims.core.files import read_file
 
 OURS: Final = "evoclaims.envs.ecorobot:assets/"
 BRAX: Final = "brax:envs/assets/"
@@ -70,7 +71,7 @@ def read(name: str, xml: str) -> mujoco.MjSpec:
         UserError: when it cannot be read, or when a built-in robot's file is not the known one.
     """
     path = path_of(name, xml)
-    if xml in BUILT_IN and hashlib.sha256(Path(path).read_bytes()).hexdigest() != BUILT_IN[xml]:
+    if xml in BUILT_IN and hashlib.sha256(read_file(Path(path))).hexdigest() != BUILT_IN[xml]:
         raise UserError(
             f"The model of the robot {name}, {path}, is not the one that the paper's trials were made with. Install "
             "the package that has it again, or copy the file into a package of yours to use it as it is."
