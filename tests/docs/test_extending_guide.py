@@ -39,6 +39,9 @@ print([int(run[words[0]](words[1:])) for words in json.loads(sys.argv[1])])
 """
 
 
+AUTHOR = ["-c", "user.name=A", "-c", "user.email=a@example.org"]
+
+
 def _write(folder: Path, names: set[str]) -> None:
     """Write files of the guide."""
     for name in names:
@@ -66,6 +69,8 @@ def test_what_the_guide_shows_is_short(names: list[str], most: int) -> None:
 
 def test_the_guide_s_repository_comes_to_verdicts_and_its_commands_do_what_they_say(pytester: pytest.Pytester) -> None:
     _write(pytester.path, set(FILES) - LATER - BESIDE)
+    for words in (["init", "-q"], ["add", "."], [*AUTHOR, "commit", "-qm", "first"]):
+        assert pytester.run("git", *words).ret == 0  # trials of unknown revision are no references
     assert COMMANDS[0] == ["pytest", "-m", "smoke"]
     result = pytester.runpytest_subprocess("-m", "smoke", "--claims-json=out.json", "-p", "no:xdist")
     assert result.ret == 0
