@@ -191,7 +191,7 @@ def test_high_obstacles_stop_ppo(trials, verdict):
 @expected(
     Outcome.REFUTED,
     tier="full",
-    because="NEAT comes further in its episodes, 56 m on average, PPO 39: PPO stops on its back",
+    because="NEAT comes further in its episodes, since PPO stops on its back",
 )
 def test_ppo_runs_more_quickly_and_falls(trials, verdict):
     ppo, neat = trials("ppo", on="obstacles"), trials("neat", on="obstacles")

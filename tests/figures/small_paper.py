@@ -37,8 +37,9 @@ HEADING = Heading("A title", "§1, Fig. 1 – full tier")
 
 
 def made(condition: Condition, seed: int, value: float, status: Status = "done") -> TrialResult:
-    """Return a record whose success is `value` on every level; its reward is ten times that."""
-    return trial_of(condition, seed, value, status, metrics={"last_fitness": 10 * value, "environment_steps": 1.0})
+    """Return a record of a success on every level, the share nearest to `value`; its reward is ten times `value`."""
+    metrics = {"last_fitness": 10 * value, "environment_steps": 1.0}
+    return trial_of(condition, seed, min(max(value, 0.0), 1.0), status, metrics=metrics)
 
 
 class Paper:

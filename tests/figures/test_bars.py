@@ -199,7 +199,7 @@ def test_brackets_make_a_panel_higher_and_squeeze_nothing(paper: Any) -> None:
     paper.put("one", "small", [0.5] * 10)
     paper.put("other", "small", [0.5] * 10)
     flat = paper.draw(_levels())
-    for method, shift in (("one", 0.0), ("other", 1.0)):
+    for method, shift in (("one", 0.5), ("other", 0.9)):
         paper.put(method, "large", [shift + i / 100 for i in range(10)])
     bracketed = paper.draw(_levels(task="large"))
 

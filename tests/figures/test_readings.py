@@ -27,7 +27,7 @@ def test_a_trial_without_a_number_has_a_status_and_no_value(paper: Any) -> None:
 
 def test_an_infinite_number_is_not_drawn_but_has_its_rank(paper: Any) -> None:
     paper.put("one", "small", [math.inf])
-    reading = _read(paper).each[0]
+    reading = read(paper.scope, "one", "small", lambda trials: trials.reward).each[0]
     assert (reading.status, reading.value, reading.rank) == ("not finite", None, math.inf)
 
 
