@@ -282,7 +282,7 @@ class Session:
         return references.of_condition(self.reproduction.references, *names, used.condition.id) or own
 
     def _pilot(self, used: _Used) -> tuple[TrialResult, ...]:
-        """Return the committed pilot of a condition; empty if there is none."""
+        """Return the committed pilot of a condition; empty without one."""
         found = pilots.load(pilots.path_of(self.reproduction.folder, used.tier, used.method, used.task))
         return found if found and found[0].condition == used.condition.id else ()
 

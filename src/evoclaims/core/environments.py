@@ -310,8 +310,8 @@ def _run(command: Sequence[str]) -> str:
     environment = {name: value for name, value in os.environ.items() if name != "PYTHONHOME"}
     done = subprocess.run(command, capture_output=True, text=True, errors="replace", env=environment, check=False)
     if done.returncode:
-        said = "" if done.returncode < 0 else reason(done.stdout + done.stderr)
-        raise NotInstallableError(said or f"{Path(command[0]).name} {ending(done.returncode)}")
+        why = "" if done.returncode < 0 else reason(done.stdout + done.stderr)
+        raise NotInstallableError(why or f"{Path(command[0]).name} {ending(done.returncode)}")
     return done.stdout
 
 

@@ -93,7 +93,7 @@ def changing_flags() -> str | None:
 
 
 def flags_that_change(flags: object) -> str | None:
-    """Return those flags of XLA that may change a trial, in order, of each name the last; None if there is none."""
+    """Return those flags of XLA that may change a trial, in order, of each name the last; None without any."""
     if not isinstance(flags, str):
         return None
     last = {flag.partition("=")[0]: flag for flag in flags.split() if not flag.startswith(CHANGES_NOTHING)}

@@ -21,7 +21,7 @@ class Copies:
             left out for all sources together, since a test may pair trials by their seeds.
         kept: how many trials per source count.
         sentence: names the copies; empty if there are none.
-        alone: the label of a source whose trials are all copies of one; empty if there is none.
+        alone: the label of a source whose trials are all copies of one; empty without one.
     """
 
     trials: Trials

@@ -199,7 +199,7 @@ def check_drift(cases: Sequence[DriftCase], alpha: float = ALPHA) -> DriftReport
     """Test whether trials have drifted: methods first, then their conditions and measures.
 
     A method is tested by all measures of all its conditions jointly (see `_joint`), with Holm's correction over the
-    methods of a group of cases. Conditions of a method that drifted, and their measures, are only told from each other:
+    methods of a group of cases. Conditions of a method that drifted, and their measures, are only distinguished:
     by Holm over them, or else the one with the smallest p is named.
 
     A failed trial ranks below all others. Cases whose trials are the references' own, to the bit, need no test, and

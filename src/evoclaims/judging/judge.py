@@ -201,7 +201,7 @@ def _shortage(assertion: Assertion, look: Look, design: Design) -> str:
 
 
 def _crashed(assertion: Assertion, trials: Trials) -> str:
-    """Return a sentence that names the crashed trials, or nothing; what several of a condition said stands once."""
+    """Return a sentence that names the crashed trials, or nothing; equal messages of a condition are named once."""
     sentences = []
     for label, mark in {source.label: source.fingerprint for source in assertion.sources()}.items():
         crashed = [trial for trial in trials[mark] if trial.status == "crashed"]

@@ -126,7 +126,7 @@ class Repetition:
         predictions: one per reading of the published spread that its scale allows.
         answer: inside or outside if all predictions agree.
         reason: why it is unknown, or what the scale says about the error bar; may be empty.
-        trials: how many of ours it is about; 0 while they are too few or broken.
+        trials: how many measured trials it is about; 0 while they are too few or broken.
     """
 
     predictions: tuple[Prediction, ...]

@@ -50,15 +50,15 @@ def spending(trial: TrialResult) -> Spending | None:
         return None
     steps, generations = budget.get("environment_steps"), budget.get("generations")
     name, most = ("environment_steps", steps) if steps else ("steps", generations)
-    told = [*trial.curves.get(name, ())[-1:]]
+    spent = [*trial.curves.get(name, ())[-1:]]
     if steps:  # of a loop whose budget is in generations, the metric may be in environment steps
-        told += [trial.metrics[name]] if name in trial.metrics else []
-    if not most or not told:
+        spent += [trial.metrics[name]] if name in trial.metrics else []
+    if not most or not spent:
         return None
     parameters: Any = method.get("parameters") if isinstance(method, Mapping) else None
     share = parameters.get("overspend", ALLOWED) if isinstance(parameters, Mapping) else ALLOWED
     allowed = share if isinstance(share, int | float) and not isinstance(share, bool) else ALLOWED
-    return Spending(max(told), most, "environment steps" if steps else "generations", most * (1 + allowed))
+    return Spending(max(spent), most, "environment steps" if steps else "generations", most * (1 + allowed))
 
 
 def overspent(assertion: Assertion, trials: Trials) -> tuple[str, str]:

@@ -62,11 +62,11 @@ def _kinds(ours: Sequence[ClaimReport], papers: Sequence[ClaimReport], agents: i
     satisfied = [(report, f"{report.name}: {', '.join(report.satisfied_by)}") for report in ours if report.satisfied_by]
     yield (
         f"supported and vacuous (satisfied by one of {plural(agents, 'null agent')})",
-        [said for report, said in satisfied if report.is_vacuous],
+        [names for report, names in satisfied if report.is_vacuous],
     )
     yield (
         "satisfied by a null agent, and not supported or changed by planted faults",
-        [f"{said} ({report.outcome})" for report, said in satisfied if not report.is_vacuous],
+        [f"{names} ({report.outcome})" for report, names in satisfied if not report.is_vacuous],
     )
     yield (
         "verdicts that depend on the reading",
@@ -98,7 +98,7 @@ def _kinds(ours: Sequence[ClaimReport], papers: Sequence[ClaimReport], agents: i
     )
     yield (
         "power of inconclusive verdicts",
-        [f"{report.name}: {said}" for report in ours if (said := table_cells.power(report))],
+        [f"{report.name}: {power}" for report in ours if (power := table_cells.power(report))],
     )
     yield "claims without the paper's line or a date", undated(ours)
 

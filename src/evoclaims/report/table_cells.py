@@ -34,12 +34,12 @@ def verdict(report: ClaimReport) -> str:
 
 def remarks(report: ClaimReport) -> str:
     """Return what stands beside an outcome, such as ", insensitive"; empty if nothing does."""
-    said = {
+    words = {
         "insensitive": report.tried is Tried.INSENSITIVE,
         "vacuous": report.is_vacuous,
         "by reading": report.depends_on_the_reading,
     }
-    return "".join(f", {word}" for word, holds in said.items() if holds)
+    return "".join(f", {word}" for word, holds in words.items() if holds)
 
 
 def power(report: ClaimReport) -> str:

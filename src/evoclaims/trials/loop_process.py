@@ -35,7 +35,7 @@ TOLD_SECONDS: Final = 0.2
 """Least time between two reports that are passed on, but for the points of the curve."""
 
 WATCHED: Final = 64
-"""Most actions by which policies are told from each other."""
+"""Most actions by which policies are distinguished."""
 
 FIXED_START: Final = 2**31 - 1
 """The seed of the starts from which these are watched, the same for every trial."""

@@ -29,7 +29,7 @@ def trained_record(
     """Return the record of a trial whose function has returned.
 
     The metrics are those of the function, those of every method (see `result_making.make_result`) and the task's own.
-    What an examination says counts, whatever the function said. Without one, those that the function does not return
+    The examination's numbers count, not the function's. Without one, those that the function does not return
     are NaN: a claim that reads such a number is an error. A trial has diverged when its function returned a NaN, or
     reported a number that is not finite, or its policy's scores are not.
     """

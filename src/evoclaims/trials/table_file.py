@@ -38,7 +38,7 @@ class TableFile:
         """Return a column; `role` says in an error what it was wanted for.
 
         Raises:
-            UserError: when there is none of this name, or two, or it cannot be read.
+            UserError: when no column has this name, or two have it, or it cannot be read.
         """
         require_known(f"column in {self.name} ({role})", name, self.columns.names)
         try:

@@ -181,7 +181,7 @@ def _of_rows(rows: Sequence[_Pairs]) -> Columns:
 def _of_object(whole: _Pairs) -> Columns:
     """Return the columns of one object: of columns, of rows, of both apart, or a row.
 
-    Columns and rows are told apart by the labels of rows, which pandas counts.
+    Columns and rows are distinguished by the labels of rows, which pandas counts.
     """
     table, values = dict(whole), [value for _, value in whole]
     rows = table.get("data")

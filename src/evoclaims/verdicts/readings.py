@@ -65,5 +65,5 @@ def by_reading(readings: Sequence[ReadAs]) -> str:
     if not depends(judged):
         return f"{judged[0].outcome} under all {len(judged)} readings"
     ended = {outcome: [f"“{one.name}”" for one in judged if one.outcome is outcome] for outcome in Outcome}
-    told = "; ".join(f"{outcome} as {', '.join(names)}" for outcome, names in ended.items() if names)
-    return f"depends on the reading: {told}"
+    ends = "; ".join(f"{outcome} as {', '.join(names)}" for outcome, names in ended.items() if names)
+    return f"depends on the reading: {ends}"

@@ -35,4 +35,4 @@ class Tally(StrEnum):
 
 
 APART: Final = (Tally.INSENSITIVE, Tally.VACUOUS)
-"""Support that is counted apart; tables leave it out where there is none."""
+"""Support that is counted apart; tables leave it out where it is 0."""

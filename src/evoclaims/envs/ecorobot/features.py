@@ -173,10 +173,10 @@ def _beyond(model: mujoco.MjModel) -> Iterator[str]:
         if not isinstance(array, np.ndarray) or name in SIMULATED or model_files.is_cosmetic(name):
             continue
         if np.any((array != 0) & (array != -1)):
-            yield next((said for begin, said in NAMES.items() if name.startswith(begin)), f"{name} (of MuJoCo's)")
-    for count, said in COUNTS.items():
+            yield next((feature for begin, feature in NAMES.items() if name.startswith(begin)), f"{name} (of MuJoCo's)")
+    for count, feature in COUNTS.items():
         if getattr(model, count, 0) > 0:
-            yield said
+            yield feature
     bits = {"disable": mujoco.mjtDisableBit, "enable": mujoco.mjtEnableBit}
     for kind, kinds in bits.items():
         allowed = sum(

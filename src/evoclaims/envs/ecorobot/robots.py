@@ -109,7 +109,7 @@ class Robot:
                 if not any(self.start[at : at + 4]):
                     raise UserError(
                         f"The robot {self.name} starts with the orientation 0 0 0 0 (positions {at} to {at + 3}), "
-                        "which is none: write 1 0 0 0 for upright."
+                        "which is not a rotation: write 1 0 0 0 for upright."
                     )
         low, high = model.actuator_ctrlrange.T
         if self.scales_actions and not np.all(low < high):

@@ -38,7 +38,7 @@ def native_action(space: Any, action: Any, task: str) -> Any:
     rewards are NaN, and the trial has diverged. Spaces that consist of others take what the policy returns.
 
     Raises:
-        UserError: for a choice that is none, and for an array of another size or not of numbers.
+        UserError: for an invalid choice, and for an array of another size or not of numbers.
     """
     if hasattr(space, "n") and space.shape == ():
         return choice(action, int(getattr(space, "start", 0)), int(space.n), task)
