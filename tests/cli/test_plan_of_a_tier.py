@@ -19,7 +19,7 @@ def test_plan_counts_what_is_stored_and_what_is_missing(evoclaims: Evoclaims) ->
     assert re.search(r"^right on parity +0 +10 +40 +unknown$", out, re.MULTILINE)
     assert re.search(r"^total +80 +unknown$", out, re.MULTILINE)
     assert "Times are by" not in out
-    assert re.search(r"^a +10 +0.05 +0.028 +\S+ +✓ ✗$", out, re.MULTILINE)
+    assert re.search(r"^a +10 +0.05 +0.028 +\S+ +✓✗$", out, re.MULTILINE)
     assert "--measure times a few steps" in out
     assert "coin" not in out  # no claim asks for it
     evoclaims("run", "right", "--trials", "4")
@@ -39,11 +39,11 @@ def test_plan_shows_whole_numbers_on_a_narrow_terminal(evoclaims: Evoclaims, mon
     monkeypatch.setenv("COLUMNS", "52")
     _, out, _ = evoclaims("plan")
     assert re.search(r"^right on +0 +10 +40 +unknown *\nparity *$", out, re.MULTILINE), out
-    assert re.search(r"^a +10 +0.05 +0.028 +\S+ +✓ ✗$", out, re.MULTILINE), out
+    assert re.search(r"^a +10 +0.05 +0.028 +\S+ +✓✗$", out, re.MULTILINE), out
     monkeypatch.setenv("COLUMNS", "30")  # too narrow for the numbers alone: lines are longer, and nothing is cut
     _, out, _ = evoclaims("plan")
     assert re.search(r"^right on parity +0 +10 +40 +unknown$", out, re.MULTILINE), out
-    assert re.search(r"^a +10 +0.05 +0.028 +\S+ +✓ ✗$", out, re.MULTILINE), out
+    assert re.search(r"^a +10 +0.05 +0.028 +\S+ +✓✗$", out, re.MULTILINE), out
     monkeypatch.setenv("COLUMNS", "0")  # a terminal that knows no size
     _, out, _ = evoclaims("plan")
     assert re.search(r"^right on parity +0 +10 +40 +unknown$", out, re.MULTILINE), out
@@ -93,8 +93,8 @@ def test_plan_tells_what_the_reference_trials_have_cost(evoclaims: Evoclaims, st
     assert re.search(r"^wrong on parity +not run$", out, re.MULTILINE)
     assert re.search(r"^total +2 h 00 min *\n +and more$", out, re.MULTILINE)
     assert "Fewer than 10 reference trials: wrong on parity (0)." in out
-    assert re.search(r"^a +10 +.*✓ ✗ +2 h 00 min$", out, re.MULTILINE)
-    assert re.search(r"^b +10 +.*✓ ✗ +not run$", out, re.MULTILINE)
+    assert re.search(r"^a +10 +.*✓✗ +2 h 00 min$", out, re.MULTILINE)
+    assert re.search(r"^b +10 +.*✓✗ +not run$", out, re.MULTILINE)
     made_here.rename("reference/smoke/wrong-parity.jsonl")
     out = evoclaims("plan")[1]
     assert re.search(r"^wrong on parity +– ", out, re.MULTILINE)
