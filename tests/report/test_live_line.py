@@ -172,8 +172,8 @@ def test_a_run_of_hours_is_announced_with_what_is_unknown_of_it_and_a_short_one_
 
     assert announced() == announced(a=3_599.0) == announced(a=None) == announced("vector", a=9_000.0) == ""
     assert announced(a=5_400.0, b=5_400.0).startswith(
-        "The missing trials take about 3 hours of a processor's core. `evoclaims"
+        "The missing trials take up to 3 hours of a processor's core. `evoclaims"
     )
     assert announced(a=7_200.0, b=None).startswith(
-        "The missing trials take about 2 hours of a processor's core, and more without a timing. `evoclaims"
+        "The missing trials take up to 2 hours of a processor's core, and more without a timing. `evoclaims"
     )

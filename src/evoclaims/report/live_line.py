@@ -112,7 +112,7 @@ def beforehand(load: Workload) -> str:
         return ""
     whole = all(cost.basis != "budget" for cost in costs)
     return (
-        f"The missing trials take about {seconds / HOUR:,.0f} hours of a processor's core"
+        f"The missing trials take up to {seconds / HOUR:,.0f} hours of a processor's core"
         f"{'' if whole else ', and more without a timing'}. `evoclaims plan` of this tier says which, and what "
         "they took elsewhere. A run that is stopped goes on where it was."
     )
