@@ -11,12 +11,13 @@ from hypothesis import strategies as st
 
 from evoclaims.claims.order import Order
 from evoclaims.claims.workload import Work, Workload
+from evoclaims.paper.cost import Cost
 
 
 def load(claims: Mapping[str, str], programs: str = "", **seconds: float) -> Workload:
     """Return claims on conditions of one letter each; those in `programs` share their programs."""
     works = {
-        name: Work(name, "shared" if name in programs else name, 100, 0, ("file",) * (took > 0), took, None)
+        name: Work(name, "shared" if name in programs else name, 0, ("file",) * (took > 0), Cost(0, took, 10, "alone"))
         for name, took in seconds.items()
     }
     return Workload("store", {claim: tuple(needs) for claim, needs in claims.items()}, works)
@@ -48,7 +49,7 @@ def given_out(made: Workload, workers: int) -> tuple[list[list[str]], float, flo
                 waited += max(there[name] - clocks[now], 0.0)
                 clocks[now] = max(there[name], clocks[now])
             else:
-                there[name] = clocks[now] = clocks[now] + (made.conditions[name].here or 0.0)
+                there[name] = clocks[now] = clocks[now] + made.conditions[name].seconds
         order.ended(claim)
     return claims, max(clocks), waited
 
@@ -98,15 +99,6 @@ def test_another_worker_takes_what_a_dead_one_had_begun() -> None:
     assert order.next(2, ["y", "x2"]) == "x2"
 
 
-def test_without_any_timing_environment_steps_tell_long_from_short() -> None:
-    works = {
-        name: Work(name, name, steps, 0, ("f",), None, None) for name, steps in (("a", 10), ("b", 1000), ("c", 99))
-    }
-    made = Workload("store", {name: (name,) for name in works}, works)
-    order = Order[int](made, 2)
-    assert [order.next(1, ["a", "b", "c"]), order.next(2, ["b", "c"])] == ["a", "b"]
-
-
 @given(
     st.lists(st.sets(st.sampled_from("abcdefgh"), max_size=3), min_size=1, max_size=20),
     st.lists(st.floats(0.0, 100.0), min_size=8, max_size=8),
@@ -121,7 +113,7 @@ def test_every_claim_is_given_out_once_and_no_worker_idles_long(
     claims, end, _ = given_out(made, workers)
     assert sorted(chain(*claims)) == sorted(made.claims)
     needed = {name for one in needs for name in one}
-    assert end <= sum(made.conditions[name].here or 0.0 for name in needed) + 1e-6
+    assert end <= sum(made.conditions[name].seconds for name in needed) + 1e-6
 
 
 @pytest.mark.parametrize("workers", [1, 2])

@@ -10,9 +10,10 @@ import pytest
 from made_trials import trial_of
 
 from evoclaims.claims.overview import Watching, remaining
-from evoclaims.claims.workload import Work, Workload, scale_of, weights
+from evoclaims.claims.workload import Work, Workload
 from evoclaims.envs.gates.parity import NParity
 from evoclaims.methods.hand_built import HandBuilt
+from evoclaims.paper.cost import Basis, Cost
 from evoclaims.trials.budget import Budget
 from evoclaims.trials.notice import announced
 from evoclaims.trials.progress import RunProgress
@@ -24,41 +25,25 @@ X, Y, Z = "a" * 64, "b" * 64, "c" * 64
 
 
 @pytest.mark.parametrize(
-    ("took", "scale", "now", "left"),
+    ("scale", "now", "left"),
     [
-        ((30.0, None), None, None, 30.0),
-        ((30.0, 10.0), 9.0, None, 30.0),  # this machine itself knows best
-        ((None, 10.0), 3.0, None, 30.0),
-        ((None, 10.0), None, None, None),  # other machines alone tell nothing about this one
-        ((None, None), 3.0, None, None),
-        ((30.0, None), None, (10.0, None), 20.0),
-        ((30.0, None), None, (40.0, None), 0.0),
-        ((30.0, None), None, (10.0, 77.0), 77.0),  # what runs tells itself how fast it is
-        ((None, None), None, (10.0, 77.0), 77.0),
-        ((None, None), None, (10.0, None), None),
+        (1.0, None, 30.0),
+        (3.0, None, 90.0),
+        (None, None, None),  # other machines alone say nothing about this one
+        (1.0, (10.0, None), 20.0),
+        (1.0, (40.0, None), 0.0),
+        (1.0, (10.0, 77.0), 77.0),  # what runs knows best how fast it is
+        (None, (10.0, 77.0), 77.0),
+        (None, (10.0, None), None),
     ],
 )
 def test_what_is_left_of_a_condition(
-    took: tuple[float | None, float | None],
-    scale: float | None,
-    now: tuple[float, float | None] | None,
-    left: float | None,
+    scale: float | None, now: tuple[float, float | None] | None, left: float | None
 ) -> None:
     """`now` is for how long a batch has been running, and what it says itself."""
     batch = now and Running(X, time.time() - now[0], RunProgress("x", "compiling", 10, seconds_left=now[1]))
-    found = remaining(took, scale, batch)
+    found = remaining(30.0, scale, batch)
     assert found == (None if left is None else pytest.approx(left, abs=1.0))
-
-
-def test_machines_are_compared_by_what_both_have_run() -> None:
-    assert scale_of([(30.0, 10.0), (None, 100.0), (7.0, None), (10.0, 10.0)]) == 2.0
-    assert scale_of([(None, 100.0), (7.0, None)]) is None
-
-
-def test_conditions_that_nothing_is_known_of_are_ordered_by_the_pace_of_the_others() -> None:
-    known, slow = Work("k", "", 100, 0, ("f",), 10.0, 5.0), Work("s", "", 100, 0, ("f",), None, 20.0)
-    unknown, stored = Work("u", "", 1000, 0, ("f",), None, None), Work("t", "", 0, 10, (), None, None)
-    assert weights([known, slow, unknown, stored]) == {known: 10.0, slow: 40.0, unknown: 250.0, stored: 0.0}
 
 
 @pytest.fixture
@@ -67,12 +52,17 @@ def store(tmp_path: Path) -> Store:
     return Store(tmp_path / "store")
 
 
+def took(seconds: float, basis: Basis = "here") -> Cost:
+    """Return the cost of a batch on an accelerator."""
+    return Cost(0.0, seconds, 10, "vector", basis)
+
+
 def watching(store: Store, workers: int = 2) -> Watching:
     """Watch three claims: on x, of which two trials are stored, on x and y, and on z."""
     works = {
-        X: Work("x", "", 100, 2, ("x1", "x2"), 40.0, 10.0),
-        Y: Work("y", "", 100, 0, ("y1", "y2", "y3"), None, 20.0),
-        Z: Work("z", "", 100, 0, ("z1",), 10.0, None),
+        X: Work("x", "", 2, ("x1", "x2"), took(40.0)),
+        Y: Work("y", "", 0, ("y1", "y2", "y3"), took(80.0)),
+        Z: Work("z", "", 0, ("z1",), took(10.0)),
     }
     return Watching(Workload(str(store.root), {"one": (X,), "two": (X, Y), "three": (Z,)}, works), workers)
 
@@ -103,8 +93,8 @@ def test_a_condition_that_ends_tells_how_fast_the_others_will_be_here(store: Sto
     assert store.put(record, {}) == "stored"
     (path,) = store.record_paths()
     works = {
-        X: Work("x", "", 100, 0, (str(path.relative_to(store.root)),), None, 10.0),
-        Y: Work("y", "", 100, 0, ("y1",), None, 20.0),
+        X: Work("x", "", 0, (str(path.relative_to(store.root)),), took(10.0, "elsewhere")),
+        Y: Work("y", "", 0, ("y1",), took(20.0, "elsewhere")),
     }
     path.rename(store.root / "aside")
     watched = Watching(Workload(str(store.root), {"one": (X,), "two": (Y,)}, works), 1)

@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 
+from evoclaims.claims import earlier_trials
 from evoclaims.claims.claim import Claim
 from evoclaims.claims.collected import ClaimTest
 from evoclaims.claims.fetching import NotStoredError, RunMissing, StoredOnly
@@ -184,7 +185,7 @@ def _settled(session: Session, made: Made, says: Claim, value: Callable[[int], f
 
 def test_the_same_trials_have_not_drifted(session: Session, says: Claim, made: Made) -> None:
     _committed(session, made, lambda seed: seed / 10)
-    drift, digests = session.drift(_settled(session, made, says, lambda seed: seed / 10))
+    drift, digests = earlier_trials.drift(session, _settled(session, made, says, lambda seed: seed / 10))
     assert not drift.drifted
     assert [(row.metric, row.status, row.n_new, row.n_ref) for row in drift.rows] == [
         ("success at level 0", "no drift", 6, 10),  # what the claim reads
@@ -198,7 +199,7 @@ def test_the_same_trials_have_not_drifted(session: Session, says: Claim, made: M
 
 def test_shifted_trials_have_drifted(session: Session, says: Claim, made: Made) -> None:
     _committed(session, made, lambda seed: seed / 100)
-    drift, _ = session.drift(_settled(session, made, says, lambda seed: 0.5 + seed / 100))
+    drift, _ = earlier_trials.drift(session, _settled(session, made, says, lambda seed: 0.5 + seed / 100))
     assert drift.drifted
     assert [row.metric for row in drift.rows if row.drifted] == [
         "success at level 0",
@@ -227,7 +228,9 @@ def test_under_a_variant_what_it_does_not_change_is_compared_too(session: Sessio
     for variant in changes:
         under = replace(session, reproduction=reproduction, variant=variant)
         better, same = _pair(under)
-        drift, _ = under.drift([under.settle(ClaimTest(says, "smoke", ""), better.mean_success > same.mean_success)])
+        drift, _ = earlier_trials.drift(
+            under, [under.settle(ClaimTest(says, "smoke", ""), better.mean_success > same.mean_success)]
+        )
         assert [(row.label, row.status) for row in drift.rows if row.metric == "mean_success"] == [
             ("better on small (smoke)", "no drift"),
             ("worse on small (smoke)", "drift"),
@@ -253,7 +256,7 @@ def test_stored_trials_that_were_not_judged_have_no_part_in_the_drift(
         group = reading.group("better", "small", "smoke")
         report = reading.settle(ClaimTest(says, "smoke", ""), group.solves_every_level.in_most_trials())
         assert report.outcome == "supported"
-        return {row.status for row in reading.drift([report])[0].rows}
+        return {row.status for row in earlier_trials.drift(reading, [report])[0].rows}
 
     assert statuses(Archive(store)) == {"no drift"}
     references.write(path, [made(better, seed, 1.0, **here) for seed in range(10)])
@@ -261,7 +264,7 @@ def test_stored_trials_that_were_not_judged_have_no_part_in_the_drift(
 
 
 def test_without_reference_trials_nothing_is_said_to_be_unchanged(session: Session, says: Claim, made: Made) -> None:
-    drift, _ = session.drift(_settled(session, made, says, lambda seed: 1.0))
+    drift, _ = earlier_trials.drift(session, _settled(session, made, says, lambda seed: 1.0))
     assert {row.status for row in drift.rows} == {"no reference"}
     assert not drift.drifted
     assert len(drift.unchecked) == 5

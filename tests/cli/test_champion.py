@@ -154,7 +154,7 @@ def test_the_same_command_writes_the_same_file_over_the_old_one(trained: Evoclai
         (
             ("neat", "--on=parity", "--seed=77"),
             "holds no trial of neat on parity (smoke) with seed 77, and reference trials come without champions. "
-            "`evoclaims run neat --on parity --tier smoke --trials 1 --first-seed 77` runs it, in at most ",
+            "`evoclaims run neat --on parity --tier smoke --trials 1 --first-seed 77` runs it, in about ",
         ),
         (
             ("neat", "--on=parity", "--seed=4", "--as=pgn"),

@@ -198,7 +198,7 @@ CHAMPION = ("maze", "--method=random", "--seed=4")
         (
             ("maze", "--method=random", "--seed=77"),
             "holds no trial of random on maze (smoke) with seed 77, and reference trials come without champions. "
-            "`evoclaims run random --on maze --tier smoke --trials 1 --first-seed 77` runs it, in at most ",
+            "`evoclaims run random --on maze --tier smoke --trials 1 --first-seed 77` runs it, in about ",
         ),
         (("maze", "--method=random", "--seed=-1"), "A seed is 0 or above and below 2147483648, not -1."),
         (

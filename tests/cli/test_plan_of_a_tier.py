@@ -97,17 +97,15 @@ def test_plan_tells_what_the_reference_trials_have_cost(evoclaims: Evoclaims, st
     assert re.search(r"^b +10 +.*✓✗ +not run$", out, re.MULTILINE)
     made_here.rename("reference/smoke/wrong-parity.jsonl")
     out = evoclaims("plan")[1]
-    assert re.search(r"^wrong on parity +– ", out, re.MULTILINE)
-    assert re.search(r"^total +2 h 00 min .*\n +and elsewhere", out, re.MULTILINE)
+    assert re.search(r"^wrong on parity +–$", out, re.MULTILINE)
+    assert re.search(r"^total +2 h 00 min *\n +and elsewhere", out, re.MULTILINE)
 
 
-def test_plan_tells_the_hours_of_a_cpu_core(evoclaims: Evoclaims, stored: Store) -> None:
+def test_plan_takes_the_pace_of_other_tiers_where_a_condition_has_not_run(evoclaims: Evoclaims, stored: Store) -> None:
     assert evoclaims("reference", "--unknown-revision")[0] == 0
     out = evoclaims("plan", "--tier", "full")[1]
-    assert re.search(r" CPU\n.* core hours$", out, re.MULTILINE)
     assert "took on one" not in out
-    assert re.search(r"^right on parity +0 +10 +80 +unknown$", out, re.MULTILINE)
-    assert re.search(r"^right on parity +< 1$", out, re.MULTILINE)
+    assert re.search(r"^right on parity +0 +10 +80 +\d+ s$", out, re.MULTILINE)
 
 
 def test_plan_times_a_few_steps_where_it_is_asked_to_and_stores_none(evoclaims: Evoclaims) -> None:

@@ -29,7 +29,7 @@ from evoclaims.cli.processes.workers import ATTEMPTS, Workers, in_queue
 from evoclaims.core.errors import UserError
 from evoclaims.envs.gates.parity import NParity
 from evoclaims.methods.hand_built import HandBuilt
-from evoclaims.paper.estimates import Estimate
+from evoclaims.paper.cost import Cost
 from evoclaims.trials import gpus
 from evoclaims.trials.budget import Budget
 from evoclaims.trials.integrity import verify
@@ -40,7 +40,7 @@ ORDER = WorkOrder("store", "smoke", "cpu", 0, 10)
 
 
 def _batch(name: str, work: float, compile_seconds: float = 0.0, layout: str = "vector") -> MissingBatch:
-    return MissingBatch(Job("", name, "parity"), tuple(range(10)), Estimate(compile_seconds, work, 10, layout))
+    return MissingBatch(Job("", name, "parity"), tuple(range(10)), Cost(compile_seconds, work, 10, layout))
 
 
 def _conditions(batches: Sequence[MissingBatch], alike: bool = False) -> dict[tuple[str, str], Condition]:
@@ -57,7 +57,7 @@ works = st.lists(st.floats(0.1, 100), min_size=1, max_size=40)
 @given(works, st.integers(1, 8), st.booleans())
 def test_the_longest_comes_first_and_each_once(took: list[float], processes: int, alike: bool) -> None:
     batches = [_batch(str(number), work) for number, work in enumerate(took)]
-    seconds = {batch.job: batch.estimate.seconds() for batch in batches}
+    seconds = {batch.job: batch.cost.seconds() for batch in batches}
     groups = in_queue(batches, _conditions(batches, alike), processes)
     totals = [sum(seconds[job] for job in group) for group in groups]
     assert totals == sorted(totals, reverse=True)
@@ -84,7 +84,7 @@ def test_four_workers_end_a_hundred_small_batches_within_15_percent_of_their_sha
 ) -> None:
     """Each takes the next of the queue when it is free; batches take as long as estimated."""
     batches = [_batch(str(number), work) for number, work in enumerate(took)]
-    seconds = {batch.job: batch.estimate.seconds() for batch in batches}
+    seconds = {batch.job: batch.cost.seconds() for batch in batches}
     free = [0.0] * 4
     for group in in_queue(batches, _conditions(batches, alike), 4):
         heapq.heapreplace(free, free[0] + sum(seconds[job] for job in group))
@@ -221,7 +221,7 @@ def test_a_condition_that_dies_on_several_gpus_is_begun_again_on_one(run: Run) -
 
 @given(works, st.integers(2, 9))
 def test_conditions_of_two_shares_have_several_gpus_and_there_are_always_enough(took: list[float], count: int) -> None:
-    batches = sorted((_batch(str(i), work) for i, work in enumerate(took)), key=lambda one: -one.estimate.seconds())
+    batches = sorted((_batch(str(i), work) for i, work in enumerate(took)), key=lambda one: -one.cost.seconds())
     found = tuple(map(str, range(count)))
     made = seats_of(Host(AUTO, found), batches)
     assert sorted(gpu for seat in made for gpu in seat.environment[gpus.VISIBLE].split(",")) == sorted(found)

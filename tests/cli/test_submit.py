@@ -29,7 +29,7 @@ from evoclaims.cli.cluster.submissions import load_all
 from evoclaims.cli.processes.job import Job
 from evoclaims.cli.processes.missing_batches import MissingBatch
 from evoclaims.cli.submit import dealt
-from evoclaims.paper.estimates import Estimate
+from evoclaims.paper.cost import Cost
 from evoclaims.trials.notice import announced, notice_path
 from evoclaims.trials.store import Store
 
@@ -291,10 +291,10 @@ def test_a_time_is_written_as_slurm_does_or_as_we_do(text: str, minutes: int) ->
 @given(st.lists(st.floats(0.1, 1000)), st.integers(1, 5))
 def test_batches_of_this_machine_are_dealt_once_and_evenly(seconds: list[float], jobs: int) -> None:
     each = sorted(seconds, reverse=True)
-    batches = [MissingBatch(Job("", "m", str(i)), (0,), Estimate(0.0, took, 1, "alone")) for i, took in enumerate(each)]
+    batches = [MissingBatch(Job("", "m", str(i)), (0,), Cost(0.0, took, 1, "alone")) for i, took in enumerate(each)]
     hands = dealt(batches, jobs)
     assert sorted((one.job.task for hand in hands for one in hand), key=int) == [one.job.task for one in batches]
-    sums = [sum(one.estimate.seconds() for one in hand) for hand in hands]
+    sums = [sum(one.cost.seconds() for one in hand) for hand in hands]
     assert max(sums, default=0) - min(sums, default=0) <= max(each, default=0) + 1e-9
 
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from evoclaims.paper.spent import spent
+from evoclaims.paper import references
+from evoclaims.paper.cost import took
 from evoclaims.report.live_line import duration
 from reproductions.nisioti2025 import REPRODUCTION
 
@@ -13,7 +14,7 @@ PAGE = " ".join((Path(__file__).parents[2] / "docs" / "performance.md").read_tex
 
 def test_the_time_of_the_whole_full_tier_is_that_of_its_records() -> None:
     files = sorted((REPRODUCTION.references / "full").iterdir())
-    costs = [spent(REPRODUCTION, "full", *file.stem.split("-", 1)) for file in files]
-    assert all(cost.trials == 10 for cost in costs)
-    total = duration(sum(cost.seconds.get("NVIDIA H200", 0.0) for cost in costs))
+    trials = [references.load(file) for file in files]
+    assert all(len(each) == 10 for each in trials)
+    total = duration(sum(took(each).get("NVIDIA H200", 0.0) for each in trials))
     assert f"**In all {total}** for the {len(files)} conditions of the full tier" in PAGE

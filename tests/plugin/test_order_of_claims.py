@@ -110,7 +110,7 @@ def test_a_run_that_takes_processors_hours_is_told_of_beforehand(project: Any, s
     assert told not in str(refused.stdout)  # nor does anything run
     result = project.run("-m", "full", "--claims-device=cpu", own_store=True)
     (line,) = [line for line in result.outlines if told in line]
-    hours = re.search(r"up to ([\d,]+) hours of a processor's core here\. `evoclaims plan` of this tier says", line)
+    hours = re.search(r"up to ([\d,]+) hours of a processor's core\. `evoclaims plan` of this tier says", line)
     assert hours
     assert int(hours[1].replace(",", "")) > 1_000
     again = project.run("-m", "full", "--claims-device=cpu", own_store=True)

@@ -9,7 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from evoclaims.claims.overview import Overview
-from evoclaims.claims.workload import LONG, Work, Workload
+from evoclaims.claims.workload import Work, Workload
+from evoclaims.paper.cost import Cost
 from evoclaims.report.live_line import (
     LOG_SECONDS,
     REWRITE_SECONDS,
@@ -160,17 +161,19 @@ def test_a_length_of_time_is_written_as_people_write_it(seconds: float, words: s
     assert duration(seconds) == words
 
 
-def test_a_run_of_hours_is_told_of_with_what_is_unknown_of_it_and_a_short_one_is_not() -> None:
-    def told(**core_seconds: float | None) -> str:
-        works = {
-            name: Work(name, name, LONG, 0, ("file",), None, None, seconds) for name, seconds in core_seconds.items()
+def test_a_run_of_hours_is_announced_with_what_is_unknown_of_it_and_a_short_one_is_not() -> None:
+    def announced(layout: str = "alone", **seconds: float | None) -> str:
+        costs = {
+            name: Cost(0.0, 9e9, 10, layout, "budget") if took is None else Cost(1.0, took, 10, layout, "elsewhere")
+            for name, took in seconds.items()
         }
+        works = {name: Work(name, name, 0, ("file",), cost) for name, cost in costs.items()}
         return beforehand(Workload("store", {}, works))
 
-    assert told() == told(a=3_599.0) == told(a=None) == ""
-    assert told(a=5_400.0, b=5_400.0).startswith(
-        "The missing trials take up to 3 hours of a processor's core here. `ev"
+    assert announced() == announced(a=3_599.0) == announced(a=None) == announced("vector", a=9_000.0) == ""
+    assert announced(a=5_400.0, b=5_400.0).startswith(
+        "The missing trials take up to 3 hours of a processor's core. `evoclaims"
     )
-    assert told(a=7_200.0, b=None).startswith(
-        "The missing trials take up to 2 hours of a processor's core here, and more without a timing. `evoclaims"
+    assert announced(a=7_200.0, b=None).startswith(
+        "The missing trials take up to 2 hours of a processor's core, and more without a timing. `evoclaims"
     )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Hashable, Sequence
 from typing import Generic, TypeVar
 
-from evoclaims.claims.workload import Workload, weights
+from evoclaims.claims.workload import Workload
 
 W = TypeVar("W", bound=Hashable)
 
@@ -23,8 +23,7 @@ class Order(Generic[W]):
         """Give out nothing yet."""
         self._needs = load.claims
         self._alone = workers < 2
-        weight = weights(load.conditions.values())
-        self._seconds = {name: weight[work] for name, work in load.conditions.items()}
+        self._seconds = {name: work.seconds for name, work in load.conditions.items()}
         self._programs = {name: work.programs for name, work in load.conditions.items()}
         self._begun: dict[str, W] = {}
         self._ended: set[str] = set()

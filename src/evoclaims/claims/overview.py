@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from evoclaims.claims.workload import Workload, scale_of, seconds_of
+from evoclaims.claims.workload import Workload
+from evoclaims.trials.devices import usable_cores
 from evoclaims.trials.shared_progress import Running, running
 from evoclaims.trials.store import DamagedFileError, Store
 
@@ -42,7 +43,9 @@ class Watching:
         self._store = Store(Path(load.storage))
         self._waiting = set(load.claims)
         self._missing = {name: list(work.missing) for name, work in load.conditions.items()}
-        self._took = {name: (work.here, work.elsewhere) for name, work in load.conditions.items()}
+        share = max(usable_cores() // workers, 1)
+        self._seconds = {name: work.cost.seconds(share) for name, work in load.conditions.items()}
+        self._took: dict[str, float] = {}
 
     def judged(self, claim: str) -> None:
         """Note that a claim has been judged."""
@@ -78,28 +81,36 @@ class Watching:
         with suppress(DamagedFileError):
             record = self._store.read(self._store.root / self._load.conditions[name].missing[-1])
             if record is not None:
-                spent = float(record.timing["compile"]) + float(record.timing["run"])
-                self._took[name] = spent, self._took[name][1]
+                self._took[name] = float(record.timing["compile"]) + float(record.timing["run"])
 
-    def _seconds_left(self, owed: Iterable[str], now: dict[str, Running]) -> float | None:
-        """Return how long the workers will still take; None if a missing condition has no timing."""
-        scale = scale_of(self._took.values())
-        left = [remaining(self._took[name], scale, now.get(name)) for name in owed]
-        known = [one for one in left if one is not None]
-        if not known or len(known) < len(left):
-            return None
-        return max(sum(known) / min(self._workers, len(known)), *known)
+    def _seconds_left(self, owed: Iterable[str], now: Mapping[str, Running]) -> float | None:
+        """Return how long the workers will still take; None if a missing condition has no timing.
+
+        Timings of other machines count as soon as a condition that they are of has ended here.
+        """
+        bases = {name: work.cost.basis for name, work in self._load.conditions.items()}
+        compared = [name for name in self._took if bases[name] == "elsewhere"]
+        whole = sum(self._seconds[name] for name in compared)
+        scale = {"here": 1.0, "elsewhere": sum(self._took[name] for name in compared) / whole if whole else None}
+        left: list[float] = []
+        for name in owed:
+            one = remaining(self._seconds[name], scale.get(bases[name]), now.get(name))
+            if one is None:
+                return None
+            left.append(one)
+        return max(sum(left) / min(self._workers, len(left)), *left) if left else None
 
 
-def remaining(took: tuple[float | None, float | None], scale: float | None, now: Running | None) -> float | None:
+def remaining(seconds: float, scale: float | None, now: Running | None) -> float | None:
     """Return about how many seconds a condition will still take; None without a timing from this machine.
 
     Args:
-        took: the condition's seconds here and elsewhere, as far as they are known.
-        scale: how many times as long conditions take here as elsewhere; None while unknown.
+        seconds: the estimate for the whole.
+        scale: how many times as long it takes here; None while unknown.
         now: the batch, if it is running: its own speed is the best estimate.
     """
     if now is not None and now.progress.seconds_left is not None:
         return now.progress.seconds_left
-    whole = seconds_of(*took, scale)
-    return whole if now is None or whole is None else max(whole - (time.time() - now.since), 0.0)
+    if scale is None:
+        return None
+    return seconds * scale if now is None else max(seconds * scale - (time.time() - now.since), 0.0)

@@ -14,22 +14,18 @@ from evoclaims.claims.fetching import NotStoredError, RunMissing, StoredOnly
 from evoclaims.claims.null_agents import satisfied_by
 from evoclaims.claims.reporting import expecting, judged
 from evoclaims.core.errors import UserError
-from evoclaims.core.packages import agree, recorded
 from evoclaims.judging.assertion import Assertion
 from evoclaims.judging.design import Design, Look
-from evoclaims.judging.drift import DriftReport
 from evoclaims.judging.fingerprint import fingerprint
 from evoclaims.judging.judge import decide, judge
 from evoclaims.judging.measure import Event, Measure, Profile
 from evoclaims.judging.power import Draws
-from evoclaims.judging.tripwire import DigestCheck
 from evoclaims.judging.verdict import Outcome, Verdict
-from evoclaims.paper import pilots, references
+from evoclaims.paper import pilots
 from evoclaims.paper.archive import Archive
 from evoclaims.paper.reproduction import Reproduction
 from evoclaims.paper.trial_group import Fetch, TrialGroup
 from evoclaims.trials.result import TrialResult
-from evoclaims.trials.spec import Condition, TrialSpec
 from evoclaims.trials.store import Store
 from evoclaims.verdicts import history, mutation_matrix
 from evoclaims.verdicts.claim_report import CONTROL, ClaimReport, located, named, save, succeeding
@@ -37,20 +33,6 @@ from evoclaims.verdicts.history import key_of
 from evoclaims.verdicts.mutation_matrix import Matrix
 from evoclaims.verdicts.readings import ReadAs, moment
 from evoclaims.verdicts.repeated_runs import following
-from evoclaims.verdicts.upgrade import Succession, Upgrade, predecessors, upgrade
-
-
-@dataclass(frozen=True)
-class _Used:
-    """A condition that a tier's claims use: the ids of its trials, and the seeds that were run again."""
-
-    tier: str
-    method: str
-    task: str
-    condition: Condition
-    ids: set[str] = field(default_factory=set)
-    again: set[int] = field(default_factory=set)
-    reads: set[str] = field(default_factory=set)
 
 
 @dataclass(frozen=True)
@@ -219,78 +201,6 @@ class Session:
         plain = self.reproduction.tier(tier)
         groups = [source for source in assertion.sources() if isinstance(source, TrialGroup)]
         return all(plain.condition(group.method, group.task).id == group.fingerprint for group in groups)
-
-    def drift(self, reports: Sequence[ClaimReport]) -> tuple[DriftReport, DigestCheck]:
-        """Compare the trials behind `reports` with the committed reference trials of their tiers."""
-        cases = [
-            references.paired(
-                f"{used.method} on {used.task} ({used.tier})",
-                trials,
-                self._reference(used),
-                method=f"{used.method} ({used.tier})",
-                reads=used.reads,
-                pilot=self._pilot(used),
-            )
-            for used in self._used(reports)
-            if (trials := self._trials(used))
-        ]
-        return references.compare(cases)
-
-    def upgrade(self, reports: Sequence[ClaimReport]) -> Upgrade:
-        """Compare the trials behind `reports` with the store's trials of other versions.
-
-        Conditions that are themselves judged from trials of other versions are left out.
-        """
-        successions = []
-        for used in self._used(reports):
-            condition, trials = used.condition, self._trials(used)
-            here = condition.versions
-            now = tuple(trial for trial in trials if agree(trial.provenance, here))
-            design = self.reproduction.tier(used.tier).design
-            seeds = {*design.seeds(design.last.n), *(trial.seed for trial in now)}
-            others = (self.store.others(TrialSpec(condition, seed).id, here) for seed in seeds)
-            before = predecessors([record for several in others for record in several], condition.packages)
-            if now and before and len(now) == len(trials):
-                old = recorded(before[0].provenance, condition.packages)
-                label = f"{used.method} on {used.task} ({used.tier})"
-                method, reads = f"{used.method} ({used.tier})", tuple(sorted(used.reads))
-                successions.append(Succession(label, old, here, before, now, len(used.again), method, reads))
-        return upgrade(successions)
-
-    def _used(self, reports: Sequence[ClaimReport]) -> list[_Used]:
-        """Return each condition of `reports` once, with all its judged trials."""
-        found: dict[tuple[str, str, str], _Used] = {}
-        for report in reports:
-            if self.variant and not report.n:  # a variant leaves most claims unchanged
-                continue
-            for source in report.sources:
-                names = report.tier, source.method, source.task
-                if names not in found:
-                    tier = self.reproduction.tier(report.tier, self.variant)
-                    found[names] = _Used(*names, tier.condition(*names[1:]))
-                found[names].ids.update(source.trials)
-                found[names].again.update(source.again)
-                found[names].reads.update(source.reads)
-        return [used for _, used in sorted(found.items())]
-
-    def _reference(self, used: _Used) -> tuple[TrialResult, ...]:
-        """Return a condition's reference trials: the variant's own, or those of the protocol or another variant."""
-        names = used.tier, used.method, used.task
-        own = references.committed(self.reproduction.references_of(self.variant), *names)
-        if any(trial.condition == used.condition.id for trial in own):
-            return own
-        return references.of_condition(self.reproduction.references, *names, used.condition.id) or own
-
-    def _pilot(self, used: _Used) -> tuple[TrialResult, ...]:
-        """Return the committed pilot of a condition; empty without one."""
-        found = pilots.load(pilots.path_of(self.reproduction.folder, used.tier, used.method, used.task))
-        return found if found and found[0].condition == used.condition.id else ()
-
-    def _trials(self, used: _Used) -> list[TrialResult]:
-        """Return the stored trials that a condition's claims were judged from."""
-        get = self.fetch.archive.stored if isinstance(self.fetch, StoredOnly) else self.store.get
-        stored = (get(trial, used.condition.versions) for trial in sorted(used.ids))
-        return [trial for trial in stored if trial is not None]
 
 
 def _judged(reading: Reading, design: Design, outcome: Outcome | None = None) -> ReadAs:

@@ -18,25 +18,21 @@ from evoclaims.core.printable import printable
 from evoclaims.core.raised import in_one_line
 from evoclaims.judging.verdict import Outcome
 from evoclaims.methods.training_loop import TrainingLoop
-from evoclaims.paper.pace import Pace, known_pace, measured_pace
+from evoclaims.paper import references
+from evoclaims.paper.cost import Estimator, Owed, Wanted, measured, took
 from evoclaims.paper.reproduction import Tier
-from evoclaims.paper.spent import Spent, spent
 from evoclaims.paper.variant import Names
 from evoclaims.report.console import PlainSpokenConsole, plain_table
 from evoclaims.report.live_line import duration
 from evoclaims.trials import devices
-from evoclaims.trials.batches import StoredTrials
 from evoclaims.trials.imported import where_from
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.spec import Condition
-from evoclaims.trials.store import DamagedFileError, Store
+from evoclaims.trials.store import DamagedFileError
 from evoclaims.verdicts.claim_report import ClaimReport
 
-Costs = Mapping[Names, Spent]
-"""What the reference trials have cost, by method and task."""
-
-HOUR: Final = 3600
-"""Seconds."""
+Costs = Mapping[Names, Sequence[TrialResult]]
+"""The reference trials of conditions, by method and task."""
 
 AND_ELSEWHERE: Final = "\nand elsewhere"
 """Follows a sum without conditions whose trials ran on other devices."""
@@ -64,35 +60,40 @@ def main(options: argparse.Namespace) -> int:
         read = _read(reports)
     used = [names for names in read if tier.condition(*names).existing is None]
 
-    untimed: list[str] = []
-
-    def pace(condition: Condition, method: str, task: str) -> Pace | None:
-        known = known_pace(condition, store, reproduction.references, options.tier, method, task, kind)
-        if known is not None or not options.measure or isinstance(condition.method, TrainingLoop):  # that has no steps
-            return known
-        try:
-            return measured_pace(condition, chosen)
-        except KeyboardInterrupt:
-            raise
-        except BaseException as error:  # an error in a method or a task must not hide the others, as in `run_jobs`
-            untimed.append(f"{method} on {task} cannot be timed: {in_one_line(error, project.config.root)}.")
-            return None
-
-    paces = {names: pace(tier.condition(*names), *names) for names in used}
-    costs = {names: spent(reproduction, options.tier, *names, variant) for names in read}
-    if options.like and not any(paces.values()):
+    seeds, untimed = tier.design.seeds(tier.design.last.n), list[str]()
+    wanted = {names: Wanted(names, tier.condition(*names), seeds) for names in used}
+    platform = chosen[0].platform if not options.like else "cpu" if options.like == "cpu" else "gpu"
+    limit = project.config.seconds(None)
+    estimator = Estimator(store, reproduction, options.tier, platform, options.like or "", limit)
+    owed = estimator.owed(wanted)
+    if options.measure:
+        for names, one in owed.items():
+            condition = wanted[names].condition
+            if one.cost.basis == "budget" and not isinstance(condition.method, TrainingLoop):  # that has no steps
+                try:
+                    owed[names] = replace(one, cost=measured(condition, chosen, one.cost.trials))
+                except KeyboardInterrupt:
+                    raise
+                except BaseException as error:  # an error in a method or a task must not hide the others
+                    reason = in_one_line(error, project.config.root)
+                    untimed.append(f"{' on '.join(names)} cannot be timed: {reason}.")
+    bases = [one.cost.basis for one in owed.values()]
+    if options.like and set(bases) <= {"budget"}:
         raise UserError(f"No trial of the {options.tier} tier at hand was made on a device called {options.like!r}.")
+    costs = {
+        names: references.of_condition(reproduction.references, options.tier, *names, tier.condition(*names).id)
+        for names in read
+    }
     console = PlainSpokenConsole(file=styled())
     where = f"as they took on one {kind}" if options.like else f"on {len(chosen)} × {kind}"
     under = f" that {variant} changes" if variant else ""
     console.print(f"Conditions of the {options.tier} tier{under}, {where}")
-    console.print_whole(_conditions(tier, store, used, paces, project.config.seconds(None)))
-    own, timed = sum(_has_run(store, tier, names) for names in used), sum(pace is not None for pace in paces.values())
-    if not options.like and own < timed:
+    console.print_whole(_conditions(wanted, owed))
+    elsewhere = bases.count("elsewhere")
+    if elsewhere and not options.like:
         console.print(
-            f"Times are by this store's own trials for {own} of {len(used)} conditions, for {timed - own} by "
-            f"{'a few steps timed now, or by ' if options.measure else ''}reference trials on such a device, perhaps "
-            "of another machine. A trial that has solved every level stops earlier."
+            f"Times of {elsewhere} of {len(used)} conditions are by trials of other machines. A trial that "
+            "has solved every level stops earlier."
         )
     for names in read:
         if names not in used:
@@ -112,7 +113,7 @@ def main(options: argparse.Namespace) -> int:
     for report in reports:
         if report.outcome is Outcome.ERROR and not report.attainable:
             console.print(f"{report.name}: error: {report.reason}")
-    if any(pace is None for pace in paces.values()) and not untimed:
+    if any(one.seeds and one.cost.basis == "budget" for one in owed.values()) and not untimed:
         console.print("\nTimes are unknown where no trial has run on such a device; --measure times a few steps.")
     for line in untimed:
         print(f"evoclaims: {printable(line)}", file=sys.stderr)
@@ -135,106 +136,64 @@ def _read(reports: Sequence[ClaimReport]) -> list[Names]:
     return sorted({(source.method, source.task) for report in reports for source in report.sources})
 
 
-def _conditions(
-    tier: Tier,
-    store: Store,
-    used: Sequence[Names],
-    paces: dict[Names, Pace | None],
-    limit: float,
-) -> Table:
-    """Build the table of conditions; steps and times are upper bounds, since a trial that has solved all levels stops.
-
-    Trials that ran out of less time than `limit` (seconds) count as missing, too.
-    """
-    table = plain_table(("condition", "cached", "missing", "environment\nsteps", "time,\nat most"), ())
-    seeds = tier.design.seeds(tier.design.last.n)
+def _conditions(wanted: Mapping[Names, Wanted], owed: Mapping[Names, Owed]) -> Table:
+    """Build the table of conditions; steps are upper bounds, since a trial that has solved all levels stops."""
+    table = plain_table(("condition", "cached", "missing", "environment\nsteps", "time,\nabout"), ())
     steps, seconds, unknown = 0, 0.0, False
-    for names in used:
-        condition = tier.condition(*names)
-        missing = len(StoredTrials(store, condition, time_limit=limit).missing(seeds))
-        owed = missing * condition.environment_steps
-        pace = paces[names]
-        time = 0.0 if not missing else None if pace is None else pace.seconds(condition, missing)
-        table.add_row(
-            " on ".join(names),
-            str(len(seeds) - missing),
-            str(missing),
-            f"{owed:,}",
-            "unknown" if time is None else duration(time),
-        )
-        steps, seconds, unknown = steps + owed, seconds + (time or 0.0), unknown or time is None
+    for names, one in owed.items():
+        missing = len(one.seeds)
+        budget = missing * wanted[names].condition.environment_steps
+        known = not missing or one.cost.basis != "budget"
+        time = one.cost.seconds(devices.usable_cores()) if missing and known else 0.0
+        cells = (str(len(wanted[names].seeds) - missing), str(missing), f"{budget:,}")
+        table.add_row(" on ".join(names), *cells, duration(time) if known else "unknown")
+        steps, seconds, unknown = steps + budget, seconds + time, unknown or not known
     whole = "unknown" if unknown and not seconds else duration(seconds) + AND_MORE * unknown
     table.add_row("total", "", "", f"{steps:,}", whole, style="bold")
     return table
 
 
 def _print_spent(console: PlainSpokenConsole, tier: Tier, costs: Costs) -> None:
-    """Print what the reference trials of conditions took, how to read that, and which are missing; nothing without any.
+    """Print what the reference trials of conditions took on accelerators, and which are missing; nothing without any.
 
     The table is apart from that of conditions, so that each fits a terminal of 80 columns.
     """
-    if not any(cost.trials or cost.core_pace for cost in costs.values()):
+    if not any(costs.values()):
         return
-    console.print(
-        "\nMeasured on the committed reference trials: what they took, with compiling. Estimated from them: the hours "
-        "of a CPU's core that all trials' whole budgets would take, at the pace of that method and task at any tier."
-    )
-    console.print_whole(_spent(tier, costs))
+    if kinds := _kinds(costs):
+        console.print("\nMeasured on the committed reference trials: what they took, with compiling.")
+        table = plain_table(("condition", *(f"took on one\n{kind}" for kind in kinds)), ())
+        for names in costs:
+            table.add_row(" on ".join(names), *(_took(costs, [names], kind) for kind in kinds))
+        table.add_row("total", *(_took(costs, list(costs), kind) for kind in kinds), style="bold")
+        console.print_whole(table)
     n = tier.design.last.n
-    few = [f"{' on '.join(names)} ({cost.trials})" for names, cost in costs.items() if cost.trials < n]
-    if few and any(cost.trials for cost in costs.values()):
+    few = [f"{' on '.join(names)} ({len(trials)})" for names, trials in costs.items() if len(trials) < n]
+    if few:
         console.print(f"Fewer than {n} reference trials: {', '.join(few)}.")
-
-
-def _spent(tier: Tier, costs: Costs) -> Table:
-    """Build the table of what the reference trials of conditions took, and would take on a CPU."""
-    kinds, cores = _kinds(costs), any(cost.core_pace for cost in costs.values())
-    table = plain_table(("condition", *(f"took on one\n{kind}" for kind in kinds), *["CPU\ncore hours"] * cores), ())
-    n = tier.design.last.n
-    needed = {names: cost.core_seconds(n * tier.condition(*names).environment_steps) for names, cost in costs.items()}
-    for names, seconds in needed.items():
-        hours = [_core_hours(seconds)] * cores
-        table.add_row(" on ".join(names), *(_took(costs, [names], kind) for kind in kinds), *hours)
-    hours = [_core_hours(sum(filter(None, needed.values()))) + AND_MORE * (None in needed.values())] * cores
-    table.add_row("total", *(_took(costs, list(costs), kind) for kind in kinds), *hours, style="bold")
-    return table
-
-
-def _has_run(store: Store, tier: Tier, names: Names) -> bool:
-    """Whether the store has a trial of a condition that came to its end, made with the installed versions."""
-    seeds = tier.design.seeds(tier.design.last.n)
-    return len(StoredTrials(store, tier.condition(*names)).missing(seeds)) < len(seeds)
 
 
 def _kinds(costs: Costs) -> list[str]:
     """Return the kinds of accelerators that reference trials were made on."""
-    return sorted({kind for cost in costs.values() for kind in cost.seconds})
+    return sorted({kind for trials in costs.values() for kind in took(trials)})
 
 
 def _took(costs: Costs, names: Sequence[Names], kind: str) -> str:
     """Return the time that the reference trials of some conditions took on a kind of accelerator."""
-    found = [costs[name] for name in names]
-    seconds = sum(cost.seconds.get(kind, 0.0) for cost in found)
-    missing = any(not cost.trials for cost in found)
+    found = {name: took(costs[name]) for name in names}
+    seconds = sum(each.get(kind, 0.0) for each in found.values())
+    missing = any(not costs[name] for name in names)
     if not seconds:
         return "not run" if missing else "–"
-    elsewhere = any(cost.trials and kind not in cost.seconds for cost in found)
+    elsewhere = any(costs[name] and kind not in each for name, each in found.items())
     return duration(seconds) + AND_ELSEWHERE * elsewhere + AND_MORE * missing
-
-
-def _core_hours(seconds: float | None) -> str:
-    """Return hours of one core of a CPU."""
-    if seconds is None:
-        return "unknown"
-    hours = seconds / HOUR
-    return f"{hours:,.0f}" if hours >= 1 else "< 1"
 
 
 def _claims(reports: Sequence[ClaimReport], costs: Costs) -> Table:
     """Build the table of claims."""
     kinds = _kinds(costs)
-    took = [f"took on one\n{kind}" for kind in kinds]
-    table = plain_table(("claim", "n", "α", "p for", "p\nagainst", "can\nend", *took), (), names=0)
+    heads = [f"took on one\n{kind}" for kind in kinds]
+    table = plain_table(("claim", "n", "α", "p for", "p\nagainst", "can\nend", *heads), (), names=0)
     table.columns[0].justify = "left"
     for report in reports:
         used = [names for names in _read([report]) if names in costs]

@@ -9,7 +9,7 @@ from typing import Any
 from evoclaims.cli.project import Project
 from evoclaims.core.errors import UserError
 from evoclaims.core.printable import printable
-from evoclaims.paper.pace import known_pace
+from evoclaims.paper.cost import Estimator, Wanted
 from evoclaims.report.live_line import duration
 from evoclaims.trials import champions, devices
 from evoclaims.trials.crashes import why
@@ -44,9 +44,9 @@ def load(project: Project, tier: str, method: str, task: str, seed: int) -> Stor
     spec = TrialSpec(condition, seed)
     result = store.get(spec.id, condition.versions)
     if result is None:
-        kind = devices.choose("auto")[0].device_kind
-        pace = known_pace(condition, store, reproduction.references, tier, method, task, kind)
-        takes = f", in at most {duration(pace.seconds(condition, 1))} on such a device ({kind})" if pace else ""
+        estimator = Estimator(store, reproduction, tier, devices.choose("auto")[0].platform)
+        cost = estimator.owed({"": Wanted((method, task), condition, [seed])})[""].cost
+        takes = "" if cost.basis == "budget" else f", in about {duration(cost.seconds())}"
         raise UserError(
             f"{store.root} holds no trial of {title} with seed {seed}, and reference trials come without champions. "
             f"`evoclaims run {method} --on {task} --tier {tier} --trials 1 --first-seed {seed}` runs it{takes}."

@@ -94,9 +94,9 @@ def _plan(
     cores = request.cpus or (usable_cores() if request.cluster == "local" else 1)
     for number, job in enumerate(jobs):
         for one in job:
-            took = duration(one.estimate.seconds(cores))
+            took = duration(one.cost.seconds(cores))
             print(f"  {number:3}  {one.job.label}: {plural(len(one.seeds), 'trial')}, about {took}")
-    print(_cost([one.estimate.seconds(cores) for one in batches], request, platform))
+    print(_cost([one.cost.seconds(cores) for one in batches], request, platform))
     return jobs
 
 
@@ -116,7 +116,7 @@ def dealt(batches: Sequence[MissingBatch], jobs: int) -> list[list[MissingBatch]
     """Deal batches, the longest first, each to the job that has least to do so far."""
     hands: list[list[MissingBatch]] = [[] for _ in range(min(jobs, len(batches)))]
     for one in batches:
-        min(hands, key=lambda hand: sum(other.estimate.seconds() for other in hand)).append(one)
+        min(hands, key=lambda hand: sum(other.cost.seconds() for other in hand)).append(one)
     return hands
 
 

@@ -86,13 +86,14 @@ class Summary:
         """
         refused = bool(self._troubles)
         if self.reports:  # they come in the order in which they were judged
+            from evoclaims.claims.earlier_trials import drift, upgraded
             from evoclaims.verdicts import history
 
             self.reports = history.ordered(self._last_runs())
             with self._telling():
-                self._drift = make_session(self._config).drift(self.reports)
+                self._drift = drift(make_session(self._config), self.reports)
             with self._telling():
-                self._upgrade = make_session(self._config).upgrade(self.reports)
+                self._upgrade = upgraded(make_session(self._config), self.reports)
             with self._telling():
                 self._compare_with_accepted()
             with self._telling():

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from typing import Final
 
 from evoclaims.claims.overview import Overview
-from evoclaims.claims.workload import Workload, core_seconds
+from evoclaims.claims.workload import Workload
 from evoclaims.core.printable import printable
 from evoclaims.trials.progress import RunProgress
 
@@ -106,11 +106,13 @@ def _briefly(progress: RunProgress) -> str:
 
 def beforehand(load: Workload) -> str:
     """Return what is to be known before a run of hours on processors; empty for a shorter one."""
-    seconds, whole = core_seconds(load.conditions.values())
+    costs = [work.cost for work in load.conditions.values() if work.missing and work.cost.layout == "alone"]
+    seconds = sum(cost.work for cost in costs if cost.basis != "budget")
     if seconds < HOUR:
         return ""
+    whole = all(cost.basis != "budget" for cost in costs)
     return (
-        f"The missing trials take up to {seconds / HOUR:,.0f} hours of a processor's core here"
+        f"The missing trials take up to {seconds / HOUR:,.0f} hours of a processor's core"
         f"{'' if whole else ', and more without a timing'}. `evoclaims plan` of this tier says which, and what "
         "they took elsewhere. A run that is stopped goes on where it was."
     )

@@ -40,6 +40,11 @@ class Execution:
         """What this process itself may look at: GPUs that workers share are theirs alone."""
         return "cpu" if self.host.gpus and not self.host.alone else self.order.device
 
+    @property
+    def platform(self) -> str:
+        """Where trials run: "cpu" or "gpu"."""
+        return "gpu" if self.host.gpus else devices.choose(self.device)[0].platform
+
     def check(self) -> None:
         """Check before the first trial that the store can be written and the device exists; raise a `UserError`."""
         RunMissing(self.project.store, self.device, self.line, self.limit).check()
@@ -61,10 +66,9 @@ class Execution:
 
     def _in_processes(self, wanted: Mapping[Job, Condition], tell: Callable[[str], None]) -> Iterator[Ended]:
         """Run conditions in worker processes."""
-        platform = "gpu" if self.host.gpus else devices.choose(self.device)[0].platform
         seeds, tier = self.order.seeds, self.order.tier
-        batches = missing_batches(self.project, tier, wanted, seeds, self.limit, platform)
-        seconds = {batch.job: batch.estimate.seconds() for batch in batches}
+        batches = missing_batches(self.project, tier, wanted, seeds, self.limit, self.platform)
+        seconds = {batch.job: batch.cost.seconds() for batch in batches}
         yield from (Ended(job) for job in wanted if job not in seconds)
         seats = seats_of(self.host, batches)
         sound = self.project.reproduction.tier(tier, self.order.variant).conditions

@@ -7,10 +7,7 @@ from dataclasses import dataclass
 
 from evoclaims.cli.processes.job import Job
 from evoclaims.cli.project import Project
-from evoclaims.paper.estimates import Estimate, Missing, committed, estimates
-from evoclaims.paper.variant import Names
-from evoclaims.trials.batches import StoredTrials
-from evoclaims.trials.result import TrialResult
+from evoclaims.paper.cost import Cost, Estimator, Wanted
 from evoclaims.trials.spec import Condition
 
 
@@ -20,7 +17,7 @@ class MissingBatch:
 
     job: Job
     seeds: tuple[int, ...]
-    estimate: Estimate
+    cost: Cost
 
 
 def missing_batches(
@@ -36,17 +33,7 @@ def missing_batches(
         limit: seconds that a batch may take; trials that ran out of less time are missing, too.
         platform: where they will run: "cpu" or "gpu".
     """
-    owed: dict[Job, tuple[int, ...]] = {}
-    known: dict[Job, Missing] = {}
-    reference: dict[Names, tuple[TrialResult, ...]] = {}
-    for job, condition in wanted.items():
-        if condition.existing is not None:
-            continue
-        owed[job] = tuple(StoredTrials(project.store, condition, time_limit=limit).missing(seeds))
-        if owed[job]:
-            earlier = list(StoredTrials(project.store, condition, any_version=True).sound(seeds))
-            if job.names not in reference:  # a condition may have many faults
-                reference[job.names] = committed(project.reproduction, tier, *job.names)
-            known[job] = Missing(condition, len(owed[job]), [*earlier, *reference[job.names]])
-    batches = [MissingBatch(job, owed[job], found) for job, found in estimates(known, platform).items()]
-    return sorted(batches, key=lambda batch: -batch.estimate.seconds())
+    estimator = Estimator(project.store, project.reproduction, tier, platform, time_limit=limit)
+    owed = estimator.owed({job: Wanted(job.names, condition, seeds) for job, condition in wanted.items()})
+    batches = [MissingBatch(job, one.seeds, one.cost) for job, one in owed.items() if one.seeds]
+    return sorted(batches, key=lambda batch: -batch.cost.seconds())

@@ -40,8 +40,8 @@ def seats_of(host: Host, batches: Sequence[MissingBatch]) -> list[Seat]:
 
 def useful_processes(batches: Sequence[MissingBatch], cores: int) -> int:
     """Return how many processes keep some cores busy: compiling takes one, running as many as there are trials."""
-    alone = sum(batch.estimate.seconds() for batch in batches)
-    in_parallel = sum(batch.estimate.seconds(cores) for batch in batches)
+    alone = sum(batch.cost.seconds() for batch in batches)
+    in_parallel = sum(batch.cost.seconds(cores) for batch in batches)
     return max(round(cores * in_parallel / alone), 1)
 
 
@@ -51,9 +51,9 @@ def _a_gpu_each(found: Sequence[str], batches: Sequence[MissingBatch]) -> list[S
     A batch that takes k shares of the whole time has k GPUs, which are single seats when it has ended. So no more GPUs
     are asked for than there are.
     """
-    share, free, seats = sum(batch.estimate.seconds() for batch in batches) / len(found), list(found), []
+    share, free, seats = sum(batch.cost.seconds() for batch in batches) / len(found), list(found), []
     for batch in batches:
-        wide = min(int(batch.estimate.seconds() / share), batch.estimate.trials, len(free))
+        wide = min(int(batch.cost.seconds() / share), batch.cost.trials, len(free))
         if wide < 2:
             continue
         taken, free = free[:wide], free[wide:]

@@ -33,7 +33,7 @@ def in_queue(batches: Sequence[MissingBatch], sound: Conditions, processes: int)
         sound: the tier's conditions.
         processes: how many will take them.
     """
-    seconds = {batch.job: batch.estimate.seconds() for batch in batches}
+    seconds = {batch.job: batch.cost.seconds() for batch in batches}
     enough = SMALL * sum(seconds.values()) / max(processes, 1)
 
     def total(group: Sequence[Job]) -> float:
