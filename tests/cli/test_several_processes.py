@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import heapq
-import os
-import signal
 import subprocess
 import sys
 import time
@@ -13,7 +11,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-import msgspec
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -270,6 +267,7 @@ def test_a_command_whose_processes_have_gpus_keeps_off_these_itself(
 
 LOOKS = """
 import sys
+import time
 from jax._src import xla_bridge
 from evoclaims.trials import devices, gpus
 
@@ -294,8 +292,6 @@ def test_a_command_keeps_off_gpus_before_libraries_make_arrays_as_they_are_impor
 
 DEADLY = '''
 
-import os
-import signal
 
 
 class Killed(Coin):
@@ -363,46 +359,3 @@ def test_two_runs_beside_each_other_share_the_work(evoclaims: Evoclaims) -> None
     assert "differently" not in out + told + err + errors
     store = Store(Path(".evoclaims"))
     assert (len(store.ids()), verify(store, repair=False)) == (10, [])
-
-
-SLOW = """
-
-import time
-
-
-class Slow(Coin):
-    name: ClassVar[str] = "slow"
-
-    def init(self, key, task):
-        Path(__file__).with_name("begun").write_text("")
-        time.sleep(600)
-
-
-METHODS = {"slow": Slow()}
-"""
-
-
-def test_a_worker_ends_with_the_command_that_has_started_it(evoclaims: Evoclaims, project: Project) -> None:
-    """Closing its input is all that a command does that is killed."""
-    head, tail = REPRODUCTION.split("METHODS = {")
-    tail = tail.split("\n", 1)[1].replace('method == "right"', "False")
-    project.pytester.makepyfile(tiny_paper=head + SLOW + tail)
-    worker = subprocess.Popen(
-        [sys.executable, "-m", "evoclaims.cli.processes.worker"],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.DEVNULL,
-    )
-    assert worker.stdin is not None
-    assert worker.stdout is not None
-    for line in (WorkOrder(".evoclaims", "smoke", "cpu", 0, 1), Job("", "slow", "parity")):
-        worker.stdin.write(msgspec.json.encode(line) + b"\n")
-    worker.stdin.flush()
-    deadline = time.monotonic() + 120
-    while not Path("begun").exists() and time.monotonic() < deadline:
-        time.sleep(0.05)
-    os.kill(worker.pid, signal.SIGINT)  # Ctrl-C reaches it, too, and is the command's to handle
-    assert worker.poll() is None
-    worker.stdin.close()
-    assert worker.wait(60) == 0
-    worker.stdout.close()

@@ -31,7 +31,7 @@ def attack_compiler(laboratory: Laboratory, times: int, draw: random.Random) -> 
                 os.kill(holder.pid, signal.SIGSTOP)
                 tally.done["locks held by a stopped process"] += 1
                 code = (
-                    "import jax; from evoclaims.kernels import machine_code\n"
+                    "import jax; from evoclaims.kernels.emit import machine_code\n"
                     "machine_code.PATIENCE = 1.0\n"
                     f"jax.config.update('jax_compilation_cache_dir', {str(cache)!r})\n"
                     "text = 'define i32 @f(i32 %x) {\\n ret i32 %x\\n}\\n'\n"
@@ -52,7 +52,7 @@ def _lock_holder(bench: Bench, cache: Path) -> subprocess.Popen[str]:
     """Start a process that has the kernel's lock, as one within LLVM has."""
     code = (
         "import sys, time, filelock\nfrom pathlib import Path\n"
-        "from evoclaims.core.private_files import make_private\nfrom evoclaims.kernels import machine_code\n"
+        "from evoclaims.core.private_files import make_private\nfrom evoclaims.kernels.emit import machine_code\n"
         f"folder = Path({str(cache)!r}) / 'kernels'\nmake_private(folder)\nmachine_code.lanes()\n"
         "text = 'define i32 @f(i32 %x) {\\n ret i32 %x\\n}\\n'\n"
         "machine_code._target()\n"
@@ -61,6 +61,7 @@ def _lock_holder(bench: Bench, cache: Path) -> subprocess.Popen[str]:
     )
     running = bench.python(code)
     until(lambda: "held" in running.output or running.process.poll() is not None, "a lock that is held")
+    assert running.process.poll() is None, running.output
     return running.process  # type: ignore[return-value]
 
 

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 from climbers import run_climbers
 
-from evoclaims.trials import memory
+from evoclaims.trials import devices, memory
 from evoclaims.trials.store import Store
 
 pytestmark = pytest.mark.oldest
@@ -19,7 +21,7 @@ def test_memory_is_given_back_at_the_end_of_a_batch(
     tmp_path: Path, cpus: list[Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     calls: list[int] = []
-    monkeypatch.setattr(memory, "_trim", lambda: calls.append)
+    monkeypatch.setattr(memory, "_libc", lambda: SimpleNamespace(malloc_trim=calls.append))
     run_climbers(Store(tmp_path), cpus)
     assert calls == [0]
     run_climbers(Store(tmp_path), cpus)  # nothing was to be run
@@ -28,7 +30,7 @@ def test_memory_is_given_back_at_the_end_of_a_batch(
 
 @pytest.mark.skipif(sys.platform != "linux", reason="glibc's allocator alone keeps what was freed")
 def test_freed_memory_goes_back_to_the_system() -> None:
-    if memory._trim() is None:
+    if memory._libc() is None:
         pytest.skip("another C library")
 
     def resident() -> int:
@@ -42,3 +44,41 @@ def test_freed_memory_goes_back_to_the_system() -> None:
     memory.give_back()
     assert resident() < full - 100_000_000
     del last
+
+
+HEAPS = """
+import ctypes, sys, threading
+from evoclaims.trials import devices, memory
+
+if sys.argv[1:]:
+    memory.share_heaps()
+libc, all_there = ctypes.CDLL(None), threading.Barrier(8)
+libc.fopen.restype = ctypes.c_void_p
+
+def work():
+    libc.malloc(5000)
+    all_there.wait()
+
+threads = [threading.Thread(target=work) for _ in range(8)]
+for thread in threads:
+    thread.start()
+for thread in threads:
+    thread.join()
+libc.malloc_info(0, ctypes.c_void_p(libc.fopen(b"/dev/stdout", b"w")))
+libc.fflush(None)
+"""
+
+
+def test_threads_share_two_heaps(monkeypatch: pytest.MonkeyPatch) -> None:
+    if memory._libc() is None:
+        pytest.skip("another C library")
+
+    def heaps(*arguments: str) -> int:
+        command = [sys.executable, "-c", HEAPS, *arguments]
+        return subprocess.run(command, capture_output=True, text=True, check=True).stdout.count("<heap nr=")
+
+    assert (heaps() > 2, heaps("shared")) == (True, 2)
+    calls: list[tuple[int, int]] = []
+    monkeypatch.setattr(memory, "_libc", lambda: SimpleNamespace(mallopt=lambda *which: calls.append(which)))
+    devices.configure()  # before jax makes its threads
+    assert calls == [(-8, 2)]

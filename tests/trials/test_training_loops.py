@@ -9,6 +9,7 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -16,12 +17,13 @@ import pytest
 import toy_loops
 from toy_loops import Nowhere
 
+from evoclaims.core import waiting
 from evoclaims.core.errors import UserError
 from evoclaims.envs.foreign.gymnasium_task import GymnasiumTask
 from evoclaims.envs.gates.parity import NParity
 from evoclaims.judging.sample import UnreadableTrialError, checked
 from evoclaims.methods.training_loop import TrainingLoop
-from evoclaims.trials import crashes
+from evoclaims.trials import crashes, loop_trials
 from evoclaims.trials.budget import Budget
 from evoclaims.trials.loop_child import Child
 from evoclaims.trials.loop_process import Reporter, actions_of
@@ -314,3 +316,25 @@ def test_policies_are_told_from_each_other_by_their_actions_on_fixed_starts() ->
 def test_what_training_gave_is_recorded_apart_from_the_examination(store: Store, cpus: list[Any]) -> None:
     first, second, third = run(condition(toy_loops.knows_parity, NParity(3)), range(3), store, cpus)
     assert first.provenance["returned"] == third.provenance["returned"] != second.provenance["returned"]
+
+
+def test_a_loops_wait_for_another_process_stops_the_clock_of_its_time_limit(
+    store: Store, cpus: list[Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    clock: list[float] = []
+
+    @contextlib.contextmanager
+    def noted() -> Iterator[None]:
+        with waiting.waiting():
+            clock.append(waiting.working_time())
+            yield
+            clock.append(waiting.working_time())
+
+    monkeypatch.setattr(loop_trials, "waiting", noted)
+    for seed, end in ((0, "done"), (1, "crashed")):
+        (result,) = run(condition(toy_loops.waits), [seed], store, cpus, time_limit=600.0)
+        before, after = clock
+        assert (result.status, before) == (end, after)
+        began = waiting.working_time()
+        assert began > after  # it runs on, also where the process died meanwhile
+        del clock[:]

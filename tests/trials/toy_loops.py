@@ -14,6 +14,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar
 
+from evoclaims.core.waiting import waiting
+
 SLEEP = [sys.executable, "-c", "import time; time.sleep(600)"]
 
 
@@ -134,3 +136,12 @@ def in_points(task: Any, seed: int, budget: Any, report: Callable[..., None], **
     if seed % 2:
         report(20, success=max(metrics.values()))
     return metrics
+
+
+def waits(task: Any, seed: int, budget: Any, report: Callable[..., None]) -> Mapping[str, float]:
+    """Wait as for another process's kernel, once to the end, and once until it is killed (odd seeds)."""
+    report(20, fitness=1.0)
+    with waiting():
+        if seed % 2:
+            os.kill(os.getpid(), signal.SIGKILL)
+    return {"last_fitness": 1.0}

@@ -4,13 +4,20 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 _lock = threading.Lock()  # of what follows
 _waits = 0
 _since = 0.0
 _waited = 0.0
+_listener: Callable[[bool], object] | None = None
+
+
+def report_to(listener: Callable[[bool], object]) -> None:
+    """Call a function whenever the clock stops (True) or goes on (False): another process counts this one's time."""
+    global _listener
+    _listener = listener
 
 
 @contextmanager
@@ -18,14 +25,20 @@ def waiting() -> Iterator[None]:
     """Stop the clock during a `with` block, in which a thread waits for another process."""
     global _waits, _since, _waited
     with _lock:
-        _since = _since if _waits else time.monotonic()
+        if not _waits:
+            _since = time.monotonic()
+            if _listener is not None:
+                _listener(True)
         _waits += 1
     try:
         yield
     finally:
         with _lock:
             _waits -= 1
-            _waited += 0.0 if _waits else time.monotonic() - _since
+            if not _waits:
+                _waited += time.monotonic() - _since
+                if _listener is not None:
+                    _listener(False)
 
 
 def working_time() -> float:

@@ -71,9 +71,8 @@ def _training(trial: TrialResult) -> Hashable | None:
     starts, and what it returned; the last may differ between copies (wall times do), so it counts only where curves
     and actions are whole numbers, which two trainings may share.
     """
-    curves = repr(sorted(trial.curves.items()))  # a repr, since NaN differs from itself
     if trial.champion:
-        return trial.champion, curves
+        return trial.champion, trial.curves_hash
     if TRAINED_BY not in trial.provenance or trial.status not in COMPLETE or not trial.digest:  # a pilot has no digest
         return None
     returned = trial.provenance.get(RETURNED)
@@ -84,7 +83,7 @@ def _training(trial: TrialResult) -> Hashable | None:
         if examined and not trial.curves:
             return None
     telling = bool(returned.get("graded")) or _is_telling(itertools.chain.from_iterable(trial.curves.values()))
-    return curves, returned.get("actions"), None if telling else returned.get("metrics")
+    return trial.curves_hash, returned.get("actions"), None if telling else returned.get("metrics")
 
 
 def _is_telling(numbers: Iterable[float]) -> bool:

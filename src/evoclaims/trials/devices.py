@@ -17,6 +17,7 @@ from evoclaims.core.forked import refuse_forked
 from evoclaims.core.private_files import doubt, make_private, say_refused
 from evoclaims.trials.compiled_cache import sweep
 from evoclaims.trials.jax_options import refuse_changed
+from evoclaims.trials.memory import share_heaps
 
 DEVICE_NAMES: Final = ("auto", "cpu", "gpu")
 MATMUL_PRECISION: Final = "highest"
@@ -36,6 +37,7 @@ def configure() -> None:
     Raises:
         UserError: when JAX_PLATFORMS names missing hardware.
     """
+    share_heaps()
     gc.set_threshold(*_COLLECTIONS)  # looking through all of them took a sixth of the time of tracing
     config: Any = jax.config
     if config.jax_compilation_cache_dir is None:

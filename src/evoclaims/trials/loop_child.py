@@ -15,7 +15,7 @@ from typing import Final
 import msgspec
 
 from evoclaims.trials.descendants import MARK, end_marked
-from evoclaims.trials.loop_messages import Answer, LoopReport, LoopRequest, decode, encode, last_lines
+from evoclaims.trials.loop_messages import Answer, LoopReport, LoopRequest, Waiting, decode, encode, last_lines
 
 _READ: Final = 4000
 _KEPT: Final = 2**16
@@ -56,7 +56,7 @@ class Child:
             except (msgspec.MsgspecError, ValueError):  # it died in the middle of a line
                 return
             yield answer
-            if not isinstance(answer, LoopReport):
+            if not isinstance(answer, LoopReport | Waiting):
                 return
 
     def stop(self) -> None:

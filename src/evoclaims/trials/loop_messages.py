@@ -38,6 +38,12 @@ class LoopReport(msgspec.Struct, frozen=True, tag=True):
     kept: bool
 
 
+class Waiting(msgspec.Struct, frozen=True, tag=True):
+    """The process begins (`stopped`) or ceases to wait for another one: that is not the trial's time."""
+
+    stopped: bool
+
+
 class Scores(msgspec.Struct, frozen=True):
     """An examination of the final policy: success and fitness on each level, and the task's metrics on the last."""
 
@@ -72,7 +78,7 @@ class Failed(msgspec.Struct, frozen=True, tag=True):
     reason: str
 
 
-Answer = LoopReport | Trained | Failed
+Answer = LoopReport | Waiting | Trained | Failed
 
 
 def encode(message: LoopRequest | Answer) -> bytes:

@@ -6,6 +6,7 @@ on its standard output. When its standard input ends, its parent is gone, and it
 
 from __future__ import annotations
 
+import contextlib
 import io
 import math
 import os
@@ -22,10 +23,21 @@ import msgspec
 from evoclaims.core.canonical import as_plain, content_hash
 from evoclaims.core.errors import UserError
 from evoclaims.core.portable import from_plain, resolve
+from evoclaims.core.waiting import report_to
 from evoclaims.envs.foreign.scoring import ForeignTask
 from evoclaims.methods.training_loop import wants_report
 from evoclaims.trials.descendants import MARK, end_marked
-from evoclaims.trials.loop_messages import Answer, Failed, LoopReport, LoopRequest, Scores, Trained, encode, last_lines
+from evoclaims.trials.loop_messages import (
+    Answer,
+    Failed,
+    LoopReport,
+    LoopRequest,
+    Scores,
+    Trained,
+    Waiting,
+    encode,
+    last_lines,
+)
 from evoclaims.trials.success import check_shares, check_success
 
 COUNTS: Final = ("steps", "environment_steps")
@@ -196,6 +208,11 @@ def main() -> None:
             while line:
                 line = line[replies.write(line) :]
 
+    def wait(stopped: bool) -> None:
+        with contextlib.suppress(OSError, ValueError):  # in a process that the function has forked
+            answer(Waiting(stopped))
+
+    report_to(wait)
     try:
         answer(train(request, answer))
     except BaseException as error:

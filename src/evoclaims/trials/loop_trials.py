@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 import os
 import queue
@@ -18,13 +19,14 @@ import jax
 
 from evoclaims.core.errors import UserError
 from evoclaims.core.portable import to_plain
+from evoclaims.core.waiting import waiting, working_time
 from evoclaims.methods.training_loop import TrainingLoop
 from evoclaims.trials import crashes
 from evoclaims.trials.allowance import Allowance, OutOfTimeError
 from evoclaims.trials.batches import StoredTrials
 from evoclaims.trials.devices import layout_on, usable_cores
 from evoclaims.trials.loop_child import Child
-from evoclaims.trials.loop_messages import Failed, LoopReport, LoopRequest, Trained
+from evoclaims.trials.loop_messages import Failed, LoopReport, LoopRequest, Trained, Waiting
 from evoclaims.trials.loop_record import trained_record
 from evoclaims.trials.progress import RunProgress, Watcher
 from evoclaims.trials.result_making import make_unfinished
@@ -43,7 +45,7 @@ class RunningLoop:
         began: when its process began, UTC.
         points: of the training curve.
         newest: the last report; None before the first.
-        seconds: that its process lived.
+        seconds: that its process lived, without those that some process waited for another one.
         outcome: what it has come to, or "late"; None until all this is known.
     """
 
@@ -122,7 +124,7 @@ class LoopTrials:
     def _attend(self, one: RunningLoop) -> None:
         """Run a trial's process to its end, on a thread of its own; what happens becomes an event each."""
         try:
-            began, one.began = time.monotonic(), datetime.now(UTC).isoformat(timespec="seconds")
+            began, one.began = working_time(), datetime.now(UTC).isoformat(timespec="seconds")
             child = Child(LoopRequest(seed=one.spec.seed, **self._request), self._environment())
             with self._lock:
                 self._children.add(child)
@@ -137,7 +139,7 @@ class LoopTrials:
                 with self._lock:
                     self._children.discard(child)
                 reason = child.close()
-            one.seconds = time.monotonic() - began
+            one.seconds = working_time() - began
             one.outcome = outcome or Failed(reason)
             self._events.put(one)
         except BaseException as error:
@@ -145,12 +147,18 @@ class LoopTrials:
 
     def _listen(self, child: Child, one: RunningLoop) -> Trained | Failed | None:
         """Note what a process reports, and return its last answer; None if it ended without one."""
-        for answer in child.answers():
-            if not isinstance(answer, LoopReport):
-                return answer
-            one.newest = answer
-            one.points += [answer] * answer.kept
-            self._events.put(one)
+        with contextlib.ExitStack() as waits:
+            for answer in child.answers():
+                if isinstance(answer, Waiting):
+                    waits.close()
+                    if answer.stopped:
+                        waits.enter_context(waiting())
+                    continue
+                if not isinstance(answer, LoopReport):
+                    return answer
+                one.newest = answer
+                one.points += [answer] * answer.kept
+                self._events.put(one)
         return None
 
     def _environment(self) -> Mapping[str, str]:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, Final, Literal
 
 from evoclaims.core.canonical import as_plain, content_hash
@@ -54,6 +56,11 @@ class TrialResult:
     timing: Mapping[str, Any]
     provenance: Mapping[str, Any]
     champion: str = ""
+
+    @cached_property
+    def curves_hash(self) -> str:
+        """SHA-256 of the training curves: equal for curves that are equal in every bit, NaN included."""
+        return hashlib.sha256(repr(sorted(self.curves.items())).encode()).hexdigest()
 
     @property
     def device(self) -> Mapping[str, Any]:

@@ -91,6 +91,8 @@ class Store(StoreFiles):
         Raises:
             DamagedFileError: when a file that may hold it is torn, edited, foreign or unreadable.
         """
+        if not self.may_have_records(trial_id):
+            return None
         usual = (self.record_path(trial_id, versions), self.record_path(trial_id))
         for path in usual:
             result = self.read(path)
@@ -114,6 +116,8 @@ class Store(StoreFiles):
 
     def records(self, trial_id: str) -> tuple[TrialResult, ...]:
         """Return all records of a trial: one for each set of versions that it was run with; raises as `get` does."""
+        if not self.may_have_records(trial_id):
+            return ()
         return tuple(result for path in self.record_files(trial_id) if (result := self.read(path)) is not None)
 
     def others(self, trial_id: str, versions: Versions) -> tuple[TrialResult, ...]:

@@ -50,6 +50,10 @@ class StoreFiles:
         usual = self.record_path(trial_id)
         return (usual, *(path for path in _entries(usual.parent) if path != usual and record_id(path) == trial_id))
 
+    def may_have_records(self, trial_id: str) -> bool:
+        """Whether anything is in the place of the folder of a trial's records; its entries take longer to look at."""
+        return os.path.lexists(f"{self.root}/trials/{checked_id(trial_id, 'trial')[:2]}")
+
     def champion_path(self, trial_id: str) -> Path:
         """Return the path for the champion of `trial_id`; raise a `UserError` for a text that is not an id."""
         return self.root / "champions" / checked_id(trial_id, "trial")[:2] / f"{trial_id}.npz"

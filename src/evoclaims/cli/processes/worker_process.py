@@ -9,17 +9,12 @@ import subprocess
 import sys
 import threading
 from collections.abc import Callable, Mapping
-from typing import IO, Any, Final
+from typing import IO, Any
 
 import msgspec
 
 from evoclaims.cli.processes.job import Job
 from evoclaims.cli.processes.worker import Ended, Reply, Told, WorkOrder
-
-_START: Final = (
-    "import signal; signal.signal(signal.SIGINT, signal.SIG_IGN); "  # before seconds of imports, which it would break
-    "import runpy; runpy.run_module('evoclaims.cli.processes.worker', run_name='__main__', alter_sys=True)"
-)
 
 
 class Process:
@@ -27,13 +22,18 @@ class Process:
 
     def __init__(self, order: WorkOrder, environment: Mapping[str, str]) -> None:
         """Start it, with these environment variables besides the command's own."""
-        self._process = subprocess.Popen(
-            [sys.executable, "-c", _START],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            env={**os.environ, **environment},
-        )
+        # A process inherits what is blocked here: Ctrl-C cannot end it before `worker.main` ignores it.
+        blocked = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+        try:
+            self._process = subprocess.Popen(
+                [sys.executable, "-m", "evoclaims.cli.processes.worker"],
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.PIPE,
+                env={**os.environ, **environment},
+            )
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, blocked)
         process: Any = self._process
         pipes: tuple[IO[bytes], ...] = process.stdin, process.stdout, process.stderr
         self._input, self._output, self._error_output = pipes

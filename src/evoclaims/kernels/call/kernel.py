@@ -73,7 +73,9 @@ class Kernel:
     @cached_property
     def _host_text(self) -> str:
         """LLVM's text of the kernel for this machine's processor, which is the same for every batch."""
-        return host_kernel.text([self.results[i] for i in self.written], self.read, machine_code.lanes())
+        text = host_kernel.text([self.results[i] for i in self.written], self.read, machine_code.lanes())
+        vars(self).pop("results", None)  # a kernel lives as long as the process; a GPU's text makes them again
+        return text
 
     def as_it_is(self, *leaves: Array) -> list[Array]:
         """Call the function itself, for every element of a batch."""

@@ -1,0 +1,69 @@
+"""A worker process ends with its command alone: neither Ctrl-C nor the command's death leaves something behind."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import msgspec
+import pytest
+from tiny_project import REPRODUCTION, Evoclaims, Project
+
+from evoclaims.cli.processes.job import Job
+from evoclaims.cli.processes.worker import WorkOrder
+from evoclaims.cli.processes.worker_process import Process
+
+SLOW = """
+
+import time
+
+
+class Slow(Coin):
+    name: ClassVar[str] = "slow"
+
+    def init(self, key, task):
+        Path(__file__).with_name("begun").write_text("")
+        time.sleep(600)
+
+
+METHODS = {"slow": Slow()}
+"""
+
+
+def test_a_worker_ends_with_the_command_that_has_started_it(evoclaims: Evoclaims, project: Project) -> None:
+    """Closing its input is all that a command does that is killed."""
+    head, tail = REPRODUCTION.split("METHODS = {")
+    tail = tail.split("\n", 1)[1].replace('method == "right"', "False")
+    project.pytester.makepyfile(tiny_paper=head + SLOW + tail)
+    worker = subprocess.Popen(
+        [sys.executable, "-m", "evoclaims.cli.processes.worker"],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+    )
+    assert worker.stdin is not None
+    assert worker.stdout is not None
+    for line in (WorkOrder(".evoclaims", "smoke", "cpu", 0, 1), Job("", "slow", "parity")):
+        worker.stdin.write(msgspec.json.encode(line) + b"\n")
+    worker.stdin.flush()
+    deadline = time.monotonic() + 120
+    while not Path("begun").exists() and time.monotonic() < deadline:
+        time.sleep(0.05)
+    os.kill(worker.pid, signal.SIGINT)  # Ctrl-C reaches it, too, and is the command's to handle
+    assert worker.poll() is None
+    worker.stdin.close()
+    assert worker.wait(60) == 0
+    worker.stdout.close()
+
+
+def test_ctrl_c_while_a_worker_starts_does_not_end_it(project: Project, capfd: pytest.CaptureFixture[str]) -> None:
+    process = Process(WorkOrder(".evoclaims", "smoke", "cpu", 0, 1), {})
+    os.kill(process._process.pid, signal.SIGINT)  # before Python, and long before its imports
+    assert process.is_ready()
+    process.close()
+    assert (process._process.returncode, capfd.readouterr().err) == (0, "")
+    assert signal.SIGINT not in signal.pthread_sigmask(signal.SIG_BLOCK, ())  # the command itself still hears it
