@@ -94,6 +94,15 @@ class Session:
         """
         return mutation_matrix.load(self.reproduction.folder / mutation_matrix.FILE)
 
+    @cached_property
+    def accepted(self) -> history.History:
+        """The verdicts as they were accepted before this session.
+
+        Raises:
+            UserError: when the file is damaged.
+        """
+        return history.load(self.reproduction.folder / history.FILE)
+
     @property
     def judged_from(self) -> Archive | Store:
         """Where `get` returns the record of a trial that was judged, if it has several."""
@@ -164,7 +173,7 @@ class Session:
             return None
         found: dict[str, tuple[TrialResult, ...]] = {}
         try:
-            accepted = history.load(self.reproduction.folder / history.FILE).get(history.key_of(report), ())
+            accepted = self.accepted.get(history.key_of(report), ())
             if not accepted or accepted[-1].outcome is not Outcome.SUPPORTED:
                 return None
             for group in assertion.sources():

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterable
 from dataclasses import replace
 
-from evoclaims.core.canonical import content_hash
 from evoclaims.verdicts.claim_report import ClaimReport, EarlierRun
 from evoclaims.verdicts.history import key_of
 
@@ -27,7 +27,7 @@ def last_runs(reports: Iterable[ClaimReport]) -> list[ClaimReport]:
     last: dict[tuple[str, str], ClaimReport] = {}
     seen = set[str]()
     for report in reports:
-        key, content = key_of(report), content_hash(report.to_json())
+        key, content = key_of(report), json.dumps(report.to_json(), sort_keys=True)
         if content not in seen:
             seen.add(content)
             last[key] = following(report, last.get(key))
