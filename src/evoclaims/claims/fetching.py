@@ -91,9 +91,15 @@ class RunMissing:
 
 @dataclass(frozen=True)
 class StoredOnly:
-    """Read the trials at hand and run nothing."""
+    """Read the trials at hand and run nothing; each is read once, since many assertions ask for the same ones.
+
+    Attributes:
+        archive: where they are.
+        known: what has been read, by the condition's id and the seed; filled in as trials are fetched.
+    """
 
     archive: Archive
+    known: dict[str, dict[int, TrialResult]] = field(default_factory=dict, compare=False, repr=False)
 
     def check(self) -> None:
         """Check that the store and the committed reference trials can be read."""
@@ -101,7 +107,11 @@ class StoredOnly:
 
     def __call__(self, condition: Condition, seeds: Sequence[int]) -> Sequence[TrialResult]:
         """Return one trial per seed, or raise `NotStoredError`."""
-        results = [result for result in self.archive.trials(condition, seeds) if result is not None]
+        known = self.known.setdefault(condition.id, {})
+        new = [seed for seed in seeds if seed not in known]
+        found = zip(new, self.archive.trials(condition, new), strict=True)
+        known.update((seed, result) for seed, result in found if result is not None)
+        results = [known[seed] for seed in seeds if seed in known]
         if len(results) < len(seeds):
             lacking = f"{len(seeds) - len(results)} of {len(seeds)} trials are missing"
             raise NotStoredError(lacking, condition.id)

@@ -77,8 +77,12 @@ class Session:
         return mutation_matrix.load(self.reproduction.folder / mutation_matrix.FILE)
 
     @cached_property
-    def _accepted(self) -> history.History:
-        """The accepted verdicts; raises as `history.load` does."""
+    def accepted(self) -> history.History:
+        """The verdicts as they were accepted before this session.
+
+        Raises:
+            UserError: when the file is damaged.
+        """
         return history.load(self.reproduction.folder / history.FILE)
 
     @property
@@ -151,7 +155,7 @@ class Session:
             return None
         found: dict[str, tuple[TrialResult, ...]] = {}
         try:
-            accepted = self._accepted.get(history.key_of(report), ())
+            accepted = self.accepted.get(history.key_of(report), ())
             if not accepted or accepted[-1].outcome is not Outcome.SUPPORTED:
                 return None
             for group in assertion.sources():

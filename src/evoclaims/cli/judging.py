@@ -97,6 +97,7 @@ class _Run:
         self._asked = asked
         self._collected: list[pytest.Item] = []
         self._now: list[ClaimReport] = []
+        self._last: object = None
 
     def pytest_configure(self, config: pytest.Config) -> None:
         """Keep the plugin from making a session of its own."""
@@ -161,8 +162,9 @@ class _Run:
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
         """Keep a claim's report."""
         plain = getattr(report, ATTRIBUTE, None)
-        if plain is not None:
+        if plain is not None and plain is not self._last:  # the report of a test's end has it, too
             self._now.append(ClaimReport.from_json(plain))
+            self._last = plain
 
     @property
     def has_claims(self) -> bool:

@@ -79,6 +79,7 @@ def _is_installed(file: Path) -> bool:
     return bool(roots) and _holds_packages(max(roots, key=len))
 
 
+@cache
 def _is_the_projects(one: Any) -> bool:
     """Whether a class or function is of the user's own files: not of this package, Python's, or an installed one."""
     if is_own(one):

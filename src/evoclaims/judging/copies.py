@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections import Counter
 from collections.abc import Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -55,8 +56,11 @@ def copies(assertion: Assertion, trials: Trials) -> Copies:
 
 def _groups(trials: Sequence[TrialResult]) -> list[list[int]]:
     """Return the positions of trials that are copies of each other, at least two each."""
+    champions = Counter(trial.champion for trial in trials)
     found: dict[Hashable, list[int]] = {}
     for position, trial in enumerate(trials):
+        if trial.champion and champions[trial.champion] == 1:  # its curves need not be compared, which takes longer
+            continue
         if (mark := _training(trial)) is not None:
             found.setdefault(mark, []).append(position)
     return [group for group in found.values() if len(group) > 1]

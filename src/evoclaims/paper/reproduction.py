@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 
 from evoclaims.core.errors import UnknownNameError, UserError, require_known
@@ -165,7 +166,7 @@ class Reproduction:
         require_known("variant", variant, self.variants)
         return self.variants[variant].conditions.get(tier, {})
 
-    @property
+    @cached_property
     def published(self) -> Published:
         """The numbers that the paper has published; none without a file of them.
 
