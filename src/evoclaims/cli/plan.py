@@ -16,6 +16,7 @@ from evoclaims.cli.terminal import styled
 from evoclaims.core.errors import UserError
 from evoclaims.core.printable import printable
 from evoclaims.core.raised import in_one_line
+from evoclaims.envs.base import Checked
 from evoclaims.judging.verdict import Outcome
 from evoclaims.methods.training_loop import TrainingLoop
 from evoclaims.paper import references
@@ -42,7 +43,11 @@ AND_MORE: Final = "\nand more"
 
 
 def main(options: argparse.Namespace) -> int:
-    """Print conditions with their cost, then claims with their attainable p; 1 when a step cannot be timed."""
+    """Print conditions with their cost, then claims with their attainable p; 1 when a step cannot be timed.
+
+    Raises:
+        UserError: when a task is refused (`Checked`).
+    """
     project = open_project(options.storage)
     reproduction, store, variant = project.reproduction, project.store, options.variant
     tier = reproduction.tier(options.tier, variant)
@@ -59,6 +64,10 @@ def main(options: argparse.Namespace) -> int:
     else:
         read = _read(reports)
     used = [names for names in read if tier.condition(*names).existing is None]
+    for names in used:
+        task = tier.condition(*names).task
+        if isinstance(task, Checked):
+            task.check()
 
     seeds, untimed = tier.design.seeds(tier.design.last.n), list[str]()
     wanted = {names: Wanted(names, tier.condition(*names), seeds) for names in used}

@@ -170,6 +170,14 @@ def played(
 
 
 @runtime_checkable
+class Checked(Protocol):
+    """A task that may be refused before anything is traced, also when it is only planned."""
+
+    def check(self) -> None:
+        """Raise a `UserError` when the task cannot be run as it is written."""
+
+
+@runtime_checkable
 class Numbered(Protocol):
     """A task with numbers that programs take as data instead of constants.
 

@@ -2,22 +2,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import jax
 import pytest
 from custom_robots import BASE, Texts
 
 from evoclaims.core.errors import UserError
-from evoclaims.envs.ecorobot import physics
-from evoclaims.envs.ecorobot.fidelity import require_fidelity
+from evoclaims.envs.ecorobot import fidelity, physics
+from evoclaims.envs.ecorobot.boxes import Box
+from evoclaims.envs.ecorobot.fidelity import check, require_fidelity
+from evoclaims.envs.ecorobot.robots import ANT
 from evoclaims.envs.ecorobot.scene import Scene
 
 
 def test_a_step_that_differs_by_a_millionth_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     scene = Scene(Texts(tmp_path, monkeypatch).robot(BASE), ())
-    require_fidelity(scene)
+    check(scene)
     frame = physics._frame
 
     def faulty(*arguments: Any) -> Any:
@@ -26,4 +31,54 @@ def test_a_step_that_differs_by_a_millionth_is_refused(tmp_path: Path, monkeypat
 
     monkeypatch.setattr(physics, "_frame", faulty)
     with pytest.raises(UserError, match="rover is not simulated here as its file says: in .* random states a frame"):
-        require_fidelity.__wrapped__(scene)
+        check(scene)
+
+
+def test_a_robot_is_checked_once_a_machine(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    checked: list[Scene] = []
+    monkeypatch.setattr(fidelity, "check", checked.append)
+    texts, cache = Texts(tmp_path, monkeypatch), tmp_path / "cache"
+
+    def checks(scene: Scene) -> int:
+        require_fidelity.cache_clear()
+        checked.clear()
+        require_fidelity(scene)
+        return len(checked)
+
+    scene = Scene(texts.robot(BASE))
+    with _cached_in(cache):
+        assert checks(Scene(ANT)) == 0
+        assert [checks(scene), checks(scene)] == [1, 0]
+        assert checks(Scene(scene.robot, (Box((3.0, 3.0), (0.1, 0.1)),))) == 1
+        assert checks(Scene(texts.robot(BASE.replace('damping="0.3"', 'damping="0.4"')))) == 1
+        assert checks(Scene(texts.robot(BASE, contacts=3))) == 1
+        (cache / "robots").chmod(0o777)
+        assert [checks(scene), checks(scene)] == [1, 1]
+        (cache / "robots").chmod(0o700)
+        for record in (cache / "robots").iterdir():
+            record.write_bytes(b"")
+        assert [checks(scene), checks(scene)] == [1, 0]
+
+
+def test_a_robot_that_is_refused_is_checked_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(scene: Scene) -> None:
+        raise UserError("refused")
+
+    monkeypatch.setattr(fidelity, "check", refuse)
+    scene = Scene(Texts(tmp_path, monkeypatch).robot(BASE))
+    with _cached_in(tmp_path / "cache"):
+        for _ in range(2):
+            with pytest.raises(UserError, match="refused"):
+                require_fidelity(scene)
+
+
+@contextmanager
+def _cached_in(folder: Path) -> Iterator[None]:
+    """Keep what is compiled in a folder."""
+    config: Any = jax.config
+    before = config.jax_compilation_cache_dir
+    config.update("jax_compilation_cache_dir", str(folder))
+    try:
+        yield
+    finally:
+        config.update("jax_compilation_cache_dir", before)

@@ -1,27 +1,36 @@
 """Whether a robot is simulated as its file says: frames of our step beside frames of MuJoCo in C.
 
 A custom robot's model may have what a step does not simulate, or what MJX computes in another way. The robot is
-refused then, before anything is trained.
+refused then, before anything is trained. What has passed is remembered beside the compiled programs, so that a model is
+checked once a machine.
 """
 
 from __future__ import annotations
 
+import contextlib
+import hashlib
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from functools import lru_cache
-from typing import Final
+from functools import cache, lru_cache
+from pathlib import Path
+from typing import Any, Final
 
 import jax
-import jax.numpy as jnp
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from evoclaims import kernels
+from evoclaims.core.canonical import as_plain, content_hash
 from evoclaims.core.errors import UserError
+from evoclaims.core.files import write_atomically
+from evoclaims.core.private_files import doubt, make_private, read_private
+from evoclaims.core.provenance import versions
 from evoclaims.envs.ecorobot import physics
 from evoclaims.envs.ecorobot.physics import Body
 from evoclaims.envs.ecorobot.pose import torso
 from evoclaims.envs.ecorobot.scene import Scene
+from evoclaims.kernels import in_numpy
 
 Numbers = NDArray[np.float64]
 
@@ -56,13 +65,58 @@ class Frames:
 
 @lru_cache(maxsize=64)
 def require_fidelity(scene: Scene) -> None:
-    """Check a custom robot among its boxes, in float64, once in a process, before it is simulated.
+    """Check a custom robot among its boxes, in float64, once a machine, before it is planned or simulated.
 
     Raises:
         UserError: when a frame differs from MuJoCo's by more than `TOLERANCE`.
     """
     if scene.robot.is_built_in:
         return
+    record = _record(scene)
+    if record is not None and _has_passed(record):
+        return
+    check(scene)
+    if record is not None:
+        with contextlib.suppress(UserError):  # a full or read-only disk costs time alone
+            write_atomically(record, record.name.encode(), mode=0o600)
+
+
+def _record(scene: Scene) -> Path | None:
+    """Return the file that says that a scene has passed; None where another user could write it."""
+    config: Any = jax.config  # defines its attributes at run time
+    if config.jax_compilation_cache_dir is None:
+        return None
+    folder = Path(config.jax_compilation_cache_dir) / "robots"
+    try:
+        make_private(folder)
+        if doubt(folder.parent) or doubt(folder):
+            return None
+    except OSError:  # a read-only disk, or a file in its place
+        return None
+    key = {"robot": as_plain(scene.robot), "boxes": as_plain(scene.boxes), "versions": versions(), "code": _code()}
+    return folder / content_hash(key)
+
+
+def _has_passed(record: Path) -> bool:
+    try:
+        return read_private(record) == record.name.encode()
+    except OSError:
+        return False
+
+
+@cache
+def _code() -> str:
+    """Return a hash of the code that simulates and checks."""
+    files = [*Path(__file__).parent.glob("*.py"), *Path(kernels.__file__).parent.glob("trace/*.py")]
+    return hashlib.sha256(b"".join(file.read_bytes() for file in sorted(files))).hexdigest()
+
+
+def check(scene: Scene) -> None:
+    """Compare frames of a robot among its boxes with MuJoCo's.
+
+    Raises:
+        UserError: as `require_fidelity` does.
+    """
     # A thread of its own, since this is called while a program is traced.
     with ThreadPoolExecutor(1) as own:
         off, made = own.submit(_differences, scene).result()
@@ -94,27 +148,17 @@ def _differences(scene: Scene) -> tuple[Numbers, Frames]:
         cpu = jax.local_devices()[0]
     with jax.enable_x64(True), jax.default_device(cpu):
         world = Scene(scene.robot, scene.boxes)  # with arrays of float64
-        body = _stepped(world, made)
-        pose = jax.device_get(jax.vmap(lambda position: torso(world, position))(jnp.array(made.position.copy())))
-    count = len(made.position)
-    ours = np.concatenate([body.position, body.velocity, pose.place, pose.rotation.reshape(count, 9)], axis=1)
+
+        def frame(position: Any, velocity: Any, acceleration: Any, control: Any) -> Any:
+            body = Body(position=position, velocity=velocity, acceleration=acceleration)
+            moved, pose = physics._frame(world, body, control, world.turns), torso(world, position)
+            return moved.position, moved.velocity, pose.place, pose.rotation.reshape(9)
+
+        # To compile what runs once would take five times as long as all the rest.
+        ours = np.concatenate(in_numpy(frame, made.position, made.velocity, made.acceleration, made.control), axis=1)
     theirs = np.concatenate([made.next_position, made.next_velocity, made.pose], axis=1)
     scale = 1.0 + np.max(np.abs(theirs), axis=1)
     return np.max(np.abs(ours - theirs), axis=1) / scale, made
-
-
-def _stepped(world: Scene, made: Frames) -> Body:
-    """Return where one frame of our step leads from each start."""
-
-    def frame(position: jax.Array, velocity: jax.Array, acceleration: jax.Array, control: jax.Array) -> Body:
-        body = Body(position=position, velocity=velocity, acceleration=acceleration)
-        moved: Body = physics._frame(world, body, control, world.turns)
-        return moved
-
-    states = [jnp.array(x.copy()) for x in (made.position, made.velocity, made.acceleration, made.control)]
-    quick = {"xla_backend_optimization_level": 0}  # it runs once
-    body: Body = jax.device_get(jax.jit(jax.vmap(frame), compiler_options=quick)(*states))
-    return body
 
 
 def frames_of(scene: Scene) -> Frames:

@@ -89,6 +89,10 @@ class RobotTask(ABC):
                 "or slides along x and y as its first joints, at x 0 and y 0."
             )
 
+    def check(self) -> None:
+        """Compare a custom robot's frames with MuJoCo's; see `require_fidelity`."""
+        require_fidelity(self.scene)
+
     @property
     @abstractmethod
     def name(self) -> str:
@@ -183,7 +187,7 @@ class RobotTask(ABC):
 
     def plain_start(self, position: Float[Array, " nq"], velocity: Float[Array, " nv"]) -> TaskState:
         """Return the state at the start of an episode."""
-        require_fidelity(self.scene)
+        self.check()
         pose = torso(self.scene, position)
         outing = strong(
             Outing(
@@ -210,7 +214,7 @@ class RobotTask(ABC):
 
         A step in which the simulation diverges (`physics.is_stable`) is undone: no reward, and the episode ends.
         """
-        require_fidelity(self.scene)
+        self.check()
         outing: Outing = state.inner
         control = action
         if self.robot.scales_actions:
