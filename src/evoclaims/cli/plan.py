@@ -32,6 +32,9 @@ from evoclaims.trials.spec import Condition
 from evoclaims.trials.store import DamagedFileError, Store
 from evoclaims.verdicts.claim_report import ClaimReport
 
+Counts = Mapping[Names, int]
+"""Most trials of each condition that claims may need, by method and task."""
+
 Costs = Mapping[Names, Spent]
 """What the reference trials have cost, by method and task."""
 
@@ -63,6 +66,7 @@ def main(options: argparse.Namespace) -> int:
     else:
         read = _read(reports)
     used = [names for names in read if tier.condition(*names).existing is None]
+    counts = _counts(tier, reports)
 
     untimed: list[str] = []
 
@@ -86,8 +90,16 @@ def main(options: argparse.Namespace) -> int:
     where = f"as they took on one {kind}" if options.like else f"on {len(chosen)} × {kind}"
     under = f" that {variant} changes" if variant else ""
     console.print(f"Conditions of the {options.tier} tier{under}, {where}")
-    console.print_whole(_conditions(tier, store, used, paces, project.config.seconds(None)))
-    own, timed = sum(_has_run(store, tier, names) for names in used), sum(pace is not None for pace in paces.values())
+    console.print_whole(_conditions(tier, store, used, counts, paces, project.config.seconds(None)))
+    if more := [" on ".join(names) for names in used if counts[names] > tier.design.last.n]:
+        console.print(
+            f"Trials beyond {tier.design.last.n} of a condition run only where a claim with a third look is open "
+            f"after them: {', '.join(more)}."
+        )
+    own, timed = (
+        sum(_has_run(store, tier, names, counts) for names in used),
+        sum(pace is not None for pace in paces.values()),
+    )
     if not options.like and own < timed:
         console.print(
             f"Times are by this store's own trials for {own} of {len(used)} conditions, for {timed - own} by "
@@ -96,11 +108,11 @@ def main(options: argparse.Namespace) -> int:
         )
     for names in read:
         if names not in used:
-            condition, n = tier.condition(*names), tier.design.last.n
+            condition, n = tier.condition(*names), counts[names]
             few = f", and the design looks at {n}" if len(condition.existing or ()) < n else ""
             line = f"{' on '.join(names)}: nothing to run: {where_from(condition)}{few}"
             console.print(line)
-    _print_spent(console, tier, {names: costs[names] for names in used})
+    _print_spent(console, tier, {names: costs[names] for names in used}, counts)
     ends = ", ".join(f"{end.symbol} {end}" for end in (Outcome.SUPPORTED, Outcome.REFUTED, Outcome.SMALLER))
     console.print(
         f"\nClaims: the smallest p that the design allows (n trials a side, α {tier.design.alpha:g}), and how each "
@@ -135,10 +147,23 @@ def _read(reports: Sequence[ClaimReport]) -> list[Names]:
     return sorted({(source.method, source.task) for report in reports for source in report.sources})
 
 
+def _counts(tier: Tier, reports: Sequence[ClaimReport]) -> Counts:
+    """Return how many trials of each condition claims may need: the tier's, or of a claim with a third look its own."""
+    found: dict[Names, int] = {}
+    for report in reports:
+        looks = [look.n for look in report.attainable]
+        if report.verdict and report.outcome in (Outcome.SUPPORTED, Outcome.REFUTED, Outcome.SMALLER):
+            looks = [report.verdict.n]  # no later look follows
+        for names in _read([report]):
+            found[names] = max([found.get(names, tier.design.last.n), *looks])
+    return found
+
+
 def _conditions(
     tier: Tier,
     store: Store,
     used: Sequence[Names],
+    counts: Counts,
     paces: dict[Names, Pace | None],
     limit: float,
 ) -> Table:
@@ -147,10 +172,9 @@ def _conditions(
     Trials that ran out of less time than `limit` (seconds) count as missing, too.
     """
     table = plain_table(("condition", "cached", "missing", "environment\nsteps", "time,\nat most"), ())
-    seeds = tier.design.seeds(tier.design.last.n)
     steps, seconds, unknown = 0, 0.0, False
     for names in used:
-        condition = tier.condition(*names)
+        condition, seeds = tier.condition(*names), tier.design.seeds(counts[names])
         missing = len(StoredTrials(store, condition, time_limit=limit).missing(seeds))
         owed = missing * condition.environment_steps
         pace = paces[names]
@@ -168,7 +192,7 @@ def _conditions(
     return table
 
 
-def _print_spent(console: PlainSpokenConsole, tier: Tier, costs: Costs) -> None:
+def _print_spent(console: PlainSpokenConsole, tier: Tier, costs: Costs, counts: Counts) -> None:
     """Print what the reference trials of conditions took, how to read that, and which are missing; nothing without any.
 
     The table is apart from that of conditions, so that each fits a terminal of 80 columns.
@@ -179,19 +203,21 @@ def _print_spent(console: PlainSpokenConsole, tier: Tier, costs: Costs) -> None:
         "\nMeasured on the committed reference trials: what they took, with compiling. Estimated from them: the hours "
         "of a CPU's core that all trials' whole budgets would take, at the pace of that method and task at any tier."
     )
-    console.print_whole(_spent(tier, costs))
+    console.print_whole(_spent(tier, costs, counts))
     n = tier.design.last.n
     few = [f"{' on '.join(names)} ({cost.trials})" for names, cost in costs.items() if cost.trials < n]
     if few and any(cost.trials for cost in costs.values()):
         console.print(f"Fewer than {n} reference trials: {', '.join(few)}.")
 
 
-def _spent(tier: Tier, costs: Costs) -> Table:
+def _spent(tier: Tier, costs: Costs, counts: Counts) -> Table:
     """Build the table of what the reference trials of conditions took, and would take on a CPU."""
     kinds, cores = _kinds(costs), any(cost.core_pace for cost in costs.values())
     table = plain_table(("condition", *(f"took on one\n{kind}" for kind in kinds), *["CPU\ncore hours"] * cores), ())
-    n = tier.design.last.n
-    needed = {names: cost.core_seconds(n * tier.condition(*names).environment_steps) for names, cost in costs.items()}
+    needed = {
+        names: cost.core_seconds(counts[names] * tier.condition(*names).environment_steps)
+        for names, cost in costs.items()
+    }
     for names, seconds in needed.items():
         hours = [_core_hours(seconds)] * cores
         table.add_row(" on ".join(names), *(_took(costs, [names], kind) for kind in kinds), *hours)
@@ -200,9 +226,9 @@ def _spent(tier: Tier, costs: Costs) -> Table:
     return table
 
 
-def _has_run(store: Store, tier: Tier, names: Names) -> bool:
+def _has_run(store: Store, tier: Tier, names: Names, counts: Counts) -> bool:
     """Whether the store has a trial of a condition that came to its end, made with the installed versions."""
-    seeds = tier.design.seeds(tier.design.last.n)
+    seeds = tier.design.seeds(counts[names])
     return len(StoredTrials(store, tier.condition(*names)).missing(seeds)) < len(seeds)
 
 
