@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import json
 import os
 import re
 import subprocess
@@ -14,7 +15,20 @@ import pytest
 from evoclaims import cli
 
 ROOT = Path(__file__).parents[2]
-SKELETON = ROOT / "src" / "evoclaims" / "projects" / "skeleton"
+STARTERS = ROOT / "src" / "evoclaims" / "projects" / "starters"
+LOOPS = """
+from evoclaims import Budget
+from reproductions.our_paper import METHODS, TASKS
+from reproductions.hill_climber import hill_climber
+task, budget = TASKS["majority"], Budget(generations=1_000)
+for name, method in METHODS.items():
+    for seed in range(10):
+        metrics, policy = hill_climber(task, seed, budget, lambda *_, **__: None, **method.settings)
+        right = [(policy(bits)[0] > 0) == wanted for bits, (wanted,) in zip(task.table.inputs, task.table.targets)]
+        print(f"{name},{seed},{metrics['steps']},{sum(right) / 8:g}")
+"""
+"""Prints the trials of the starter project with a training loop, as rows of a table."""
+
 PAGE = re.compile(r"docs/[\w.]+\.md")
 
 
@@ -48,6 +62,37 @@ def test_a_paper_is_unpacked_whole(tmp_path: Path, capsys: pytest.CaptureFixture
     assert "[tool.evoclaims]" in (tmp_path / "paper" / "pyproject.toml").read_text()
 
 
+@pytest.mark.parametrize("kind", [pytest.param("loop", marks=pytest.mark.newest), "gymnasium", "csv"])
+def test_a_starter_project_of_each_kind_passes_as_it_is(
+    kind: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    if kind == "gymnasium":
+        pytest.importorskip("gymnasium")
+    folder = tmp_path / "mine"
+    status, said, _ = _new(capsys, str(folder), "--with", kind)
+    assert (status, f"wrote {len(_files(folder))} files to {folder}; next:" in said) == (0, True)
+    named = set(re.findall(r"[\w/]+\.(?:py|csv)\b", said.replace("docs/", "")))
+    assert {Path(name).name for name in named} <= {Path(name).name for name in _files(folder)}
+    ran = _run(folder, "-W", "error", "-m", "pytest", "-m", "smoke", "-p", "no:xdist", "--claims-json=out.json")
+    assert ran.returncode == 0, ran.stdout + ran.stderr
+    claims = json.loads((folder / "out.json").read_text())["claims"]
+    assert [(one["claim"], one["outcome"], one["verdict"]["n"]) for one in claims] == [
+        ("H1", "supported", 10),
+        ("H2", "supported", 10),
+    ]
+
+
+def test_the_table_that_is_written_has_the_trials_of_the_loop_that_is_written(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for kind in ("loop", "csv"):
+        assert _new(capsys, str(tmp_path / kind), "--with", kind)[0] == 0
+    ran = _run(tmp_path / "loop", "-c", LOOPS)
+    assert ran.returncode == 0, ran.stderr
+    table = (tmp_path / "csv" / "reproductions" / "our_paper" / "runs.csv").read_text()
+    assert table.splitlines() == ["method,seed,generations,success", *ran.stdout.splitlines()]
+
+
 def test_nothing_is_overwritten(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "claims").mkdir()
     status, _, said = _new(capsys, str(tmp_path))
@@ -72,7 +117,11 @@ def test_a_new_repository_is_a_place_for_a_project(
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (("mine", "--from", "nisoti"), "There is no project named 'nisoti'. Did you mean 'nisioti2025'? Known: "),
+        (("mine", "--from", "nisoti"), "There is no paper named 'nisoti'. Did you mean 'nisioti2025'? Known: "),
+        (
+            ("mine", "--with", "gym"),
+            "There is no kind of starter project named 'gym'. Did you mean 'gymnasium'? Known: ",
+        ),
         (("file",), "Cannot write a project to file: Not a directory. Name a new folder."),
         (("file/mine",), "Cannot write a project to file/mine: Not a directory."),
     ],
@@ -125,7 +174,7 @@ def test_a_wheel_is_enough_to_judge_the_paper_s_claims(tmp_path: Path) -> None:
     where = _run(paper, "-c", "import evoclaims; print(evoclaims.__file__)", site=site)
     assert Path(where.stdout.strip()).is_relative_to(site)
     assert _files(paper / "reproductions") == _files(ROOT / "reproductions")
-    assert _files(site / "evoclaims" / "projects" / "skeleton") == _files(SKELETON)
+    assert _files(site / "evoclaims" / "projects" / "starters") == _files(STARTERS)
 
     shown = _run(paper, "-m", "evoclaims", "status", "--tier", "full", "--only", "C2", site=site)
     assert "claims (full): controls: 2 supported" in shown.stdout

@@ -28,6 +28,33 @@ def test_plan_counts_what_is_stored_and_what_is_missing(evoclaims: Evoclaims) ->
     assert re.search(r"^wrong on parity +0 +10 +40 +unknown$", out, re.MULTILINE)
 
 
+def test_plan_counts_the_trials_of_a_third_look_where_a_claim_is_open(evoclaims: Evoclaims, project: Project) -> None:
+    paper = project.path / "tiny_paper.py"
+    looks = "Design(looks=(Look(5, 0.01), Look(10, 0.04)))"
+    text = paper.read_text().replace("Design.fixed(10)", looks)
+    paper.write_text(text.replace("import Design", "import Design, Look"))
+    body = (
+        "def test_{0}(trials, verdict):\n    verdict(trials('{0}', on='parity').solves_every_level.in_most_trials())\n"
+    )
+    third = "@third_look\n@says('{0}')\n" + body
+    project.write(
+        "from evoclaims import third_look\n"
+        + "\n\n".join([third.format("right"), third.format("coin"), ("@says('{0}')\n" + body).format("wrong")])
+    )
+    status, out, err = evoclaims("plan")
+    assert (status, err) == (0, "")
+    assert re.search(r"^right on parity +0 +30 +120 +unknown$", out, re.MULTILINE), out
+    assert re.search(r"^coin on parity +0 +30 +120 +unknown$", out, re.MULTILINE)
+    assert re.search(r"^wrong on parity +0 +10 +40 +unknown$", out, re.MULTILINE)
+    assert re.search(r"^total +280 +unknown$", out, re.MULTILINE)
+    rest = "Trials beyond 10 of a condition run only where a claim with a third look is open after them: "
+    assert f"{rest}coin on parity, right on parity." in " ".join(out.split())
+    evoclaims("run", "right")
+    status, out, _ = evoclaims("plan")  # ten of ten decide the claim, so that no third look follows
+    assert re.search(r"^right on parity +10 +0 +0 +0 s$", out, re.MULTILINE), out
+    assert f"{rest}coin on parity." in " ".join(out.split())
+
+
 def test_plan_says_which_claim_cannot_be_judged_and_why(evoclaims: Evoclaims, project: Project) -> None:
     project.write(c="verdict(trials('rigth', on='parity').mean_success > 0)")
     status, out, _ = evoclaims("plan")

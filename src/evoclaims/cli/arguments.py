@@ -52,7 +52,13 @@ def parser() -> argparse.ArgumentParser:
     new = commands.add_parser("new", help=text.partition("; ")[0], description=text)
     new.set_defaults(storage=None, refuse=new.error)  # it reads no trials
     new.add_argument("folder", metavar="DIR", help="where to: a folder that is new or empty")
-    new.add_argument("--from", dest="project", metavar="PAPER", default="skeleton", help="a paper, such as nisioti2025")
+    what = new.add_mutually_exclusive_group()
+    text = (
+        "what it begins with: method (default), loop (your own training loop), gymnasium (one of its environments) or "
+        "csv (a table of trials)"
+    )
+    what.add_argument("--with", dest="kind", metavar="KIND", default="method", help=text)
+    what.add_argument("--from", dest="paper", metavar="PAPER", help="a paper, such as nisioti2025")
 
     for group in (_running, _reading, _keeping, _comparing, _exporting):
         group(add)

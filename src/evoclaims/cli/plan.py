@@ -32,6 +32,9 @@ from evoclaims.trials.spec import Condition
 from evoclaims.trials.store import DamagedFileError
 from evoclaims.verdicts.claim_report import ClaimReport
 
+Counts = Mapping[Names, int]
+"""Most trials of each condition that claims may need, by method and task."""
+
 Costs = Mapping[Names, Sequence[TrialResult]]
 """The reference trials of conditions, by method and task."""
 
@@ -69,8 +72,8 @@ def main(options: argparse.Namespace) -> int:
         if isinstance(task, Checked):
             task.check()
 
-    seeds, untimed = tier.design.seeds(tier.design.last.n), list[str]()
-    wanted = {names: Wanted(names, tier.condition(*names), seeds) for names in used}
+    counts, untimed = _counts(tier, reports), list[str]()
+    wanted = {names: Wanted(names, tier.condition(*names), tier.design.seeds(counts[names])) for names in used}
     platform = chosen[0].platform if not options.like else "cpu" if options.like == "cpu" else "gpu"
     limit = project.config.seconds(None)
     estimator = Estimator(store, reproduction, options.tier, platform, options.like or "", limit)
@@ -98,6 +101,11 @@ def main(options: argparse.Namespace) -> int:
     under = f" that {variant} changes" if variant else ""
     console.print(f"Conditions of the {options.tier} tier{under}, {where}")
     console.print_whole(_conditions(wanted, owed))
+    if more := [" on ".join(names) for names in used if counts[names] > tier.design.last.n]:
+        console.print(
+            f"Trials beyond {tier.design.last.n} of a condition run only where a claim with a third look is open "
+            f"after them: {', '.join(more)}."
+        )
     elsewhere = bases.count("elsewhere")
     if elsewhere and not options.like:
         console.print(
@@ -106,7 +114,7 @@ def main(options: argparse.Namespace) -> int:
         )
     for names in read:
         if names not in used:
-            condition, n = tier.condition(*names), tier.design.last.n
+            condition, n = tier.condition(*names), counts[names]
             few = f", and the design looks at {n}" if len(condition.existing or ()) < n else ""
             line = f"{' on '.join(names)}: nothing to run: {where_from(condition)}{few}"
             console.print(line)
@@ -143,6 +151,18 @@ class _SoundOnly(StoredOnly):
 def _read(reports: Sequence[ClaimReport]) -> list[Names]:
     """Return the conditions that claims read."""
     return sorted({(source.method, source.task) for report in reports for source in report.sources})
+
+
+def _counts(tier: Tier, reports: Sequence[ClaimReport]) -> Counts:
+    """Return how many trials of each condition claims may need: the tier's, or of a claim with a third look its own."""
+    found: dict[Names, int] = {}
+    for report in reports:
+        looks = [look.n for look in report.attainable]
+        if report.verdict and report.outcome in (Outcome.SUPPORTED, Outcome.REFUTED, Outcome.SMALLER):
+            looks = [report.verdict.n]  # no later look follows
+        for names in _read([report]):
+            found[names] = max([found.get(names, tier.design.last.n), *looks])
+    return found
 
 
 def _conditions(wanted: Mapping[Names, Wanted], owed: Mapping[Names, Owed]) -> Table:
