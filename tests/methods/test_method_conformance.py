@@ -48,9 +48,11 @@ def test_progress_is_scalars_of_the_same_names_at_every_step(bench: Workbench) -
 
 
 def test_stepping_compiles_once(bench: Workbench) -> None:
+    bench.run(1)  # compiled programs may have been forgotten since another test compiled them
+    traces = bench.traces
     for level in range(bench.task.levels):
         bench.run(2, level=level)
-    assert bench.traces == 1
+    assert bench.traces == traces
 
 
 def test_the_same_key_gives_the_same_state(bench: Workbench) -> None:
