@@ -18,6 +18,7 @@ import pytest
 from hypothesis import settings
 
 from evoclaims.core.temporary import temporary_folder
+from evoclaims.trials.memory import give_back, share_heaps
 
 pytest_plugins = ["hand_made_paper", "pytester", "tiny_project"]
 
@@ -27,6 +28,7 @@ settings.load_profile("untimed")
 
 # Tracing makes many small objects that live: looking through all of them often took a seventh of the time.
 gc.set_threshold(100_000, 20, 20)
+share_heaps()  # as a run does, before jax makes its threads
 
 _CACHE: Final = "JAX_COMPILATION_CACHE_DIR"
 _made = ""
@@ -70,8 +72,6 @@ def bounded_memory() -> Iterator[None]:
     """Forget compiled programs after a module where they fill the memory: jax keeps all of them."""
     yield
     if "jax" in sys.modules and _resident() > _MOST_RESIDENT:
-        from evoclaims.trials.memory import give_back
-
         sys.modules["jax"].clear_caches()
         give_back()
 

@@ -9,6 +9,7 @@ import subprocess
 import sys
 import warnings
 from collections.abc import Iterator
+from contextlib import nullcontext
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -149,11 +150,13 @@ def test_refused_code_is_reported_once_and_never_an_error(
 def test_a_lock_that_is_never_released_ends_in_compiling_alone(
     compiled: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    waits: list[str] = []
     monkeypatch.setattr(machine_code, "PATIENCE", 0.05)
+    monkeypatch.setattr(machine_code, "waiting", lambda: nullcontext(waits.append("for a lock")))
     (tmp_path / "kernels").mkdir(mode=0o700)
     with FileLock(tmp_path / "kernels" / f"{machine_code.key_of(TEXT)}.lock"):  # as one stopped by Ctrl-Z holds it
         assert _seven_times(6) == 42
-    assert compiled == [TEXT]
+    assert (compiled, waits) == ([TEXT], ["for a lock"])  # which is nobody's time
 
 
 def test_another_text_or_another_processor_has_another_key(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -18,7 +18,7 @@ from kernel_functions import FUNCTIONS, NO_KERNELS, X, Y
 
 from evoclaims.kernels.call.kernel import Kernel
 from evoclaims.kernels.call.one_kernel import one_kernel
-from evoclaims.kernels.emit import block_shape, machine_code
+from evoclaims.kernels.emit import block_shape, gpu_kernel, machine_code
 from evoclaims.kernels.trace.algebra import Algebra
 from evoclaims.kernels.trace.elementary import WIDEST
 
@@ -222,3 +222,13 @@ def test_sorting_keeps_the_order_of_equals(values: list[float]) -> None:
 
     made, expected = jax.vmap(one_kernel(both, "This"))(x), jax.vmap(both)(x)
     jax.tree.map(np.testing.assert_array_equal, made, expected)
+
+
+@pytest.mark.oldest
+def test_expressions_go_with_their_text_and_a_gpus_text_makes_them_again() -> None:
+    number = jax.ShapeDtypeStruct((), jnp.float32)
+    kernel = Kernel(lambda x, y: x / y + jnp.sin(x), "This", jax.tree.structure((0, 0)), (number, number))
+    before = gpu_kernel.text(kernel.results, kernel.read, {0: 1, 1: 1}, 5)
+    kernel.on_host(jnp.ones(5), jnp.ones(5))
+    assert "results" not in vars(kernel)  # they would live as long as the process
+    assert gpu_kernel.text(kernel.results, kernel.read, {0: 1, 1: 1}, 5) == before

@@ -113,16 +113,19 @@ def _maker(stored: StoredTrials, devices: Sequence[jax.Device], checkpoint_secon
     def make(owed: Sequence[int], tell: Watcher) -> None:
         """Run batches until all trials are stored, or one turns out too large for the device's memory."""
         nonlocal most
-        one = Run(Lanes(stored.condition, devices), stored, tell, checkpoint_seconds, most)
         try:
-            with single_threaded_linear_algebra():
-                too_large = _finish_all(one, owed)
+            most = _run_batches(Run(Lanes(stored.condition, devices), stored, tell, checkpoint_seconds, most), owed)
         finally:
-            give_back()
-        if too_large is not None:
-            most = halved(one, too_large)
+            give_back()  # when nothing holds the compiled programs any more
 
     return make
+
+
+def _run_batches(run: Run, owed: Sequence[int]) -> int:
+    """Run batches, and return how many trials the next ones may have."""
+    with single_threaded_linear_algebra():
+        too_large = _finish_all(run, owed)
+    return run.most if too_large is None else halved(run, too_large)
 
 
 def _finish_all(run: Run, owed: Sequence[int]) -> Header | None:
