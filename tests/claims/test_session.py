@@ -149,7 +149,7 @@ def test_a_stored_trial_is_read_once_and_a_missing_one_is_looked_for_again(
         stored(condition, [0, 1])
     store.put(made(condition, 1, 1.0), {})
     assert [trial.seed for trial in stored(condition, [1, 0])] == [1, 0]
-    first, second = (TrialSpec(condition, seed).id for seed in (0, 1))
+    first, second = (made(condition, seed, 1.0).id for seed in (0, 1))
     assert read == [first, second, second]
 
 
