@@ -58,12 +58,14 @@ def stones() -> Iterator[str]:
 
 
 def noise() -> Iterator[str]:
-    """Yield NEAT's stones against the noise on starts, as far as it has run."""
-    yield "| share of the code's noise on starts | NEAT's stones (training's best / 1,000) |"
-    yield "| --- | --- |"
+    """Yield NEAT's stones against the noise on starts, as far as it has run, each tested against the whole noise."""
+    yield "| share of the code's noise on starts | NEAT's stones (training's best / 1,000) | p, more than with all |"
+    yield "| --- | --- | --- |"
+    whole = [trial.metrics["stones"] for trial in trials("", "neat")]
     for variant, share in NOISE.items():
         if found := trials(variant, "neat"):
-            yield f"| {share:g} | {cell(found)} |"
+            p = f"{rank_test([trial.metrics['stones'] for trial in found], whole).p:.2g}" if variant else "–"
+            yield f"| {share:g} | {cell(found)} | {p} |"
 
 
 def rule() -> Iterator[str]:

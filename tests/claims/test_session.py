@@ -139,6 +139,21 @@ def test_stored_trials_are_read_in_the_order_of_the_seeds(store: Store, made: Ma
         StoredOnly(Archive(store))(condition, [1, 2, 3])
 
 
+def test_a_stored_trial_is_read_once_and_a_missing_one_is_looked_for_again(
+    store: Store, made: Made, session: Session, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    condition, read = session.group("better", "small", "smoke").condition, list[str]()
+    monkeypatch.setattr(Archive, "get", lambda self, trial, versions: read.append(trial) or store.get(trial, versions))
+    stored = StoredOnly(Archive(store))
+    store.put(made(condition, 0, 1.0), {})
+    with pytest.raises(NotStoredError, match="1 of 2 trials"):
+        stored(condition, [0, 1])
+    store.put(made(condition, 1, 1.0), {})
+    assert [trial.seed for trial in stored(condition, [1, 0])] == [1, 0]
+    first, second = (made(condition, seed, 1.0).id for seed in (0, 1))
+    assert read == [first, second, second]
+
+
 def test_missing_trials_are_run_and_a_bad_store_or_device_is_found_before(tmp_path: Path, session: Session) -> None:
     condition = session.group("better", "small", "smoke").condition
     mode = RunMissing(Store(tmp_path / "new"), "cpu", ignore)

@@ -47,7 +47,9 @@ def test_a_sentence_has_one_line_with_its_cases_at_every_tier(filled: Laboratory
 def test_a_line_tells_what_came_of_each_case_under_each_variant(filled: Laboratory) -> None:
     page = filled.page(filled.judge(better_wins), filled.judge(better_solves, id="T2"))
     row = Robustness("T1", "full", Outcome.SUPPORTED, {"network": Outcome.REFUTED, "rows": Outcome.SUPPORTED})
-    first, second = opening_lines(replace(page, robustness=(row,), variants={"network": "x", "rows": "y", "z": "z"}))
+    shown = replace(page, robustness=(row,), variants={"network": "x", "rows": "y", "z": "z"})
+    first, second = opening_lines(shown)
+    assert list(map(shown.protocols, page.sections)) == ["refuted under network; supported under rows", ""]
     assert first.variants == {"network": (row,), "rows": (row,)}
     assert second.variants == {"network": (), "rows": ()}
 
@@ -55,7 +57,10 @@ def test_a_line_tells_what_came_of_each_case_under_each_variant(filled: Laborato
 def test_findings_count_sentences_whose_cases_end_alike_at_the_papers_tier(filled: Laboratory) -> None:
     def one(name: str, *outcomes: Outcome, tier: str = "full", where: str = "§1.2") -> list[ClaimReport]:
         judged = filled.judge(better_wins, tier=tier, id=name, says=f"Sentence {name}", where=where)
-        return [replace(judged, case=str(case), outcome=outcome) for case, outcome in enumerate(outcomes)]
+        return [
+            replace(judged, case=str(case), outcome=outcome, verdict=None, asserts=f"{name} {case}")
+            for case, outcome in enumerate(outcomes)
+        ]
 
     good, bad, unrun = Outcome.SUPPORTED, Outcome.REFUTED, Outcome.NOT_RUN
     reports = [
@@ -64,8 +69,10 @@ def test_findings_count_sentences_whose_cases_end_alike_at_the_papers_tier(fille
         *one("T3", good, bad),
         *one("T4", bad),
         *one("T5", unrun),
+        replace(one("T6", good)[0], asserts="T1 1"),  # the same result as T1[1], which decides it
     ]
-    page = filled.page(*reports, *one("C1", good, where="control"), *one("T5", good, tier="smoke"))
+    said = {"T3[1]": "a second sentence of one claim"}
+    page = filled.page(*reports, *one("C1", good, where="control"), *one("T5", good, tier="smoke"), sentences=said)
     found = findings(page, opening_lines(page))
     assert [(one.says, [line.claim for line in one.lines]) for one in found] == [
         ("2 of 4 sentences (full): supported in every case", ["T1", "T2"]),

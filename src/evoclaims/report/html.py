@@ -66,7 +66,10 @@ def _pieces(page: Page) -> Iterator[tuple[str, str]]:
     render = _environment().get_template
     names = {key: str(number) for number, key in enumerate(page.conditions)}
     for section in page.sections:
-        yield section.anchor, render("evidence.html.j2").render(claim=section, names=names)
+        yield (
+            section.anchor,
+            render("evidence.html.j2").render(claim=section, names=names, protocols=page.protocols(section)),
+        )
     for key, condition in page.conditions.items():
         yield f"trials {names[key]}", render("trials.html.j2").render(condition=condition)
         yield f"settings {names[key]}", render("settings.html.j2").render(condition=condition)

@@ -133,6 +133,8 @@ def _section(section: Section, page: Page) -> Iterator[str]:
     yield literal(section.nulls)
     if len(report.readings) > 1:
         yield literal(f"Readings of the sentence: {section.read or 'not all are judged'}.")
+    protocols = page.protocols(section)
+    yield literal(f"Variants of the protocol: {protocols}." if protocols else "")
     yield literal(f"Power: {section.power}." if section.power else "")
     if report.because:
         yield f"Accepted as {literal(report.expected or '')}: {literal(report.because)}"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
@@ -177,6 +177,15 @@ class Page:
         """Variants that some claim was judged under."""
         names = {name for row in self.robustness for name in row.outcomes}
         return {name: says for name, says in self.variants.items() if name in names}
+
+    def protocols(self, section: Section) -> str:
+        """Return how a claim ends under the variants of the protocol; empty where it was judged under none."""
+        key = section.report.name, section.report.tier
+        found: defaultdict[Outcome, list[str]] = defaultdict(list)
+        for row in self.robustness:
+            for variant, outcome in row.outcomes.items() if (row.claim, row.tier) == key else ():
+                found[outcome].append(variant)
+        return "; ".join(f"{outcome} under {', '.join(variants)}" for outcome, variants in found.items())
 
     @property
     def sections(self) -> Sequence[Section]:

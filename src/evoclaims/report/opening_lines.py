@@ -10,6 +10,7 @@ from evoclaims.judging.verdict import Outcome
 from evoclaims.report.formatting import plural
 from evoclaims.report.model import Page, Section
 from evoclaims.verdicts.robustness import Robustness
+from evoclaims.verdicts.sentences import sentences
 
 
 @dataclass(frozen=True)
@@ -75,13 +76,20 @@ class Finding:
 
 
 def findings(page: Page, lines: Sequence[OpeningLine]) -> list[Finding]:
-    """Return what came out, by sentence of the paper, at the first tier that has a verdict on one."""
-    papers = [line for line in lines if not line.cases[0].report.is_control]
-    for tier in (board.tier for board in page.boards):
-        ended = [(line, {section.report.outcome for section in line.at(tier)} - {Outcome.NOT_RUN}) for line in papers]
+    """Return what came out, by sentence of the paper, at the first tier that has a verdict on one.
+
+    A claim is counted once, and one that the result of another decides is not: as in `sentences`.
+    """
+    first = {line.claim: line for line in reversed(lines)}
+    for board in page.boards:
+        ended = [
+            (first[one.claim], {case.outcome for case in one.cases} - {Outcome.NOT_RUN})
+            for one in sentences(section.report for section in board.sections)
+            if not one.same_as
+        ]
         judged = [(line, outcomes) for line, outcomes in ended if outcomes]
         if judged:
-            return list(_findings(tier, judged))
+            return list(_findings(board.tier, judged))
     return []
 
 

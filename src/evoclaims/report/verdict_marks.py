@@ -10,7 +10,7 @@ from evoclaims.judging.verdict import Outcome
 from evoclaims.report.markdown_text import literal, table
 from evoclaims.report.table_cells import NONE, in_the_papers_order
 from evoclaims.verdicts.claim_report import ClaimReport, named
-from evoclaims.verdicts.sensitivity import Tally
+from evoclaims.verdicts.sensitivity import APART, Tally
 
 WORDS: Final = 10
 """Words of a sentence that has no short form."""
@@ -46,11 +46,14 @@ def marks(
 
 
 def mark(reports: Iterable[ClaimReport]) -> str:
-    """Return the mark of a sentence's cases, such as "✓"; with numbers of cases where they differ, such as "✓1 ✗3"."""
+    """Return the mark of a sentence's cases, such as "✓"; with numbers of cases where they differ, such as "✓1 ✗3".
+
+    Support that is counted apart is in brackets.
+    """
     tallies = Counter(report.counted_as for report in reports if report.outcome is not Outcome.NOT_RUN)
     found: Counter[str] = Counter()
     for tally in Tally:
-        found[tally.symbol] += tallies[tally]
+        found[f"({tally.symbol})" if tally in APART else tally.symbol] += tallies[tally]
     shown = {symbol: count for symbol, count in found.items() if count}
     if len(shown) < 2:
         return next(iter(shown), NONE)
