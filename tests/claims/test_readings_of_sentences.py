@@ -89,14 +89,14 @@ def test_a_reading_that_cannot_be_one_is_a_sentence(reproduction: Reproduction, 
     verdict = Verdicts(lambda assertion, readings: assertion)
     solves = better.solves_every_level.in_most_trials()
     for name, given, since, said in (
-        ("a", True, "2026-01-02", r"The reading 'a' is True and takes an assertion"),
-        (" ", solves, "2026-01-02", r"The reading ' ' needs a name of its own"),
+        ("a", True, "2026-01-02", r"The reading 'a' is True, which is not an assertion"),
+        (" ", solves, "2026-01-02", r"The reading ' ' needs a unique name"),
         ("a", solves, "yesterday", r"'yesterday' is not a date: write it as 2026-11-26"),
     ):
         with pytest.raises(UserError, match=said):
             verdict.reading(name, given, because="a word", since=since)
     verdict.reading("a", solves, because="a word", since="2026-01-02")
-    with pytest.raises(UserError, match=r"The reading 'a' needs a name of its own"):
+    with pytest.raises(UserError, match=r"The reading 'a' needs a unique name"):
         verdict.reading("a", solves, because="a word", since="2026-01-02")
     verdict(solves)
     with pytest.raises(UserError, match=r"The reading 'b' comes after the verdict"):

@@ -81,7 +81,8 @@ def test_an_end_that_cannot_be_judged_is_an_error(evoclaims: Evoclaims, outcomes
     status, _, err = evoclaims(*BISECT)
     assert status == 2
     assert (
-        "pebble 1.8, named by --bad, cannot be judged: no wheel. If the release is to blame, name another one." in err
+        "pebble 1.8, named by --bad, cannot be judged: no wheel. If the release itself is the cause, name another one."
+        in err
     )
 
 
@@ -120,13 +121,16 @@ def test_nothing_is_judged_where_the_newest_release_is_installed(
 @pytest.mark.parametrize(
     ("arguments", "text"),
     [
-        (("across",), "Name what is to differ: --package NAME VERSION"),
-        (("across", "--package", "pebble"), "--package pebble names no version"),
+        (("across",), "No difference between environments is named. Add --package NAME VERSION"),
+        (("across", "--package", "pebble"), "--package pebble has no version"),
         (
             ("across", "--package", "pebble", "latest"),
             "'latest' is not a version of a package. Write one such as 0.3.2.",
         ),
-        (("across", "--package", "pebble", "installed"), "pebble is not installed here: name a version."),
+        (
+            ("across", "--package", "pebble", "installed"),
+            "pebble is not installed here, so it has no installed version. Name a version.",
+        ),
         (("across", "--package", "pebble", "1.0", "--as", "xml"), "There is no form named 'xml'."),
         (("across", "--package", "pebble", "1.0", "--tier", "tiny"), "There is no tier named 'tiny'."),
         (("across", "--package", "pebble", "1.0", "--only", "T9"), "There is no claim named 'T9'."),
@@ -135,7 +139,7 @@ def test_nothing_is_judged_where_the_newest_release_is_installed(
         (("across", "--package", "", "1.0"), "'' is not the name of a package. Write one such as jax."),
         (("across", "--package", "jax @ file:", "1.0"), "'jax @ file:' is not the name of a package"),
         (("bisect", "a", "--package=-rfile", "--good=1", "--bad=2", "--releases=1"), "'-rfile' is not the name of a"),
-        (("across", "--python", ""), "'' is no version of Python: write such as 3.13."),
+        (("across", "--python", ""), "'' is not a version of Python. Write such as 3.13."),
         (("across", "--constraints", "none.txt"), "Cannot read the constraints none.txt"),
         ((*BISECT, "--by", "luck"), "There is no kind of change named 'luck'. Known: bits, drift, verdict."),
         (("bisect", "a", "--package", "p", "--good", "2", "--bad", "1", "--releases", "1"), "2 is not older than 1"),

@@ -150,7 +150,7 @@ def test_the_same_command_writes_the_same_file_over_the_old_one(trained: Evoclai
         (("neat", "--on=partiy"), "There is no task for neat named 'partiy'. Did you mean 'parity'?"),
         (("neat", "--on=parity", "--tier=smok"), "There is no tier named 'smok'. Did you mean 'smoke'?"),
         (("neat", "--on=parity", "--device=tpu"), "There is no device named 'tpu'."),
-        (("neat", "--on=parity", "--seed=-1"), "A seed is 0 or above and below 2147483648, not -1."),
+        (("neat", "--on=parity", "--seed=-1"), "A seed is a whole number from 0 to 2147483647, not -1."),
         (
             ("neat", "--on=parity", "--seed=77"),
             "holds no trial of neat on parity (smoke) with seed 77, and reference trials come without champions. "
@@ -170,8 +170,14 @@ def test_the_same_command_writes_the_same_file_over_the_old_one(trained: Evoclai
             ("neat", "--on=parity", "--seed=4", "--as=json", "--out=tiny_paper.py/x"),
             "Cannot write tiny_paper.py/x: File exists. Name another file with --out.",
         ),
-        (("cma_es", "--on=parity", "--seed=4", "--as=svg"), "A champion of cma_es is no genome"),
-        (("right", "--on=parity", "--seed=4", "--as=json"), "A champion of right is no genome"),
+        (
+            ("cma_es", "--on=parity", "--seed=4", "--as=svg"),
+            "A champion of cma_es has arrays of parameters and no genome",
+        ),
+        (
+            ("right", "--on=parity", "--seed=4", "--as=json"),
+            "A champion of right has arrays of parameters and no genome",
+        ),
     ],
 )
 def test_a_users_mistake_is_one_sentence_and_status_2(

@@ -79,12 +79,15 @@ def test_run_can_be_held_to_a_task_and_a_tier(evoclaims: Evoclaims, monkeypatch:
         (("run", "right", "--on", "x"), "There is no task for right named 'x'. Known: parity."),
         (
             ("run", "right", "--trials", "0"),
-            "--trials takes 1 to 100 trials a condition (no verdict looks at more), not 0.",
+            "--trials takes 1 to 100 trials per condition (no verdict reads more), not 0.",
         ),
-        (("run", "right", "--trials", "101"), "not 101. Further seeds are run by another call, with --first-seed."),
-        (("run", "right", "--trials", "1000000000000"), "--trials takes 1 to 100 trials a condition"),
-        (("run", "right", "--first-seed", "-1"), "A seed is 0 or above and below 2147483648, not -1."),
-        (("run", "right", "--first-seed", "2147483647"), "A seed is 0 or above and below 2147483648, not 2147483648."),
+        (("run", "right", "--trials", "101"), "not 101. Run further seeds by another call, with --first-seed."),
+        (("run", "right", "--trials", "1000000000000"), "--trials takes 1 to 100 trials per condition"),
+        (("run", "right", "--first-seed", "-1"), "A seed is a whole number from 0 to 2147483647, not -1."),
+        (
+            ("run", "right", "--first-seed", "2147483647"),
+            "A seed is a whole number from 0 to 2147483647, not 2147483648.",
+        ),
         (("run", "right", "--device", "tpu"), "There is no device named 'tpu'. Did you mean 'gpu'?"),
         (("run", "right", "--storage", "pyproject.toml"), "is a file, not a folder"),
         (("run", "--tier", "ful"), "There is no tier named 'ful'. Did you mean 'full'? Known: full, smoke."),
@@ -270,5 +273,5 @@ def test_a_device_without_enough_memory_is_one_sentence(evoclaims: Evoclaims, mo
     assert (status, err.count("\n")) == (1, 1)
     assert err.startswith("evoclaims: right on parity (smoke) failed: The device's memory ")
     assert (
-        "does not hold 1 trial of hand_built on n_parity at once, and fewer cannot be run. Close what else uses" in err
+        "does not hold 1 trial of hand_built on n_parity at once, and fewer cannot be run. Close other programs" in err
     )

@@ -79,7 +79,7 @@ def test_a_command_that_computes_nothing_waits_for_no_large_library(
         ("2> /dev/full", "status", 2, "", ""),
         (">&-", "new made", 0, "", ""),
         ("2>&-", "status", 2, "", ""),
-        ("", "status", 2, "", "evoclaims: The current folder cannot be used (No such file or directory): if it was"),
+        ("", "status", 2, "", "evoclaims: The current folder cannot be used (No such file or directory). If it was"),
     ],
 )
 def test_a_full_disk_a_closed_stream_or_a_folder_that_is_gone_gives_no_traceback(

@@ -200,7 +200,7 @@ CHAMPION = ("maze", "--method=random", "--seed=4")
             "holds no trial of random on maze (smoke) with seed 77, and reference trials come without champions. "
             "`evoclaims run random --on maze --tier smoke --trials 1 --first-seed 77` runs it, in about ",
         ),
-        (("maze", "--method=random", "--seed=-1"), "A seed is 0 or above and below 2147483648, not -1."),
+        (("maze", "--method=random", "--seed=-1"), "A seed is a whole number from 0 to 2147483647, not -1."),
         (
             (*CHAMPION, "--as=gfi"),
             "There is no way to look at a champion named 'gfi'. Did you mean 'gif'? Known: elites, gif, page, path.",

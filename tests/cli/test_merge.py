@@ -100,9 +100,9 @@ def test_a_verdict_in_a_foreign_place_is_left_out(evoclaims: Evoclaims) -> None:
     ("arguments", "text"),
     [
         (("right", "nowhere"), "There is no trial store 'nowhere': the folder does not exist."),
-        (("right", "claims"), "claims is no trial store: it has no store.json"),
-        (("right", ".evoclaims"), ".evoclaims is the store that would be copied into"),
-        (("right", "--storage=claims"), "claims is no trial store: it has no store.json"),
+        (("right", "claims"), "claims is not a trial store: it has no store.json"),
+        (("right", ".evoclaims"), ".evoclaims is the store to copy into"),
+        (("right", "--storage=claims"), "claims is not a trial store: it has no store.json"),
     ],
 )
 def test_what_is_no_other_store_is_refused_before_anything_is_copied(

@@ -104,5 +104,5 @@ def test_trials_of_unknown_code_are_refused_unless_asked_for(evoclaims: Evoclaim
     assert status == 2
     assert "right-parity" in out
     assert "wrong-parity" not in out
-    assert "Trials of wrong on parity ran code of unknown revision" in err
+    assert "Trials of wrong on parity ran code of an unknown revision" in err
     assert "wrong-parity.jsonl: 10 trials" in evoclaims("reference", "--unknown-revision")[1]

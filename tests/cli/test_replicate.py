@@ -98,7 +98,7 @@ def test_files_have_the_same_numbers(evoclaims: Evoclaims) -> None:
         (("--tier=ful",), "There is no tier named 'ful'."),
         (("--variant=trade",), "There is no variant named 'trade'. Did you mean 'traded'?"),
         (("--as=xml",), "There is no form named 'xml'."),
-        (("--variant=traded",), "No trial of the full tier under traded is at hand whose numbers are published."),
+        (("--variant=traded",), "There are no trials of the full tier under traded whose numbers are published."),
     ],
 )
 def test_a_mistake_is_a_sentence(evoclaims: Evoclaims, arguments: tuple[str, ...], text: str) -> None:

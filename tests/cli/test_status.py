@@ -57,7 +57,7 @@ def test_claims_are_chosen_by_id_by_whole_name_and_by_the_letters_of_ids(
 def test_a_list_without_a_claim_is_a_sentence(status: Evoclaims) -> None:
     code, out, err = status("--only= ,")
     assert (code, out) == (2, "")
-    assert "' ,' names no claim: name some, such as G1" in err
+    assert "' ,' names no claim. Name some, such as G1" in err
 
 
 def test_a_claim_that_does_not_exist_is_a_sentence(status: Evoclaims) -> None:

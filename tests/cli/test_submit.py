@@ -200,7 +200,7 @@ def test_jobs_of_this_machine_are_estimated_on_its_gpus(evoclaims: Evoclaims, mo
     [
         (["--cluster=cloud"], "cluster"),
         (["--time=soon"], "A time limit is a length of time"),
-        (["--time=0"], "A job needs some time, not '0'."),
+        (["--time=0"], "A job's time must be above 0, not '0'."),
         (["--gpus=-1"], "--gpus takes a number from 0 up, not -1."),
         (["--cpus=-1", "--dry-run"], "--cpus takes a number from 0 up, not -1."),
         (["--array=0"], "--array takes a number from 1 up, not 0."),
@@ -208,7 +208,7 @@ def test_jobs_of_this_machine_are_estimated_on_its_gpus(evoclaims: Evoclaims, mo
         (["--slurm=output=x"], "The option output of sbatch cannot be passed through: evoclaims sets it."),
         (["--slurm==3"], "An option of sbatch is a name and a text or a number"),
         (["--slurm=a=1\n#SBATCH --uid=0"], "An option of sbatch is a name and a text or a number"),
-        (["--cluster=local", "--slurm=account=lab"], "--slurm is for jobs of SLURM"),
+        (["--cluster=local", "--slurm=account=lab"], "--slurm is only for SLURM jobs"),
         (["nobody"], "nobody"),
     ],
 )
@@ -252,7 +252,7 @@ def test_a_silent_slurm_and_a_torn_record_are_sentences(evoclaims: Evoclaims, sl
     path.write_text(path.read_text().replace('"41"', '"41; rm -rf ~"'))
     status, _, err = evoclaims("jobs")
     assert status == 2
-    assert f"Cannot read which jobs were submitted, {path}: " in err
+    assert f"Cannot read the list of submitted jobs, {path}: " in err
 
 
 def test_jobs_of_this_machine_store_their_trials_and_failures_say_why(evoclaims: Evoclaims) -> None:

@@ -259,7 +259,7 @@ def test_what_is_left_of_the_reward_of_the_episode_that_made_a_champion_is_that_
 
 
 @pytest.mark.parametrize(
-    ("variant", "said"), [("", "6-parity ({} on average)"), ("whole_tables", "published mode, it is none ({})")]
+    ("variant", "said"), [("", "6-parity ({} on average)"), ("whole_tables", "published mode, none of ten is ({})")]
 )
 def test_success_of_ppo_without_the_curriculum_is_that_of_the_trials(variant: str, said: str) -> None:
     trials = committed(REPRODUCTION.references_of(variant), "full", "ppo", "n_parity_direct")

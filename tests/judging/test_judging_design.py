@@ -29,11 +29,11 @@ def test_a_fixed_design_looks_once() -> None:
         (lambda: Look(10, 0.0), "alpha"),
         (lambda: Look(10, 1.0), "alpha"),
         (lambda: Design(()), "at least one look"),
-        (lambda: Design((Look(5, 0.01), Look(5, 0.04))), "more trials than the one before"),
-        (lambda: Design((Look(5, 0.5), Look(6, 0.5))), "add up to less than 1"),
+        (lambda: Design((Look(5, 0.01), Look(5, 0.04))), "more than the one before"),
+        (lambda: Design((Look(5, 0.5), Look(6, 0.5))), "add up to 1. Their sum must be below 1"),
         (lambda: Design((Look(5, 0.05),), p0=1.0), "p0"),
         (lambda: Design((Look(5, 0.05),), a12_margin=0.4), "A12 margin"),
-        (lambda: Design((Look(5, 0.05),), first_seed=-1), "seed is 0 or above"),
+        (lambda: Design((Look(5, 0.05),), first_seed=-1), "first seed is -1. It must be at least 0"),
     ],
 )
 def test_an_impossible_design_is_rejected_in_a_sentence(make: Callable[[], object], sentence: str) -> None:

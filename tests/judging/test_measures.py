@@ -101,7 +101,7 @@ def test_a_level_of_a_profile_is_a_measure(source) -> None:
 
 
 def test_a_profile_of_one_level_is_rejected(source) -> None:
-    with pytest.raises(UserError, match="at least 2 levels"):
+    with pytest.raises(UserError, match="a profile needs at least 2"):
         source("ppo", []).success(1)
 
 

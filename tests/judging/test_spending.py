@@ -64,7 +64,7 @@ def test_overspend_is_part_of_a_trials_id_only_where_it_is_set() -> None:
 
 @pytest.mark.parametrize("share", [-0.1, float("nan"), True, "1"])
 def test_an_overspend_that_is_no_share_is_refused(share: Any) -> None:
-    with pytest.raises(UserError, match="is a share of its budget, 0 or above"):
+    with pytest.raises(UserError, match="is not a share of its budget, 0 or above"):
         trained(overspend=share)
 
 

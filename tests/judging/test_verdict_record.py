@@ -79,5 +79,5 @@ def test_the_part_that_decided_is_named_whatever_the_compound(source) -> None:
 
 @pytest.mark.parametrize("p", [(2.0, 0.0), (0.0, -1.0), (float("nan"), 0.5)])
 def test_a_p_value_that_is_no_probability_is_refused(p: tuple[float, float]) -> None:
-    with pytest.raises(UserError, match="A p value lies between 0 and 1"):
+    with pytest.raises(UserError, match="A p value is .* It must be between 0 and 1"):
         PValues(*p)

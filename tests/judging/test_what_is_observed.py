@@ -110,14 +110,14 @@ def test_steps_of_several_sizes_are_compared_by_the_largest(source) -> None:
 @pytest.mark.parametrize("other", [Window(100.0, 25.0), Window(10.0)])
 def test_steps_that_do_not_fit_together_are_refused(source, other) -> None:
     with pytest.raises(
-        UserError, match="multiples of .*20 up to .*give the conditions budgets with reports equally far apart"
+        UserError, match="multiples of .*20 up to .*Give the conditions budgets with reports equally far apart"
     ):
         _ = until(source, "a", [], Window(100.0, 20.0)) < until(source, "b", [], other)
 
 
 def test_a_kind_is_not_given_measures_that_are_not_observed_alike(source) -> None:
     a, b = until(source, "a", [], Window(100.0)), until(source, "b", [], Window(50.0))
-    with pytest.raises(UserError, match="not observed alike: write a < b"):
+    with pytest.raises(UserError, match="not observed up to the same limit. Write a < b"):
         Greater(a, b)
 
 
@@ -128,7 +128,7 @@ def test_nothing_is_asserted_beyond_what_is_observed(source) -> None:
     for assertion in (lambda: a < 81, lambda: a > 81, lambda: a.between(5, 81)):
         with pytest.raises(UserError, match="within 80' is not observed beyond that.*about 81"):
             assertion()
-    with pytest.raises(UserError, match="nobody knows how far"):
+    with pytest.raises(UserError, match="the distance of two trials beyond it is unknown"):
         a.equivalent_to(until(source, "b", [], Window(80.0)), margin=5)
     assert judge(a.never_above_itself(), FIXED_10).outcome is SUPPORTED
 
@@ -179,7 +179,7 @@ def test_what_can_be_below_0_has_no_ratios(source) -> None:
 
 @pytest.mark.parametrize("factor", [0, -1, math.inf, math.nan, True, "2"])
 def test_a_factor_is_a_finite_number_above_0(source, factor) -> None:
-    with pytest.raises(UserError, match="multiplied by a finite number above 0, not by"):
+    with pytest.raises(UserError, match="is multiplied by .* Use a finite number above 0"):
         _ = source("a", []).score() * factor
 
 

@@ -139,7 +139,7 @@ def test_a_misspelt_curve_says_which_there_are(group: Any) -> None:
         trials.steps_to("sucess", 0.9).of(trials.fetch([0])[0])
     with pytest.raises(UserError, match="a finite value, not nan"):
         trials.steps_to("success", math.nan)
-    with pytest.raises(UserError, match="a share of 0 to 1, and never reaches 90"):
+    with pytest.raises(UserError, match="between 0 and 1, and never reaches 90"):
         trials.steps_to("success", 90)
 
 

@@ -97,7 +97,7 @@ def test_two_claim_tests_of_one_name_are_a_sentence_that_names_both(
     project.write(text)
     result = project.run(own_store=True)
     assert result.ret == pytest.ExitCode.USAGE_ERROR
-    sentence(result, f"Two claim tests are called {name} at the smoke tier, ")
+    sentence(result, f"Two claim tests at the smoke tier are called {name}: ")
     for test in tests:
         sentence(result, f"claims/test_claims.py::{test}")
     assert not (project.path / ".evoclaims" / "trials").exists()
@@ -127,9 +127,9 @@ def test_a_claim_without_parameters_shares_its_id_with_no_cases_of_another_test(
     result = project.run(own_store=True)
     assert result.ret == pytest.ExitCode.USAGE_ERROR
     sentence(
-        result, "Two claim tests have the id X1, claims/test_claims.py::test_plain[X1-smoke] without parameters and"
+        result, "Two claim tests have the id X1: claims/test_claims.py::test_plain[X1-smoke] without parameters, and"
     )
-    sentence(result, "claims/test_claims.py::test_cases[right-X1-smoke] with some, so that")
+    sentence(result, "claims/test_claims.py::test_cases[right-X1-smoke] with some. So X1 would name")
     project.write(BESIDE.format("X2"))  # two sentences under one id, each with its own cases
     assert project.run("--collect-only").ret == 0
 
@@ -138,7 +138,7 @@ def test_the_command_line_refuses_two_claims_of_one_name_too(project: Any, capsy
     project.write(IN_THE_ID)
     for command in ("status", "accept"):
         assert main([command, "--tier=smoke"]) == 2
-        assert "Two claim tests are called G1[a] at the smoke tier" in capsys.readouterr().err
+        assert "Two claim tests at the smoke tier are called G1[a]" in capsys.readouterr().err
     assert not (project.path / "verdicts.toml").exists()
 
 

@@ -114,9 +114,9 @@ def test_a_bare_assert_cannot_bypass_the_judge(project: Any) -> None:
         ),
         (
             "trials('right', 'parity')",
-            "trials('right', 'parity') does not say on which task: write trials('right', on='p",
+            "trials('right', 'parity') names no task. Write trials('right', on='p",
         ),
-        ("trials('right')", "trials('right') does not say on which task: write trials('right', on=task)."),
+        ("trials('right')", "trials('right') names no task. Write trials('right', on=task)."),
         (
             "verdict(trials('right', on='parity').solves_every_level.in_most_trials)",
             "verdict(...) was given the function in_most_trials itself: call it, as in in_most_trials().",

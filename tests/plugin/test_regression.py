@@ -203,7 +203,7 @@ def test_accepted_verdicts_that_are_torn_fail_the_run_and_hide_no_verdict(accept
             "There is no outcome named 'suported'. Did you mean 'supported'?",
         ),
         (("--claims-compare-fail=",), "No change of a verdict is named"),
-        (("--claims-compare-fail=*->error", "--claims-variant=traded"), "leave one of them out"),
+        (("--claims-compare-fail=*->error", "--claims-variant=traded"), "Leave one of them out"),
     ],
 )
 def test_a_wrong_value_is_one_sentence_before_anything_runs(

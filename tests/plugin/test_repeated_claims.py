@@ -168,4 +168,4 @@ def test_functions_with_the_same_claim_are_no_repetition(project: Any) -> None:
     (project.path / "conftest.py").write_text(PARAMETERS.replace("HOW", "trylast=True").replace("INDIRECT", "True"))
     result = project.run()
     assert result.ret == pytest.ExitCode.USAGE_ERROR
-    result.stderr.fnmatch_lines(["ERROR: Two claim tests are called a at the smoke tier*"])
+    result.stderr.fnmatch_lines(["ERROR: Two claim tests at the smoke tier are called a: *"])

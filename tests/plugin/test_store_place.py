@@ -48,7 +48,7 @@ def test_a_path_after_a_space_that_moves_pytests_root_is_a_sentence(
     there = tmp_path_factory.mktemp("there")
     result = project.run(option, str(there), own_store=True)
     assert result.ret == pytest.ExitCode.USAGE_ERROR
-    sentence(result, f"instead of the project {project.path}, because it")
+    sentence(result, f"not the project {project.path}: it")
     sentence(result, f"Write {option} with =, as in {option}=PATH.")
     project.run(option, "inside", own_store=True)
     assert project.run(option, "inside", own_store=True).ret == 0  # it exists now, and is below the project's root
@@ -73,8 +73,8 @@ def test_commands_find_the_projects_store_from_a_folder_below(
     [
         (("--claims-storage=",), "--claims-storage names no folder"),
         (("--claims-stored", "--claims-storage=mistyped"), "the folder does not exist"),
-        (("--claims-storage=claims",), "is no trial store"),
-        (("--claims-stored", "--claims-storage=claims"), "is no trial store"),
+        (("--claims-storage=claims",), "is not a trial store"),
+        (("--claims-stored", "--claims-storage=claims"), "is not a trial store"),
     ],
 )
 def test_a_folder_that_is_no_store_ends_a_run_before_it_begins(
@@ -131,7 +131,7 @@ def test_verify_moves_nothing_in_a_folder_that_is_no_store(project: Any, capsys:
     home.mkdir(parents=True)
     (home / "photo.jpg").write_text("precious")
     assert main(["verify", f"--storage={project.path / 'home'}"]) == 2
-    assert "is no trial store" in capsys.readouterr().err
+    assert "is not a trial store" in capsys.readouterr().err
     assert [path.name for path in (project.path / "home").rglob("*")] == ["trials", "of_my_life", "photo.jpg"]
 
 

@@ -105,9 +105,12 @@ OTHERS = {
 @pytest.mark.parametrize(
     ("body", "what"),
     [
-        ({"name": "mine"}, r"Mine has no revision, .*: write `revision: ClassVar\[int\] = …`"),
-        ({"name": "mine", "revision": "1"}, r"Mine has '1' as its revision, .*: write `revision: ClassVar\[int\] = …`"),
-        ({"name": "mine", "revision": 1}, r"Mine is no dataclass: write @dataclass\(frozen=True\)"),
+        ({"name": "mine"}, r"Mine has no revision, .*\. Write `revision: ClassVar\[int\] = …`"),
+        (
+            {"name": "mine", "revision": "1"},
+            r"Mine has '1' as its revision, .*\. Write `revision: ClassVar\[int\] = …`",
+        ),
+        ({"name": "mine", "revision": 1}, r"Mine is not a dataclass. Write @dataclass\(frozen=True\)"),
     ],
 )
 def test_what_a_method_lacks_to_be_told_apart_is_a_sentence(body: dict[str, Any], what: str) -> None:
@@ -120,9 +123,9 @@ def test_what_a_method_lacks_to_be_told_apart_is_a_sentence(body: dict[str, Any]
     [
         (
             "init step cost",
-            "Mine has no function best: write `def best(self, …)` in it. A method has init, step, best, ",
+            "Mine has no function best. Write `def best(self, …)` in it. A method has init, step, best, ",
         ),
-        ("step", "Mine has no function init and no best and no cost: write `def init(self, …)` in it. A method has "),
+        ("step", "Mine has no function init and no best and no cost. Write `def init(self, …)` in it. A method has "),
     ],
 )
 def test_a_method_that_lacks_a_function_is_a_sentence(functions: str, what: str) -> None:
@@ -143,14 +146,14 @@ _TASK: dict[str, Any] = {
     [
         (
             ("examine",),
-            "Mine has no function examine: write `def examine(self, …)` in it. A task has reset, step, episode, "
+            "Mine has no function examine. Write `def examine(self, …)` in it. A task has reset, step, episode, "
             "examine.",
         ),
-        (("reset", "step"), "Mine has no function reset and no step: write `def reset(self, …)` in it. A task has "),
+        (("reset", "step"), "Mine has no function reset and no step. Write `def reset(self, …)` in it. A task has "),
         (
             ("levels", "horizon"),
-            "Mine has no levels and no horizon: write `levels: ClassVar[int] = …` in it, or a field or property of "
-            "that name. A task says levels, observation_size, action_size, horizon.",
+            "Mine has no levels and no horizon. Write `levels: ClassVar[int] = …` in it, or a field or property of "
+            "that name. A task needs levels, observation_size, action_size, horizon.",
         ),
     ],
 )
@@ -169,14 +172,14 @@ def test_the_task_of_a_training_loop_needs_nothing_that_only_the_engine_asks_for
 
 def test_a_method_that_can_be_changed_after_its_trials_have_an_id_is_a_sentence() -> None:
     mine: Any = make_dataclass("Mine", [], namespace={"name": "mine", "revision": 1})
-    with pytest.raises(UserError, match="Mine is no frozen dataclass: write @dataclass"):
+    with pytest.raises(UserError, match="Mine is not a frozen dataclass. Write @dataclass"):
         _ = Condition(mine(), NParity(3), "direct", Budget(generations=1)).id
 
 
 @pytest.mark.parametrize("field", ["method", "task"])
 def test_a_class_in_the_place_of_an_object_is_a_sentence(field: str) -> None:
     given: Any = type(getattr(CONDITION, field))
-    said = f"^{given.__name__} is a class, where an object of it is needed: write {given.__name__}\\(\\)\\.$"
+    said = f"^{given.__name__} is a class, and an object of it is needed\\. Write {given.__name__}\\(\\)\\.$"
     with pytest.raises(UserError, match=said):
         _ = replace(CONDITION, **{field: given}).id
 
@@ -274,7 +277,7 @@ def test_parts_and_subclasses_of_a_users_own_are_told_apart_by_their_classes() -
 
 
 def test_a_field_that_cannot_be_written_is_a_sentence_that_names_the_class() -> None:
-    with pytest.raises(UserError, match="A field of RandomSearch identifies its trials and is not a number, word"):
+    with pytest.raises(UserError, match="A field of RandomSearch is not a number, word"):
         _ = Condition(RandomSearch(8, network=Mlp), TASK, "direct", BUDGET).id  # type: ignore[arg-type]
 
 

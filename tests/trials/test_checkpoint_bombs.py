@@ -144,7 +144,7 @@ def test_a_large_state_of_another_program_is_refused_before_it_is_read(
     with_part(path, "0001", npy((LARGE // 8,), bytes(LARGE)))
     memory()
     assert checkpoint.fault(path) is None
-    with pytest.raises(UserError, match="delete it, and its trials begin anew"):
+    with pytest.raises(UserError, match="Delete it; its trials then start again"):
         run(CONDITION, [1, 5], store, cpus)
     assert memory() < BOUND
 

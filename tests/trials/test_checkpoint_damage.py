@@ -111,7 +111,7 @@ def test_a_checkpoint_of_another_program_says_that_it_is_to_be_deleted(
     path = store.checkpoints / interrupted.name
     path.parent.mkdir(parents=True)
     path.write_bytes(pack({**arrays, "0001": np.zeros((2, 9), np.float32)}))
-    with pytest.raises(UserError, match="delete it, and its trials begin anew") as caught:
+    with pytest.raises(UserError, match="Delete it; its trials then start again") as caught:
         run(CONDITION, [1, 5], store, cpus)
     assert str(path) in str(caught.value)
     path.unlink()

@@ -122,17 +122,17 @@ STEPS: dict[str, Any] = {
     "float32 afterwards.": lambda state, told: (jnp.zeros(5), told),
     "'walker' changes its state by a step: it is of shape (4,) and type float32 before and of shape (4,) and type "
     "int32 afterwards.": lambda state, told: (jnp.zeros(4, jnp.int32), told),
-    "a step of 'walker' reports a metric 'level', which is a name of the engine's own numbers: give it another name.": (
+    "a step of 'walker' reports a metric 'level', which the engine itself uses: give it another name.": (
         lambda state, told: (state, replace(told, metrics={"level": told.fitness}))
     ),
     "a step of 'walker' returns a Progress, not two values: state, Progress(...).": lambda state, told: told,
     "a step of 'walker' returns None (without a `return`?), not two values: state, Progress(...).": lambda *_: None,
     "a step of 'walker' reports None (without a `return`?) as its metrics, not a table such as {'gap': gap} ({} if it "
     "has none).": lambda state, told: (state, replace(told, metrics=None)),
-    "a step of 'walker' reports a metric 1, whose name is no text: write it in quotes.": (
+    "a step of 'walker' reports a metric 1, whose name is not text: write it in quotes.": (
         lambda state, told: (state, replace(told, metrics={1: told.fitness}))
     ),
-    "a step of 'walker' reports a metric 'x' of a list, which is no array, not a real number of shape ().": (
+    "a step of 'walker' reports a metric 'x' of a list, which is not an array, not a real number of shape ().": (
         lambda state, told: (state, replace(told, metrics={"x": [told.fitness]}))
     ),
     "'walker' changes its state by a step: its structure is another one afterwards.": (
@@ -180,7 +180,7 @@ STATES: dict[str, Any] = {
     "a mark `terminated` of shape () and type float32, not of shape () and type bool.": (
         lambda made: replace(made, terminated=jnp.zeros(()))
     ),
-    "an observation of a list, which is no array, not of shape (3,) and type float32.": (
+    "an observation of a list, which is not an array, not of shape (3,) and type float32.": (
         lambda made: replace(made, observation=list(made.observation))
     ),
     "a mark `truncated` of shape (1,) and type bool, not of shape () and type bool.": (
@@ -232,7 +232,7 @@ def test_a_step_that_costs_no_whole_number_of_environment_steps_is_refused(
 
 def test_a_task_without_time_is_to_blame_where_a_step_costs_a_multiple_of_it() -> None:
     empty = type("Empty", (NParity,), {"name": "empty", "horizon": 0})
-    with pytest.raises(UserError, match=r"'empty' has horizon = 0: its episodes take at least 1 step\."):
+    with pytest.raises(UserError, match=r"'empty' has horizon = 0\. It must be at least 1 step\."):
         _ = Condition(RandomSearch(2), empty(3), "direct", Budget(generations=1)).cost
 
 
@@ -265,7 +265,7 @@ class Examining(NParity):
         (lambda e: replace(e, fitness=e.fitness[None]), "a fitness of shape (2, 1) and type float32, not"),
         (lambda e: replace(e, success=e.success > 0), "a success of shape (2,) and type bool, not of shape (2,)"),
         (lambda e: replace(e, metrics={"x": jnp.zeros(3)}), "a metric 'x' of shape (2, 3) and type float32"),
-        (lambda e: replace(e, metrics={"steps": e.fitness}), "a metric 'steps', which is a name of the engine's own"),
+        (lambda e: replace(e, metrics={"steps": e.fitness}), "a metric 'steps', which the engine itself uses"),
         (lambda e: (e.fitness, e.success), "a tuple, not an Episode"),
     ],
 )
@@ -290,9 +290,9 @@ BITS = np.ones((4, 2), np.float32)
         ((BITS, YES[:3], YES[:3], (3,)), "table's targets have shape (3, 1) and type bool"),
         ((BITS, YES.astype(np.float32), YES, (4,)), "table's targets have shape (4, 1) and type float32"),
         ((BITS, YES, np.ones((4, 2), bool), (4,)), "table's active outputs have shape (4, 2), and its targets (4, 1)"),
-        ((BITS, YES, YES, (2, 5)), "table's levels ask for (2, 5) rows, not for ever more of its 4"),
-        ((BITS, YES, YES, (3, 2)), "table's levels ask for (3, 2) rows, not for ever more of its 4"),
-        ((BITS, YES, YES, ()), "table's levels ask for () rows, not for ever more of its 4"),
+        ((BITS, YES, YES, (2, 5)), "table's levels ask for (2, 5) rows, which must increase up to all 4"),
+        ((BITS, YES, YES, (3, 2)), "table's levels ask for (3, 2) rows, which must increase up to all 4"),
+        ((BITS, YES, YES, ()), "table's levels ask for () rows, which must increase up to all 4"),
     ],
 )
 def test_a_truth_table_whose_parts_do_not_belong_together_is_refused(table: Any, what: str) -> None:
@@ -347,7 +347,7 @@ def test_a_task_whose_reset_does_not_read_the_level_is_refused_if_it_has_several
     ("parts", "sentence"),
     [
         ((BITS, YES, np.array([[True], [False], [True], [True]]), (2, 4)), "a row that asks nothing"),
-        ((BITS, YES, YES, (2, 3)), "not for ever more of its 4, at last for all"),
+        ((BITS, YES, YES, (2, 3)), "which must increase up to all 4"),
     ],
 )
 def test_a_table_with_rows_that_ask_nothing_or_are_never_asked_is_refused(parts: Any, sentence: str) -> None:
@@ -363,7 +363,7 @@ class Misspelled(Walker):
 
 
 def test_a_package_that_is_not_installed_is_named_before_anything_runs(tmp_path: Any, cpus: list[Any]) -> None:
-    with pytest.raises(UserError, match="The packages of 'walker' name optacs, not installed here: is it misspelled"):
+    with pytest.raises(UserError, match="The packages of 'walker' name optacs, not installed here. Check the spelling"):
         run(Condition(Misspelled(), TASK, "direct", Budget(generations=1)), [0], Store(tmp_path), cpus)
 
 
@@ -376,5 +376,5 @@ class Rounded(NParity):
 
 
 def test_a_success_that_is_1_but_for_rounding_is_a_sentence(tmp_path: Any, cpus: list[Any]) -> None:
-    with pytest.raises(UserError, match=r"of 0\.9999999\d+, which is 1 but for rounding.*evoclaims\.envs\.averaged"):
+    with pytest.raises(UserError, match=r"of 0\.9999999\d+, which is 1 except for rounding.*evoclaims\.envs\.averaged"):
         run(Condition(Walker(), Rounded(3), "direct", Budget(generations=1)), [0], Store(tmp_path), cpus)

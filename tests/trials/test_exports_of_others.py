@@ -72,7 +72,7 @@ def test_json_of_pandas_is_read_in_every_layout_with_names(
     ],
 )
 def test_json_without_names_or_with_doubt_is_refused(values: Callable[..., list[float]], text: str, said: str) -> None:
-    with pytest.raises(UserError, match=rf"runs\.json is no table that can be read: .*({said})"):
+    with pytest.raises(UserError, match=rf"runs\.json is not a table that can be read: .*({said})"):
         values(text, "runs.json")
 
 
@@ -110,7 +110,7 @@ def test_other_delimiters_are_named(values: Callable[..., list[float]], delimite
 
 
 def test_quote_that_is_never_closed_swallows_no_rows(values: Callable[..., list[float]]) -> None:
-    with pytest.raises(UserError, match="a cell begins with a quote that is never closed"):
+    with pytest.raises(UserError, match="a cell begins with a quote that does not end"):
         values('seed,return,note\n4,1,a\n7,2,"b\n9,3,c\n')
 
 

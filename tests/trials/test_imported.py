@@ -219,11 +219,14 @@ def test_where_the_folder_is_does_not_matter(table: Callable[..., Imported], tmp
             r"runs\.csv has no row whose algo is 'sca'\. Did you mean 'sac'\? Known: ppo,",
         ),
         ({"where": {"algo": "ppo", "lr": 0.001}}, r"runs\.csv has no row with algo 'ppo' and lr 0\.001\."),
-        ({}, r"runs\.csv has 2 rows of seed 7 \(rows 2 and 4\), and a row is a trial: choose among them by where="),
-        ({"metric": "algo", "where": SAC}, r"runs\.csv holds 'sac' in row 2 of the column 'algo', which is no number"),
+        ({}, r"runs\.csv has 2 rows of seed 7 \(rows 2 and 4\), and a row is a trial\. Choose among them by where="),
+        (
+            {"metric": "algo", "where": SAC},
+            r"runs\.csv holds 'sac' in row 2 of the column 'algo', which is not a number",
+        ),
         ({"seed": "lr"}, r"Row 1 of runs\.csv has the seed 0\.001 in the column 'lr': each trial has a whole number"),
         ({"path": "gone.csv"}, r"The table .*gone\.csv cannot be read: No such file"),
-        ({"path": "runs.xlsx"}, r"runs\.xlsx is no table that can be read: the name of one ends in \.csv, "),
+        ({"path": "runs.xlsx"}, r"runs\.xlsx is not a table that can be read. Its name must end in \.csv, "),
         ({"metric": ""}, r"Imported\('runs\.csv'\) names no metric"),
         (
             {"metric": ["return", "environment_steps"], "step": "lr"},
@@ -261,13 +264,13 @@ def test_what_does_not_fit_is_a_sentence_with_the_file_and_what_is_there(
         ("c.csv", "seed,seed\n1,2\n", r"two of its columns have one name \(seed, seed\)"),
         ("d.json", "[1, 2]", "a table in JSON is a list of objects, .*, and row 1 is 1"),
         ("e.json", "{", "a table in JSON is a list of objects, .*, and its line 1 is '{'"),
-        ("f.parquet", "PAR", "it is no Parquet file"),
+        ("f.parquet", "PAR", "it is not a Parquet file"),
         ("g.json", '[{"seed": 1, "seed": 2, "return": 3}]', r"two of its columns have one name \(seed, return, seed"),
         ("h.jsonl", '{"seed": 1, "return": 3, "return": 4}', r"two of its columns have one name \(seed, return, ret"),
     ],
 )
 def test_a_file_without_a_table_is_a_sentence(table: Callable[..., Imported], name: str, text: str, said: str) -> None:
-    with pytest.raises(UserError, match=rf"{name} is no table that can be read: {said}"):
+    with pytest.raises(UserError, match=rf"{name} is not a table that can be read: {said}"):
         _ = table(text, name).existing
 
 
@@ -288,7 +291,7 @@ def test_a_line_separator_within_a_text_ends_no_line_of_json(table: Callable[...
 
 @pytest.mark.parametrize("cell", ["1_0", '"1,000"', "0x1F", "1;5"])
 def test_what_only_some_programs_take_for_a_number_is_none(table: Callable[..., Imported], cell: str) -> None:
-    with pytest.raises(UserError, match=r"in row 1 of the column 'return', which is no number"):
+    with pytest.raises(UserError, match=r"in row 1 of the column 'return', which is not a number"):
         _ = table(f"seed,return\n1,{cell}\n").existing
 
 

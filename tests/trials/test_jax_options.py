@@ -64,7 +64,9 @@ def test_option_with_another_value_is_free_or_refused(name: str) -> None:
         if name in FREE:
             refuse_changed()
         else:
-            with pytest.raises(UserError, match=rf"^jax is set to .*\b{name} is .* \(default: .*Remove jax\.config"):
+            with pytest.raises(
+                UserError, match=rf"^These settings of jax change .*\b{name} is .* \(default: .*Remove jax\.config"
+            ):
                 refuse_changed()
 
 

@@ -40,7 +40,7 @@ def test_a_policy_without_function_or_arrays_is_refused(policy: Any, what: str) 
 def test_an_action_that_is_no_array_is_refused_with_both_names(action: Any) -> None:
     method = type("Odd", (Walker,), {"best": lambda self, task, state: Policy(state, lambda p, bits: action)})()
     with pytest.raises(
-        UserError, match=BOTH + r"an action is .*, which is no array, and 'n_parity' takes shape \(1,\)"
+        UserError, match=BOTH + r"an action is .*, which is not an array, and 'n_parity' takes shape \(1,\)"
     ):
         traced_progress(method, TASK)
 
@@ -61,7 +61,7 @@ class Playing(NParity):
         (lambda e: None, "None (without a `return`?), not an Episode."),
         (lambda e: e.fitness, "an array, not an Episode."),
         (lambda e: (e.fitness, e.success), "a tuple, not an Episode."),
-        (lambda e: replace(e, success=[e.success]), "a success of a list, which is no array, not of shape () and"),
+        (lambda e: replace(e, success=[e.success]), "a success of a list, which is not an array, not of shape () and"),
     ],
     ids=["None", "array", "tuple", "list"],
 )

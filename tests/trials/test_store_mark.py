@@ -86,7 +86,7 @@ def test_a_folder_that_is_no_store_is_refused_and_nothing_in_it_is_touched(tmp_p
     os.utime(tmp_path / "home" / ".half.tmp", (0, 0))
     before, store = contents(tmp_path), Store(tmp_path / "home")
     for use in (store.check, store.check_writable, lambda: verify(store, repair=True)):
-        with pytest.raises(UserError, match=r"is no trial store: it has no store\.json") as caught:
+        with pytest.raises(UserError, match=r"is not a trial store: it has no store\.json") as caught:
             use()
         assert name.split("/")[0] in str(caught.value)
     assert contents(tmp_path) == before
@@ -103,13 +103,13 @@ def test_an_empty_folder_and_one_that_is_not_there_may_become_stores(tmp_path: P
 @pytest.mark.parametrize("text", ["", "{}", "[]", "\x00", '{"program": "another"}', "[" * 100_000])
 def test_a_mark_that_says_something_else_is_no_mark(tmp_path: Path, text: str) -> None:
     (tmp_path / MARK).write_text(text)
-    with pytest.raises(UserError, match=r"is no trial store: its store\.json does not say so"):
+    with pytest.raises(UserError, match=r"is not a trial store: its store\.json was not written by evoclaims"):
         check_store(tmp_path)
 
 
 def test_a_store_of_a_later_release_is_left_to_it(tmp_path: Path) -> None:
     (tmp_path / MARK).write_text('{"program": "evoclaims", "schema": 2}')
-    with pytest.raises(UserError, match="says schema 2"):
+    with pytest.raises(UserError, match="has schema 2"):
         check_store(tmp_path)
 
 

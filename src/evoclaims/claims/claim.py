@@ -135,7 +135,7 @@ def expected(outcome: Outcome | str, *, because: str, tier: str | None = None) -
     if outcome not in set(Outcome):
         raise UserError(f"The outcome {outcome!r} does not exist. Use one of {', '.join(Outcome)}.")
     if not because.strip():
-        raise UserError(f"An accepted {outcome} verdict needs because=...: what is known about the reason.")
+        raise UserError(f"An expected outcome ({outcome}) lacks its reason. Write because=...: what is known about it.")
     if tier is not None:
         require_known("tier", tier, TIERS)
     return pytest.mark.claim_expect(Expectation(Outcome(outcome), because, tier))

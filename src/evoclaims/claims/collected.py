@@ -107,17 +107,18 @@ def claim_tests(items: Iterable[pytest.Item]) -> dict[pytest.Item, ClaimTest]:
         if _call(other) != _call(item):
             tier, name = test.key
             raise UserError(
-                f"Two claim tests are called {name} at the {tier} tier, {other.nodeid} and {item.nodeid}, so that the "
-                "verdict of one would take the other's place: give one of them another claim id or other parameter ids."
+                f"Two claim tests at the {tier} tier are called {name}: {other.nodeid} and {item.nodeid}. "
+                "Each would overwrite the other's verdict. Give one of them another claim id, or other "
+                "parameter ids."
             )
     whole = {(test.claim.id, test.tier): item for item, test in tests.items() if not test.case}
     for item, test in tests.items():
         plain = whole.get((test.claim.id, test.tier))
         if test.case and plain:
             raise UserError(
-                f"Two claim tests have the id {test.claim.id}, {plain.nodeid} without parameters and "
-                f"{item.nodeid} with some, so that {test.claim.id} would mean one claim and all of its cases: give one "
-                "of them another claim id, or both parameters."
+                f"Two claim tests have the id {test.claim.id}: {plain.nodeid} without parameters, and "
+                f"{item.nodeid} with some. So {test.claim.id} would name one claim and all its cases. "
+                "Give one of them another claim id, or parameters to both."
             )
     return tests
 

@@ -30,17 +30,17 @@ def selected(option: str, known: Collection[str], *, incomplete: bool = False) -
         if not found:
             if incomplete:
                 raise UserError(
-                    f"There is no claim named {name!r} in the files that were collected, and not all were: the errors "
-                    "above say why."
+                    f"There is no claim named {name!r} in the files that were collected. Other files were "
+                    "not collected; the errors above give the reasons."
                 )
             if not known:
                 raise UserError(
-                    f"There is no claim named {name!r} here: pytest has collected no claims at all. Run it in the "
-                    "project's root, or name the folder of the claims (pytest ../claims)."
+                    f"There is no claim named {name!r} here, since pytest has collected no claims at all. "
+                    "Run it in the project's root, or name the folder of the claims (pytest ../claims)."
                 )
             alike = {one for one in known if ("[" in one) == ("[" in name)}
             raise UnknownNameError("claim", name, alike or known)
         chosen |= found
     if not chosen:
-        raise UserError(f"{option!r} names no claim: name some, such as G1 or G1,S2, or leave the option out.")
+        raise UserError(f"{option!r} names no claim. Name some, such as G1 or G1,S2, or leave the option out.")
     return chosen

@@ -272,8 +272,10 @@ class Verdicts:
         if self.report is not None:
             raise UserError(f"The reading {name!r} comes after the verdict: write verdict.reading(...) before it.")
         if not isinstance(assertion, Assertion):
-            raise UserError(f"The reading {name!r} is {assertion!r} and takes an assertion, as verdict(...) does.")
+            raise UserError(
+                f"The reading {name!r} is {assertion!r}, which is not an assertion. Write one, as for verdict(...)."
+            )
         if not (name.strip() and because.strip()) or name in (one.name for one in self.readings):
-            raise UserError(f"The reading {name!r} needs a name of its own and because=...: why the sentence means it.")
+            raise UserError(f"The reading {name!r} needs a unique name and because=...: why the sentence means this.")
         moment(since)
         self.readings.append(Reading(name, assertion, because, since))

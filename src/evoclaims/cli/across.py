@@ -77,18 +77,23 @@ def _recipes(options: argparse.Namespace) -> list[Recipe]:
     if named:
         package = checked_name(named.pop(0))
     if package and not named:
-        raise UserError(f"--package {package} names no version: write such as --package {package} installed newest.")
+        raise UserError(f"--package {package} has no version. Add some, such as --package {package} installed newest.")
     if not (named or options.constraints or options.python):
-        raise UserError("Name what is to differ: --package NAME VERSION ..., --constraints FILE ... or --python 3.13.")
+        raise UserError(
+            "No difference between environments is named. Add --package NAME VERSION ..., --constraints "
+            "FILE ... or --python 3.13."
+        )
     if "" in (options.python or ()):
-        raise UserError("'' is no version of Python: write such as 3.13.")
+        raise UserError("'' is not a version of Python. Write one such as 3.13.")
     versions = [_version(package, word) for word in named] or [""]
     pins: list[Path | None] = [Path(name) for name in options.constraints or ()] or [None]
     found = itertools.product(versions, options.python or [""], pins)
     recipes = list(dict.fromkeys(Recipe(package, version, python, file) for version, python, file in found))
     labels = [recipe.label for recipe in recipes]
     if alike := sorted({label for label in labels if labels.count(label) > 1}):
-        raise UserError(f"Several environments would be called {alike[0]}: give the files of pins different names.")
+        raise UserError(
+            f"Several environments would be called {alike[0]}. Give the files of constraints different names."
+        )
     return recipes
 
 
@@ -100,7 +105,7 @@ def _version(package: str, word: str) -> str:
         return checked(word)
     here = installed_here()
     if package not in here:
-        raise UserError(f"{package} is not installed here: name a version.")
+        raise UserError(f"{package} is not installed here, so it has no installed version. Name a version.")
     return here[package]
 
 

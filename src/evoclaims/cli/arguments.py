@@ -17,8 +17,8 @@ _TIERS = {
 _ON_DEVICES = {"plan", "run", "submit", "mutants", "power", "champion", "look", "across", "bisect"}
 IN_PROCESSES = {"run", "mutants", "power"}
 _PROCESSES = (
-    "how many processes run trials (1, on all devices); auto: one for each GPU, and on processors as many as keep the "
-    "cores busy"
+    "number of processes that run trials (1: this one, on all devices); auto: one per GPU, or without GPUs as many as "
+    "keep the cores busy"
 )
 
 
@@ -51,7 +51,7 @@ def parser() -> argparse.ArgumentParser:
     text = "write a project that runs; it has a method, a task and two claims, or, with --from, those of a paper"
     new = commands.add_parser("new", help=text.partition("; ")[0], description=text)
     new.set_defaults(storage=None, refuse=new.error)  # it reads no trials
-    new.add_argument("folder", metavar="DIR", help="where to: a folder that is new or empty")
+    new.add_argument("folder", metavar="DIR", help="the folder to write: new or empty")
     what = new.add_mutually_exclusive_group()
     text = (
         "what it begins with: method (default), loop (your own training loop), gymnasium (one of its environments) or "
@@ -68,11 +68,11 @@ def parser() -> argparse.ArgumentParser:
 def _running(add: _Add) -> None:
     """Add what runs trials, or shows what running them takes."""
     plan = add("plan", "show what a tier would run, what it costs here, and what its verdicts can show")
-    plan.add_argument("--variant", metavar="NAME", default="", help="what this variant of the protocol changes")
-    plan.add_argument("--like", metavar="KIND", help="times as of trials made on such a device, such as 'NVIDIA H200'")
+    plan.add_argument("--variant", metavar="NAME", default="", help="only what this variant of the protocol changes")
+    plan.add_argument("--like", metavar="KIND", help="use times of trials made on this device, such as 'NVIDIA H200'")
     plan.add_argument("--measure", action="store_true", help="time a few steps of conditions never run here")
 
-    text = "run missing trials, and judge none; with --variant those that it changes, and show which verdicts change"
+    text = "run missing trials and judge nothing; with --variant run what it changes, and show which verdicts change"
     run = add("run", text)
     run.add_argument("method", nargs="?", help="only this method")
     run.add_argument("--on", metavar="TASK", help="only this task")
@@ -81,21 +81,26 @@ def _running(add: _Add) -> None:
     run.add_argument(
         "--time-limit",
         metavar="TIME",
-        help="time that a batch of trials may take, such as 90s, 30min, 24h or none (24h, or what pyproject.toml says)",
+        help="time that a batch of trials may take, such as 90s, 30min, 24h or none (24h, or that of pyproject.toml)",
     )
-    run.add_argument("--retry", action="store_true", help="run trials again that ran out of time under this limit")
+    run.add_argument("--retry", action="store_true", help="continue trials that ran out of time under this limit")
     run.add_argument("--first-seed", type=int, default=0, metavar="SEED", help="seed of the first trial (0)")
 
-    submit = add("submit", "submit the batches that a tier lacks as jobs of SLURM, or of this machine; none twice")
+    submit = add(
+        "submit",
+        "submit a tier's missing batches as jobs of SLURM or of this machine; a queued or running batch is left out",
+    )
     submit.add_argument("method", nargs="?", help="only this method")
     submit.add_argument("--on", metavar="TASK", help="only this task")
-    submit.add_argument("--variant", metavar="NAME", default="", help="what this variant of the protocol changes")
+    submit.add_argument("--variant", metavar="NAME", default="", help="only what this variant of the protocol changes")
     submit.add_argument("--cluster", default="slurm", help="slurm (default), or local: jobs on this machine")
     submit.add_argument("--partition", metavar="NAME", help="SLURM's partition")
     submit.add_argument("--gpus", type=int, metavar="N", help="GPUs of a job")
     submit.add_argument("--cpus", type=int, metavar="N", help="CPU cores of a job")
-    submit.add_argument("--time", metavar="TIME", help="of a job, which goes on in another one if need be (2:00:00)")
-    submit.add_argument("--array", type=int, metavar="N", help="how many jobs run at a time (256; local: 1)")
+    submit.add_argument(
+        "--time", metavar="TIME", help="time of a job; a longer batch continues in another job (2:00:00)"
+    )
+    submit.add_argument("--array", type=int, metavar="N", help="number of jobs that run at a time (256; local: 1)")
     submit.add_argument(
         "--slurm", metavar="KEY=VALUE", action="append", default=[], help="another option of sbatch: account=lab"
     )
@@ -103,13 +108,13 @@ def _running(add: _Add) -> None:
 
     add("jobs", "show which submitted jobs are queued, running, done or failed, why, and where their logs are")
 
-    mutants = add("mutants", "plant faults in methods and tasks, run them, and write which of them the claims notice")
+    mutants = add("mutants", "plant faults in methods and tasks, run them, and write which faults change which claims")
     mutants.add_argument("--mutant", metavar="NAME", help="only this fault, such as minimizes")
     mutants.add_argument("--of", metavar="TARGET", help="only faults of this method or this task")
-    mutants.add_argument("--stored", action="store_true", help="run nothing: judge the trials that have run")
+    mutants.add_argument("--stored", action="store_true", help="run nothing; judge the stored trials")
 
     power = add(
-        "power", "estimate from a pilot how often each claim ends as expected; exit status 1 if one does below 0.95"
+        "power", "estimate from a pilot how often each claim ends as expected; exit status 1 if one is below 0.95"
     )
     power.add_argument("--only", metavar="CLAIMS", help="only these claims, by id or name, such as G1,S2[cma_es]")
     made = power.add_mutually_exclusive_group()
@@ -152,20 +157,20 @@ def _reading(add: _Add) -> None:
     report.add_argument(
         "--trajectories",
         action="store_true",
-        help="run the champions of robots' tasks once more and draw their ways (minutes)",
+        help="run the champions of robots' tasks again and draw their paths (minutes)",
     )
-    report.add_argument("--out", metavar="FOLDER", help="where to (report/)")
+    report.add_argument("--out", metavar="FOLDER", help="folder to write (report/)")
 
     champion = add("champion", "replay a stored trial's champion on every level, and draw or export its network")
     champion.add_argument("method", help="the method")
     champion.add_argument("--on", metavar="TASK", required=True, help="the task")
     champion.add_argument("--seed", type=int, default=0, help="the trial's seed (0)")
     champion.add_argument("--as", dest="form", metavar="FORM", help="also write its network: json, svg or png")
-    champion.add_argument("--out", metavar="FILE", help="where to (figures/METHOD-TASK-SEED.FORM)")
+    champion.add_argument("--out", metavar="FILE", help="file to write (figures/METHOD-TASK-SEED.FORM)")
 
     look = add("look", "draw a robot's task, or show what a stored champion does in it")
     look.add_argument("task", help="the task")
-    look.add_argument("--method", help="the method whose champion is shown; else the task alone")
+    look.add_argument("--method", help="the method whose champion is shown; without it only the task is drawn")
     look.add_argument("--seed", type=int, default=0, help="the trial's seed (0)")
     look.add_argument(
         "--as",
@@ -174,24 +179,31 @@ def _reading(add: _Add) -> None:
         help="path (default): a picture of the paths of all episodes; page: an episode in 3D, for a browser; gif: an "
         "episode, animated; elites: the map of MAP-Elites",
     )
-    look.add_argument("--episode", type=int, default=0, metavar="N", help="which of the evaluation's episodes (0)")
+    look.add_argument(
+        "--episode", type=int, default=0, metavar="N", help="number of the evaluation's episode, from 0 (0)"
+    )
     look.add_argument(
         "--out",
         metavar="FILE",
-        help="where to (figures/TASK.svg, figures/METHOD-TASK-SEED-FORM.…); pictures are svg or png",
+        help="file to write (figures/TASK.svg, figures/METHOD-TASK-SEED-FORM.…); pictures are svg or png",
     )
 
     reproduce = add("reproduce", "redraw figures and tables of the paper from the trials at hand; run nothing")
     reproduce.add_argument("figure", help="its name, such as fig3; all: every figure and table")
     reproduce.add_argument("--out", metavar="DIR", help="folder for PNG, SVG and CSV (figures/TIER)")
-    reproduce.add_argument("--variant", metavar="NAME", default="", help="under this variant of the protocol")
+    reproduce.add_argument(
+        "--variant", metavar="NAME", default="", help="use the trials under this variant of the protocol"
+    )
 
-    replicate = add("replicate", "put the numbers that the paper has published beside those of the trials at hand")
+    replicate = add("replicate", "compare the numbers that the paper has published with those of the trials at hand")
     replicate.add_argument(
-        "--variant", metavar="NAME", default="", help="under this variant of the protocol; all: under each, too"
+        "--variant",
+        metavar="NAME",
+        default="",
+        help="use trials under this variant of the protocol; all: the protocol and each variant",
     )
     replicate.add_argument("--as", dest="form", metavar="FORM", help="write a file instead: csv, json or markdown")
-    replicate.add_argument("--out", metavar="FILE", help="where to (report/replication.FORM)")
+    replicate.add_argument("--out", metavar="FILE", help="file to write (report/replication.FORM)")
 
 
 def _keeping(add: _Add) -> None:
@@ -203,19 +215,17 @@ def _keeping(add: _Add) -> None:
     )
     verify.add_argument("--dry-run", action="store_true", help="list bad files and leave them where they are")
 
-    merge = add("merge", "copy trials, champions and verdicts of other stores into one; what is there already stays")
+    merge = add("merge", "copy trials, champions and verdicts of other stores into one; existing files stay")
     merge.add_argument("stores", nargs="+", metavar="STORE", help="a folder of trials, such as another machine's")
     merge.add_argument("--dry-run", action="store_true", help="list what would be copied, and copy nothing")
 
     reference = add("reference", "write the stored trials of a tier as the committed reference trials")
-    reference.add_argument("--variant", metavar="NAME", default="", help="those that only this variant has")
+    reference.add_argument("--variant", metavar="NAME", default="", help="only trials that this variant changes")
     reference.add_argument(
         "--unknown-revision", action="store_true", help="also trials that ran code of unknown git revision"
     )
 
-    add(
-        "accept", "write the current verdicts into verdicts.toml, as accepted; exit status 1 when that changed the file"
-    )
+    add("accept", "write the current verdicts into verdicts.toml, as accepted; exit status 1 if that changed the file")
 
 
 def _comparing(add: _Add) -> None:
@@ -226,7 +236,9 @@ def _comparing(add: _Add) -> None:
         "(OLD) with --storage; or two revisions, or two stores; run nothing",
     )
     compare.add_argument("places", nargs="*", metavar="OLD [NEW]", help="a git revision or a folder of trials")
-    compare.add_argument("--fail", metavar="CHANGES", help="end with 1 on these, such as 'supported->refuted,*->error'")
+    compare.add_argument(
+        "--fail", metavar="CHANGES", help="exit with 1 on these changes, such as 'supported->refuted,*->error'"
+    )
     compare.add_argument(
         "--timeline", metavar="CLAIM", nargs="?", const="", help="list accepted verdicts by date, of CLAIM or of all"
     )
@@ -235,8 +247,8 @@ def _comparing(add: _Add) -> None:
 
     across = add(
         "across",
-        "judge claims with several releases of a package, files of pins or Pythons; each has an environment, "
-        "and is compared with the first; exit status 1 when a verdict changed, trials drifted, or an "
+        "judge claims with several releases of a package, files of constraints or Pythons; each has an environment, "
+        "and is compared with the first; exit status 1 if a verdict changed, trials drifted, or an "
         "environment has no verdicts",
         ".evoclaims-releases",
     )
@@ -244,26 +256,30 @@ def _comparing(add: _Add) -> None:
         "--package",
         nargs="+",
         metavar=("NAME", "VERSION"),
-        help="a package and its versions on trial; all else stays as it is here; installed and newest are versions too",
+        help="a package and versions to compare; other packages stay; installed and newest are versions too",
     )
-    across.add_argument("--constraints", nargs="+", metavar="FILE", help="an environment with the pins of each file")
+    across.add_argument(
+        "--constraints", nargs="+", metavar="FILE", help="an environment with the constraints of each file"
+    )
     across.add_argument("--python", nargs="+", metavar="VERSION", help="an environment with each Python, such as 3.13")
     across.add_argument("--only", metavar="IDS", help="judge only these claims, such as G1,G7 or G6[neat-ppo]")
     across.add_argument(
         "--as", dest="form", metavar="FORM", help="also write it: markdown, csv, json, or a chart as svg"
     )
-    across.add_argument("--out", metavar="FILE", help="where to (report/across.FORM; .md for markdown)")
+    across.add_argument("--out", metavar="FILE", help="file to write (report/across.FORM; .md for markdown)")
 
     bisect = add(
         "bisect",
-        "find the release of a package in which a claim's verdict, or what its trials do, changed",
+        "find the release of a package in which a claim's verdict, or its trials, changed",
         ".evoclaims-releases",
     )
     bisect.add_argument("claim", help="the claim, such as G9, or one case of it, such as 'G1[n_parity]'")
     bisect.add_argument("--package", metavar="NAME", required=True, help="the package")
     bisect.add_argument("--good", metavar="VERSION", required=True, help="a release before the change")
-    bisect.add_argument("--bad", metavar="VERSION", required=True, help="a later release, after it")
-    bisect.add_argument("--releases", nargs="+", metavar="VERSION", help="those between (default: as pip lists them)")
+    bisect.add_argument("--bad", metavar="VERSION", required=True, help="a later release, after the change")
+    bisect.add_argument(
+        "--releases", nargs="+", metavar="VERSION", help="the releases between them (default: as pip lists them)"
+    )
     bisect.add_argument("--by", metavar="WHAT", help="verdict, drift or bits (default: the first of them that changed)")
 
 
@@ -272,12 +288,12 @@ def _exporting(add: _Add) -> None:
     export = add("export", "write the trials at hand, or the verdicts that they give, as a table")
     export.add_argument("--verdicts", action="store_true", help="one row per claim instead of one per trial")
     export.add_argument("--as", dest="form", metavar="FORM", default="json", help="json (default), csv or parquet")
-    export.add_argument("--out", metavar="FILE", help="where to (report/trials.FORM, report/verdicts.FORM)")
+    export.add_argument("--out", metavar="FILE", help="file to write (report/trials.FORM, report/verdicts.FORM)")
 
     tables = add(
-        "tables", "write the tables in Markdown files anew, from the reference trials; exit status 1 when one changed"
+        "tables", "write the tables in Markdown files again, from the reference trials; exit status 1 if one changed"
     )
     tables.add_argument("files", nargs="+", metavar="FILE", help="such as README.md")
 
-    badge = add("badge", "draw how many claims ended how, as a small SVG picture")
-    badge.add_argument("--out", metavar="FILE", help="where to (report/claims-TIER.svg)")
+    badge = add("badge", "draw the number of claims with each outcome, as a small SVG picture")
+    badge.add_argument("--out", metavar="FILE", help="file to write (report/claims-TIER.svg)")

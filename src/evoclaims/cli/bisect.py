@@ -38,8 +38,8 @@ def main(options: argparse.Namespace) -> int:
     for index, option in ((0, "--good"), (last, "--bad")):
         if judge(index).trouble:
             raise UserError(
-                f"{tried[index].label}, named by {option}, cannot be judged: {tried[index].trouble}. If the "
-                "release is to blame, name another one."
+                f"{tried[index].label}, named by {option}, cannot be judged: {tried[index].trouble}. If "
+                "the release itself is the cause, name another one."
             )
     kinds = [kind for kind in KINDS if options.by in (None, kind) and _differs(tried[0], tried[last], kind)]
     if not kinds:

@@ -34,8 +34,8 @@ def main(options: argparse.Namespace) -> int:
         made = FORMS[options.form](trial)
         if made is None:
             raise UserError(
-                f"A champion of {options.method} is no genome but arrays of parameters, of which there is no graph to "
-                f"write as {options.form}. Leave --as out to replay it; its arrays are in "
+                f"A champion of {options.method} has arrays of parameters and no genome, so there is no "
+                f"graph to write as {options.form}. Leave --as out to replay it; its arrays are in "
                 f"{trial.file}."
             )
     replay = champions.replay(trial.condition, trial.result, trial.parameters, chosen)

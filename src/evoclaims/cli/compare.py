@@ -42,7 +42,7 @@ def main(options: argparse.Namespace) -> int:
     tiers = project.tiers(options.tier)
     if options.timeline is not None:
         if options.places or patterns:
-            raise UserError("--timeline shows the accepted verdicts alone; leave out what else is to be compared.")
+            raise UserError("--timeline shows only the accepted verdicts. Leave out the other things to compare.")
         kept = history.load(project.reproduction.folder / history.FILE)
         asked = {key: entries for key, entries in kept.items() if key[0] in tiers}
         print(timeline(asked, options.timeline))
@@ -89,7 +89,7 @@ def _sides(project: Project, tiers: Sequence[str], places: Sequence[str]) -> tup
     stores = [place for place in found if isinstance(place, Store)]
     if revisions and stores:
         raise UserError(
-            f"{revisions[0].name} is a revision and {stores[0].root} a store: two of a kind can be compared."
+            f"{revisions[0].name} is a revision and {stores[0].root} a store. Compare two revisions or two stores."
         )
     if revisions:
         read = [comparison.revision(reproduction, place) for place in revisions]

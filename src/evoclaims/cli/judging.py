@@ -185,9 +185,9 @@ class _Run:
             if left:
                 listed = ", ".join(left[:MOST_NAMES]) + (" and others" if len(left) > MOST_NAMES else "")
                 raise UserError(
-                    f"{len(left)} of {len(wanted)} claims of the {tier} tier were collected and not judged "
-                    f"({listed}), since a plugin, a conftest.py or pytest.exit() left them out: a claim that is not to "
-                    "be judged has the mark pytest.mark.skip."
+                    f"{len(left)} of {len(wanted)} claims of the {tier} tier were collected and not "
+                    f"judged ({listed}): a plugin, a conftest.py or pytest.exit() left them out. Mark a "
+                    "claim that is not to be judged with pytest.mark.skip."
                 )
 
 

@@ -104,6 +104,6 @@ def _check_folder() -> None:
         os.getcwd()
     except OSError as error:
         raise UserError(
-            f"The current folder cannot be used ({error.strerror or error}): if it was deleted and made anew, go into "
-            "it again (cd .)."
+            f"The current folder cannot be used ({error.strerror or error}). If it was deleted and "
+            "created again, enter it again (cd .)."
         ) from error

@@ -41,10 +41,12 @@ def _source(name: str, into: Store) -> Store:
         UserError: when it does not exist, or is the one to copy into.
     """
     if not name or not os.path.lexists(name):
-        raise UserError(f"There is no trial store {name!r}: the folder does not exist.")
+        raise UserError(f"There is no trial store {name!r}: the folder does not exist. Check its name.")
     source = open_store(name)
     if source.root.resolve() == into.root.resolve():
-        raise UserError(f"{name} is the store that would be copied into: name others, or that one with --storage.")
+        raise UserError(
+            f"{name} is the store to copy into. Name other stores, or name the store to copy into with --storage."
+        )
     return source
 
 

@@ -33,7 +33,7 @@ def main(options: argparse.Namespace) -> int:
     claims = project.judge(options.tier)
     used = {(source.method, source.task) for report in claims for source in report.sources}
     if not used:
-        raise UserError(f"No claim of the {options.tier} tier reads trials, so that no fault could change a verdict.")
+        raise UserError(f"No claim of the {options.tier} tier reads trials, so no fault could change a verdict.")
     every = plantings(
         {names: one for names, one in tier.conditions.items() if names in used}, catalogue.load(project.reproduction)
     )
@@ -51,8 +51,9 @@ def main(options: argparse.Namespace) -> int:
         claims = project.judge(options.tier)
     if not any(report.n for report in claims):
         raise UserError(
-            f"No claim of the {options.tier} tier is judged yet, so that no fault could change a verdict: "
-            f"`pytest -m {options.tier}` judges them, and `evoclaims mutants` without --stored runs what is missing."
+            f"No claim of the {options.tier} tier is judged yet, so no fault could change a verdict. "
+            f"Judge them with `pytest -m {options.tier}`, or run what is missing with `evoclaims mutants` "
+            "without --stored."
         )
     mutated = replace(project, reproduction=under_faults(project.reproduction, options.tier, planted))
     reports = mutated.judge_variants([(options.tier, one.name) for one in planted])
@@ -81,7 +82,7 @@ def _chosen(every: Sequence[Planted], options: argparse.Namespace) -> list[Plant
     """
     if not every:
         raise UserError(
-            f"No fault can be planted: the trials that the {options.tier} tier's claims read are not run here but "
+            f"No fault can be planted: the trials that the {options.tier} tier's claims read are "
             "imported, or come from training loops."
         )
     for wanted, kind, known in (

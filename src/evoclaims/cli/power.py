@@ -75,13 +75,14 @@ def _make(
     seeds = range(options.first_seed, options.first_seed + options.trials)
     if not design.last.n <= options.trials <= MAX_TRIALS:
         raise UserError(
-            f"--trials takes {design.last.n} (as many as a verdict looks at) to {MAX_TRIALS} trials a condition, not "
-            f"{options.trials}."
+            f"--trials takes {design.last.n} (as many as a verdict reads) to {MAX_TRIALS} trials per "
+            f"condition, not {options.trials}."
         )
     if set(seeds) & set(design.seeds(design.last.n)):
         raise UserError(
-            f"The seeds {seeds[0]} to {seeds[-1]} are partly the {options.tier} tier's own ({design.first_seed} to "
-            f"{design.seeds(design.last.n)[-1]}), whose verdicts a pilot must not know: name others by --first-seed."
+            f"The seeds {seeds[0]} to {seeds[-1]} overlap the {options.tier} tier's own "
+            f"({design.first_seed} to {design.seeds(design.last.n)[-1]}), and a pilot must not use trials "
+            "that verdicts read. Choose other seeds with --first-seed."
         )
     for condition in list(wanted.values())[:1]:  # an invalid seed is so for every condition: it is reported at once
         _ = [TrialSpec(condition, seed) for seed in seeds]

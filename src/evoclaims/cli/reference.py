@@ -85,9 +85,9 @@ def main(options: argparse.Namespace) -> int:
         )
     if unknown:
         raise UserError(
-            f"Trials of {', '.join(unknown)} ran code of unknown revision, so nobody could run it again: they were "
-            "made where there is no git repository, or before its first commit. Commit the project and run them anew "
-            "in an empty store, or keep them as they are with --unknown-revision."
+            f"Trials of {', '.join(unknown)} ran code of an unknown revision: there was no git "
+            "repository, or no commit. Nobody could run that code again. Commit the project and run the "
+            "trials again in an empty store, or keep them with --unknown-revision."
         )
     if not (written or (used and shared == len(used))):
         variant, smallest = options.variant, [*looks, max(tier.design.last.n, MIN_REFERENCES)][0]

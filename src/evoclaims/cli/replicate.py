@@ -62,10 +62,12 @@ def _found(project: Project, tier: str, variant: str) -> tuple[Replication, ...]
     variants = ("", *reproduction.variants) if variant == ALL else (variant,)
     found = replications(project.archive, reproduction, tier, variants)
     if not reproduction.published.plots:
-        raise UserError(f"The paper's numbers are read from {reproduction.folder / 'reported.toml'}, which has none.")
+        raise UserError(
+            f"{reproduction.folder / 'reported.toml'} has no published numbers. Write the paper's numbers into it."
+        )
     if not found:
         raise UserError(
-            f"No trial of the {tier} tier under {variant} is at hand whose numbers are published. "
-            f"`evoclaims run --tier {tier} --variant {variant}` runs them."
+            f"There are no trials of the {tier} tier under {variant} whose numbers are published. Run "
+            f"them with `evoclaims run --tier {tier} --variant {variant}`."
         )
     return found

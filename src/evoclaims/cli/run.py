@@ -33,8 +33,8 @@ def main(options: argparse.Namespace) -> int:
     n = options.trials if options.trials is not None else tier.design.last.n
     if not 1 <= n <= MAX_TRIALS:
         raise UserError(
-            f"--trials takes 1 to {MAX_TRIALS} trials a condition (no verdict looks at more), not {n}. Further seeds "
-            "are run by another call, with --first-seed."
+            f"--trials takes 1 to {MAX_TRIALS} trials per condition (no verdict reads more), not {n}. Run "
+            "further seeds by another call, with --first-seed."
         )
     seeds = range(options.first_seed, options.first_seed + n)
     for names in chosen[:1]:  # an invalid seed is so for every condition: it is reported once, and nothing is run

@@ -43,9 +43,9 @@ def main(options: argparse.Namespace) -> int:
         reports = [report for report in reports if report.outcome is not Outcome.NOT_RUN]
         if not reports:
             raise UserError(
-                f"No claim of the {options.tier} tier that was asked for is judged under {options.variant}: it changes "
-                f"none of their trials, or they have not run. `evoclaims run --variant {options.variant} --tier "
-                f"{options.tier}` runs what is missing."
+                f"None of these claims of the {options.tier} tier is judged under {options.variant}: it "
+                "changes none of their trials, or they have not run. Run what is missing with `evoclaims "
+                f"run --variant {options.variant} --tier {options.tier}`."
             )
     if options.form is None:
         _print(reports, options.tier, options.why)

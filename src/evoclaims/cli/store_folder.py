@@ -32,7 +32,7 @@ def storage_of(named: str | None, command: str) -> str:
     if named is None:
         return os.path.relpath(_project() / APART.get(command, DEFAULT_ROOT))
     if not named:
-        raise UserError("--storage names no folder; leave it out for the project's own store.")
+        raise UserError("--storage names no folder. Name one, or leave it out for the project's own store.")
     if command not in BEGINNING and not os.path.lexists(named):
         raise UserError(
             f"There is no trial store {named}: the folder does not exist. Check its name, or leave --storage out for "

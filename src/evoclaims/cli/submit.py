@@ -135,7 +135,9 @@ def _submitted(
     """
     root = project.store.root.absolute()
     if "%" in str(root):
-        raise UserError(f"SLURM would read a % in the name of the store's folder in another way: {root}.")
+        raise UserError(
+            f"The name of the store's folder contains %, which SLURM would replace: {root}. Use a folder without %."
+        )
     device = "gpu" if options.device == "auto" and request.gpus else options.device
 
     def command(batch: MissingBatch) -> list[str]:
@@ -161,7 +163,7 @@ def _send(request: JobRequest, folder: Path, requeues: int, work: Sequence[Batch
         import submitit
     except ImportError as error:
         raise UserError(
-            "Jobs are submitted by submitit, which is not installed: pip install 'evoclaims[slurm]'."
+            "Jobs are submitted by submitit, which is not installed. Install it: pip install 'evoclaims[slurm]'."
         ) from error
     timeouts = {f"{request.cluster}_max_num_timeout": requeues}
     settings: dict[str, Any] = {

@@ -100,7 +100,7 @@ def filled(text: str, project: Project) -> str:
     whole = {found.start() for found in _TABLE.finditer(text)}
     alone = [begin[0] for begin in _BEGIN.finditer(text) if begin.start() not in whole]
     if whole and alone:
-        raise UserError(f"{alone[0]} has no <!-- evoclaims: end --> before the next table: write one.")
+        raise UserError(f"{alone[0]} has no <!-- evoclaims: end --> before the next table. Write one.")
     if not whole:
         raise UserError(
             "There is no table to write: put <!-- evoclaims: verdicts full --> and <!-- evoclaims: end -->."
@@ -196,7 +196,7 @@ def _tier(project: Project, words: list[str]) -> str:
     """Return the tier that a table is of: the last one unless it is named."""
     tier, *more = words or list(project.reproduction.tiers)[-1:]
     if more:
-        raise UserError(f"A table of this kind is of one tier, not of {', '.join(words)}: write one for each.")
+        raise UserError(f"A table of this kind shows one tier, not {', '.join(words)}. Write one table for each.")
     project.reproduction.tier(tier)
     return tier
 

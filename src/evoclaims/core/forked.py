@@ -22,9 +22,9 @@ def refuse_forked() -> None:
     """
     if _forked_with_jax:
         raise UserError(
-            "This process was forked from one in which jax had started, and jax would wait here for ever. Run trials "
-            "in processes that begin anew: leave out --forked (pytest-forked) and os.fork(), use multiprocessing's "
-            "start method spawn, or run claims side by side with pytest-xdist (-n 4)."
+            "This process was forked from one in which jax had started, so jax would wait forever. Run "
+            "trials in new processes: leave out --forked (pytest-forked) and os.fork(), use "
+            "multiprocessing's start method spawn, or run claims side by side with pytest-xdist (-n 4)."
         )
 
 

@@ -30,7 +30,7 @@ def reference(value: Any) -> str:
     except (ImportError, AttributeError) as error:  # a class that was made while the program ran
         raise UserError(f"{named} cannot be imported by another process: {error}.") from error
     if found != value:  # a method of one object, or a function that a decorator has replaced
-        raise UserError(f"Another process that imports {named} finds {found!r} there, and not {value!r}.")
+        raise UserError(f"Another process that imports {named} finds {found!r} there, not {value!r}.")
     return named
 
 

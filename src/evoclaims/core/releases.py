@@ -23,7 +23,7 @@ def released(package: str) -> list[str]:
     listed = re.search(r"^Available versions: (.*)$", done.stdout, re.MULTILINE)
     if listed is None:
         why = reason(done.stdout + done.stderr)
-        raise UserError(f"pip lists no releases of {package} ({why}): name them on the command line.")
+        raise UserError(f"pip lists no releases of {package} ({why}). Name them on the command line.")
     return sorted(listed[1].split(", "), key=Version)
 
 

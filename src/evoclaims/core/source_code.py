@@ -100,9 +100,11 @@ def _hash(code: Any) -> str:
         if not (inspect.isclass(one) or inspect.isfunction(one)) or not _is_the_projects(one):
             continue
         name = f"{one.__module__}.{one.__qualname__}"
+        # Functions may name each other in circles: each is hashed once.
         if name in found:
             continue
         tree = _tree(one)
+        # The syntax tree and not the text, so that a comment or a new layout does not look like an edit.
         found[name] = _as_lists(tree)
         held += one.__bases__ if inspect.isclass(one) else ()
         for word, value in _named(tree, vars(sys.modules.get(one.__module__, one))):

@@ -137,7 +137,7 @@ def fitting(task: Task, action: Float[Array, " action"]) -> Float[Array, " actio
         found = jnp.asarray(action)
     except (TypeError, ValueError) as error:  # None, a word, rows of different lengths
         raise MisfitError(
-            f"an action is {action!r}, which is no array, and {task.name!r} takes shape {wanted} and type float32"
+            f"an action is {action!r}, which is not an array, and {task.name!r} takes shape {wanted} and type float32"
         ) from error
     if found.shape != wanted or found.dtype != jnp.float32:
         raise MisfitError(

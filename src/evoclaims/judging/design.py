@@ -27,7 +27,7 @@ class Look:
         if not 1 <= self.n <= MAX_TRIALS:
             raise UserError(f"A look takes 1 to {MAX_TRIALS} trials (the exact tests' range), not {self.n}.")
         if not 0 < self.alpha < 1:
-            raise UserError(f"A look's alpha lies between 0 and 1 (such as 0.05), unlike {self.alpha}.")
+            raise UserError(f"A look's alpha is {self.alpha}. Use one between 0 and 1, such as 0.05.")
 
 
 THREE_LOOKS: Final = (Look(5, 0.01), Look(10, 0.04), Look(30, 0.0095))
@@ -64,15 +64,15 @@ class Design:
             raise UserError("A design needs at least one look, such as Look(n=10, alpha=0.05).")
         if any(later.n <= earlier.n for earlier, later in pairwise(self.looks)):
             sizes = ", ".join(str(look.n) for look in self.looks)
-            raise UserError(f"Each look takes more trials than the one before, unlike {sizes}.")
+            raise UserError(f"The looks take {sizes} trials. Each look must take more than the one before.")
         if self.alpha >= 1:
-            raise UserError(f"The alphas of all looks add up to less than 1, not to {self.alpha:g}.")
+            raise UserError(f"The alphas of all looks add up to {self.alpha:g}. Their sum must be below 1.")
         if not 0 < self.p0 < 1:
-            raise UserError(f"p0 lies strictly between 0 and 1 (default 0.7), unlike {self.p0}.")
+            raise UserError(f"p0 is {self.p0}. It must be above 0 and below 1 (default 0.7).")
         if not 0.5 <= self.a12_margin < 1:
-            raise UserError(f"The A12 margin lies from 0.5 to below 1 (default 0.71), unlike {self.a12_margin}.")
+            raise UserError(f"The A12 margin is {self.a12_margin}. It must be at least 0.5 and below 1 (default 0.71).")
         if self.first_seed < 0:
-            raise UserError(f"A seed is 0 or above, not {self.first_seed}.")
+            raise UserError(f"The first seed is {self.first_seed}. It must be at least 0.")
 
     @property
     def alpha(self) -> float:
@@ -95,7 +95,9 @@ class Design:
             UserError: for fewer than 4 or more than the exact tests' number of trials.
         """
         if not 4 <= trials <= MAX_TRIALS:
-            raise UserError(f"A paper's comparison has 4 to {MAX_TRIALS} trials a side, not {trials}: set a12_margin.")
+            raise UserError(
+                f"A paper's comparison has 4 to {MAX_TRIALS} trials per side, not {trials}. Set a12_margin instead."
+            )
         return replace(self, a12_margin=detectable_a12(trials))
 
     def with_third_look(self) -> Design:

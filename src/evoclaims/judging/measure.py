@@ -63,7 +63,7 @@ class Measure(NumberReading):
             UserError: when `factor` is no finite number above 0.
         """
         if not _is_number(factor) or not 0 < factor < math.inf:
-            raise UserError(f"{self.describe()!r} is multiplied by a finite number above 0, not by {factor!r}.")
+            raise UserError(f"{self.describe()!r} is multiplied by {factor!r}. Use a finite number above 0.")
         written = repr(float(factor)).removesuffix(".0")
         return Measure(
             self.source,
@@ -91,7 +91,7 @@ class Measure(NumberReading):
     def _measure(self, other: object) -> Measure:
         """Return `other`, which must be a measure."""
         if not isinstance(other, Measure):
-            raise UserError(f"{self.describe()!r} is compared with another measure or a number, not with {other!r}.")
+            raise UserError(f"{self.describe()!r} is compared with {other!r}. Use another measure or a number.")
         return other
 
     def _at_least_0(self, trial: TrialResult) -> float:

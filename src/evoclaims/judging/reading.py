@@ -120,8 +120,8 @@ class NumberReading(ScalarReading):
         """
         if number > self.window.limit:
             raise UserError(
-                f"{self.describe()!r} is not observed beyond that, so no trial says anything about {number:,.12g}: "
-                "name a smaller number, or raise the budget."
+                f"{self.describe()!r} is not observed beyond that, so trials show nothing about "
+                f"{number:,.12g}. Name a smaller number, or raise the budget."
             )
 
     def sample(self, trials: Trials) -> Sample:
@@ -146,8 +146,8 @@ def comparable(*readings: AnyNumber) -> tuple[AnyNumber, ...]:
     for other in readings[1:]:
         if other.better != first.better:
             raise UserError(
-                f"{first.describe()!r} is better when {first.better}, {other.describe()!r} when {other.better}: "
-                "compare measures of one direction."
+                f"{first.describe()!r} is better when {first.better}, {other.describe()!r} when "
+                f"{other.better}. Compare measures of one direction."
             )
     window = shared([reading.window for reading in readings])
     return tuple(reading.seen_through(window) for reading in readings)
@@ -163,12 +163,14 @@ def require_independent(*readings: NumberReading) -> None:
         a, b = one.source, other.source
         if a.fingerprint == b.fingerprint or (isinstance(a, Limited) and a.shares_trials_with(b)):
             raise UserError(
-                f"{one.describe()!r} and {other.describe()!r} read the same trials, which no rank test may compare: "
-                "use a profile's falls() or rises() for levels, never_above_itself() for a control."
+                f"{one.describe()!r} and {other.describe()!r} read the same trials, which a rank test "
+                "cannot compare. Use a profile's falls() or rises() for levels, never_above_itself() for "
+                "a control."
             )
         if one.window != other.window:
             raise UserError(
-                f"{one.describe()!r} and {other.describe()!r} are not observed alike: write a < b, which sees to that."
+                f"{one.describe()!r} and {other.describe()!r} are not observed up to the same limit. "
+                "Write a < b, which handles this."
             )
 
 
@@ -193,8 +195,9 @@ class EventReading(ScalarReading):
         held: object = self.holds(checked(trial))
         if not isinstance(held, bool | np.bool_):
             raise UnreadableTrialError(
-                f"{self.describe()!r} is {held!r} in the trial of seed {trial.seed}, neither True nor False: the "
-                "function of an event returns a comparison, such as lambda t: t.metrics['steps'] > 5."
+                f"{self.describe()!r} is {held!r} in the trial of seed {trial.seed}, neither True nor "
+                "False. Let the event's function return a comparison, such as lambda t: "
+                "t.metrics['steps'] > 5."
             )
         return float(held)
 
@@ -218,7 +221,7 @@ class LevelsReading(TrialReading):
         _worst(self.better)
         if self.size < 2:
             raise UserError(
-                f"A profile has at least 2 levels; {self.describe()!r} has {self.size}: say last_success instead."
+                f"{self.describe()!r} has {self.size} levels, and a profile needs at least 2. Use last_success instead."
             )
 
     def plain(self) -> dict[str, Any]:

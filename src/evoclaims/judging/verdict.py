@@ -80,7 +80,7 @@ class PValues:
         """Reject an invalid probability, for example from a custom kind."""
         for p in (self.supported, self.refuted, self.size):
             if not 0.0 <= p <= 1.0:
-                raise UserError(f"A p value lies between 0 and 1, unlike {p}.")
+                raise UserError(f"A p value is {p}. It must be between 0 and 1.")
 
     @property
     def size(self) -> float:

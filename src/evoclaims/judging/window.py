@@ -60,10 +60,12 @@ def shared(windows: Sequence[Window]) -> Window:
         finer = [window.every for window in windows if window.every]
         if not limit or any(abs(every / one - round(every / one)) > _ROUNDING for one in finer):
             raise UserError(
-                f"These measures are known to multiples of {' and '.join(f'{one:,.12g}' for one in finer)} up to "
-                f"{min(window.limit for window in windows):,.12g}, which no rank test compares: give the conditions "
-                "budgets with reports equally far apart (one number of environment_steps, a multiple of reports × cost "
-                "of each method), or one after each step of the method."
+                "These measures are known to multiples of "
+                f"{' and '.join(f'{one:,.12g}' for one in finer)} up to "
+                f"{min(window.limit for window in windows):,.12g}, which a rank test cannot compare. Give "
+                "the conditions budgets with reports equally far apart (one number of environment_steps, "
+                "a multiple of reports × cost of each method), or one report after each step of the "
+                "method."
             )
     return Window(limit, every)
 

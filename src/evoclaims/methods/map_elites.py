@@ -92,10 +92,12 @@ class MapElites:
     def __post_init__(self) -> None:
         """Check the sizes and standard deviations."""
         if not isinstance(self.network, Mlp):
-            raise UserError(f"MAP-Elites evolves perceptrons: network is an Mlp, and not {self.network!r}.")
+            raise UserError(f"MAP-Elites evolves perceptrons: its network is an Mlp, not {self.network!r}.")
         require_at_least(1, "MAP-Elites's", batch=self.batch, initial=self.initial)
         if len(self.cells) != 2 or min(self.cells) < 1:
-            raise UserError(f"The grid of MAP-Elites is two numbers of cells, each at least 1, not {self.cells}.")
+            raise UserError(
+                f"The grid of MAP-Elites is {self.cells}. It must be two numbers of cells, each at least 1."
+            )
         spreads = (self.iso_sigma, self.line_sigma)
         if not all(math.isfinite(sigma) and sigma >= 0 for sigma in spreads) or sum(spreads) == 0:
             raise UserError(

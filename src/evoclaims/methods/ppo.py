@@ -117,9 +117,10 @@ class Ppo:
         """
         if self.level_test.sampled_episodes and task.horizon > 1:
             raise UserError(
-                f"PPO's level test by sampled episodes plays one step in each, and an episode of {task.name} has up to "
-                f"{task.horizon}: the first would decide alone. Let the task draw one row an episode "
-                '(sampling="sampled"), or test the deterministic policy on the whole table (sampled_episodes=0).'
+                "PPO's level test by sampled episodes plays one step in each, and an episode of "
+                f"{task.name} has up to {task.horizon}, so the first step would decide alone. Let the "
+                "task draw one row per episode (sampling='sampled'), or test the deterministic policy on "
+                "the whole table (sampled_episodes=0)."
             )
         policy_key, value_key, reset_key = streams(key, "policy", "value", "reset")
         net = self._networks(task)

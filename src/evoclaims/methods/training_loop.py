@@ -53,15 +53,16 @@ class TrainingLoop:
         object.__setattr__(self, "settings", dict(self.settings))
         if isinstance(self.overspend, bool) or not (isinstance(self.overspend, int | float) and self.overspend >= 0):
             raise UserError(
-                f"overspend={self.overspend!r} of a training loop is a share of its budget, 0 or above: write 0.5 "
-                "where it may spend 1.5 times its budget."
+                f"overspend={self.overspend!r} of a training loop is not a share of its budget, 0 or "
+                "above. Write 0.5 if it may spend 1.5 times its budget."
             )
         object.__setattr__(self, "overspend", float(self.overspend))  # 1 and 1.0 are one id
         for name, value in self.settings.items():
             if not _is_plain(value):
                 raise UserError(
-                    "Settings of a training loop are part of its trials' ids, so they are numbers, words, lists and "
-                    f"tables by name, and {name!r} is {value!r}; let the training function make it."
+                    "Settings of a training loop are part of its trials' ids, so they are numbers, "
+                    f"words, lists and tables by name; {name!r} is {value!r}. Let the training function "
+                    "make it."
                 )
         if callable(self.function):
             place = reference(self.function)

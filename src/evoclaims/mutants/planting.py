@@ -46,7 +46,7 @@ def plant(fault: type[F], component: Any) -> F:
         UserError: when there is a fault in it already: a combination of two has no clear meaning.
     """
     if isinstance(component, Fault):
-        raise UserError(f"{component.name!r} has a fault already; plant each in a component without one.")
+        raise UserError(f"{component.name!r} has a fault already. Plant each fault in a component without one.")
     kinds: Any = fault, type(component)
     made: F = object.__new__(_faulty(*kinds))
     made.__dict__.update(component.__dict__)

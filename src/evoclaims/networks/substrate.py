@@ -33,7 +33,7 @@ class Substrate:
             raise UserError("A substrate has a layer of inputs, one of outputs, and at least one neuron in each layer.")
         for point in (point for layer in self.layers for point in layer):
             if len(point) != 2 or not all(map(math.isfinite, point)):
-                raise UserError(f"A neuron of a substrate lies at two finite coordinates, not at {point}.")
+                raise UserError(f"A neuron of a substrate is at {point}. It must be at two finite coordinates.")
 
     @property
     def shapes(self) -> list[tuple[int, int]]:

@@ -38,4 +38,4 @@ class NullAgent:
     def __post_init__(self) -> None:
         """Check that it has trials of one kind."""
         if (self.numbers is None) == (not self.method):
-            raise UserError(f"The null agent {self.says!r} has numbers=... or method=..., and not both.")
+            raise UserError(f"The null agent {self.says!r} needs either numbers=... or method=..., and not both.")

@@ -44,7 +44,7 @@ def load(path: Path) -> tuple[TrialResult, ...]:
         data = read_file(path)
     except FileNotFoundError as error:
         if path.is_symlink():
-            raise UserError(f"The reference trials {path} are a link to a file that is not there. {_MEND}") from error
+            raise UserError(f"The reference trials {path} are a link to a file that does not exist. {_MEND}") from error
         return ()
     except OSError as error:
         if error.errno == errno.ENAMETOOLONG:  # no file has such a name

@@ -36,7 +36,9 @@ def steps_to(source: Source, condition: Condition, curve: str, value: float, lev
     if not math.isfinite(value):
         raise UserError(f"{source.label}: steps_to takes a finite value, not {value}.")
     if curve == "success" and not 0.0 <= value <= 1.0:
-        raise UserError(f"{source.label}: a success is a share of 0 to 1, and never reaches {value:g}.")
+        raise UserError(
+            f"{source.label}: a success is between 0 and 1, and never reaches {value:g}. Use a value in this range."
+        )
     if not 0 <= wanted < levels:
         raise UserError(f"{source.label} has levels 0 to {levels - 1}, not {wanted}.")
     cost, budget = condition.cost, float(condition.environment_steps)

@@ -167,8 +167,7 @@ def trials(request: pytest.FixtureRequest, claim_tier: str) -> Callable[..., Tri
         if rest or on is None:
             task = repr(on or rest[0]) if on or rest else "task"
             raise UserError(
-                f"trials({', '.join(map(repr, (method, *rest)))}) does not say on which task: write "
-                f"trials({method!r}, on={task})."
+                f"trials({', '.join(map(repr, (method, *rest)))}) names no task. Write trials({method!r}, on={task})."
             )
         return session.group(method, on, claim_tier)
 

@@ -121,9 +121,9 @@ def _check_root(config: pytest.Config) -> None:
         return
     if not config.rootpath.is_relative_to(project):
         raise UserError(
-            f"pytest uses {config.rootpath} as the root of this run instead of the project {project}, because it "
-            f"reads an existing path after a space as a path of tests. Write {' and '.join(spaced)} with =, as in "
-            f"{spaced[0]}=PATH."
+            f"pytest uses {config.rootpath} as the root of this run, not the project {project}: it reads "
+            f"an existing path after a space as a path of tests. Write {' and '.join(spaced)} with =, as "
+            f"in {spaced[0]}=PATH."
         )
 
 
@@ -134,6 +134,6 @@ def _check_changes(config: pytest.Config, changes: str) -> None:
     parse_patterns(changes)
     if config.getoption("claims_variant"):
         raise UserError(
-            "--claims-compare-fail compares verdicts under the protocol itself, and --claims-variant judges under "
-            "another one: leave one of them out."
+            "--claims-compare-fail compares verdicts under the protocol itself, and --claims-variant "
+            "judges under another one. Leave one of them out."
         )

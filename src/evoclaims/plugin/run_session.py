@@ -77,7 +77,7 @@ def _storage(config: pytest.Config) -> Path:
     if named is None:
         return config.rootpath / DEFAULT_ROOT
     if not named:
-        raise UserError("--claims-storage names no folder; leave it out for the project's own store.")
+        raise UserError("--claims-storage names no folder. Name one, or leave it out for the project's own store.")
     folder = Path(config.invocation_params.dir, named)
     if config.getoption("claims_stored") and not os.path.lexists(folder):
         raise UserError(

@@ -120,7 +120,7 @@ def _filled(shapes: Any, arrays: Mapping[str, NDArray[Any]], what: str) -> Any:
     expected = {name: (leaf.shape, leaf.dtype) for name, leaf in named_leaves(shapes).items()}
     if {name: (array.shape, array.dtype) for name, array in arrays.items()} != expected:
         raise UserError(
-            f"{what} does not have the arrays of this method's policies, so it was made by another version of the "
-            "code: name another storage, or check that version out."
+            f"{what} does not have the arrays of this method's policies, so another version of the code "
+            "made it. Name another store with --storage, or check that version out."
         )
     return jax.tree.unflatten(jax.tree.structure(shapes), [arrays[name] for name in expected])

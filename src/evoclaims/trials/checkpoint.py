@@ -171,8 +171,8 @@ def restore(folder: Path, header: Header, like: Any) -> TrialState | None:
             # Compare before reading: a file must not take more memory than the state it represents.
             if [packed.kinds[name] for name in names] != [(x.shape, x.dtype) for x in expected]:
                 raise UserError(
-                    f"Cannot go on from {path}: its arrays are not those of this condition's state, so it "
-                    "was made by another version of the code; delete it, and its trials begin anew."
+                    f"Cannot continue from {path}: its arrays do not fit this condition's state, so "
+                    "another version of the code made it. Delete it; its trials then start again."
                 )
             state: TrialState = jax.tree.unflatten(structure, [packed[name] for name in names])
             return state

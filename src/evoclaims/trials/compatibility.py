@@ -194,11 +194,9 @@ def _check_numbers(what: str, metrics: object, shape: tuple[int, ...], taken: Co
         )
     for name, leaf in metrics.items():
         if not isinstance(name, str):
-            raise MisfitError(f"{what} a metric {name!r}, whose name is no text: write it in quotes")
+            raise MisfitError(f"{what} a metric {name!r}, whose name is not text: write it in quotes")
         if name in taken:
-            raise MisfitError(
-                f"{what} a metric {name!r}, which is a name of the engine's own numbers: give it another name"
-            )
+            raise MisfitError(f"{what} a metric {name!r}, which the engine itself uses: give it another name")
         real = _is_array(leaf) and (np.can_cast(leaf.dtype, np.float64) or leaf.dtype == jnp.bfloat16)
         if not real or leaf.shape != shape:
             raise MisfitError(f"{what} a metric {name!r} of {_described(leaf)}, not a real number of shape {shape}")
@@ -236,4 +234,4 @@ def _kind(value: object) -> str:
 
 def _described(leaf: Any) -> str:
     """Return shape and type in words."""
-    return f"shape {leaf.shape} and type {leaf.dtype}" if _is_array(leaf) else f"{_kind(leaf)}, which is no array"
+    return f"shape {leaf.shape} and type {leaf.dtype}" if _is_array(leaf) else f"{_kind(leaf)}, which is not an array"

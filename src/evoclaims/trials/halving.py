@@ -45,8 +45,8 @@ def halved(run: Run, tried: Header) -> int:
         each = "" if least == 1 else ", one on each device"
         raise UserError(
             f"The device's memory does not hold {len(left)} {'trial' if len(left) == 1 else 'trials'} of "
-            f"{run.condition.label} at once{each}, and fewer cannot be run. Close what else uses the device, or take "
-            "one with more memory."
+            f"{run.condition.label} at once{each}, and fewer cannot be run. Close other programs that use "
+            "the device, or use one with more memory."
         )
     half = -(-len(left) // 2)
     text = f"the device's memory does not hold {len(left)} trials at once: on with {half}"

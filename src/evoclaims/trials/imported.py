@@ -95,7 +95,9 @@ class Imported(Condition):
         """Reject a table from which no number is read, and two axes of a curve."""
         object.__setattr__(self, "budget", _Reports(self))
         if not self.columns:
-            raise UserError(f"Imported({str(self.path)!r}) names no metric: metric is the column of what was measured.")
+            raise UserError(
+                f"Imported({str(self.path)!r}) names no metric. Write metric=..., the column of what was measured."
+            )
         if self.step and self.columns.get(STEPS, self.step) != self.step:
             raise UserError(
                 f"Imported({str(self.path)!r}) has two columns of environment steps: {self.columns[STEPS]!r} and "

@@ -128,8 +128,8 @@ def refuse_changed() -> None:
         usual = {**DEFAULTS, **usual}
         listed = ", ".join(f"{name} is {values[name]} (default: {usual.get(name, 'another')})" for name in changed)
         raise UserError(
-            f"jax is set to what changes or forbids trials: {listed}. Trials are defined with jax's defaults. "
-            f"{_how_to_unset(changed)}"
+            f"These settings of jax change or forbid trials: {listed}. Trials are defined with jax's "
+            f"defaults. {_how_to_unset(changed)}"
         )
 
 

@@ -81,7 +81,7 @@ class Reporter:
         """
         self.last = step = int(step)
         if not 0 <= step <= MOST_STEPS:
-            raise UserError(f"A training function reports a number of steps, and not {step}.")
+            raise UserError(f"A training function reports {step} steps. Report a number from 0 to {MOST_STEPS}.")
         given = numbers(values)
         self.finite = self.finite and all(map(math.isfinite, given.values()))
         check_success("A training loop", given.get("success", 0.0), solves=False, advice="report such a share")
@@ -108,7 +108,7 @@ def numbers(values: Mapping[str, Any]) -> dict[str, Any]:
         if not isinstance(name, str) or not name.isprintable() or not isinstance(number, Real):
             raise UserError(f"A training loop's metrics are numbers by name, and {name!r} is {value!r}.")
         if name in COUNTS and not 0 <= float(number) <= MOST_STEPS:
-            raise UserError(f"A training loop's {name} is a number of steps, and not {value!r}.")
+            raise UserError(f"A training loop's {name} is a number of steps, not {value!r}.")
         found[name] = float(number)
     return found
 
@@ -130,7 +130,7 @@ def train(request: LoopRequest, answer: Callable[[Answer], None]) -> Trained:
     metrics, policy = returned if isinstance(returned, tuple) and len(returned) == 2 else (returned, None)
     told_metrics = numbers(metrics)
     if policy is not None and not callable(policy):
-        raise UserError(f"A policy is a function from an observation to an action, and not {policy!r}.")
+        raise UserError(f"A policy is {policy!r}. It must be a function from an observation to an action.")
     if policy is None:
         check_shares("A training loop", told_metrics, "return such a share, or give the metric another name")
         return Trained(told_metrics, None, report.last, finite=report.finite)

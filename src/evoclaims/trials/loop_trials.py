@@ -81,8 +81,8 @@ class LoopTrials:
         missing = [name for name in self._method.packages if stored.condition.versions[name] is None]
         if missing:
             raise UserError(
-                f"The training loop {self._method.name!r} needs {', '.join(missing)}, not installed here: "
-                f"pip install {' '.join(missing)}"
+                f"The training loop {self._method.name!r} needs {', '.join(missing)}, which is not "
+                f"installed. Install it: pip install {' '.join(missing)}"
             )
         _ = stored.condition.task.horizon  # a task without one is refused before training, not after it
         self._request = {

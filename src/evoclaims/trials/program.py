@@ -110,10 +110,12 @@ class Program:
             return ~self._ended(trial) & (trial.steps < until)
 
         def step(trial: TrialState) -> TrialState:
+            # The key depends on seed and step alone: a trial that continues from a checkpoint draws the same numbers.
             key = jax.random.fold_in(training_key, trial.steps)
             state, progress = method.step(key, task, trial.ascent.level, trial.method)
             steps = trial.steps + 1
             healthy = progress.healthy & jnp.isfinite(progress.fitness) & jnp.isfinite(progress.success)
+            # A step that diverged never solves a level: its success may come from numbers that are not finite.
             return replace(
                 trial,
                 method=strong(state),

@@ -106,8 +106,9 @@ def _maker(stored: StoredTrials, devices: Sequence[jax.Device], checkpoint_secon
     for component in (stored.condition.method, stored.condition.task):
         if missing := absent(component):
             raise UserError(
-                f"The packages of {component.name!r} name {', '.join(missing)}, not installed here: is it misspelled? "
-                "Another version of a package runs trials again, and one that is not there has none."
+                f"The packages of {component.name!r} name {', '.join(missing)}, not installed here. Check "
+                "the spelling. Trials are keyed by the versions of packages, so they cannot be recorded "
+                "without the package."
             )
 
     def make(owed: Sequence[int], tell: Watcher) -> None:

@@ -39,7 +39,7 @@ def _described(component: Any, kind_of: Literal["method", "task", ""]) -> dict[s
     """
     if isinstance(component, type):
         raise UserError(
-            f"{component.__name__} is a class, where an object of it is needed: write {component.__name__}()."
+            f"{component.__name__} is a class, and an object of it is needed. Write {component.__name__}()."
         )
     kind = type(component).__name__
     for name, of in (("name", str), ("revision", int)):
@@ -47,27 +47,27 @@ def _described(component: Any, kind_of: Literal["method", "task", ""]) -> dict[s
         if type(given) is not of:
             has = "has no" if given is None else f"has {given!r} as its"
             raise UserError(
-                f"{kind} {has} {name}, by which its trials are stored: write `{name}: ClassVar[{of.__name__}] = …` in "
-                "it."
+                f"{kind} {has} {name}, which is part of its trials' ids. Write `{name}: "
+                f"ClassVar[{of.__name__}] = …` in it."
             )
     frozen = getattr(getattr(type(component), "__dataclass_params__", None), "frozen", None)
     if not frozen:
         raise UserError(
-            f"{kind} is no {'dataclass' if frozen is None else 'frozen dataclass'}: write @dataclass(frozen=True) "
-            "above the class, since the fields of a method or task tell its trials apart."
+            f"{kind} is not a {'dataclass' if frozen is None else 'frozen dataclass'}. Write "
+            "@dataclass(frozen=True) above the class: the fields of a method or task identify its trials."
         )
     functions, numbers = _NEEDS.get(kind_of, ((), ()))
     lacking = [name for name in functions if not callable(getattr(component, name, None))]
     if lacking:
         raise UserError(
-            f"{kind} has no function {' and no '.join(lacking)}: write `def {lacking[0]}(self, …)` in it. A {kind_of} "
-            f"has {', '.join(functions)}."
+            f"{kind} has no function {' and no '.join(lacking)}. Write `def {lacking[0]}(self, …)` in it. "
+            f"A {kind_of} has {', '.join(functions)}."
         )
     unsaid = [name for name in numbers if getattr_static(component, name, None) is None]  # to read one may take long
     if unsaid:
         raise UserError(
-            f"{kind} has no {' and no '.join(unsaid)}: write `{unsaid[0]}: ClassVar[int] = …` in it, or a field or "
-            f"property of that name. A {kind_of} says {', '.join(numbers)}."
+            f"{kind} has no {' and no '.join(unsaid)}. Write `{unsaid[0]}: ClassVar[int] = …` in it, or a "
+            f"field or property of that name. A {kind_of} needs {', '.join(numbers)}."
         )
     require_whole_numbers(component)
     inherited = not is_own(type(component)) and not _has_own_name(component)
@@ -76,7 +76,8 @@ def _described(component: Any, kind_of: Literal["method", "task", ""]) -> dict[s
         parameters = fields_of(component)
     except TypeError as error:
         raise UserError(
-            f"A field of {kind} identifies its trials and is not a number, word, tuple or frozen dataclass: {error}."
+            f"A field of {kind} is not a number, word, tuple or frozen dataclass, so it cannot identify "
+            f"trials: {error}."
         ) from error
     return {"name": component.name, "revision": component.revision, "parameters": parameters, **named}
 
@@ -184,10 +185,10 @@ class Condition:
         cost = self.method.cost(self.task)
         if not (isinstance(cost, Real) and cost >= 1 and cost % 1 == 0):
             if (horizon := self.task.horizon) == 0:  # of which most methods' costs are multiples
-                raise UserError(f"{self.task.name!r} has horizon = {horizon}: its episodes take at least 1 step.")
+                raise UserError(f"{self.task.name!r} has horizon = {horizon}. It must be at least 1 step.")
             raise UserError(
-                f"A step of {self.method.name!r} on {self.task.name!r} costs {cost!r} environment steps by its `cost`, "
-                "which has to return a whole number of them, at least 1."
+                f"A step of {self.method.name!r} on {self.task.name!r} costs {cost!r} environment steps "
+                "by its `cost`. It must return a whole number, at least 1."
             )
         return cost
 
@@ -200,11 +201,15 @@ class Condition:
         """
         steps = self.budget.steps(self.cost)
         if steps >= 2**31 and not isinstance(self.method, TrainingLoop):
-            raise UserError(f"{self.label} has a budget of {steps} steps, and a trial takes at most {2**31 - 1}.")
+            raise UserError(
+                f"{self.label} has a budget of {steps} steps, and a trial takes at most {2**31 - 1}. Make "
+                "the budget smaller."
+            )
         if steps * self.cost > 2**53:
             raise UserError(
-                f"{self.label} has a budget of {steps * self.cost} environment steps ({steps} steps of {self.cost}), "
-                f"and a trial takes at most 2^53 = {2**53}: make the budget or the cost of a step smaller."
+                f"{self.label} has a budget of {steps * self.cost} environment steps ({steps} steps of "
+                f"{self.cost}), and a trial takes at most 2^53 = {2**53}. Make the budget or the cost of "
+                "a step smaller."
             )
         return steps
 
@@ -224,7 +229,7 @@ class TrialSpec:
     def __post_init__(self) -> None:
         """Reject seeds that the device's 32-bit integers cannot hold."""
         if not 0 <= self.seed < 2**31:
-            raise UserError(f"A seed is 0 or above and below 2147483648, not {self.seed}.")
+            raise UserError(f"A seed is a whole number from 0 to {2**31 - 1}, not {self.seed}.")
 
     @cached_property
     def plain(self) -> dict[str, Any]:

@@ -56,8 +56,8 @@ def check_store(root: Path) -> None:
     strange = _strange(root, names)
     if strange:
         raise UserError(
-            f"{root} is no trial store: it has no {MARK}, and a store has no {strange} in it. Nothing in it was "
-            f"touched. {_OTHER}; a new one begins in a folder that is empty or not there yet."
+            f"{root} is not a trial store: it has no {MARK}, and a store has no {strange} in it. Nothing "
+            f"in it was changed. {_OTHER}. A new store needs a folder that is empty or does not exist."
         )
 
 
@@ -86,13 +86,13 @@ def _check_mark(path: Path) -> None:
         plain = None
     if not isinstance(plain, dict) or plain.get("program") != PROGRAM:
         raise UserError(
-            f"{path.parent} is no trial store: its {MARK} does not say so. {_OTHER}, or delete {path} if it was torn "
-            "and this is one."
+            f"{path.parent} is not a trial store: its {MARK} was not written by {PROGRAM}. {_OTHER}. If "
+            f"the folder is a store whose {MARK} was torn, delete {path}."
         )
     if plain.get("schema") != SCHEMA:
         raise UserError(
-            f"{path} says schema {plain.get('schema')!r}, and this version of evoclaims knows stores of schema "
-            f"{SCHEMA}: use a later version of evoclaims, or another folder."
+            f"{path} has schema {plain.get('schema')!r}, and this version of evoclaims reads schema "
+            f"{SCHEMA}. Use a later version of evoclaims, or another folder."
         )
 
 

@@ -42,8 +42,9 @@ def check_success(
     rounded = [success for success in successes if 0.0 < abs(success - 1.0) <= _ROUNDING]
     if rounded and solves:
         raise UserError(
-            f"{what} reports a {name} of {rounded[0]!r}, which is 1 but for rounding, and a level is solved at exactly "
-            "1: average episodes by evoclaims.envs.averaged, or shares by evoclaims.envs.share."
+            f"{what} reports a {name} of {rounded[0]!r}, which is 1 except for rounding, and a level is "
+            "solved at exactly 1. Average episodes by evoclaims.envs.averaged, or shares by "
+            "evoclaims.envs.share."
         )
     wrong = [success for success in successes if math.isfinite(success) and not is_share(success)]
     if wrong:

@@ -44,7 +44,7 @@ class TableFile:
         try:
             return self.columns.cells(name)
         except NoTableError as error:
-            raise UserError(f"{self.name} is no table that can be read: {error}.") from error
+            raise UserError(f"{self.name} is not a table that can be read: {error}.") from error
 
     def rows_where(self, where: Mapping[str, object]) -> list[int]:
         """Return the rows, counted from 0, that have these values in these columns.
@@ -101,7 +101,7 @@ class TableFile:
                 return number
         except (TypeError, ValueError, OverflowError):
             pass
-        raise UserError(f"{self.name} holds {cell!r} in row {row + 1} of the column {name!r}, which is no number.")
+        raise UserError(f"{self.name} holds {cell!r} in row {row + 1} of the column {name!r}, which is not a number.")
 
 
 def read_table(path: Path) -> TableFile:
@@ -121,12 +121,12 @@ def read_table(path: Path) -> TableFile:
 def _read(path: Path, modified: int, size: int) -> TableFile:
     """Read a table; `modified` and `size` tell its versions apart."""
     if path.suffix.lower() not in READERS:
-        raise UserError(f"{path.name} is no table that can be read: the name of one ends in {', '.join(READERS)}.")
+        raise UserError(f"{path.name} is not a table that can be read. Its name must end in {', '.join(READERS)}.")
     data = read_file(path)
     try:
         columns = READERS[path.suffix.lower()](data)
     except NoTableError as error:
-        raise UserError(f"{path.name} is no table that can be read: {error}.") from error
+        raise UserError(f"{path.name} is not a table that can be read: {error}.") from error
     if not columns.names:
         raise UserError(f"{path.name} is a table without columns.")
     return TableFile(path.name, hashlib.sha256(data).hexdigest(), columns)

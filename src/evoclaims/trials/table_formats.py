@@ -79,7 +79,7 @@ def _csv(data: bytes, delimiter: str = ",") -> Columns:
     except csv.Error as error:
         raise NoTableError(str(error)) from error
     if last != [end]:
-        raise NoTableError("a cell begins with a quote that is never closed")
+        raise NoTableError("a cell begins with a quote that does not end")
     if not table:
         raise NoTableError("it has no first line with the columns' names")
     head, *rows = table
@@ -237,7 +237,7 @@ def _parquet(data: bytes) -> Columns:
         file = parquet.ParquetFile(io.BytesIO(data))
         schema, rows = file.schema_arrow, file.metadata.num_rows
     except (arrow.ArrowException, OSError) as error:
-        raise NoTableError("it is no Parquet file") from error
+        raise NoTableError("it is not a Parquet file") from error
     if rows > MOST_ROWS:
         raise NoTableError(f"it has {rows:,} rows, and at most {MOST_ROWS:,} are read: keep those of the claims")
 

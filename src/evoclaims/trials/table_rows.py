@@ -78,8 +78,9 @@ class TrialRows:
             if len(rows) > 1:
                 listed = " and ".join(str(row + 1) for row in rows[:2])
                 raise UserError(
-                    f"{self.table.name} has {len(rows)} rows of seed {seed} (rows {listed}), and a row is a trial: "
-                    "choose among them by where={column: value}, or name the column of training steps by step=."
+                    f"{self.table.name} has {len(rows)} rows of seed {seed} (rows {listed}), and a row is "
+                    f"a trial. Choose among them by where={{column: value}}, or name the column of "
+                    "training steps by step=."
                 )
             return rows
         steps = dict(zip(rows, self.steps(rows), strict=True))

@@ -75,7 +75,7 @@ def test_an_environment_whose_episodes_may_never_end_is_refused_before_training(
     endless = Condition(
         TrainingLoop(trains, packages=()), GymnasiumTask("Blackjack-v1"), "whole_budget", Budget(environment_steps=1)
     )
-    with pytest.raises(UserError, match="Episodes of Blackjack-v1 may never end: say episode_steps="):
+    with pytest.raises(UserError, match="Episodes of Blackjack-v1 may never end. Write episode_steps="):
         run(endless, [0], store_of, jax.devices("cpu"))
 
 

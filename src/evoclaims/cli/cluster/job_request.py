@@ -104,7 +104,7 @@ def requested(options: argparse.Namespace, table: Mapping[str, object]) -> JobRe
     if not local and not options.dry_run and shutil.which("sbatch") is None:
         raise UserError("There is no SLURM here (no sbatch): --cluster local runs the same jobs on this machine.")
     if local and options.slurm:
-        raise UserError("--slurm is for jobs of SLURM; --cluster local takes none.")
+        raise UserError("--slurm is only for SLURM jobs, and --cluster is local. Leave one of them out.")
     site = _Table(array=MOST_TOGETHER["local"]) if local else _site(table)
     own = {key: value for key, value in table.items() if key not in _Table.__dataclass_fields__ and not local}
     more = {**dict(_option(key, value) for key, value in own.items()), **dict(map(_given, options.slurm))}
@@ -139,7 +139,7 @@ def minutes_of(text: str) -> int:
         units = (3600, 60, 1) if in_hours else (60, 1, 0)
         seconds = float((days or 0) * 86400 + sum(part * unit for part, unit in zip(given, units, strict=False)))
     if seconds <= 0:
-        raise UserError(f"A job needs some time, not {text!r}.")
+        raise UserError(f"A job's time must be above 0, not {text!r}. Write a time such as 2:00:00 or 2h.")
     return math.ceil(seconds / 60)
 
 

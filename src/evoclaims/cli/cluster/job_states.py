@@ -79,7 +79,10 @@ def _queue() -> dict[str, Seen]:
     """Return the jobs that SLURM's controller knows, those of the last minutes that have ended among them."""
     command = ["squeue", "--noheader", "--array", "--states=all", f"--name={JOB_NAME}", "--format=%i|%T|%r|%N"]
     if shutil.which(command[0]) is None:
-        raise UserError("There are jobs of SLURM in this store, and there is no squeue here to ask about them.")
+        raise UserError(
+            "This store has SLURM jobs, and there is no squeue here to ask about them. Run this on a "
+            "machine of the cluster."
+        )
     status, out, err = _answer(command)
     if status:
         raise UserError(f"SLURM does not say which jobs are queued (squeue: {' '.join(err.split())}); try again later.")

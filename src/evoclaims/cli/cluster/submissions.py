@@ -108,7 +108,7 @@ def load_all(store_root: Path) -> dict[str, Submission]:
             found[path.stem] = msgspec.json.decode(read_file(path), type=Submission)
         except (OSError, msgspec.MsgspecError, RecursionError) as error:
             raise UserError(
-                f"Cannot read which jobs were submitted, {path}: {error}. Move the file away; jobs that it names and "
-                "that still run are not known then."
+                f"Cannot read the list of submitted jobs, {path}: {error}. Move the file away; its jobs "
+                "that still run are then unknown."
             ) from error
     return found

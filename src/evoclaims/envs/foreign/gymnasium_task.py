@@ -76,7 +76,7 @@ class GymnasiumTask(ForeignTask):
         """
         limit = self.episode_steps or self._spaces[2]
         if limit is None:
-            raise UserError(f"Episodes of {self.name} may never end: say episode_steps=.")
+            raise UserError(f"Episodes of {self.name} may never end. Write episode_steps=..., the longest episode.")
         return int(limit)
 
     @cached_property

@@ -74,14 +74,17 @@ class Descriptor:
     def __post_init__(self) -> None:
         """Reject places that are none, and an area without room."""
         if len(self.places) != 2 or not all(isinstance(place, int) and place >= 0 for place in self.places):
-            raise UserError(f"A descriptor's places are two positions in the observation from 0, not {self.places!r}.")
+            raise UserError(
+                f"A descriptor's places are {self.places!r}. They must be two positions in the "
+                "observation, counted from 0."
+            )
         if len(self.area) != 2:
-            raise UserError(f"A descriptor's area is a range for each of its two numbers, not {self.area!r}.")
+            raise UserError(f"A descriptor's area is {self.area!r}. It must be a range for each of its two numbers.")
         for lowest, highest in self.area:
             if not (math.isfinite(lowest) and math.isfinite(highest) and lowest < highest):
                 raise UserError(
-                    f"A descriptor's area is the lowest and the highest value of each number, lowest first, and not "
-                    f"({lowest}, {highest})."
+                    f"A descriptor's area has the range ({lowest}, {highest}). Write the lowest value "
+                    "first, then the highest."
                 )
 
 
@@ -202,8 +205,8 @@ class JaxTask(ForeignTask):
         """What MAP-Elites maps; raises a `UserError` where it is not declared."""
         if self.descriptor is None:
             raise UserError(
-                f"MAP-Elites maps how episodes end, and nothing says by what of {self.name}: give the task a "
-                "descriptor, such as descriptor=Descriptor(places=(0, 1), area=((-1, 1), (-1, 1)))."
+                f"MAP-Elites maps how episodes end, and {self.name} has no descriptor of this. Add one, "
+                "such as descriptor=Descriptor(places=(0, 1), area=((-1, 1), (-1, 1)))."
             )
         return self.descriptor.area
 

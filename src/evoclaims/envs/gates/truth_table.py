@@ -57,9 +57,7 @@ class TruthTable:
             raise MisfitError("a truth table has a row that asks nothing: none of its outputs is active")
         levels = self.rows_at_level
         if not levels or levels[0] < 1 or levels[-1] != rows or any(b <= a for a, b in pairwise(levels)):
-            raise MisfitError(
-                f"a truth table's levels ask for {levels} rows, not for ever more of its {rows}, at last for all"
-            )
+            raise MisfitError(f"a truth table's levels ask for {levels} rows, which must increase up to all {rows}")
 
     @property
     def rows(self) -> int:

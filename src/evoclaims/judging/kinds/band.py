@@ -45,8 +45,9 @@ class Band(Assertion):
         """Reject an empty or infinite band."""
         if not -math.inf < self.lo <= self.hi < math.inf:
             raise UserError(
-                f"A band runs from a finite lower end to a finite higher one, unlike [{self.lo}, {self.hi}]: "
-                "compare the measure with a number (m > 90), or state a bound as an event that stays()."
+                f"A band must go from a finite number to a higher finite number, not from {self.lo} to "
+                f"{self.hi}. Compare the measure with one number (m > 90), or state a bound as an event "
+                "that stays()."
             )
         self.measure.require_seen(self.hi)
 

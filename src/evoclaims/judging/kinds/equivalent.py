@@ -41,12 +41,12 @@ class Equivalent(Assertion):
     def __post_init__(self) -> None:
         """Reject an impossible margin, and measures that cannot be ranked together at a distance."""
         if not (math.isfinite(self.margin) and self.margin > 0):
-            raise UserError(f"The margin of an equivalence is a finite number above 0, unlike {self.margin}.")
+            raise UserError(f"The margin of an equivalence is {self.margin}. It must be a finite number above 0.")
         require_independent(self.left, self.right)
         if self.left.is_censored:
             raise UserError(
-                f"{self.left.describe()!r} is not observed beyond that, and nobody knows how far two trials beyond it "
-                "are apart: compare it with <, or with a number."
+                f"{self.left.describe()!r} is not observed beyond that, so the distance of two trials "
+                "beyond it is unknown. Compare it with <, or with a number."
             )
 
     def describe(self) -> str:

@@ -30,7 +30,7 @@ class MostTrials(Assertion):
     def __post_init__(self) -> None:
         """Reject a probability that cannot be tested."""
         if self.p0 is not None and not 0 < self.p0 < 1:
-            raise UserError(f"p0 lies strictly between 0 and 1 (default 0.7), unlike {self.p0}.")
+            raise UserError(f"p0 is {self.p0}. It must be above 0 and below 1 (default 0.7).")
 
     def describe(self) -> str:
         """Return "E in most trials"."""

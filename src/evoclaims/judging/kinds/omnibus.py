@@ -147,6 +147,7 @@ def kruskal_wallis_test(groups: Sequence[Sequence[float]]) -> ExactTest:
 
     def p(least: float) -> float:
         as_large = int((spreads >= least * (1 - 1e-12)).sum())  # sums of the same numbers in another order
+        # All splits contain the observed one. Draws need not: counting it keeps p above 0 and the test valid.
         return as_large / len(spreads) if exact else (as_large + 1) / (len(spreads) + 1)
 
     return ExactTest(p(observed), p(largest))

@@ -45,7 +45,7 @@ class Threshold(Assertion):
         """Reject an unknown side, and a number that is not finite or beyond what is observed."""
         require_known("side", self.side, _OPPOSITE)
         if not math.isfinite(self.number):
-            raise UserError(f"{self.measure.describe()!r} is compared with a finite number, unlike {self.number}.")
+            raise UserError(f"{self.measure.describe()!r} is compared with {self.number}. Use a finite number.")
         self.measure.require_seen(self.number)
 
     def describe(self) -> str:

@@ -31,6 +31,7 @@ def slots(schedule: Schedule, results: Sequence[Number]) -> Slots:
     """
     uses = _Uses(schedule, results)
     slot_of: dict[int, int] = {}
+    # Only one way of a choice runs in a round, so the short way may write over what the whole way writes.
     short = {number for _, numbers in uses.short for number in numbers}
     count = _place([n for n in uses.written if n not in short], uses, [], slot_of)
     for begin, numbers in uses.short:
@@ -54,6 +55,7 @@ def _place(numbers: Iterable[int], uses: _Uses, taken: list[tuple[int, int]], sl
         slot_of: gets each number's slot.
     """
     for number in sorted(numbers, key=uses.written.__getitem__):
+        # Strictly earlier: within a phase no barrier orders the last read before the write.
         free = taken and taken[0][0] < uses.written[number]
         slot = heapq.heappop(taken)[1] if free else len(taken)
         slot_of[number] = slot

@@ -137,6 +137,7 @@ def _groups(
             users[number].append(id(operation))
     root: dict[int, int] = {}
     size: Counter[int] = Counter()
+    # Backwards, since an operation joins the group of its one use, which has to be known before.
     for operation in reversed(operations):
         mine, used = INSTRUCTIONS.get(operation.name, 1), users[id(operation)]
         joins = len(used) == 1 and size[root[used[0]]] + mine <= GROUP
@@ -167,6 +168,7 @@ def _phases(operations: Sequence[ScalarOperation], warps: int, owner: dict[int, 
     for at, makers in enumerate(before):
         for maker in makers:
             users[maker].append(at)
+    # The longest remaining chain first: a chain that starts late keeps all warps waiting at the end.
     turn = [0] * len(groups)  # lower ones come first: the instructions from here to the end, negated
     for at in reversed(range(len(groups))):
         turn[at] = min((turn[user] for user in users[at]), default=0) - groups[at].instructions
@@ -191,6 +193,7 @@ def _phases(operations: Sequence[ScalarOperation], warps: int, owner: dict[int, 
                     missing[user] -= 1
                     if missing[user]:
                         continue
+                    # What another warp makes in this phase is visible only behind the barrier at its end.
                     here = {warp_of[maker] for maker in before[user] if phase_of[maker] == len(phases)}
                     if here == {warp} == {warp_of[user]}:
                         heapq.heappush(queue, (turn[user], user))

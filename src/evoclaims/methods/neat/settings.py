@@ -41,8 +41,8 @@ class Attribute:
             )
         if self.mutate_rate < 0 or self.replace_rate < 0 or self.mutate_rate + self.replace_rate > 1:
             raise UserError(
-                "The rates of mutation and replacement are probabilities that exclude each other; "
-                f"{self.mutate_rate} and {self.replace_rate} are not."
+                f"The rates of mutation and replacement are {self.mutate_rate} and {self.replace_rate}. "
+                "They must be probabilities whose sum is at most 1."
             )
 
 
@@ -64,7 +64,7 @@ class Mutation:
         for field in fields(self):
             value = getattr(self, field.name)
             if isinstance(value, float) and not 0 <= value <= 1:
-                raise UserError(f"The probability of {field.name} lies between 0 and 1; {value} does not.")
+                raise UserError(f"The probability of {field.name} is {value}. It must be between 0 and 1.")
 
 
 @dataclass(frozen=True)

@@ -85,6 +85,7 @@ def speciate(settings: Species, species: SpeciesState, population: Genome, gener
         return result
 
     def recentre(place: Array, grouping: _Grouping) -> _Grouping:
+        # Only genomes that are no centre yet, so that two species never share one.
         distances = to_all(_at(species.centres, place))
         chosen = jnp.argmin(jnp.where(grouping.member_of == NONE, distances, jnp.inf)).astype(jnp.int32)
         return _join(grouping, place, chosen)
@@ -94,6 +95,7 @@ def speciate(settings: Species, species: SpeciesState, population: Genome, gener
         return _attract(settings, grouping, place, distances)
 
     def found(grouping: _Grouping) -> _Grouping:
+        # The founder also draws nearer genomes from older species, as if its species had been there all along.
         founder = jnp.argmax(grouping.member_of == NONE).astype(jnp.int32)
         founded = _join(grouping, grouping.count, founder)
         distances = to_all(_at(population, founder))
@@ -108,6 +110,7 @@ def speciate(settings: Species, species: SpeciesState, population: Genome, gener
         member_of=jnp.full(everyone.shape, NONE, jnp.int32),
         nearest=jnp.full(everyone.shape, jnp.inf),
     )
+    # All centres are chosen before any genome joins: one that has joined could no longer become a centre.
     grouping = jax.lax.fori_loop(0, species.count, recentre, grouping)
     grouping = jax.lax.fori_loop(0, species.count, gather, grouping)
     grouping = jax.lax.while_loop(unfinished, found, grouping)
