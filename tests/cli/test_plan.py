@@ -14,6 +14,8 @@ from tiny_project import Evoclaims, Project, forget, trials_of
 
 from evoclaims import cli
 from evoclaims.cli import judging
+from evoclaims.core.errors import UserError
+from evoclaims.envs.gates.parity import NParity
 from evoclaims.report.live_line import duration
 from evoclaims.trials.store import Store
 from reproductions.nisioti2025 import REPRODUCTION
@@ -111,3 +113,16 @@ def test_a_method_whose_steps_cannot_be_timed_is_named_and_the_others_are_planne
     assert re.search(r"^right on parity +0 +10 +4\d +\d+ s$", out, re.MULTILINE)
     assert re.search(r"^d +10 +0.05 ", out, re.MULTILINE)
     assert "--measure times a few steps" not in out
+
+
+def test_a_task_that_is_refused_is_refused_when_it_is_planned(
+    evoclaims: Evoclaims, project: Project, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(task: NParity) -> None:
+        raise UserError(f"The robot of {task.name} is not simulated here as its file says.")
+
+    project.write(a="supported")
+    monkeypatch.setattr(NParity, "check", refuse, raising=False)
+    status, out, err = evoclaims("plan")
+    assert (status, out) == (2, "")
+    assert err == "evoclaims: The robot of n_parity is not simulated here as its file says.\n"

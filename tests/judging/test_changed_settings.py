@@ -39,3 +39,16 @@ def _sorted(value: Any) -> Any:
     if isinstance(value, dict):
         return {key: _sorted(value[key]) for key in sorted(value)}
     return [_sorted(part) for part in value] if isinstance(value, list) else value
+
+
+def test_an_edited_robot_is_named_by_its_file_not_by_hashes() -> None:
+    old = {"task": {"robot": {"xml": "mine:rover.xml", "body": "1f", "frames": 5}}}
+    edited = {"task": {"robot": {**old["task"]["robot"], "body": "2e"}}}
+    other = {"task": {"robot": {"xml": "mine:car.xml", "body": "2e", "frames": 5}}}
+    assert changed_settings(old, edited) == (
+        "task.robot.xml 'mine:rover.xml': this file, or one that it includes, was edited"
+    )
+    assert changed_settings(old, other) == "task.robot.xml 'mine:rover.xml' -> 'mine:car.xml'"
+    old["task"]["robot"].pop("body")  # a trial from before there was a hash
+    assert changed_settings(old, edited) == "task.robot.body none -> '2e'"
+    assert changed_settings({"body": "1f"}, {"body": "2e"}) == "body '1f' -> '2e'"

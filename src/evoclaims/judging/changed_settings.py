@@ -14,13 +14,20 @@ MOST: Final = 5
 def changed_settings(old: Mapping[str, Any], new: Mapping[str, Any]) -> str:
     """Return the settings that differ, such as "method.settings.sigma 0.5 -> 0.3"; empty if none does.
 
-    The seed is no setting; "none" stands for a setting that one side does not have.
+    The seed is no setting; "none" stands for a setting that one side does not have. Of an edited robot only a
+    hash of its model is known, so its file is named.
     """
     before, after = (dict(_leaves("", {**spec, "seed": None})) for spec in (old, new))
     names = sorted(name for name in before.keys() | after.keys() if before.get(name) != after.get(name))
-    shown = [f"{name} {before.get(name, 'none')} -> {after.get(name, 'none')}" for name in names[:MOST]]
-    more = [f"and {len(names) - MOST} more"] if len(names) > MOST else []
-    return printable(", ".join([*shown, *more]))
+    shown = []
+    for name in names:
+        file, both = f"{name.removesuffix('.body')}.xml", before.keys() & after.keys()
+        if not name.endswith(".body") or not {name, file} <= both:
+            shown.append(f"{name} {before.get(name, 'none')} -> {after.get(name, 'none')}")
+        elif file not in names:  # otherwise another file has another model anyway
+            shown.append(f"{file} {after[file]}: this file, or one that it includes, was edited")
+    more = [f"and {len(shown) - MOST} more"] if len(shown) > MOST else []
+    return printable(", ".join([*shown[:MOST], *more]))
 
 
 def _leaves(name: str, value: Any) -> Iterator[tuple[str, str]]:

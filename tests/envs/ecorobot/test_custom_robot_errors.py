@@ -112,7 +112,7 @@ def test_a_built_in_robot_s_start_is_checked_with_its_task() -> None:
             ("<body", '<body mocap="true"><geom size="0.1"/></body><body'),
             "has motion-capture bodies, which is not simulated",
         ),
-        (("<option", '<option integrator="implicit"'), "another integrator than Euler, which is not"),
+        (("<option", '<option integrator="implicit"'), "another integrator than Euler or RK4, which is not"),
         (("<option", '<option solver="CG"'), "has another solver than Newton's, which is not"),
         (("<option", '<option noslip_iterations="3"'), "has noslip_iterations=3, which is not"),
         (

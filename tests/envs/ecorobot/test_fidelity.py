@@ -16,6 +16,7 @@ from evoclaims.core.errors import UserError
 from evoclaims.envs.ecorobot import fidelity, physics
 from evoclaims.envs.ecorobot.boxes import Box
 from evoclaims.envs.ecorobot.fidelity import check, require_fidelity
+from evoclaims.envs.ecorobot.locomotion import Locomotion
 from evoclaims.envs.ecorobot.robots import ANT
 from evoclaims.envs.ecorobot.scene import Scene
 
@@ -65,11 +66,13 @@ def test_a_robot_that_is_refused_is_checked_again(tmp_path: Path, monkeypatch: p
         raise UserError("refused")
 
     monkeypatch.setattr(fidelity, "check", refuse)
-    scene = Scene(Texts(tmp_path, monkeypatch).robot(BASE))
+    task = Locomotion(robot=Texts(tmp_path, monkeypatch).robot(BASE))
     with _cached_in(tmp_path / "cache"):
         for _ in range(2):
             with pytest.raises(UserError, match="refused"):
-                require_fidelity(scene)
+                task.check()
+            with pytest.raises(UserError, match="refused"):
+                _ = task.observation_size
 
 
 @contextmanager

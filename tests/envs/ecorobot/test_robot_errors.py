@@ -124,7 +124,7 @@ BEYOND = {
     ('axis="0 1 0"', 'axis="0 1 0" frictionloss="0.1"'): "friction loss in joints",
     ("<general ", '<general dyntype="filter" '): "actuators with a state",
     ("pyramidal", "elliptic"): "elliptic friction cones",
-    ('"Euler"', '"RK4"'): "another integrator than Euler",
+    ('"Euler"', '"implicit"'): "another integrator than Euler or RK4",
     ("<!-- more -->", '<equality><joint joint1="x" joint2="y"/></equality>'): "equality constraints",
     ("<!-- more -->", '<tendon><fixed><joint joint="x" coef="1"/></fixed></tendon>'): "tendons",
 }

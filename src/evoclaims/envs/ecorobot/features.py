@@ -151,7 +151,7 @@ def require_simulated(name: str, model: mujoco.MjModel) -> None:
         raise UserError(
             f"The model of the robot {name} has {', '.join(beyond)}, which is not simulated here: a step knows "
             "joints with limits, springs and damping, motors without a state of their own, and contacts with pyramidal "
-            "friction cones, and integrates as MuJoCo's Euler does."
+            "friction cones, and integrates as MuJoCo's Euler or RK4 does."
         )
     if model.nbody < 2 or not model.body_jntnum[1]:
         body = model.body(1).name or "without a name" if model.nbody > 1 else ""
@@ -191,6 +191,8 @@ def _beyond(model: mujoco.MjModel) -> Iterator[str]:
         given = getattr(model.opt, option)
         if option.startswith("_") or callable(given) or option in OPTIONS:
             continue
+        if option == "integrator" and given == mujoco.mjtIntegrator.mjINT_RK4:
+            continue
         if np.any(given != getattr(usual, option)):
             yield _option(option, given)
     if model.opt.tolerance > LARGEST_TOLERANCE:
@@ -204,7 +206,7 @@ def _option(name: str, given: Any) -> str:
     """Return what a model with an unusual option has."""
     known = {
         "cone": "elliptic friction cones",
-        "integrator": "another integrator than Euler",
+        "integrator": "another integrator than Euler or RK4",
         "solver": "another solver than Newton's",
         "disableactuator": "disabled groups of actuators",
     }

@@ -179,14 +179,14 @@ def frames_of(scene: Scene) -> Frames:
             if frame % EVERY == 0:
                 # Half of the runs ask for more than the motors' range.
                 data.ctrl[:] = (low + high) / 2 + (1 + run % 2) * random.uniform(-0.5, 0.5, model.nu) * (high - low)
+            mujoco.mj_kinematics(model, data)
+            pose = np.concatenate([data.xpos[1], data.xmat[1]])
             before = [data.qpos.copy(), data.qvel.copy(), data.qacc_warmstart.copy(), data.ctrl.copy()]
             mujoco.mj_step(model, data)
             if not (np.isfinite(data.qvel).all() and np.abs(data.qvel).max(initial=0.0) < FASTEST):
                 break
             if frame % EVERY == 0:
                 touching = sum(contact.efc_address >= 0 for contact in data.contact)
-                # A step computes the pose before it integrates.
-                pose = np.concatenate([data.xpos[1], data.xmat[1]])
                 rows.append([*before, data.qpos.copy(), data.qvel.copy(), pose, touching])
     if not rows:
         raise UserError(

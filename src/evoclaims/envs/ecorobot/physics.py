@@ -65,7 +65,7 @@ def is_stable(body: Body) -> Bool[Array, ""]:
 # MJX takes a second to trace; with its own jit this is traced once per scene, not once per use.
 @partial(jax.jit, static_argnums=0)
 def _frame(scene: Scene, body: Body, control: Float[Array, " nu"], places: Places) -> Body:
-    """Simulate one time step, as `mjx.step` does with semi-implicit Euler integration."""
+    """Simulate one time step, as `mjx.step` does with semi-implicit Euler integration, or as C does with RK4."""
     with implicit_promotions():
         model = on_device(scene.mjx)
         if places:
@@ -73,29 +73,64 @@ def _frame(scene: Scene, body: Body, control: Float[Array, " nu"], places: Place
             nearest = _nearest(scene, model, body, places)
             theirs = {name: jnp.asarray(array)[nearest] for name, array in places.items()}
             model = model.replace(**{name: getattr(model, name).at[geoms].set(new) for name, new in theirs.items()})
-        data = on_device(scene.blank).replace(qpos=body.position, qvel=body.velocity, ctrl=control)
-        data = mjx.kinematics(model, data)
-        data = mjx.com_pos(model, data)
-        data = mjx.crb(model, data)
-        data = mjx.collision(model, data)
-        if not scene.robot.is_built_in:
-            data = as_in_c(jnp.asarray(scene.model.geom_type), model, data)
-        data = _seldom_crowded(data, scene.robot.touching)
-        data = mjx.make_constraint(model, data)
-        data = mjx.transmission(model, data)
-        data = mjx.fwd_velocity(model, data)
-        data = mjx.fwd_actuation(model, data)
-        mass = mjx.full_m(model, data)
-        force = data.qfrc_passive - data.qfrc_bias + data.qfrc_actuator
-        acceleration = constrained_acceleration(
-            mass, force, body.acceleration, data._impl.efc_J, data._impl.efc_aref, data._impl.efc_D, scene.newton_steps
-        )
+        data = on_device(scene.blank).replace(ctrl=control)
+        if scene.integrates_by_rk4:
+            return _runge_kutta(scene, model, data, body)
+        acceleration, mass, data = _accelerated(scene, model, data, body)
         used = acceleration
         if scene.damps_implicitly:  # (M + h B) a' = M a: MuJoCo's documentation, "Computation", numerical integration
             damping = model.opt.timestep * model.dof_damping
             used = acceleration - cholesky_solve(mass + jnp.diag(damping), damping * acceleration)
         data = mjx.euler(model, data.replace(qacc=used))
     return Body(position=data.qpos, velocity=data.qvel, acceleration=acceleration)
+
+
+def _accelerated(scene: Scene, model: Any, data: Any, body: Body) -> tuple[Array, Array, Any]:
+    """Return a body's acceleration, the mass matrix, and MJX's data there; `body.acceleration` is a guess."""
+    data = data.replace(qpos=body.position, qvel=body.velocity)
+    data = mjx.kinematics(model, data)
+    data = mjx.com_pos(model, data)
+    data = mjx.crb(model, data)
+    data = mjx.collision(model, data)
+    if not scene.robot.is_built_in:
+        data = as_in_c(jnp.asarray(scene.model.geom_type), model, data)
+    data = _seldom_crowded(data, scene.robot.touching)
+    data = mjx.make_constraint(model, data)
+    data = mjx.transmission(model, data)
+    data = mjx.fwd_velocity(model, data)
+    data = mjx.fwd_actuation(model, data)
+    mass = mjx.full_m(model, data)
+    force = data.qfrc_passive - data.qfrc_bias + data.qfrc_actuator
+    acceleration = constrained_acceleration(
+        mass, force, body.acceleration, data._impl.efc_J, data._impl.efc_aref, data._impl.efc_D, scene.newton_steps
+    )
+    return acceleration, mass, data
+
+
+def _runge_kutta(scene: Scene, model: Any, data: Any, body: Body) -> Body:
+    """Simulate one time step by the classical Runge-Kutta method: MuJoCo's documentation, "Computation"."""
+
+    def moved(velocity: Array) -> Array:
+        # Without acceleration, Euler's step adds the velocity to the positions, and turns quaternions by it.
+        still = jnp.zeros_like(velocity)
+        position: Array = mjx.euler(model, data.replace(qpos=body.position, qvel=velocity, qacc=still)).qpos
+        return position
+
+    def stage(carry: Any, _: None) -> Any:
+        number, velocity, acceleration, mean_velocity, mean_acceleration = carry
+        # One loop for all four, the first of them at the start itself, so that MJX is traced once.
+        ahead = jnp.where(number == 0, 0.0, jnp.where(number == 3, 1.0, 0.5)).astype(velocity.dtype)
+        weight = jnp.where((number == 0) | (number == 3), 1.0 / 6.0, 1.0 / 3.0).astype(velocity.dtype)
+        position = moved(ahead * velocity)
+        velocity = body.velocity + model.opt.timestep * ahead * acceleration
+        acceleration = _accelerated(scene, model, data, Body(position, velocity, acceleration))[0]
+        mean_velocity, mean_acceleration = mean_velocity + weight * velocity, mean_acceleration + weight * acceleration
+        return (number + 1, velocity, acceleration, mean_velocity, mean_acceleration), None
+
+    none = jnp.zeros_like(body.velocity)
+    start = (jnp.int32(0), body.velocity, body.acceleration, none, none)
+    _, _, last, velocity, acceleration = jax.lax.scan(stage, start, None, length=4)[0]
+    return Body(moved(velocity), body.velocity + model.opt.timestep * acceleration, last)
 
 
 def _seldom_crowded(data: Any, usual: int) -> Any:

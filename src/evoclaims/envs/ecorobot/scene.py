@@ -110,7 +110,12 @@ class Scene:
     def damps_implicitly(self) -> bool:
         """Whether a frame integrates the joints' damping implicitly, as MuJoCo does unless a file asks for less."""
         explicit = self.model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_EULERDAMP
-        return not explicit and bool(self.model.dof_damping.any())
+        return not explicit and bool(self.model.dof_damping.any()) and not self.integrates_by_rk4
+
+    @property
+    def integrates_by_rk4(self) -> bool:
+        """Whether a frame is one of Runge and Kutta's fourth order, not of Euler."""
+        return bool(self.model.opt.integrator == mujoco.mjtIntegrator.mjINT_RK4)
 
     @cached_property
     def start(self) -> NDArray[np.float32]:
