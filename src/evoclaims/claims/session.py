@@ -17,7 +17,7 @@ from evoclaims.core.errors import UserError
 from evoclaims.core.packages import agree, recorded
 from evoclaims.judging.assertion import Assertion
 from evoclaims.judging.design import Design, Look
-from evoclaims.judging.drift import DriftReport
+from evoclaims.judging.drift_report import DriftReport
 from evoclaims.judging.fingerprint import fingerprint
 from evoclaims.judging.judge import decide, judge
 from evoclaims.judging.measure import Event, Measure, Profile
