@@ -8,6 +8,7 @@ from importlib.metadata import version
 from pathlib import Path
 
 import pytest
+import unpacked
 from hand_made_verdicts import report
 from tiny_project import Evoclaims, Project
 
@@ -106,7 +107,7 @@ def test_the_table_is_printed_and_written_and_the_status_says_that_something_cha
     assert Path(".evoclaims-releases/.gitignore").read_text() == "*\n"
     assert not Path(".evoclaims").exists()
     assert evoclaims("report")[0] == 0
-    assert "pebble 1.3 has no verdicts." in Path("report/index.html").read_text(encoding="utf-8")
+    assert "pebble 1.3 has no verdicts." in unpacked.read(Path("report/index.html"))
 
 
 def test_nothing_is_judged_where_the_newest_release_is_installed(

@@ -119,8 +119,8 @@ def test_a_new_repository_is_a_place_for_a_project(
     [
         (("mine", "--from", "nisoti"), "There is no paper named 'nisoti'. Did you mean 'nisioti2025'? Known: "),
         (
-            ("mine", "--with", "gym"),
-            "There is no kind of starter project named 'gym'. Did you mean 'gymnasium'? Known: ",
+            ("mine", "--with", "gymnasum"),
+            "There is no kind of starter project named 'gymnasum'. Did you mean 'gymnasium'? Known: ",
         ),
         (("file",), "Cannot write a project to file: Not a directory. Name a new folder."),
         (("file/mine",), "Cannot write a project to file/mine: Not a directory."),

@@ -64,7 +64,7 @@ def test_the_page_is_below_11_kilobytes_a_claim_and_lacks_no_evidence(
     text = page.decode()
     judged = re.findall(r'<section class="claim [^>]*? id="([^"]+)"[^>]*? data-verdict="(?:supp|ref|smaller|inc)', text)
     assert len(judged) == len(history.load(REPRODUCTION.folder / history.FILE))
-    assert len(page) < 11_000 * len(judged)
+    assert len(page) < 8_000 * len(judged)
     found = pieces(text)
     assert sum("<circle" in found[anchor] for anchor in judged) == len(judged)
     assert found["all figures"].count("<figure>") == 9

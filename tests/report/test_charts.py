@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import math
 import sys
 from dataclasses import replace
 from itertools import pairwise
 from statistics import median_low
+from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
 import pytest
-from hypothesis import example, given
+from hypothesis import assume, example, given
 from hypothesis import strategies as st
 
 from evoclaims.judging.verdict import Bound, Interval
@@ -116,14 +118,37 @@ def test_ticks_are_few_rising_and_within_the_axis(one: float, other: float) -> N
     assert all(a < b for a, b in pairwise(found)) or high - low <= room
 
 
-def test_a_curve_has_a_gap_where_it_has_no_value_and_two_points_for_a_flat_stretch() -> None:
-    x = np.arange(7.0)
-    line = Line("seed <0>", x, np.array([0, 1, np.nan, 1, 1, 1, 0]))
+def _corners(values: list[float]) -> list[np.ndarray[Any, Any]]:
+    """Return the corners of each stretch of a curve that is drawn, from steps relative to the corner before."""
+    line = Line("seed <0>", np.arange(float(len(values))), np.array(values))
     svg = ElementTree.fromstring(curves_svg(CurvePanel("success", (line,), None, 1), "success over training"))
-    (path,) = [path for path in svg.iter("path") if path.get("class") == "line"]
-    d = path.get("d", "")
-    assert (d.count("M"), d.count("L")) == (2, 3)
-    assert path.findtext("title") == "seed <0>"
+    paths = [path for path in svg.iter("path") if path.get("class") == "line"]
+    assert all(path.findtext("title") == "seed <0>" for path in paths)
+    stretches = [one for path in paths for one in path.get("d", "").split("M")[1:]]
+    return [np.array(one.replace("l", " ").split(), float).reshape(-1, 2).cumsum(axis=0) for one in stretches]
+
+
+def test_a_curve_has_a_gap_where_it_has_no_value_and_two_points_for_a_flat_stretch() -> None:
+    assert [len(one) for one in _corners([0, 1, math.nan, 1, 1, 1, 0])] == [2, 3]
+
+
+@given(st.lists(st.one_of(st.just(math.nan), st.integers(-40, 40).map(float)), min_size=2, max_size=60))
+def test_a_curve_passes_each_value_within_a_quarter_of_a_unit(values: list[float]) -> None:
+    """However many steps there are, their roundings do not add up."""
+    finite = [value for value in values if value == value]
+    assume(finite)
+    low, high = min(finite), max(finite)
+    low, high = (low, high) if high > low else (low - 0.5, high + 0.5)
+    corners = _corners(values)
+    places = [round((x - 34) / (240 - 34 - 8) * (len(values) - 1)) for one in corners for x, _ in one]
+    ups = dict(zip(places, (y for one in corners for _, y in one), strict=True))
+    shown = -math.inf
+    for index, value in enumerate(values):
+        if value == value:
+            shown = ups.get(index, shown)  # within a flat stretch, the corner at its start
+            assert abs(shown - (112 - (value - low) / (high - low) * (112 - 8))) <= 0.25 + 1e-9
+        else:
+            assert index not in ups
 
 
 @example([sys.float_info.max, -1e292])

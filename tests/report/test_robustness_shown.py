@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from hand_made_verdicts import report
+from unpacked import whole
 
 from evoclaims.judging.verdict import Outcome
 from evoclaims.report.html import html
@@ -24,7 +25,7 @@ PAGE = Page(
 
 
 def test_the_page_sets_off_what_hangs_on_a_detail() -> None:
-    text = html(PAGE)
+    text = whole(PAGE)
     assert "<b>supported</b>" in text
     assert "<b>refuted</b>" not in text
     assert "another &lt;network&gt;" in text
@@ -42,13 +43,13 @@ def test_markdown_sets_off_what_hangs_on_a_detail() -> None:
 
 def test_a_verdict_stands_out_from_no_protocol_that_has_not_run() -> None:
     alone = replace(PAGE, robustness=(Robustness("G3", "full", Outcome.NOT_RUN, {"rows": Outcome.REFUTED}),))
-    assert "<b>refuted</b>" not in html(alone)
+    assert "<b>refuted</b>" not in whole(alone)
     assert "| G3 | full | not run | refuted |" in markdown(alone).splitlines()
 
 
 def test_without_variants_nothing_is_said_of_them() -> None:
     bare = Page(title="A Paper", name="paper", boards=())
-    assert "hang on a detail" not in html(bare)
+    assert "hang on a detail" not in whole(bare)
     assert "hang on a detail" not in markdown(bare)
 
 

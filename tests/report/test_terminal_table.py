@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from rich.cells import cell_len
 
-from evoclaims.judging.drift import DriftReport, DriftRow
+from evoclaims.judging.drift_report import DriftReport, DriftRow
 from evoclaims.judging.verdict import Outcome
 from evoclaims.report.console import PlainSpokenConsole, plain_table
 from evoclaims.report.table_cells import totals

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from evoclaims.claims.fetching import StoredOnly
 from evoclaims.claims.session import Session
 from evoclaims.core.packages import agree, recorded
-from evoclaims.judging.drift import DriftReport
+from evoclaims.judging.drift_report import DriftReport
 from evoclaims.judging.tripwire import DigestCheck
 from evoclaims.paper import pilots, references
 from evoclaims.trials.result import TrialResult

@@ -16,7 +16,7 @@ from evoclaims.cli.output_files import write
 from evoclaims.cli.project import Project, open_project
 from evoclaims.cli.store_folder import open_store
 from evoclaims.core.errors import UserError
-from evoclaims.judging.drift import DriftReport
+from evoclaims.judging.drift_report import DriftReport
 from evoclaims.judging.tripwire import DigestCheck
 from evoclaims.paper.archive import Archive
 from evoclaims.report.charts_of_verdicts import timeline_chart

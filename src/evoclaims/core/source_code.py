@@ -97,7 +97,8 @@ def _hash(code: Any) -> str:
     held = [code]
     while held:
         one = _bare(held.pop())
-        if not (inspect.isclass(one) or inspect.isfunction(one)) or not _is_the_projects(one):
+        kind_of_code = inspect.isclass(one) or inspect.isfunction(one)
+        if not kind_of_code or not _is_the_projects(one):
             continue
         name = f"{one.__module__}.{one.__qualname__}"
         # Functions may name each other in circles: each is hashed once.

@@ -12,7 +12,8 @@ from evoclaims.core.errors import UserError
 from evoclaims.core.files import read_file, write_atomically
 from evoclaims.core.packages import agree, depends_on, differences, recorded
 from evoclaims.core.provenance import what_fixes_bits
-from evoclaims.judging.drift import DriftCase, DriftReport, check_drift
+from evoclaims.judging.drift import DriftCase, check_drift
+from evoclaims.judging.drift_report import DriftReport
 from evoclaims.judging.tripwire import DigestCheck, compare_digests
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.result_codec import dump, parse

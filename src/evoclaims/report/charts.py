@@ -251,18 +251,23 @@ def _ends(series: Sequence[np.ndarray[tuple[int, ...], np.dtype[np.float64]]]) -
 
 
 def _path(line: Line, x: _Scale, y: _Scale) -> str:
-    """Return a curve as path data, with a gap where a value is not finite; flat stretches take two points."""
-    path, pen = [], "M"
+    """Return a curve as path data, with a gap where a value is not finite; flat stretches take two points.
+
+    Each point is given from the one before, in halves of a unit: curves are most of the page, and these steps repeat.
+    """
+    path, pen, last = [], "M", (0, 0)
     values = line.y
     for index, (across, up) in enumerate(zip(line.x, values, strict=True)):
         if not math.isfinite(up):
             pen = "M"
             continue
         flat = 0 < index < len(values) - 1 and values[index - 1] == up == values[index + 1]
-        if flat and pen == "L":
+        if flat and pen != "M":
             continue
-        path.append(f"{pen}{_at(x(across))} {_at(y(up))}")
-        pen = "L"
+        place = (round(2 * x(across)), round(2 * y(up)))  # rounded before the difference, so that no error adds up
+        before = (0, 0) if pen == "M" else last
+        path.append(f"{pen}{(place[0] - before[0]) / 2:g} {(place[1] - before[1]) / 2:g}")
+        pen, last = "l" if pen == "M" else " ", place
     return "".join(path)
 
 

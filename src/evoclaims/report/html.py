@@ -48,10 +48,9 @@ def html(page: Page) -> str:
             page=page,
             lines=lines,
             findings=findings(page, lines),
-            chapters=[one for one in _CHAPTERS if getattr(page, one[0]) or (one == _FIGURES and page.missing)],
+            chapters=_chapters(page),
             pieces=packed(dict(_pieces(page))),
             outcomes=list(Outcome),
-            legend=LEGEND,
             style=style,
             script=script,
             policy=policy(style, script),
@@ -73,9 +72,13 @@ def _pieces(page: Page) -> Iterator[tuple[str, str]]:
     for key, condition in page.conditions.items():
         yield f"trials {names[key]}", render("trials.html.j2").render(condition=condition)
         yield f"settings {names[key]}", render("settings.html.j2").render(condition=condition)
-    if page.history:
-        yield "all history", chart_svg(page.history)
-    yield "all figures", render("drawn_figures.html.j2").render(figures=page.figures)
+    for name, _, _ in _chapters(page):
+        yield f"all {name}", render(f"{name}.html.j2").render(page=page, legend=LEGEND)
+
+
+def _chapters(page: Page) -> list[tuple[str, str, str]]:
+    """Return the parts below the claims that have something to show."""
+    return [one for one in _CHAPTERS if getattr(page, one[0]) or (one == _FIGURES and page.missing)]
 
 
 def packed(pieces: Mapping[str, str]) -> Markup:

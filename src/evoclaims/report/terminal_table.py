@@ -15,7 +15,7 @@ from rich.text import Text
 
 from evoclaims.core.printable import printable, spelled
 from evoclaims.core.provenance import changing_flags
-from evoclaims.judging.drift import DriftReport
+from evoclaims.judging.drift_report import DriftReport
 from evoclaims.judging.verdict import Outcome
 from evoclaims.report import table_cells
 from evoclaims.report.console import PlainSpokenConsole

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from evoclaims.judging.drift import DriftReport, DriftRow
+from evoclaims.judging.drift_report import DriftReport, DriftRow
 from evoclaims.judging.verdict import Outcome
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.store import Store

@@ -10,7 +10,7 @@ from pathlib import Path, PurePosixPath
 
 from evoclaims.core.errors import UserError
 from evoclaims.core.packages import Versions, depends_on
-from evoclaims.judging.drift import DriftReport
+from evoclaims.judging.drift_report import DriftReport
 from evoclaims.judging.tripwire import DigestCheck
 from evoclaims.paper import references
 from evoclaims.paper.archive import Archive

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from evoclaims.judging.drift import DriftReport
+from evoclaims.judging.drift_report import DriftReport
 from evoclaims.judging.tripwire import DigestCheck
 from evoclaims.verdicts.acceptance import changes
 from evoclaims.verdicts.claim_report import ClaimReport

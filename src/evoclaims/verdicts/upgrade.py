@@ -9,7 +9,8 @@ from typing import Any
 from evoclaims.core.packages import Versions, agree, recorded
 from evoclaims.core.printable import printable
 from evoclaims.core.provenance import what_fixes_bits
-from evoclaims.judging.drift import DriftCase, DriftReport, check_drift
+from evoclaims.judging.drift import DriftCase, check_drift
+from evoclaims.judging.drift_report import DriftReport
 from evoclaims.judging.verdict import Outcome
 from evoclaims.paper import references
 from evoclaims.trials.result import TrialResult
