@@ -198,7 +198,7 @@ def test_a_descriptors_places_are_two_positions(places: Any) -> None:
 
 @pytest.mark.parametrize("area", [((1, 0), (0, 1)), ((0, 1), (1, 1)), ((0, math.inf), (0, 1)), ((0, math.nan), (0, 1))])
 def test_a_descriptors_area_has_room(area: Any) -> None:
-    with pytest.raises(UserError, match=r"has the range \(.*Write the lowest value first"):
+    with pytest.raises(UserError, match=r"has the range \(.*Write two finite numbers, the lower one first"):
         Descriptor(places=(0, 1), area=area)
 
 

@@ -83,8 +83,8 @@ class Descriptor:
         for lowest, highest in self.area:
             if not (math.isfinite(lowest) and math.isfinite(highest) and lowest < highest):
                 raise UserError(
-                    f"A descriptor's area has the range ({lowest}, {highest}). Write the lowest value "
-                    "first, then the highest."
+                    f"A descriptor's area has the range ({lowest}, {highest}). Write two finite "
+                    "numbers, the lower one first."
                 )
 
 
