@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from itertools import permutations
 
 import numpy as np
@@ -11,7 +12,7 @@ from scipy.stats import mannwhitneyu, norm
 from evoclaims.core.errors import UserError
 from evoclaims.judging.design import FIXED_10, SEQUENTIAL
 from evoclaims.judging.fingerprint import fingerprint
-from evoclaims.judging.telescope import _u_distribution, detectable_a12
+from evoclaims.judging.telescope import _u_distribution, comparison_power, detectable_a12
 
 
 def test_ten_against_ten_give_the_margin_of_all_committed_fingerprints() -> None:
@@ -53,3 +54,13 @@ def test_larger_designs_detect_less_and_too_small_ones_nothing() -> None:
 def test_a_paper_with_other_trials_has_other_fingerprints(source) -> None:
     claim = source("a", []).score() > source("b", []).score()
     assert fingerprint(claim, SEQUENTIAL.for_paper(20)) != fingerprint(claim, SEQUENTIAL.for_paper(10))
+
+
+def test_the_power_of_a_comparison_is_that_of_its_closed_form_and_of_normal_trials() -> None:
+    odds = 0.8 / 0.2  # all three of A above all of B: each time the largest left is one of A
+    assert comparison_power(3, 0.05, 0.8) == pytest.approx(math.prod(i * odds / (i * odds + 3) for i in (3, 2, 1)))
+    assert 0.03 < comparison_power(10, 0.04, 0.5) <= 0.04
+    rng = np.random.default_rng(0)
+    a, b = rng.normal(2**0.5 * norm.ppf(0.8), 1, (4000, 10)), rng.normal(0, 1, (4000, 10))
+    found = (mannwhitneyu(a, b, axis=1, method="exact", alternative="greater").pvalue <= 0.04).mean()
+    assert comparison_power(10, 0.04, 0.8) == pytest.approx(found, abs=0.05)

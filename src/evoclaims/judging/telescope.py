@@ -38,6 +38,16 @@ def detectable_a12(n: int) -> float:
     return round(low, 2)
 
 
+@lru_cache
+def comparison_power(n: int, alpha: float, a12: float) -> float:
+    """Return the probability that the one-sided rank test of `n` against `n` trials without ties rejects at `alpha`.
+
+    The alternatives are Lehmann's, as in `detectable_a12`; `a12` is strictly between 0 and 1.
+    """
+    tail = _u_distribution(n, 1.0)[::-1].cumsum()[::-1]
+    return float(_u_distribution(n, a12 / (1 - a12))[tail <= alpha].sum())
+
+
 def _u_distribution(n: int, odds: float) -> NDArray[np.float64]:
     """Return the distribution of U = number of pairs in which A is larger, shape [n² + 1], for F_A = F_B ** odds.
 

@@ -7,6 +7,8 @@ from collections.abc import Iterable, Sequence
 
 from evoclaims.judging.design import Look
 from evoclaims.judging.event_power import RATES, event_power
+from evoclaims.judging.kinds.greater import Greater
+from evoclaims.judging.telescope import comparison_power
 from evoclaims.judging.verdict import Direction, Outcome
 from evoclaims.report.formatting import p_value, place_key, places
 from evoclaims.verdicts import mixed_versions
@@ -16,6 +18,8 @@ from evoclaims.verdicts.sensitivity import Tally, Tried
 
 NONE = "–"
 """Not measured."""
+EFFECTS = (0.71, 0.8, 0.9)
+"""A12 for which the power of a comparison is shown; the first is what ten trials a side of a paper could study."""
 
 
 def in_the_papers_order(reports: Iterable[ClaimReport]) -> list[ClaimReport]:
@@ -43,20 +47,28 @@ def remarks(report: ClaimReport) -> str:
 
 
 def power(report: ClaimReport) -> str:
-    """Return how often an undecided "most trials" would be supported at some true rates; empty for other verdicts."""
+    """Return how often undecided parts would be supported at some true rates, or effects; empty for other verdicts.
+
+    Of a comparison: by its last look alone, and without ties, which make it harder.
+    """
     verdict = report.verdict
     if verdict is None or report.outcome is not Outcome.INCONCLUSIVE or not report.attainable:
         return ""
-    open_ = [part for part in verdict.evidence if part.events and part.outcome is not Outcome.SUPPORTED and part.bounds]
+    open_ = [part for part in verdict.evidence if part.outcome is not Outcome.SUPPORTED and part.bounds]
     looks = [Look(look.n, look.alpha) for look in report.attainable]
     rates = ", ".join(f"{rate:g}" for rate in RATES)
 
     def at_rates(p0: float) -> str:
         return ", ".join(f"{event_power(looks, p0, rate):.2f}" for rate in RATES)
 
+    effects = ", ".join(f"{a12:g}" for a12 in EFFECTS)
+    found = ", ".join(f"{comparison_power(looks[-1].n, looks[-1].alpha, a12):.2f}" for a12 in EFFECTS)
     return "; ".join(
         f"“{part.describe}” is supported with probability {at_rates(part.bounds[0].value)} at true rates of {rates}"
+        if part.events
+        else f"“{part.describe}” is supported by {looks[-1].n} trials with probability {found} at an A12 of {effects}"
         for part in open_
+        if part.events or part.kind == Greater.kind
     )
 
 
