@@ -225,7 +225,7 @@ def test_sorting_keeps_the_order_of_equals(values: list[float]) -> None:
 
 
 @pytest.mark.oldest
-def test_expressions_go_with_their_text_and_a_gpus_text_makes_them_again() -> None:
+def test_expressions_go_when_their_text_is_written() -> None:
     number = jax.ShapeDtypeStruct((), jnp.float32)
     kernel = Kernel(lambda x, y: x / y + jnp.sin(x), "This", jax.tree.structure((0, 0)), (number, number))
     before = gpu_kernel.text(kernel.results, kernel.read, {0: 1, 1: 1}, 5)

@@ -320,7 +320,7 @@ def test_what_training_gave_is_recorded_apart_from_the_examination(store: Store,
     assert first.provenance["returned"] == third.provenance["returned"] != second.provenance["returned"]
 
 
-def test_a_loops_wait_for_another_process_stops_the_clock_of_its_time_limit(
+def test_a_loops_wait_for_a_kernel_stops_its_clock(
     store: Store, cpus: list[Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     clock: list[float] = []
