@@ -8,6 +8,7 @@ from dataclasses import replace
 import pytest
 from laboratory import Laboratory, better_solves, better_wins
 from rich.console import Console
+from unpacked import whole
 
 from evoclaims.figures.readings import Reading, Readings
 from evoclaims.figures.replication import Replication
@@ -16,7 +17,6 @@ from evoclaims.judging.verdict import Outcome
 from evoclaims.paper.reported import Reported
 from evoclaims.report import replication_blocks, replication_cells
 from evoclaims.report.build import gather
-from evoclaims.report.html import html
 from evoclaims.report.markdown import markdown
 from evoclaims.report.model import Page
 
@@ -91,7 +91,7 @@ def test_a_block_says_why_a_number_has_no_interval() -> None:
 
 
 def test_the_page_has_a_line_for_each_number_and_escapes_it() -> None:
-    text = html(PAGE)
+    text = whole(PAGE)
     assert "Do the numbers replicate?" in text
     assert "&lt;neat&gt; on maze: reward" in text
     for colour, answer in (
@@ -114,7 +114,7 @@ def test_markdown_has_the_same_table() -> None:
 
 def test_without_numbers_nothing_is_said_of_them() -> None:
     bare = Page(title="A Paper", name="paper", boards=())
-    assert "replicate?" not in html(bare)
+    assert "replicate?" not in whole(bare)
     assert "replicate?" not in markdown(bare)
 
 
