@@ -298,7 +298,7 @@ def test_a_lost_support_comes_with_how_often_draws_from_the_pilots_lose_it(
     def chance() -> float | None:
         groups = _pair(reading)
         assertion = groups[0].mean_success > groups[1].mean_success
-        report = reading.settle(ClaimTest(says, "smoke", ""), assertion)
+        report = replace(reading).settle(ClaimTest(says, "smoke", ""), assertion)  # a session reads verdicts once
         assert report.outcome == "inconclusive"
         return report.chance
 
