@@ -293,9 +293,9 @@ def test_a_lost_support_comes_with_how_often_draws_from_the_pilots_lose_it(
     for seed in range(6):
         session.store.put(made(better.condition, seed, seed / 10), {})
         session.store.put(made(worse.condition, seed, seed / 10), {})
-    reading = replace(session, fetch=StoredOnly(Archive(session.store)))
 
     def chance() -> float | None:
+        reading = replace(session, fetch=StoredOnly(Archive(session.store)))  # a session reads what is accepted once
         groups = _pair(reading)
         assertion = groups[0].mean_success > groups[1].mean_success
         report = replace(reading).settle(ClaimTest(says, "smoke", ""), assertion)  # a session reads verdicts once
