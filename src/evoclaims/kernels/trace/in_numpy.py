@@ -64,18 +64,21 @@ def _run(closed: Any, operands: Sequence[Lanes]) -> list[Lanes]:
     values.update(zip(jaxpr.invars, operands, strict=True))
 
     def read(variable: Any) -> Lanes:
-        return (
-            np.asarray(variable.val, variable.aval.dtype)[None] if isinstance(variable, Literal) else values[variable]
-        )
+        if isinstance(variable, Literal):
+            aval: Any = variable.aval
+            return np.asarray(variable.val, aval.dtype)[None]
+        return values[variable]
 
     for equation in jaxpr.eqns:
         name, arguments = equation.primitive.name, [read(v) for v in equation.invars]
         if name in CALLS:
             results: Sequence[Lanes] = _run(equation.params[CALLS[name]], arguments)
         elif name in ELEMENTARY:
-            results = [ELEMENTARY[name](*_of_one_rank(arguments))]
+            function: Any = ELEMENTARY[name]
+            results = [function(*_of_one_rank(arguments))]
         else:
-            results = RULES.get(name, _compiled)(equation, *arguments)
+            rule: Any = RULES.get(name, _compiled)
+            results = rule(equation, *arguments)
         values.update(zip(equation.outvars, results, strict=True))
     return [read(v) for v in jaxpr.outvars]
 
