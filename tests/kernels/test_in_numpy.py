@@ -15,6 +15,10 @@ from evoclaims.kernels import in_numpy
 
 X = np.random.default_rng(0).normal(size=(5, 4))
 MORE: dict[str, Callable[[Any], Any]] = {
+    "angles": lambda x: (jnp.arccos(jnp.tanh(x)), jnp.arcsin(jnp.tanh(x)), jnp.arctan(x), jnp.tan(x)),
+    "bounds": lambda x: (jax.lax.clamp(-0.3, x, jnp.abs(x[0])), jnp.sign(x), jnp.isfinite(1 / (x - x[0])), x % 0.3),
+    "powers": lambda x: (jax.lax.rsqrt(x * x), jnp.power(jnp.abs(x), x), jnp.exp(x), jnp.log(x * x), jnp.square(x)),
+    "rows": lambda x: (jnp.tile(x, 2), jax.lax.pad(x, 0.5, [(1, 2, 1)]), jax.lax.cumsum(x, reverse=True)),
     "integer quotients": lambda x: (jnp.int32(x * 9) // 4, jax.lax.div(jnp.int32(x * 9), jnp.int32(x * 3))),
     "a matrix that has no Cholesky factor": lambda x: jnp.linalg.cholesky(jnp.diag(x)),
     "a loop over rows": lambda x: jax.lax.scan(lambda c, row: (c + row, c * row), x[0], x[1:], reverse=True),

@@ -214,8 +214,9 @@ def main() -> None:
         for name, text in variants():
             try:
                 off = furthest(texts.robot(text, frames=1, contacts=12))
-                counts["equal" if off < TOLERANCE else "OTHER"] += 1
-                print("equal" if off < TOLERANCE else "OTHER", f"{off:.1e}", name, flush=True)
+                end = "equal" if off < TOLERANCE else "unclear" if off <= fidelity.TOLERANCE else "refused by frames"
+                counts[end] += 1
+                print(end, f"{off:.1e}", name, flush=True)
             except UserError as error:
                 counts["refused"] += 1
                 print("refused", name, error, flush=True)

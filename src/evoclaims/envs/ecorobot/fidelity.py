@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from evoclaims import kernels
 from evoclaims.core.canonical import as_plain, content_hash
 from evoclaims.core.errors import UserError
-from evoclaims.core.files import write_atomically
+from evoclaims.core.files import read_file, write_atomically
 from evoclaims.core.private_files import doubt, make_private, read_private
 from evoclaims.core.provenance import versions
 from evoclaims.envs.ecorobot import physics
@@ -108,7 +108,7 @@ def _has_passed(record: Path) -> bool:
 def _code() -> str:
     """Return a hash of the code that simulates and checks."""
     files = [*Path(__file__).parent.glob("*.py"), *Path(kernels.__file__).parent.glob("trace/*.py")]
-    return hashlib.sha256(b"".join(file.read_bytes() for file in sorted(files))).hexdigest()
+    return hashlib.sha256(b"".join(map(read_file, sorted(files)))).hexdigest()
 
 
 def check(scene: Scene) -> None:

@@ -65,8 +65,8 @@ def _run(closed: Any, operands: Sequence[Lanes]) -> list[Lanes]:
 
     def read(variable: Any) -> Lanes:
         if isinstance(variable, Literal):
-            shaped: Any = variable.aval
-            return np.asarray(variable.val, shaped.dtype)[None]
+            aval: Any = variable.aval
+            return np.asarray(variable.val, aval.dtype)[None]
         return values[variable]
 
     for equation in jaxpr.eqns:
@@ -74,9 +74,10 @@ def _run(closed: Any, operands: Sequence[Lanes]) -> list[Lanes]:
         if name in CALLS:
             results: Sequence[Lanes] = _run(equation.params[CALLS[name]], arguments)
         elif name in ELEMENTARY:
-            results = [ELEMENTARY[name](*_of_one_rank(arguments))]
+            function: Any = ELEMENTARY[name]
+            results = [function(*_of_one_rank(arguments))]
         else:
-            rule: Rule = RULES.get(name, _compiled)
+            rule: Any = RULES.get(name, _compiled)
             results = rule(equation, *arguments)
         values.update(zip(equation.outvars, results, strict=True))
     return [read(v) for v in jaxpr.outvars]
