@@ -109,4 +109,4 @@ def test_a_mistake_is_a_sentence(evoclaims: Evoclaims, arguments: tuple[str, ...
 def test_a_paper_without_numbers_says_where_they_are_read_from(evoclaims: Evoclaims) -> None:
     Path("reported.toml").unlink()
     status, _, err = evoclaims("replicate")
-    assert (status, "reported.toml, which has none" in " ".join(err.split())) == (2, True)
+    assert (status, "reported.toml has no published numbers." in " ".join(err.split())) == (2, True)

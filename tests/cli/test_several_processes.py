@@ -291,7 +291,8 @@ def test_a_command_keeps_off_gpus_before_libraries_make_arrays_as_they_are_impor
 
 
 DEADLY = '''
-
+import os
+import signal
 
 
 class Killed(Coin):

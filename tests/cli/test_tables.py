@@ -172,7 +172,7 @@ def test_published_numbers_are_a_table_too(committed: Evoclaims) -> None:
         (PAGE.replace("verdicts", "verdict"), "There is no kind of table named 'verdict'. Did you mean 'verdicts'?"),
         (PAGE.replace("verdicts full", "verdicts ful"), "There is no tier named 'ful'."),
         (PAGE.replace("smoke:traded", "smoke:trade"), "There is no variant named 'trade'."),
-        (PAGE.replace("verdicts", "tally"), "shows one tier, not full, smoke, smoke:traded. Write one for each."),
+        (PAGE.replace("verdicts", "tally"), "shows one tier, not full, smoke, smoke:traded. Write one table for each."),
         (PAGE.replace("verdicts full smoke smoke:traded", "details full smoke"), "shows one tier, not full, smoke."),
         (PAGE.replace("verdicts full smoke smoke:traded", "tally ful"), "There is no tier named 'ful'."),
         (

@@ -14,7 +14,7 @@ ROOT = Path(__file__).parents[2]
 PAGES = (ROOT / "README.md", *(ROOT / "docs").glob("*.md"))
 DOCUMENTS = {path.name: path.read_text(encoding="utf-8") for path in PAGES}
 OPTIONS = re.findall(r"^\| `(--claims-.*?)` \|", DOCUMENTS["pytest.md"], re.MULTILINE)
-NAMED = {"merge", "champion"}
+NAMED = {"bisect", "merge", "champion"}
 """Commands that take more words, and that sentences call by their names."""
 
 
