@@ -54,7 +54,7 @@ def test_the_tables_are_as_the_reference_trials_give_them(
     assert status == 0, f"{capsys.readouterr().out}`evoclaims tables {' '.join(map(str, PAGES))}` writes them anew."
 
 
-def test_the_page_is_below_11_kilobytes_a_claim_and_lacks_no_evidence(
+def test_the_page_is_below_8_kilobytes_a_claim_and_lacks_no_evidence(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(ROOT)
