@@ -361,8 +361,8 @@ def test_a_task_that_cannot_be_mapped_is_one_sentence() -> None:
     [
         ({"batch": 0}, "MAP-Elites's batch must be at least 1, not 0"),
         ({"initial": 0}, "MAP-Elites's initial must be at least 1, not 0"),
-        ({"cells": (5,)}, "two numbers of cells, each at least 1, not (5,)"),
-        ({"cells": (5, 0)}, "not (5, 0)"),
+        ({"cells": (5,)}, "The grid of MAP-Elites is (5,). It must be two numbers of cells, each at least 1."),
+        ({"cells": (5, 0)}, "The grid of MAP-Elites is (5, 0)."),
         ({"iso_sigma": -0.1}, "iso_sigma and line_sigma are -0.1 and 0.2"),
         ({"line_sigma": float("nan")}, "are 0.2 and nan"),
         ({"iso_sigma": 0.0, "line_sigma": 0.0}, "not both 0"),

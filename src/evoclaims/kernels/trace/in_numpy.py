@@ -296,12 +296,16 @@ def _dot_general(equation: Any, left: Lanes, right: Lanes) -> Sequence[Lanes]:
 @_rule("scan")
 def _scan(equation: Any, *operands: Lanes) -> Sequence[Lanes]:
     p = equation.params
-    fixed, carry = list(operands[: p["num_consts"]]), list(operands[p["num_consts"] :][: p["num_carry"]])
-    rows, stacked = operands[p["num_consts"] + p["num_carry"] :], []
+    inner = p["jaxpr"].jaxpr
+    # What jax calls these counts differs by release: rows and results by rows have one dimension more outside.
+    known = sum(a.aval.ndim == b.aval.ndim for a, b in zip(equation.invars, inner.invars, strict=True))
+    carries = sum(a.aval.ndim == b.aval.ndim for a, b in zip(equation.outvars, inner.outvars, strict=True))
+    fixed, carry = list(operands[: known - carries]), list(operands[known - carries : known])
+    rows, stacked = operands[known:], []
     for i in reversed(range(p["length"])) if p["reverse"] else range(p["length"]):
         results = _run(p["jaxpr"], [*fixed, *carry, *(x[:, i] for x in rows)])
-        carry = results[: p["num_carry"]]
-        stacked.append(results[p["num_carry"] :])
+        carry = results[:carries]
+        stacked.append(results[carries:])
     if not stacked:
         return _compiled(equation, *operands)
     order = stacked[::-1] if p["reverse"] else stacked
