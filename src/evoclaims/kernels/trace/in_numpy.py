@@ -94,7 +94,8 @@ def _rule(*names: str) -> Callable[[Rule], Rule]:
 def _compiled(equation: Any, *operands: Lanes) -> Sequence[Lanes]:
     """Compute a primitive that has no rule by jax."""
     params = equation.primitive.get_bind_params(equation.params)
-    results = jax.jit(jax.vmap(partial(equation.primitive.bind, **params)))(*_alike(operands))
+    bind = partial(equation.primitive.bind, **params)
+    results = jax.jit(jax.vmap(bind))(*_alike(operands)) if operands else jax.tree.map(lambda x: x[None], bind())
     return [np.asarray(x) for x in (results if equation.primitive.multiple_results else [results])]
 
 
