@@ -51,8 +51,8 @@ def test_the_full_plan_fits_eighty_columns_and_says_there_what_it_says_on_a_wide
     assert max(cell_len(line.rstrip()) for line in narrow.splitlines()) <= 80
     assert Counter(narrow.split()) == Counter(wide.split())
     to_run, took = (line.split()[3:] for line in wide.splitlines() if line.startswith("neat on stones "))
-    assert to_run[:4] == ["0", "10", "20,480,000,000", to_run[3]]
-    assert to_run[4:] in (["h", to_run[5], "min"], ["min", to_run[5], "s"])  # by smoke's pace on a processor
+    assert to_run[:3] == ["0", "10", "20,480,000,000"]
+    assert re.fullmatch(r"\d+ (h|min) \d\d (min|s)", " ".join(to_run[3:7]))  # by smoke's pace on a processor
     committed = REPRODUCTION.references / "full" / "neat-stones.jsonl"
     batches = {
         timing["started"]: timing

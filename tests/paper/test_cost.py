@@ -132,7 +132,7 @@ def test_the_protocols_trials_come_first_and_a_variants_own_say_what_the_variant
         path = references.path_of(reproduction.references_of(variant), tier, *names)
         condition = reproduction.tier(tier, variant).condition(*names)
         references.write(path, _trials(run, condition=condition, started=f"{variant} {tier}"))
-    found = of_names(reproduction, "full", *names)
+    found = of_names(reproduction, ("full", "smoke"), *names)
     assert [trial.timing["run"] for trial in found[::4]] == [40.0, 20.0, 1000.0]
     estimator = Estimator(store, reproduction, "full", "cpu")
     both = {name: Wanted(names, one, range(4)) for name, one in (("slow", LONGER), ("", CONDITIONS[names]))}
@@ -170,6 +170,17 @@ def test_only_trials_of_a_kind_of_device_count_where_one_is_named(owed: Callable
     case = CONDITION, 4, _trials(20.0, "gpu")
     (named,), (other,) = owed("gpu", case, kind="GPU"), owed("gpu", case, kind="NVIDIA Abacus")
     assert (named.cost.basis, other.cost.basis) == ("here", "budget")
+
+
+def test_the_files_of_a_name_are_read_once_for_all_its_conditions(
+    monkeypatch: pytest.MonkeyPatch, reproduction: Reproduction, store: Store
+) -> None:
+    read: list[tuple[str, str, str]] = []
+    monkeypatch.setattr(references, "committed", lambda folder, *names: read.append(names) or ())
+    many = {bits: Wanted(("better", "small"), replace(CONDITION, task=NParity(bits)), range(4)) for bits in (2, 3, 4)}
+    Estimator(store, reproduction, "full", "cpu").owed(many)
+    assert sorted(set(read)) == [("full", "better", "small"), ("smoke", "better", "small")]
+    assert len(read) == 3  # of the tier itself, and of all
 
 
 def test_a_file_of_committed_trials_that_cannot_be_read_says_nothing(reproduction: Reproduction, store: Store) -> None:

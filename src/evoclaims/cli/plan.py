@@ -74,7 +74,9 @@ def main(options: argparse.Namespace) -> int:
 
     counts, untimed = _counts(tier, reports), list[str]()
     wanted = {names: Wanted(names, tier.condition(*names), tier.design.seeds(counts[names])) for names in used}
-    platform = chosen[0].platform if not options.like else "cpu" if options.like == "cpu" else "gpu"
+    platform = chosen[0].platform
+    if options.like:
+        platform = "cpu" if options.like == "cpu" else "gpu"
     limit = project.config.seconds(None)
     estimator = Estimator(store, reproduction, options.tier, platform, options.like or "", limit)
     owed = estimator.owed(wanted)

@@ -10,9 +10,10 @@ import math
 import statistics
 import time
 from collections import defaultdict
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import cache
 from typing import Final, Literal, TypeVar
 
 import jax
@@ -34,6 +35,9 @@ Key = TypeVar("Key")
 
 Basis = Literal["here", "elsewhere", "budget"]
 """What an estimate is by: trials of this machine, or of others that were compared with it; of others; no trial."""
+
+Committed = Callable[[tuple[str, ...], str, str], tuple[TrialResult, ...]]
+"""Reads the committed trials of tiers, a method and a task."""
 
 COMPILE_SECONDS: Final = 10.0
 """To compile a condition, where nothing is known: between a gate's and a robot's, on a processor."""
@@ -148,7 +152,8 @@ class Estimator:
         layout = layout_on(self.platform)
         lacking = {key: tuple(self._missing(one)) for key, one in wanted.items()}
         counts = {key: len(lacking[key]) or len(one.seeds) for key, one in wanted.items()}
-        found = {key: self._by_earlier(one, counts[key]) for key, one in wanted.items()}
+        read = cache(self._committed)  # many conditions may have the same names: faults planted in one
+        found = {key: self._by_earlier(one, counts[key], read) for key, one in wanted.items()}
         both = [(one.here.seconds(), one.elsewhere.seconds()) for one in found.values() if one.here and one.elsewhere]
         scale = sum(here for here, _ in both) / sum(there for _, there in both) if both else None
         known = {key: one.at(scale) for key, one in found.items()}
@@ -170,10 +175,10 @@ class Estimator:
             return []
         return StoredTrials(self.store, one.condition, self.any_version, self.time_limit).missing(one.seeds)
 
-    def _by_earlier(self, one: Wanted, trials: int) -> _Known:
+    def _by_earlier(self, one: Wanted, trials: int, read: Committed) -> _Known:
         """Return what so many trials cost by earlier ones: of the condition itself, or else of its names."""
         mine = machine_class()
-        for earlier in self._earlier(one):
+        for earlier in self._earlier(one, read):
             sides: dict[bool, list[TrialResult]] = {True: [], False: []}
             for trial in earlier:
                 if trial.status in COMPLETE and self._is_fitting(trial):
@@ -186,19 +191,19 @@ class Estimator:
                 )
         return _Known(None, None)
 
-    def _earlier(self, one: Wanted) -> Iterator[Sequence[TrialResult]]:
-        """Yield earlier trials: of the condition itself, then of its names, as long as the first say nothing.
-
-        A file of committed trials that cannot be read is reported by whoever compares with it.
-        """
-        tier, paper = self.tier, self.reproduction
+    def _earlier(self, one: Wanted, read: Committed) -> Iterator[Sequence[TrialResult]]:
+        """Yield earlier trials: of the condition itself, then of its names, as long as the first say nothing."""
         seeds = sorted({*range(SEEDS_LOOKED_AT), *one.seeds})
-        stored = list(StoredTrials(self.store, one.condition, any_version=True).sound(seeds))
+        stored = StoredTrials(self.store, one.condition, any_version=True).sound(seeds)
+        committed = (trial for trial in read((self.tier,), *one.names) if trial.condition == one.condition.id)
+        yield [*stored, *committed]
+        yield read(tuple(sorted(self.reproduction.tiers, key=lambda name: name != self.tier)), *one.names)
+
+    def _committed(self, tiers: tuple[str, ...], method: str, task: str) -> tuple[TrialResult, ...]:
+        """Return committed trials; none where a file cannot be read, which whoever compares with it reports."""
         with suppress(UserError):
-            stored += references.of_condition(paper.references, tier, *one.names, one.condition.id)
-        yield stored
-        with suppress(UserError):
-            yield of_names(paper, tier, *one.names)
+            return of_names(self.reproduction, tiers, method, task)
+        return ()
 
     def _is_fitting(self, trial: TrialResult) -> bool:
         """Whether a trial was made on such a device."""
@@ -221,9 +226,8 @@ class _Known:
         return replace(there, compile=there.compile * scale, work=there.work * scale, basis="here")
 
 
-def of_names(reproduction: Reproduction, tier: str, method: str, task: str) -> tuple[TrialResult, ...]:
-    """Return the committed trials of a method on a task: the protocol's, those of `tier` first, then its variants'."""
-    tiers = sorted(reproduction.tiers, key=lambda name: name != tier)
+def of_names(reproduction: Reproduction, tiers: Sequence[str], method: str, task: str) -> tuple[TrialResult, ...]:
+    """Return the committed trials of a method on a task: the protocol's by `tiers`, then its variants'."""
     folders = map(reproduction.references_of, ("", *reproduction.variants))
     files = (references.committed(folder, name, method, task) for folder in folders for name in tiers)
     return tuple(itertools.chain.from_iterable(files))
