@@ -9,7 +9,7 @@ import itertools
 
 import numpy as np
 
-from evoclaims import Event, Measure, TrialGroup
+from evoclaims import Event, Measure, Profile, TrialGroup
 from evoclaims.envs import Circuit
 
 
@@ -31,6 +31,16 @@ class PaperTrials(TrialGroup):
         guess = constant_success(self.condition.task)[-1]
         return self.measure(
             "success beyond guessing on the last level", lambda t: (t.metrics["last_success"] - guess) / (1.0 - guess)
+        )
+
+    @property
+    def success_so_far(self) -> Profile:
+        """Success of the final policy, averaged over each level and all before it."""
+        return Profile(
+            self,
+            "success averaged over the levels so far",
+            lambda t: tuple(np.cumsum(t.levels["success"]) / np.arange(1, len(t.levels["success"]) + 1)),
+            self.condition.task.levels,
         )
 
     @property

@@ -1,4 +1,4 @@
-"""Single details of the maze with stepping stones, its starts and its methods, as the authors' older commits have them.
+"""Single details of the mazes, their starts and their methods, as the authors' older commits have them.
 
 Each function returns the changed condition, or None where the detail does not matter. Controls stay as they are.
 """
@@ -10,8 +10,9 @@ from dataclasses import fields, replace
 from typing import Any, Final
 
 from evoclaims import Budget, Condition
-from evoclaims.envs import ANT, RobotTask, SteppingStones
+from evoclaims.envs import ANT, DeceptiveMaze, RobotTask, SteppingStones
 from evoclaims.methods import CmaEs, HyperNeat, MapElites, Neat, Ppo, RandomPolicy, SeldomDecomposedCmaEs
+from evoclaims.networks import AllSkips
 from reproductions.nisioti2025 import ecorobot
 from reproductions.nisioti2025.first_level_ppo import FirstLevelPpo
 from reproductions.nisioti2025.other_champions import (
@@ -21,6 +22,7 @@ from reproductions.nisioti2025.other_champions import (
     OtherCmaEs,
     OtherSeldomDecomposedCmaEs,
 )
+from reproductions.nisioti2025.other_mazes import EXAMINED_STEPS, EasyMazeAsCoded, Recurrent, RememberingStones
 from reproductions.nisioti2025.other_ppo import OtherFirstLevelPpo, OtherPpo
 from reproductions.nisioti2025.other_stones import MetreRanges, OtherStones
 from reproductions.nisioti2025.waypoints import Waypoints
@@ -155,6 +157,35 @@ def torso_only(method: str, task: str, condition: Condition) -> Condition | None
     if getattr(asked, "robot", None) != ANT:
         return None
     return other_stones(robot=replace(ANT, seen_velocities=2), seen_positions=3)(method, task, condition)
+
+
+def easy_as_coded(method: str, task: str, condition: Condition) -> Condition | None:
+    """The full tier's easy maze, with HyperNEAT's substrate layered: the paper's has no neurons for the way shown."""
+    asked: Any = condition.task
+    if type(asked) is not DeceptiveMaze or asked.difficulty != "easy":
+        return None
+    steps = EXAMINED_STEPS if isinstance(condition.method, Ppo) else asked.episode_steps
+    coded = as_kind(
+        EasyMazeAsCoded,
+        asked,
+        sensor=EasyMazeAsCoded.sensor,
+        robot=replace(asked.robot, seen_velocities=2),
+        episode_steps=steps,
+    )
+    return replace(layered_16(method, task, condition) or condition, task=coded)
+
+
+def recurrent_24(method: str, task: str, condition: Condition) -> Condition | None:
+    """CMA-ES among the full tier's stones, with 24 neurons that feed each other and keep their state."""
+    trained: Any = condition.method
+    if type(condition.task) is not SteppingStones or not isinstance(trained, CmaEs):
+        return None
+    if not isinstance(trained.network, AllSkips):
+        return None
+    network = Recurrent(hidden=trained.network.hidden)
+    seldom = SeldomDecomposedCmaEs(trained.population, network)
+    remembering = as_kind(RememberingStones, condition.task, remembered=network.hidden)
+    return replace(condition, method=seldom, task=remembering)
 
 
 def other_ppo(**settings: Any) -> Change:

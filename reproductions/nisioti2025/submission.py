@@ -43,6 +43,12 @@ def _stones(pays: Literal["each", "once"], within: float) -> Change:
     return change
 
 
+def _easy_maze(method: str, task: str, condition: Condition) -> Condition | None:
+    """The easy maze as coded, examined as often."""
+    now = stones_details.easy_as_coded(method, task, condition)
+    return now and replace(now, task=replace(now.task, examined_episodes=EXAMINED))
+
+
 def _evolution(method: str, task: str, condition: Condition) -> Condition | None:
     """NEAT and HyperNEAT with robots: rates, species, and CPPNs of at most 50 nodes with sigmoids alone."""
     evolved: Any = condition.method
@@ -69,6 +75,7 @@ def robots(pays: Literal["each", "once"], within: float, given: tuple[Change, ..
     changes = (
         *given,
         _stones(pays, within),
+        _easy_maze,
         _evolution,
         stones_details.layered_16,
         stones_details.best_ever,

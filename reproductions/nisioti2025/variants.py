@@ -332,6 +332,15 @@ VARIANTS = {
     "frozen_noise": _variant(
         "PPO is examined with noise, the same draw in every step", stones_details.other_ppo(frozen_noise=True)
     ),
+    "easy_as_coded": _variant(
+        "The easy maze shows the way to the target, pays metres, and has its rangefinders 3 m from the robot; "
+        "examinations, and PPO's episodes, have 300 steps",
+        stones_details.easy_as_coded,
+    ),
+    "recurrent_24": _variant(
+        "CMA-ES among stones trains 24 neurons that feed each other five times a step and keep their state",
+        stones_details.recurrent_24,
+    ),
     "submission": _variant(
         "The protocol at the time of the paper; stones pay in every step and count from 0.32 m",
         _submission("each", 0.32),
