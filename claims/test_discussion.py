@@ -2,13 +2,14 @@
 
 import pytest
 
-from evoclaims import Outcome, claim, expected
+from evoclaims import Outcome, claim, expected, third_look
 
 AUDIT = "2026-11-26"
 """When an audit made these sentences claims, after all trials had run."""
 OVER_TASKS = "it is about the tasks at their own sizes; each task's own claims have smoke tests"
 
 
+@third_look
 @claim(
     "T1",
     says="architecture search (through NEAT) performing in general on par with CMA-ES",
@@ -40,6 +41,7 @@ def test_neat_is_on_par_with_cma_es(trials, verdict, task):
         verdict(neat.last_success.equivalent_to(cma_es.last_success, margin=0.1))
 
 
+@third_look
 @claim(
     "T2",
     says="direct encodings fair better in transfer learning",

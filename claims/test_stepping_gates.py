@@ -5,7 +5,7 @@ Smoke judges a sentence on 3-parity and the first two operations of the ALU, whe
 
 import pytest
 
-from evoclaims import Outcome, claim, expected, without_smoke
+from evoclaims import Outcome, claim, expected, third_look, without_smoke
 
 TASKS = ["n_parity", "simple_alu"]
 FIRST, SECOND = "2026-11-21 02:39", "2026-11-21 07:12"
@@ -105,6 +105,7 @@ def test_neat_solves_parity(trials, verdict):
     verdict(neat.solves_every_level.in_most_trials())
 
 
+@third_look
 @claim(
     "G3",
     says="NEAT ... stops at level 5 of the Simple ALU task",
@@ -169,6 +170,7 @@ def test_hyperneat_drops_with_the_levels(trials, verdict, task):
     )
 
 
+@third_look
 @claim(
     "G5",
     says="PPO only reached the first level of both tasks",
@@ -253,6 +255,7 @@ def test_ppo_is_better_without_the_curriculum(trials, verdict):
     verdict(direct.last_success_is(1).in_most_trials() & curriculum.solves_no_level_beyond(0).stays())
 
 
+@third_look
 @claim(
     "G6",
     says="Direct encodings perform best in this benchmark",
@@ -391,6 +394,7 @@ def test_neat_s_networks_stay_small_in_the_maze(trials, verdict, claim_tier, tas
     verdict(small & neat.stones.between(1.25, 3) if claim_tier == "smoke" else small)
 
 
+@third_look
 @claim(
     "G11",
     says="the Simple ALU task is more challenging",
