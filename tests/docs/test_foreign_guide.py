@@ -10,12 +10,12 @@ from typing import Any
 
 import jax
 import pytest
+from evoclaims.trials.spec import Budget
 
 from evoclaims import cli
 from evoclaims.envs.foreign.gymnasium_task import GymnasiumTask
 from evoclaims.envs.foreign.gymnax_task import GymnaxTask
 from evoclaims.methods.training_loop import TrainingLoop
-from evoclaims.trials.budget import Budget
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.runner import run
 from evoclaims.trials.spec import Condition

@@ -21,7 +21,7 @@ import pytest
 from filelock import FileLock
 
 from evoclaims.core import private_files
-from evoclaims.kernels.call.one_kernel import one_kernel
+from evoclaims.kernels.call.kernel import one_kernel
 from evoclaims.kernels.emit import machine_code
 
 TEXT = "define i32 @seven(i32 %x) {\n%y = mul i32 %x, 7\nret i32 %y\n}\n"

@@ -19,7 +19,7 @@ from evoclaims.judging.judge import decide, fetch_from
 from evoclaims.judging.kinds.greater import Greater
 from evoclaims.judging.sample import Source
 from evoclaims.judging.verdict import Outcome
-from evoclaims.paper.null_agent import NullAgent
+from evoclaims.paper.reproduction import NullAgent
 from evoclaims.paper.trial_group import TrialGroup
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.spec import TrialSpec

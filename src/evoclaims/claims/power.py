@@ -5,21 +5,18 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
-from evoclaims.claims.collected import ClaimTest
-from evoclaims.claims.reporting import judged
-from evoclaims.claims.selection import selected
-from evoclaims.claims.session import Reading, Session
+from evoclaims.claims.collected import ClaimTest, selected
+from evoclaims.claims.session import Reading, Session, judged
 from evoclaims.judging.assertion import Assertion
 from evoclaims.judging.design import Look
-from evoclaims.judging.fingerprint import fingerprint
+from evoclaims.judging.judge import fingerprint
 from evoclaims.judging.power import Draws, Power, power
 from evoclaims.judging.reading import TrialReading
 from evoclaims.judging.sample import Source
 from evoclaims.judging.verdict import Outcome, Verdict
 from evoclaims.paper import pilots
-from evoclaims.paper.reproduction import Reproduction
+from evoclaims.paper.reproduction import Names, Reproduction
 from evoclaims.paper.trial_group import TrialGroup
-from evoclaims.paper.variant import Names
 from evoclaims.trials.result import TrialResult
 from evoclaims.verdicts.claim_report import ClaimReport, named
 

@@ -11,16 +11,14 @@ from typing import Any, Final, get_args
 
 import numpy as np
 
-from evoclaims.cli.episodes import Outings, run_again
-from evoclaims.cli.output_files import FIGURES, write
 from evoclaims.cli.project import Project, open_project
-from evoclaims.cli.stored_trial import Stored, describe, load
+from evoclaims.cli.stored_trial import Outings, Stored, describe, load, run_again
+from evoclaims.cli.terminal import FIGURES, write
 from evoclaims.core.drawing import Format
 from evoclaims.core.errors import UnknownNameError, UserError
 from evoclaims.envs.ecorobot.robot_task import RobotTask
-from evoclaims.envs.ecorobot.views import film, page, pictures
-from evoclaims.envs.ecorobot.views.marks import marks
-from evoclaims.envs.ecorobot.views.motion import Motion, motion
+from evoclaims.envs.ecorobot.views import page, pictures
+from evoclaims.envs.ecorobot.views.motion import Motion, marks, motion
 from evoclaims.methods.map_elites import MapElites
 from evoclaims.paper.reproduction import Tier
 from evoclaims.trials import devices
@@ -192,6 +190,6 @@ def _elites(subject: Subject, ending: str) -> bytes:
 FORMS: Final[Mapping[str, Form]] = {
     "path": Form(PICTURE, _path),
     "page": Form(("html",), lambda one, _: page.page(one.task, one.motion, one.episode_title)),
-    "gif": Form(("gif",), lambda one, _: film.film(one.task, one.motion, one.episode_title)),
+    "gif": Form(("gif",), lambda one, _: pictures.film(one.task, one.motion, one.episode_title)),
     "elites": Form(PICTURE, _elites, episodes=False),
 }

@@ -14,8 +14,7 @@ from pathlib import Path
 from evoclaims.cli.arguments import IN_PROCESSES, parser
 from evoclaims.cli.terminal import OutputError, plain_output
 from evoclaims.core.errors import UserError
-from evoclaims.trials.allowance import end_without
-from evoclaims.trials.stopping import interrupted_by
+from evoclaims.trials.stopping import end_without, interrupted_by
 
 USER_ERROR, INTERRUPTED, CLOSED_PIPE = 2, 130, 141
 

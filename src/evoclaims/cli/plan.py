@@ -21,8 +21,7 @@ from evoclaims.judging.verdict import Outcome
 from evoclaims.methods.training_loop import TrainingLoop
 from evoclaims.paper import references
 from evoclaims.paper.cost import Estimator, Owed, Wanted, measured, took
-from evoclaims.paper.reproduction import Tier
-from evoclaims.paper.variant import Names
+from evoclaims.paper.reproduction import Names, Tier
 from evoclaims.report.console import PlainSpokenConsole, plain_table
 from evoclaims.report.live_line import duration
 from evoclaims.trials import devices

@@ -14,11 +14,9 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
-from evoclaims.cli.chosen_conditions import choose
-from evoclaims.cli.cluster.batch_job import SIGNAL_SECONDS, BatchJob
-from evoclaims.cli.cluster.job_request import JobRequest, clock, requested
-from evoclaims.cli.cluster.job_states import JOB_NAME
+from evoclaims.cli.cluster.job import SIGNAL_SECONDS, BatchJob, JobRequest, clock, requested
 from evoclaims.cli.cluster.submissions import (
+    JOB_NAME,
     SCHEMA,
     Submission,
     SubmittedBatch,
@@ -28,8 +26,7 @@ from evoclaims.cli.cluster.submissions import (
     save,
 )
 from evoclaims.cli.jobs import active
-from evoclaims.cli.processes.job import Job
-from evoclaims.cli.processes.missing_batches import MissingBatch, missing_batches
+from evoclaims.cli.processes.job import Job, MissingBatch, choose, missing_batches
 from evoclaims.cli.project import Project, open_project
 from evoclaims.core.canonical import content_hash
 from evoclaims.core.errors import UserError

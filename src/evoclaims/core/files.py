@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import hashlib
 import io
 import json
 import os
+import re
 import secrets
 import stat
 from collections.abc import Iterator
@@ -156,3 +158,27 @@ def _unwritten(path: Path, error: OSError, elsewhere: str) -> StorageError:
     """Return the error that says why a file was not written, and what to do."""
     way = f"Free some space, or {elsewhere}" if error.errno in _FULL else f"{elsewhere[0].upper()}{elsewhere[1:]}"
     return StorageError(f"Cannot write {path}: {error.strerror or error}. {way}")
+
+
+LONGEST: Final = 120
+"""Most characters in a name; file systems allow 255 bytes, and suffixes and temporary names need some."""
+
+_HASH_DIGITS: Final = 16
+_WORD: Final = r"[A-Za-z0-9_][A-Za-z0-9_.]*"
+_PLAIN: Final = re.compile(rf"{_WORD}(-[A-Za-z0-9_.-]+)?")
+
+
+def file_name(first: str, second: str = "") -> str:
+    """Return a name, without a suffix, for one text or two: "G1-n_parity" for "G1" and "n_parity".
+
+    A name that would be ambiguous (characters dropped, text cut short, or a dash in the first text) ends in "~" and
+    a hash of both texts; no other name contains a "~".
+    """
+    joined = f"{first}-{second}" if second else first
+    if "-" not in first and len(joined) <= LONGEST and _PLAIN.fullmatch(joined):
+        return joined
+    slug = re.sub(r"[^A-Za-z0-9_.-]+", "-", joined).strip("-.") or "_"
+    # The length of the first text says where it ends, so two pairs never hash the same text.
+    whole = f"{len(first)}:{first}{second}".encode("utf-8", errors="surrogatepass")
+    mark = f"~{hashlib.sha256(whole).hexdigest()[:_HASH_DIGITS]}"
+    return f"{slug[: LONGEST - len(mark)]}{mark}"

@@ -10,8 +10,7 @@ from evoclaims.core.drawing import optional
 from evoclaims.figures import brackets
 from evoclaims.figures.brackets import PairTest
 from evoclaims.figures.readings import NOT_RUN, MeasureOf, Readings
-from evoclaims.figures.sheet import PanelRow, measured
-from evoclaims.figures.style import FAINT, INK, SMALL, TEXT, lighter
+from evoclaims.figures.sheet import FAINT, INK, SMALL, TEXT, PanelRow, lighter, measured
 from evoclaims.paper.reported import Reported
 
 GAP: Final = 0.7

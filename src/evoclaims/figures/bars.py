@@ -12,7 +12,7 @@ from evoclaims.figures import bar_panel, brackets, sheet
 from evoclaims.figures.bar_panel import Bar, BarPanel, Filled, Measured, Series
 from evoclaims.figures.figure import Drawing, Heading, Scope
 from evoclaims.figures.readings import MeasureOf, absences, frame, read
-from evoclaims.figures.style import COLUMN, plain
+from evoclaims.figures.sheet import COLUMN, plain
 from evoclaims.paper.reported import Published
 
 PanelOf = Callable[[Scope], BarPanel]

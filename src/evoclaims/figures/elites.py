@@ -15,7 +15,7 @@ from evoclaims.envs.ecorobot.views.painting import paint_elites, paint_ground
 from evoclaims.figures import sheet
 from evoclaims.figures.figure import Drawing, Heading, Scope
 from evoclaims.figures.readings import MeasureOf, Readings, absences, frame, read
-from evoclaims.figures.style import FAINT, SMALL, TEXT, plain
+from evoclaims.figures.sheet import FAINT, SMALL, TEXT, plain
 from evoclaims.trials import champions
 
 LINE: Final = 0.12

@@ -12,7 +12,6 @@ from operator import and_
 from typing import NoReturn, TypeGuard
 
 from evoclaims.core.errors import UserError
-from evoclaims.judging.as_written import product
 from evoclaims.judging.assertion import Assertion
 from evoclaims.judging.kinds.band import Band
 from evoclaims.judging.kinds.equivalent import Equivalent
@@ -24,6 +23,7 @@ from evoclaims.judging.kinds.threshold import Threshold
 from evoclaims.judging.kinds.trend import Trend
 from evoclaims.judging.reading import EventReading, LevelsReading, NumberReading, comparable
 from evoclaims.judging.sample import UnreadableTrialError
+from evoclaims.judging.window import product
 from evoclaims.trials.result import TrialResult
 
 

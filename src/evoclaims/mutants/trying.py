@@ -8,11 +8,10 @@ from functools import cache
 
 from evoclaims.judging.drift import ALPHA, DriftCase, check_drift
 from evoclaims.judging.verdict import Outcome
-from evoclaims.mutants.conditions import Planted
+from evoclaims.mutants.mutant import Planted
 from evoclaims.paper.archive import Archive
 from evoclaims.paper.references import METRICS, load, path_of
-from evoclaims.paper.reproduction import Reproduction
-from evoclaims.paper.variant import Names, Variant
+from evoclaims.paper.reproduction import Names, Reproduction, Variant
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.spec import Condition
 from evoclaims.verdicts.claim_report import ClaimReport

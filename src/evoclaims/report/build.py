@@ -13,16 +13,16 @@ from evoclaims.judging.design import Design
 from evoclaims.judging.verdict import Outcome
 from evoclaims.paper.archive import Archive
 from evoclaims.paper.reproduction import Reproduction
-from evoclaims.report import audit, origin, replication_cells, table_cells, training_curves
+from evoclaims.report import audit, replication_cells, table_cells, training_curves, trial_summary
+from evoclaims.report.across import timeline_chart
 from evoclaims.report.champion import Draw, champion_of, network
-from evoclaims.report.charts_of_verdicts import timeline_chart
 from evoclaims.report.evidence import Part, judged_parts, unjudged_part
 from evoclaims.report.fault_grid import fault_grid
 from evoclaims.report.formatting import Anchors, clean, counted, listed, places, plural
 from evoclaims.report.model import Board, ConditionTrials, Page, Section, ShownChampion
 from evoclaims.report.trial_summary import Reader, TrialSummary
 from evoclaims.trials.store import Store
-from evoclaims.verdicts import edited_code
+from evoclaims.verdicts import mixed_versions
 from evoclaims.verdicts.claim_report import ClaimReport
 from evoclaims.verdicts.history import AcceptedVerdict, History, eras, key_of
 from evoclaims.verdicts.mutation_matrix import Matrix, described
@@ -137,7 +137,7 @@ class _Gathering:
             made=made,
             warnings=(
                 *_broken(every),
-                *origin.warnings(made),
+                *trial_summary.warnings(made),
                 *_edited(report),
                 *_overspent(report),
                 *filter(None, [failing]),
@@ -186,7 +186,7 @@ def _overspent(report: ClaimReport) -> tuple[str, ...]:
 
 def _edited(report: ClaimReport) -> list[str]:
     """Return a sentence for each method or task that was edited after trials of a claim had run."""
-    lines = [clean(edited_code.summary(name)) for name in edited_code.edited(report)]
+    lines = [clean(mixed_versions.summary(name)) for name in mixed_versions.edited(report)]
     return [f"{words[0].upper()}{words[1:]}." for words in lines]
 
 

@@ -9,8 +9,7 @@ from typing import Final
 from evoclaims.verdicts import history
 from evoclaims.verdicts.claim_report import ClaimReport
 from evoclaims.verdicts.history import key_of
-from evoclaims.verdicts.mutation_matrix import Attempt, Fate, Matrix, current
-from evoclaims.verdicts.mutation_score import score
+from evoclaims.verdicts.mutation_matrix import Attempt, Fate, Matrix, current, score
 
 LEGEND: Final = ", ".join(f"{fate.symbol} {fate}" for fate in Fate)
 """What the symbols of a cell say."""

@@ -7,12 +7,11 @@ from collections.abc import Iterable, Iterator, Sequence
 from evoclaims.figures.replication import Replication
 from evoclaims.report import replication_cells, table_cells
 from evoclaims.report.fault_grid import LEGEND
-from evoclaims.report.formatting import plural
-from evoclaims.report.markdown_text import literal, table
+from evoclaims.report.formatting import literal, plural, table
 from evoclaims.report.model import Board, Page, Section
 from evoclaims.report.table_cells import NONE
+from evoclaims.verdicts.claim_report import Tally
 from evoclaims.verdicts.robustness import Robustness
-from evoclaims.verdicts.sensitivity import Tally
 
 
 def markdown(page: Page) -> str:

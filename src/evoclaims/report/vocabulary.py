@@ -13,7 +13,7 @@ from evoclaims.judging import assertion, kinds
 from evoclaims.judging.assertion import Assertion
 from evoclaims.judging.measure import Measure, Profile
 from evoclaims.paper.trial_group import TrialGroup
-from evoclaims.report.markdown_text import literal, table
+from evoclaims.report.formatting import literal, table
 
 _READS: Final = {"Measure": "a number", "Event": "true or false", "Profile": "a number per level"}
 """What is read from each trial, by the class that a property returns."""

@@ -21,7 +21,7 @@ from evoclaims.core.pytree import strong
 from evoclaims.envs.base import Episode, MisfitError, Task, TaskState, fitting
 from evoclaims.kernels import kernel_prng
 from evoclaims.methods.base import Method, Policy, Progress
-from evoclaims.trials.success import SHARES
+from evoclaims.trials.result import SHARES
 
 _NUMBER = jax.ShapeDtypeStruct((), jnp.int32)
 

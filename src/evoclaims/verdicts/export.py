@@ -15,7 +15,7 @@ from typing import Any, Final
 from evoclaims.core.canonical import as_plain
 from evoclaims.core.errors import UserError
 from evoclaims.core.printable import printable
-from evoclaims.paper.condition_names import Name
+from evoclaims.paper.archive import Name
 from evoclaims.trials.result import TrialResult
 from evoclaims.verdicts.claim_report import ClaimReport
 

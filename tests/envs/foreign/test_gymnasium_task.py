@@ -13,6 +13,7 @@ pytest.importorskip("gymnasium", reason="Gymnasium is not installed")
 import gymnasium
 import jax
 import numpy as np
+from evoclaims.trials.spec import Budget
 from gymnasium.utils.env_checker import check_env
 
 from evoclaims.core.errors import UserError
@@ -23,7 +24,6 @@ from evoclaims.envs.gates.parity import NParity
 from evoclaims.methods.random_search import RandomSearch
 from evoclaims.methods.training_loop import TrainingLoop
 from evoclaims.networks.mlp import Mlp
-from evoclaims.trials.budget import Budget
 from evoclaims.trials.runner import run
 from evoclaims.trials.spec import Condition
 from evoclaims.trials.store import Store

@@ -9,8 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Final
 
-from evoclaims.kernels.emit.llvm_ir import Instructions
-from evoclaims.kernels.emit.llvm_names import BYTES, STORED, SUFFIXES, ArrayRow
+from evoclaims.kernels.emit.llvm_ir import BYTES, STORED, SUFFIXES, ArrayRow, Instructions
 from evoclaims.kernels.emit.xla_handler import handler
 from evoclaims.kernels.trace.expressions import Input, in_order
 from evoclaims.kernels.trace.interpreter import Numbers

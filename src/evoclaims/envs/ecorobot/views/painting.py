@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from evoclaims.core.drawing import optional
 from evoclaims.envs.ecorobot.maze import Maze
 from evoclaims.envs.ecorobot.robot_task import RobotTask
-from evoclaims.envs.ecorobot.views.marks import Mark, marks
-from evoclaims.envs.ecorobot.views.motion import Motion, at_start
+from evoclaims.envs.ecorobot.views.motion import Mark, Motion, at_start, marks
 
 TorsoPath = NDArray[np.floating]
 """Centres of the torso in an episode, shape [steps, 3], m; finite."""
