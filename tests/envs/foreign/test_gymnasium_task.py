@@ -13,7 +13,6 @@ pytest.importorskip("gymnasium", reason="Gymnasium is not installed")
 import gymnasium
 import jax
 import numpy as np
-from evoclaims.trials.spec import Budget
 from gymnasium.utils.env_checker import check_env
 
 from evoclaims.core.errors import UserError
@@ -25,7 +24,7 @@ from evoclaims.methods.random_search import RandomSearch
 from evoclaims.methods.training_loop import TrainingLoop
 from evoclaims.networks.mlp import Mlp
 from evoclaims.trials.runner import run
-from evoclaims.trials.spec import Condition
+from evoclaims.trials.spec import Budget, Condition
 from evoclaims.trials.store import Store
 
 CART = GymnasiumTask("CartPole-v1", solved_at=100, examined_episodes=4)
