@@ -48,10 +48,10 @@ def test_freed_memory_goes_back_to_the_system() -> None:
 
 HEAPS = """
 import ctypes, sys, threading
-from evoclaims.trials import devices, memory
+from evoclaims.trials import devices
 
 if sys.argv[1:]:
-    memory.share_heaps()
+    devices.share_heaps()
 libc, all_there = ctypes.CDLL(None), threading.Barrier(8)
 libc.fopen.restype = ctypes.c_void_p
 
