@@ -15,8 +15,7 @@ import pytest
 
 from evoclaims.claims.collected import claim_tests
 from evoclaims.claims.session import Session
-from evoclaims.core.errors import UserError
-from evoclaims.core.raised import in_one_line
+from evoclaims.core.errors import UserError, in_one_line
 from evoclaims.paper.config import SuiteConfig
 from evoclaims.plugin.options import SESSION
 from evoclaims.plugin.summary import ATTRIBUTE

@@ -70,8 +70,8 @@ def _ended(arguments: Sequence[str] | None) -> int:
 
 def _raised_in_project(error: Exception) -> str:
     """Return in one line what the project's own code has raised; empty for an error that may be of evoclaims."""
+    from evoclaims.core.errors import in_one_line, is_of_project
     from evoclaims.core.printable import printable
-    from evoclaims.core.raised import in_one_line, is_of_project
     from evoclaims.paper.config import find_root
 
     try:

@@ -13,9 +13,8 @@ from rich.table import Table
 from evoclaims.claims.fetching import NotStoredError, StoredOnly
 from evoclaims.cli.project import open_project
 from evoclaims.cli.terminal import styled
-from evoclaims.core.errors import UserError
+from evoclaims.core.errors import UserError, in_one_line
 from evoclaims.core.printable import printable
-from evoclaims.core.raised import in_one_line
 from evoclaims.envs.base import Checked
 from evoclaims.judging.verdict import Outcome
 from evoclaims.methods.training_loop import TrainingLoop

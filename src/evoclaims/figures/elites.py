@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from evoclaims.core.errors import UserError
 from evoclaims.envs.ecorobot.maze import Maze
-from evoclaims.envs.ecorobot.views.painting import paint_elites, paint_ground
+from evoclaims.envs.ecorobot.views.pictures import paint_elites, paint_ground
 from evoclaims.figures import sheet
 from evoclaims.figures.figure import Drawing, Heading, Scope
 from evoclaims.figures.readings import MeasureOf, Readings, absences, frame, read

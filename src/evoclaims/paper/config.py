@@ -12,9 +12,8 @@ from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING
 
-from evoclaims.core.errors import UserError, guess
+from evoclaims.core.errors import UserError, guess, in_one_line
 from evoclaims.core.files import read_text
-from evoclaims.core.raised import in_one_line
 from evoclaims.trials.failed import DEFAULT_LIMIT, seconds_of
 
 if TYPE_CHECKING:

@@ -12,9 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from evoclaims.core.errors import UserError
+from evoclaims.core.errors import UserError, in_one_line, is_in_project
 from evoclaims.core.printable import shown
-from evoclaims.core.raised import in_one_line, is_in_project
 from evoclaims.plugin.options import make_session
 from evoclaims.plugin.summary import ATTRIBUTE
 

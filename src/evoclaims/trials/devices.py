@@ -27,9 +27,8 @@ import jax
 from threadpoolctl import threadpool_limits
 
 from evoclaims.core.errors import UserError, require_known
-from evoclaims.core.files import read_file
+from evoclaims.core.files import doubt, make_private, read_file, say_refused
 from evoclaims.core.forked import refuse_forked
-from evoclaims.core.private_files import doubt, make_private, say_refused
 from evoclaims.trials.jax_options import refuse_changed
 
 MOST_BYTES: Final = 4 * 2**30

@@ -11,8 +11,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Final
 
-from evoclaims.core.errors import UserError
-from evoclaims.core.raised import PACKAGE_FOLDERS
+from evoclaims.core.errors import PACKAGE_FOLDERS, UserError
 from evoclaims.trials.result import TrialResult
 
 _seen: Final = set[str]()

@@ -16,10 +16,9 @@ import numpy as np
 import pytest
 
 from evoclaims.core.errors import UnknownNameError, UserError
-from evoclaims.envs.foreign.actions import Choice, Range, actions_of
 from evoclaims.envs.foreign.brax_task import BraxTask
 from evoclaims.envs.foreign.gymnax_task import GymnaxTask
-from evoclaims.envs.foreign.jax_task import Descriptor
+from evoclaims.envs.foreign.jax_task import Choice, Descriptor, Range, actions_of
 from evoclaims.methods.cma_es import CmaEs
 from evoclaims.methods.map_elites import MapElites
 from evoclaims.methods.neat.evolution import Neat

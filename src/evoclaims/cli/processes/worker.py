@@ -21,9 +21,8 @@ import msgspec
 from evoclaims.claims.fetching import RunMissing
 from evoclaims.cli.processes.job import Job, jobs
 from evoclaims.cli.project import Project, open_project
-from evoclaims.core.errors import StorageError, UserError
+from evoclaims.core.errors import StorageError, UserError, in_one_line
 from evoclaims.core.printable import printable
-from evoclaims.core.raised import in_one_line
 from evoclaims.mutants import mutant
 from evoclaims.mutants.mutant import plantings
 from evoclaims.report.live_line import LiveLine
