@@ -59,7 +59,6 @@ def claimed(assertion: Assertion) -> frozenset[str]:
 
 
 def _satisfies(agent: NullAgent, assertion: Assertion, design: Design, others: OtherTrials | None) -> bool:
-    """Whether an agent's trials support an assertion."""
     if agent.method and others is None:
         return False
     every = frozenset(source.fingerprint for source in assertion.sources())

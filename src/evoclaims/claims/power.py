@@ -138,7 +138,6 @@ class Pilots:
         return str(path)
 
     def _read(self, names: Names) -> None:
-        """Read a pilot, and whether it is one."""
         found = pilots.load(pilots.path_of(self._folder, self._tier, *names))
         self._unfit[names] = pilots.unfit(found, self.groups[names].condition, self._design, self._readings[names])
         if self.groups[names].existing is not None:
@@ -154,7 +153,6 @@ class Pilots:
         return [self._power(one, drawn) for one in claims]
 
     def _power(self, one: Asserted, draws: Draws) -> ClaimPower:
-        """Return the power of one claim."""
         name, expected = one.report.name, one.expected
         if one.assertion is None:
             return ClaimPower(name, expected, None, f"its test broke: {one.report.reason}")

@@ -60,7 +60,6 @@ def main(options: argparse.Namespace) -> int:
 
 
 def _command() -> str:
-    """Return the command that runs."""
     return shlex.join(["evoclaims", *sys.argv[1:]])
 
 

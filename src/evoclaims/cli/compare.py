@@ -131,7 +131,6 @@ def _stores(project: Project, tiers: Sequence[str], old: Store, new: Store) -> t
 
 
 def _drift_lines(drift: DriftReport, digests: DigestCheck, new: Side) -> Iterator[str]:
-    """Yield what the comparison of trials found."""
     names = {trials[0].condition: name for name, trials in new.trials.items() if trials}
     yield f"trials: {drift.counts}"
     yield from (f"  {line}" for line in drift.lines)

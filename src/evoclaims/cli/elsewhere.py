@@ -108,7 +108,6 @@ class Elsewhere:
         return reports
 
     def _command(self, environment: Environment, store: Store, verdicts: Path) -> list[str]:
-        """Return the command that judges."""
         claims = os.path.join(os.curdir, os.path.relpath(self.claims, self.root))  # as in `judging`
         return [
             *(str(environment.python), "-m", "pytest", claims, f"--rootdir={os.curdir}"),

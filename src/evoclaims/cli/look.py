@@ -144,7 +144,6 @@ def _champion(options: argparse.Namespace, project: Project) -> tuple[Path, byte
 
 
 def _with_robot(tier: Tier, name: str, task: Any) -> RobotTask:
-    """Return the task as one with a robot."""
     if not isinstance(task, RobotTask):
         known = sorted({on for (_, on), condition in tier.conditions.items() if isinstance(condition.task, RobotTask)})
         others = f"Tasks with one: {', '.join(known)}." if known else "No task of this tier has one."
@@ -153,7 +152,6 @@ def _with_robot(tier: Tier, name: str, task: Any) -> RobotTask:
 
 
 def _target(out: str | None, default: str, endings: tuple[str, ...]) -> tuple[Path, str]:
-    """Return the file to write, and its ending, which selects the format."""
     path = FIGURES / f"{default}.{endings[0]}" if out is None else Path(out)
     ending = path.suffix.removeprefix(".").lower()
     if ending not in endings:
@@ -165,7 +163,6 @@ def _target(out: str | None, default: str, endings: tuple[str, ...]) -> tuple[Pa
 
 
 def _path(subject: Subject, ending: str) -> bytes:
-    """Draw the paths of all episodes."""
     outings = subject.outings
     count = f"{sum(outings.reached)} of {len(outings.reached)} episodes reach the goal"
     title = f"{subject.title}\n{count}" if marks(subject.task) else subject.title

@@ -219,7 +219,6 @@ def _took(costs: Costs, names: Sequence[Names], kind: str) -> str:
 
 
 def _claims(reports: Sequence[ClaimReport], costs: Costs) -> Table:
-    """Build the table of claims."""
     kinds = _kinds(costs)
     heads = [f"took on one\n{kind}" for kind in kinds]
     table = plain_table(("claim", "n", "α", "p for", "p\nagainst", "can\nend", *heads), (), names=0)

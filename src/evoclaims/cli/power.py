@@ -105,7 +105,6 @@ def main(options: argparse.Namespace) -> int:
 
 
 def _claims(project: Project, tier: str) -> tuple[Asserted, ...]:
-    """Return the claims that have a test at a tier."""
     store = project.archive.store
     listening = Listening(project.reproduction, store, StoredOnly(project.archive))
     (reports,) = project.judge_sessions([(listening, tier)])
@@ -148,7 +147,6 @@ def _make(
 
 
 def _write(project: Project, pilots: Pilots, names: Names, condition: Condition, seeds: Sequence[int]) -> None:
-    """Write a pilot from stored trials of one environment, if all of them are there."""
     stored = [record for seed in seeds for record in project.store.records(TrialSpec(condition, seed).id)]
     trials = references.of_one_environment([*filter(is_final, stored)], condition, seeds, len(seeds))
     if not trials:

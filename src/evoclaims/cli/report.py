@@ -106,7 +106,6 @@ def main(options: argparse.Namespace) -> int:
 
 
 def _tried(project: Project, tier: str) -> list[str]:
-    """Return the variants that have run at a tier."""
     reproduction = project.reproduction
     seeds = reproduction.tier(tier).design.seeds(1)
     return [

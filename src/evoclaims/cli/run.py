@@ -100,7 +100,6 @@ def main(options: argparse.Namespace) -> int:
 
 
 def _print_trials(store: Store, name: str, condition: Condition, seeds: Sequence[int], note: str) -> bool:
-    """List the trials of a condition, and return whether one of them has crashed."""
     print(name)
     if note:
         print(f"  {note}")
@@ -118,7 +117,6 @@ def _print_trials(store: Store, name: str, condition: Condition, seeds: Sequence
 
 
 def _print_matrix(project: Project, tier: str, variant: str) -> None:
-    """Print how claims end under the protocol and under a variant of it."""
     plain, varied = project.judge_variants([(tier, ""), (tier, variant)])
     rows = matrix(plain, {variant: varied})
     print(f"\n{variant}: {project.reproduction.variants[variant].says}")

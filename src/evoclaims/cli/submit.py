@@ -67,7 +67,6 @@ def main(options: argparse.Namespace) -> int:
 def _plan(
     project: Project, options: argparse.Namespace, request: JobRequest, conditions: Mapping[Job, Condition]
 ) -> list[list[MissingBatch]]:
-    """Print and return the jobs that are to be submitted, each with its batches."""
     design = project.reproduction.tier(options.tier).design
     seeds, limit = design.seeds(design.last.n), project.config.seconds(None)
     has_gpu = request.gpus or (request.cluster == "local" and gpus("auto"))  # jobs here see what this process sees
@@ -98,7 +97,6 @@ def _plan(
 
 
 def _cost(seconds: Sequence[float], request: JobRequest, platform: str) -> str:
-    """Return a sentence on the hours of all batches."""
     each = f"{request.gpus} GPUs" if request.gpus > 1 else "a GPU" if platform == "gpu" else "a job"
     hours = max(sum(seconds) / 3600, 0.1)
     sentence = (

@@ -61,13 +61,11 @@ def _commands(whole: argparse.ArgumentParser) -> list[tuple[str, str, argparse.A
 
 
 def _section(name: str, command: argparse.ArgumentParser) -> str:
-    """Return what there is to know about one command."""
     says = literal(_sentence(str(command.description)))
     return f"## {name}\n\n{says}\n\n{table(('argument', 'meaning'), _rows(command))}"
 
 
 def _rows(command: argparse.ArgumentParser) -> Iterator[tuple[str, str]]:
-    """Yield each argument of a command as it is written, and its meaning."""
     for action in command._actions:
         if not isinstance(action, argparse._HelpAction):
             yield f"`{_written(action)}`", literal(str(action.help))
@@ -154,7 +152,6 @@ def filled(text: str, project: Project) -> str:
 
 
 def _made(found: re.Match[str], project: Project) -> str:
-    """Return one table."""
     kind, words = found["kind"], found["words"].split()
     if kind not in _KINDS:
         raise UnknownNameError("kind of table", kind, _KINDS)
@@ -162,7 +159,6 @@ def _made(found: re.Match[str], project: Project) -> str:
 
 
 def _verdicts(project: Project, words: list[str], *_: str) -> str:
-    """Return the verdicts with what decided them."""
     return overview(*_columns(project, words), Reader(project.archive))
 
 
@@ -202,7 +198,6 @@ def _sentences(project: Project, words: list[str], *_: str) -> str:
 
 
 def _readings(project: Project, words: list[str], *_: str) -> str:
-    """Return the readings of each sentence that a tier judges."""
     (reports,) = project.judge_variants([(_tier(project, words), "")])
     return verdict_overview.readings(reports)
 
@@ -217,7 +212,6 @@ def _details(project: Project, words: list[str], *_: str) -> str:
 
 
 def _refutations(project: Project, words: list[str], *_: str) -> str:
-    """Return which refuted claims of a tier have which other verdict under a variant."""
     rows, variants = _under_variants(project, _tier(project, words))
     refuted = [row for row in rows if row.plain is Outcome.REFUTED and row.hangs_on]
     others = [one for one in Outcome if any(row.outcomes[name] is one for row in refuted for name in row.hangs_on)]

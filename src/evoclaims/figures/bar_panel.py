@@ -221,7 +221,6 @@ _CROSS: Final = {"marker": "x", "markersize": 4.0, "markeredgewidth": 1.0, "colo
 
 
 def _paint_bar(axis: Any, filled: Filled, middle: float, width: float) -> None:
-    """Paint one bar with its dots, or the words "not run"."""
     readings, colour = filled.readings, filled.bar.series.colour
     if readings.values:
         style = {"facecolor": lighter(colour), "edgecolor": colour, "linewidth": 0.8, "zorder": 2}

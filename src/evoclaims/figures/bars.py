@@ -124,7 +124,6 @@ def compared(
 
 
 def _success_at(level: int, group: Any) -> Any:
-    """Return the measure of success at a level."""
     return group.mean_success if group.condition.task.levels == 1 else group.success.at(level)
 
 

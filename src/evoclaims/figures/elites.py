@@ -85,7 +85,6 @@ class ElitesMap:
 
 
 def _task(scope: Scope, ground: Ground) -> Maze:
-    """Return the maze of a panel."""
     task = scope.tier.condition(ground.method, ground.task).task
     if not isinstance(task, Maze):
         raise UserError(f"A map of elites needs the area of a maze; {ground.task!r} is not a maze.")
@@ -132,7 +131,6 @@ def _paint(
 
 
 def _summary(readings: Readings) -> str:
-    """Return a measure of all trials in words."""
     if not readings.values:
         return "no values"
     spread = f" ± {_text(readings.deviation)}" if len(readings.values) > 1 else ""

@@ -179,7 +179,6 @@ def _columns(legend: Sequence[Any], room: float) -> int:
 
 
 def _write(figure: Any, lines: Sequence[str], left: float, top: float, size: float, **style: Any) -> None:
-    """Write lines of text, one below the other."""
     width, height = figure.get_size_inches()
     for number, line in enumerate(lines):
         y = 1 - (top + number * size * LINE) / height
@@ -201,6 +200,5 @@ def contents(drawing: Drawing) -> dict[str, bytes]:
 
 
 def _picture(drawing: Drawing, file_format: Format) -> bytes:
-    """Return the contents of a picture's file."""
     with plain():
         return saved(drawing.figure, file_format, drawing.title, dpi=DOTS_PER_INCH)

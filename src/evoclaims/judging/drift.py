@@ -179,7 +179,6 @@ def _prepared(case: DriftCase) -> tuple[list[Columns], list[DriftRow]]:
 
 
 def _has(trial: TrialResult, metric: str) -> bool:
-    """Whether a trial has a measure."""
     try:
         measured(trial, metric)
     except KeyError:

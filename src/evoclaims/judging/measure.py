@@ -89,7 +89,6 @@ class Measure(NumberReading):
         return SelfComparison(self)
 
     def _measure(self, other: object) -> Measure:
-        """Return `other`, which must be a measure."""
         if not isinstance(other, Measure):
             raise UserError(f"{self.describe()!r} is compared with {other!r}. Use another measure or a number.")
         return other
@@ -106,7 +105,6 @@ class Measure(NumberReading):
 
 
 def _is_number(value: object) -> TypeGuard[float]:
-    """Whether a value is a number, of Python or of numpy."""
     return isinstance(value, Real) and not isinstance(value, bool)
 
 

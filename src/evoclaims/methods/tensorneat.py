@@ -253,7 +253,6 @@ def _without_records(state: Any, forget: Bool[Array, ""]) -> Any:
 
 
 def _count(genes: Float[Array, "population rows columns"]) -> Float[Array, " population"]:
-    """Count each genome's genes."""
     return jnp.sum(~jnp.isnan(genes[:, :, 0]), axis=1, dtype=jnp.int32).astype(jnp.float32)
 
 

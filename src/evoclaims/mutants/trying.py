@@ -61,7 +61,6 @@ class Comparison:
         return check_drift([case], ALPHA / max(1, len(self.used))).drifted
 
     def _sound(self, names: Names) -> Condition:
-        """Return a condition without a fault."""
         return self.reproduction.tier(self.tier).condition(*names)
 
     def _trials(self, condition: Condition) -> tuple[TrialResult | None, ...]:

@@ -278,5 +278,4 @@ def _best(batches: Sequence[Batch], condition: Condition) -> Batch | None:
 
 
 def _cost(batch: Batch, condition: Condition, trials: int, basis: Basis) -> Cost:
-    """Return what so many trials of a condition cost by a batch."""
     return Cost(batch.compile, batch.work(condition, trials), trials, batch.layout, basis)

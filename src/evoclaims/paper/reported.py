@@ -140,7 +140,6 @@ def _is_plot(plot: Any) -> bool:
 
 
 def _are_numbers(found: Any) -> TypeGuard[list[float]]:
-    """Whether something is a list of numbers."""
     return isinstance(found, list) and all(isinstance(one, int | float) for one in found)
 
 

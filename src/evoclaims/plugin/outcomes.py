@@ -152,7 +152,6 @@ def _give_outcome(
     report: pytest.TestReport,
     claimed: ClaimReport,
 ) -> None:
-    """Turn the outcome of a test into that of its claim."""
     vars(report).pop("wasxfail", None)  # only expect=... accepts a verdict, and no mark of pytest's
     sentence = f"{claimed.name} ({claimed.tier}) is {claimed.outcome}: {claimed.reason}"
     undecided = claimed.outcome == "inconclusive" and item.config.getoption("claims_undecided") == "fail"

@@ -133,7 +133,6 @@ class Summary:
             self._regression = regression(folder, self.reports, self._config.getoption("claims_compare_fail"))
 
     def _status(self) -> pytest.ExitCode:
-        """Return the exit status of a run in which no test failed."""
         unjudged = self.reports and not self._judged
         if (
             self._troubles
@@ -226,7 +225,6 @@ class Summary:
         return f" by {' with '.join(options)}{two}" if options else ""
 
     def _safe(self, text: str) -> str:
-        """Return a line that is safe for the terminal."""
         return self._drawn(shown(text))
 
     def _drawn(self, text: str) -> str:

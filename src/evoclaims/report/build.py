@@ -83,7 +83,6 @@ def gather(
 
 
 def _notices(boards: Sequence[Board], reader: Reader) -> list[str]:
-    """Return notices about the whole report."""
     sections = [section for board in boards for section in board.sections]
     notices = []
     if not sections:
@@ -219,7 +218,6 @@ def _broken(trials: Sequence[TrialSummary]) -> tuple[str, ...]:
 
 
 def _in_words(design: Design) -> str:
-    """Return a design in a sentence."""
     looks = ", then ".join(f"{look.n} trials a side at α = {look.alpha:g}" for look in design.looks)
     return (
         f"Looks at {looks}; seeds from {design.first_seed} up; p0 = {design.p0:g} for “most trials”; "
@@ -240,7 +238,6 @@ def _flat(plain: Mapping[str, Any], prefix: str = "") -> tuple[tuple[str, str], 
 
 
 def _setting(value: Any) -> str:
-    """Return one setting as text."""
     if isinstance(value, list):
         return listed(map(_setting, value), most=20) or "none"
     return "–" if value is None else clean(value)

@@ -67,7 +67,6 @@ def fault_grid(matrix: Matrix, tier: str, reports: Iterable[ClaimReport]) -> Fau
 
 
 def _cells(attempts: Sequence[Attempt]) -> dict[str, list[Attempt]]:
-    """Return the attempts by mutant."""
     by_mutant: dict[str, list[Attempt]] = {}
     for attempt in attempts:
         by_mutant.setdefault(attempt.mutant, []).append(attempt)

@@ -34,7 +34,6 @@ def markdown(page: Page) -> str:
 
 
 def _scoreboard(page: Page) -> str:
-    """Count verdicts by tier."""
     boards = [board for board in page.boards if board.sections]
     tallies = [tally for tally in Tally if any(tally in board.counts for board in boards)]
     return table(
@@ -69,7 +68,6 @@ def _faults(page: Page) -> Iterator[str]:
 
 
 def _details(page: Page) -> str:
-    """List the variants."""
     return "\n".join(f"* {literal(name)}: {literal(says)}" for name, says in page.tried.items())
 
 
@@ -118,7 +116,6 @@ def _overview(board: Board) -> str:
 
 
 def _section(section: Section, page: Page) -> Iterator[str]:
-    """Yield the blocks of one claim."""
     report = section.report
     heading = literal(f"{report.name} ({report.tier}): {table_cells.verdict(report)}")
     yield f'<a id="{section.anchor}"></a>\n\n### {heading}'

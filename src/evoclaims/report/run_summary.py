@@ -26,7 +26,6 @@ def run_summary(reports: Sequence[ClaimReport], notes: Sequence[str] = ()) -> st
 
 
 def _cells(report: ClaimReport) -> tuple[str, ...]:
-    """Return a row of the table."""
     because = f"; looked into and accepted: {report.because}" if report.as_expected and report.because else ""
     return (
         f"{report.name} ({report.tier})",

@@ -116,7 +116,6 @@ def _shown(versions: Iterable[tuple[str, str]], needed: Iterable[str]) -> Versio
 
 
 def _table(name: str, says: str, columns: Iterable[str], rows: _Rows, made: Environments) -> str:
-    """Return a table with a line for each sentence."""
     lines = [
         (literal(claim), literal(sentence), *(_cell(found[heading], made) for heading in columns))
         for (claim, sentence), found in rows.items()
@@ -143,7 +142,6 @@ def _verdict(report: ClaimReport, made: Environments) -> str:
 
 
 def _evidence(report: ClaimReport) -> str:
-    """Return what the part that decided has found."""
     part = report.verdict.deciding_part if report.verdict else None
     trials = plural(report.n, "trial")
     if report.verdict is None or part is None:

@@ -54,7 +54,6 @@ def declared_kinds() -> Iterator[type[Assertion]]:
 
 
 def _section(kind: type[Assertion]) -> str:
-    """Return what there is to say of one kind."""
     entry, file = kind.entry, kind.__module__.replace(".", "/") + ".py"
     assert entry is not None
     return "\n\n".join(

@@ -211,7 +211,6 @@ def _restored(run: Run, interrupted: Header) -> tuple[Header, TrialState] | None
 
 
 def _planned(lanes: Lanes, seeds: Sequence[int]) -> Header:
-    """Return the header of a new batch."""
     width = lanes.width(len(seeds), len(seeds))
     order = lanes.arrangement(range(len(seeds)), width)
     return Header(
@@ -229,7 +228,6 @@ def _planned(lanes: Lanes, seeds: Sequence[int]) -> Header:
 
 
 def _started(run: Run, header: Header) -> Batch:
-    """Return a new batch."""
     lanes, width = run.lanes, len(header.lanes)
     run.watch(RunProgress(run.condition.label, "compiling", len(header.batch)))
     lanes.programs(width)

@@ -79,7 +79,6 @@ class TrialRows:
         return [_whole(cells[row], seed) for row, seed in zip(self.chosen, found, strict=True) if seed is not None]
 
     def _in_order(self, seed: int, rows: list[int]) -> list[int]:
-        """Return the rows of one trial in the order of steps."""
         if not self.step:
             if len(rows) > 1:
                 listed = " and ".join(str(row + 1) for row in rows[:2])

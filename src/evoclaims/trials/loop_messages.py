@@ -119,7 +119,6 @@ def end_marked(value: str) -> None:
 
 
 def _processes() -> list[int]:
-    """Return the numbers of all processes."""
     try:
         return [int(name) for name in os.listdir("/proc") if name.isdecimal()]
     except OSError:

@@ -319,7 +319,6 @@ class LoopTrials:
         return {**chosen, "XLA_PYTHON_CLIENT_PREALLOCATE": "false"}  # this process has taken most of the memory
 
     def _store(self, one: RunningLoop, tell: Watcher) -> None:
-        """Store a trial that has ended."""
         timing = {"run": one.seconds, "compile": 0.0, "batch": 1, "started": one.began}
         ending = ""
         if isinstance(one.outcome, Trained):
@@ -337,7 +336,6 @@ class LoopTrials:
         self._stored.store.put(result, {})
 
     def _progress(self, running: Sequence[RunningLoop], ended: int, seconds: float) -> RunProgress:
-        """Return how far all trials are."""
         condition = self._stored.condition
         steps = [condition.steps if one.outcome else one.newest.step if one.newest else 0 for one in running]
         reached = [min(step, condition.steps) for step in steps]

@@ -111,7 +111,6 @@ def sweep(store_root: Path) -> None:
 
 
 def _lease(path: Path) -> filelock.SoftFileLease:
-    """Return a lease that is not taken yet."""
     return filelock.SoftFileLease(path, lease_duration=FRESH_SECONDS, heartbeat_interval=REFRESH_SECONDS)
 
 

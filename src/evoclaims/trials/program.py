@@ -198,7 +198,6 @@ class Program:
         return traced_progress(self.condition.method, self.condition.task)
 
     def _task(self, trial: TrialState) -> Task:
-        """Return the task with the trial's numbers."""
         task = self.condition.task
         return task.with_numbers(trial.numbers) if isinstance(task, Numbered) else task
 

@@ -246,7 +246,6 @@ def parse(data: bytes | str) -> TrialResult:
 
 
 def _fail(reason: str) -> NoReturn:
-    """Raise `RecordError`."""
     raise RecordError(reason)
 
 
@@ -295,7 +294,6 @@ def _unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
 
 
 def _vectors(fields: Mapping[str, Vector]) -> dict[str, tuple[float, ...]]:
-    """Return named vectors of floats."""
     vectors: dict[str, tuple[float, ...]] = {}
     for name, values in fields.items():
         worded = str in set(map(type, values))  # rarely

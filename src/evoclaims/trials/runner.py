@@ -279,7 +279,6 @@ def _go_on(run: Run, batch: Batch, allowance: Allowance, strides: Strides) -> tu
 
 
 def _save(run: Run, batch: Batch) -> None:
-    """Write a checkpoint."""
     spent = batch.header.compile_seconds + run.lanes.seconds
     state = run.lanes.gather(batch.state)
     checkpoint.save(run.store.checkpoints, replace(batch.header, compile_seconds=spent), state)
@@ -337,7 +336,6 @@ def _store_ended(run: Run, batch: Batch, report: Report, ended: Sequence[int], a
 
 
 def _give_up(run: Run, header: Header) -> None:
-    """Store the unfinished trials of a batch as timed out."""
     limit = run.stored.time_limit
     timing = {**_timing(run, header), "limit": limit}
     owed = [seed for seed in header.seeds if not run.stored.has(seed)]

@@ -155,7 +155,6 @@ class Allowance:
         return made.result()
 
     def _wait(self, made: Future[Any]) -> None:
-        """Wait until the work is done or the time is over."""
         while not made.done() and self.left > 0:
             began = working_time()
             wait([made], min(LOOK_SECONDS, self.left))
@@ -175,7 +174,6 @@ def end_without(status: int) -> None:
 
 
 def _do(work: Callable[[], Any], made: Future[Any]) -> None:
-    """Do the work and keep its result or error."""
     try:
         made.set_result(work())
     except BaseException as error:

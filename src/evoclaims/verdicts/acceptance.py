@@ -163,7 +163,6 @@ def chosen(history: History, claim: str) -> list[tuple[str, str]]:
 
 
 def _claim(tier: str, claim: str, entries: Sequence[AcceptedVerdict]) -> Iterator[str]:
-    """Yield the lines of one claim."""
     yield f"{printable(claim)} ({printable(tier)})"
     before: AcceptedVerdict | None = None
     for era in eras(entries):
@@ -191,7 +190,6 @@ def _first(entry: AcceptedVerdict) -> str:
 
 
 def _changes(before: AcceptedVerdict, entry: AcceptedVerdict) -> str:
-    """Return what differs from the entry before."""
     moved = changes(before, entry)
     if before.revision != entry.revision:
         moved.append(f"revision {before.short_revision(SHORT)} -> {entry.short_revision(SHORT)}")

@@ -63,7 +63,6 @@ class GitRevision:
         return tuple(sorted(os.fsdecode(name) for name in listed.split(b"\0") if name))
 
     def _git(self, *arguments: str) -> bytes:
-        """Return what git prints."""
         done = run_git(self.folder, *arguments)
         if done.returncode:
             reason = " ".join(done.stderr.decode(errors="replace").split())

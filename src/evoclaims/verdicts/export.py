@@ -123,7 +123,6 @@ def columns_of(rows: Sequence[Row]) -> list[str]:
 
 
 def _trial_row(trial: TrialResult, names: Sequence[Name]) -> Row:
-    """Return one trial."""
     of = trial.spec
     return {
         "id": trial.id,

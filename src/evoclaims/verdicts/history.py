@@ -141,7 +141,6 @@ def dump(history: History) -> str:
 
 
 def _entry(row: object, environments: Mapping[str, Any], name: str, claim: str) -> AcceptedVerdict:
-    """Return one accepted verdict, with every field checked."""
     plain = _table(row, name, claim)
     expected = {field.name for field in fields(AcceptedVerdict)} - {"versions"} | {"environment"}
     if plain.keys() | {"p"} != expected:
@@ -159,7 +158,6 @@ def _entry(row: object, environments: Mapping[str, Any], name: str, claim: str) 
 
 
 def _table(value: object, name: str, part: str) -> dict[str, Any]:
-    """Return a TOML table."""
     if not isinstance(value, dict):
         raise _torn(name, f"{part} is no table")
     return value

@@ -213,7 +213,6 @@ class _Written:
 
 
 def _written(row: Sensitivity) -> _Written:
-    """Return a row as the file has it."""
     written = _Written(row.outcome, row.fingerprint, row.untried, {name: {} for name in row.methods}, {})
     for one in row.attempts:
         text = str(one.outcome if one.fate is Fate.KILLED else one.fate)

@@ -251,7 +251,6 @@ class BatchJob:
         return DelayedSubmission(self)
 
     def _run(self, command: list[str]) -> int:
-        """Run a command and return its status."""
         print(f"$ {shlex.join(command)}", flush=True)
         # SLURM signals all processes of a job shortly before its time limit. The batch would die of that signal: it is
         # blocked there, and `checkpoint` alone passes it on. (A `subprocess.Popen` has locks, and may not be waited for

@@ -217,7 +217,6 @@ def _seen(state: str, reason: str, nodes: str) -> Seen:
 
 
 def _answer(command: Sequence[str]) -> tuple[int, str, str]:
-    """Return status, output and errors of a command."""
     try:
         done = subprocess.run(command, capture_output=True, text=True, errors="replace", timeout=ANSWER_SECONDS)
     except subprocess.TimeoutExpired:

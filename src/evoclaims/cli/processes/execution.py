@@ -63,7 +63,6 @@ class Execution:
             yield ended
 
     def _in_processes(self, wanted: Mapping[Job, Condition], tell: Callable[[str], None]) -> Iterator[Ended]:
-        """Run conditions in worker processes."""
         seeds, tier = self.order.seeds, self.order.tier
         batches = missing_batches(self.project, tier, wanted, seeds, self.limit, self.platform)
         seconds = {batch.job: batch.cost.seconds() for batch in batches}

@@ -93,7 +93,6 @@ class Process:
             return None
 
     def _pass_errors_on(self) -> None:
-        """Print what it writes to standard error."""
         for line in self._error_output:
             print(line.decode(errors="replace"), end="", file=sys.stderr, flush=True)
 
@@ -162,7 +161,6 @@ class Workers:
             self._stop()
 
     def _sit(self, seats: Sequence[Seat]) -> None:
-        """Start a thread for each seat."""
         with self._changed:
             self._taken += len(seats)
             self._running += sum(seat.first is not None for seat in seats)

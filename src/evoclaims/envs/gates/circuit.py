@@ -193,7 +193,6 @@ class Circuit(ABC):
         )
 
     def _rows(self, level: Int[Array, ""]) -> Int[Array, ""]:
-        """Return the number of rows of `level`."""
         return jnp.asarray(self.table.rows_at_level, jnp.int32)[level]
 
     def _errors(

@@ -128,7 +128,6 @@ def speciate(settings: Species, species: SpeciesState, population: Genome, gener
 
 
 def _at(genomes: Genome, place: Any) -> Genome:
-    """Return the genome or genomes at `place`."""
     return take_rows(genomes, place)
 
 
