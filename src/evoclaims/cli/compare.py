@@ -25,7 +25,7 @@ from evoclaims.trials.store import Store
 from evoclaims.verdicts import comparison, history, transitions
 from evoclaims.verdicts.acceptance import timeline
 from evoclaims.verdicts.comparison import GitRevision, Side, find_revision
-from evoclaims.verdicts.mixed_versions import listed
+from evoclaims.verdicts.other_code import listed
 from evoclaims.verdicts.transitions import Kind
 
 UNSAID = (Kind.SAME, Kind.NOT_RUN)

@@ -26,7 +26,7 @@ from evoclaims.trials.imported import where_from
 from evoclaims.trials.result import COMPLETE
 from evoclaims.trials.spec import Condition, TrialSpec
 from evoclaims.trials.store import Store
-from evoclaims.verdicts import mixed_versions
+from evoclaims.verdicts import other_code
 from evoclaims.verdicts.robustness import matrix
 
 
@@ -106,7 +106,7 @@ def _print_trials(store: Store, name: str, condition: Condition, seeds: Sequence
     found = (store.get(TrialSpec(condition, seed).id, condition.versions) for seed in seeds)
     results = [result for result in found if result is not None]
     for name in condition.edited_since(results):
-        print(f"  {mixed_versions.summary(name)}")
+        print(f"  {other_code.summary(name)}")
     for result in results:
         print(f"  {describe(result)}")
     crashed = [result for result in results if result.status == "crashed"]

@@ -62,10 +62,10 @@ def plain() -> AbstractContextManager[None]:
     return own_style(**_SETTINGS)
 
 
-def lighter(colour: str, share: float = 0.5) -> str:
-    """Return a colour mixed with white; `share` is white's."""
+def lighter(colour: str) -> str:
+    """Return a colour mixed with as much white."""
     channels = [int(colour[i : i + 2], 16) for i in (1, 3, 5)]
-    return "#" + "".join(f"{round(c + (255 - c) * share):02x}" for c in channels)
+    return "#" + "".join(f"{round((c + 255) / 2):02x}" for c in channels)
 
 
 LEFT, RIGHT, EDGE = 0.56, 0.1, 0.06

@@ -22,7 +22,7 @@ from evoclaims.report.formatting import Anchors, clean, counted, listed, places,
 from evoclaims.report.model import Board, ConditionTrials, Page, Section, ShownChampion
 from evoclaims.report.trial_summary import Reader, TrialSummary
 from evoclaims.trials.store import Store
-from evoclaims.verdicts import mixed_versions
+from evoclaims.verdicts import other_code
 from evoclaims.verdicts.claim_report import ClaimReport
 from evoclaims.verdicts.history import AcceptedVerdict, History, eras, key_of
 from evoclaims.verdicts.mutation_matrix import Matrix, described
@@ -185,7 +185,7 @@ def _overspent(report: ClaimReport) -> tuple[str, ...]:
 
 def _edited(report: ClaimReport) -> list[str]:
     """Return a sentence for each method or task that was edited after trials of a claim had run."""
-    lines = [clean(mixed_versions.summary(name)) for name in mixed_versions.edited(report)]
+    lines = [clean(other_code.summary(name)) for name in other_code.edited(report)]
     return [f"{words[0].upper()}{words[1:]}." for words in lines]
 
 

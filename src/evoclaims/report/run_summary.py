@@ -8,7 +8,7 @@ from typing import Final
 from evoclaims.judging.verdict import Outcome
 from evoclaims.report import table_cells
 from evoclaims.report.formatting import listed, literal, plural, table
-from evoclaims.verdicts import history, mixed_versions
+from evoclaims.verdicts import history, other_code
 from evoclaims.verdicts.claim_report import ClaimReport
 
 COLUMNS = ("claim", "what is claimed", "verdict", "n", "p", "why")
@@ -19,7 +19,7 @@ def run_summary(reports: Sequence[ClaimReport], notes: Sequence[str] = ()) -> st
     rows = (map(literal, _cells(report)) for report in history.ordered(reports))
     lines = ["## Claims", "", f"**{literal(table_cells.totals(reports))}**", ""]
     lines += [table(COLUMNS, rows, numbers=("n", "p"))]
-    of_trials = (*mixed_versions.lines(reports), *mixed_versions.edited_code_lines(reports))
+    of_trials = other_code.lines(reports)
     further = filter(None, (table_cells.faults(reports), *of_trials, *notes))
     lines += ["", *(f"* {literal(note)}" for note in further)]
     return "\n".join(lines).rstrip("\n") + "\n"

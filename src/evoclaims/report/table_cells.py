@@ -11,7 +11,7 @@ from evoclaims.judging.power import RATES, event_power
 from evoclaims.judging.telescope import comparison_power
 from evoclaims.judging.verdict import Direction, Outcome
 from evoclaims.report.formatting import p_value, place_key, places
-from evoclaims.verdicts import mixed_versions
+from evoclaims.verdicts import other_code
 from evoclaims.verdicts.claim_report import ClaimReport, Tally, Tried
 from evoclaims.verdicts.history import ordered
 
@@ -72,8 +72,8 @@ def power(report: ClaimReport) -> str:
 
 
 def verdict_of_versions(report: ClaimReport) -> str:
-    """Return the outcome with a dagger if trials are of mixed versions (see `mixed_versions.lines`)."""
-    return verdict(report) + mixed_versions.MARK * mixed_versions.is_mixed(report)
+    """Return the outcome with a dagger if trials are of mixed versions (see `other_code.lines`)."""
+    return verdict(report) + other_code.MARK * other_code.is_mixed(report)
 
 
 def trials(report: ClaimReport) -> str:

@@ -23,7 +23,7 @@ from evoclaims.trials.result import TrialResult
 from evoclaims.trials.store import DamagedFileError
 from evoclaims.verdicts import history, transitions
 from evoclaims.verdicts.claim_report import ClaimReport
-from evoclaims.verdicts.mixed_versions import listed
+from evoclaims.verdicts.other_code import listed
 from evoclaims.verdicts.source_trials import found_in, moved
 from evoclaims.verdicts.transitions import Standings
 

@@ -24,11 +24,14 @@ def is_mixed(report: ClaimReport) -> bool:
 
 
 def lines(reports: Sequence[ClaimReport]) -> list[str]:
-    """Return lines on claims judged from mixed versions, or from other versions than the installed ones, if any."""
+    """Return lines on claims judged from mixed or other versions of packages, or from code that was edited since."""
     mixed: dict[str, list[str]] = defaultdict(list)
     foreign: dict[str, list[str | None]] = defaultdict(list)
+    edits: dict[str, list[str]] = defaultdict(list)
     elsewhere = []
     for report in reports:
+        for name in edited(report):
+            edits[name].append(f"{report.name} ({report.tier})")
         versions = versions_of(report.sources)
         several = [f"{name} {in_words(those)}" for name, those in versions.items() if len(those) > 1]
         if several:
@@ -48,6 +51,7 @@ def lines(reports: Sequence[ClaimReport]) -> list[str]:
             for name, those in sorted(foreign.items())
         )
         lines.append(f"not made with the installed versions: {', '.join(packages)}: {listed(elsewhere)}")
+    lines += [f"{summary(name)}: {listed(names)}" for name, names in sorted(edits.items())]
     return [printable(line) for line in lines]
 
 
@@ -55,15 +59,6 @@ def listed(names: Sequence[str]) -> str:
     """Return the first names, and how many more there are."""
     rest = len(names) - MOST_NAMES
     return ", ".join(names[:MOST_NAMES]) + (f" and {rest} more" if rest > 0 else "")
-
-
-def edited_code_lines(reports: Sequence[ClaimReport]) -> list[str]:
-    """Return a line for each method or task that was edited after trials behind claims had run, if any."""
-    claims: dict[str, list[str]] = defaultdict(list)
-    for report in reports:
-        for name in edited(report):
-            claims[name].append(f"{report.name} ({report.tier})")
-    return [printable(f"{summary(name)}: {listed(names)}") for name, names in sorted(claims.items())]
 
 
 def edited(report: ClaimReport) -> list[str]:
