@@ -2,7 +2,7 @@
 
 `python benchmarks/ecorobot_steps.py` on CPU cores; `--environments 32768` on a GPU. A plain port carries all of MJX's
 data from step to step and simulates all boxes; ours carries positions, velocities and accelerations (see
-`evoclaims.envs.ecorobot.physics`), and makes a step in one kernel (`evoclaims.kernels.call.one_kernel`); on a GPU
+`evoclaims.envs.ecorobot.physics`), and makes a step in one kernel (`evoclaims.kernels.call.kernel`); on a GPU
 the same step in XLA's kernels is a case of its own. Counted are environment steps: ours with sensors and rewards, the
 others without.
 """

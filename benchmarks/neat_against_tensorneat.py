@@ -33,14 +33,13 @@ import numpy as np  # noqa: E402
 
 from evoclaims.core.errors import UserError  # noqa: E402
 from evoclaims.envs.gates.parity import NParity  # noqa: E402
-from evoclaims.methods.neat.neat import Neat  # noqa: E402
+from evoclaims.methods.neat.evolution import Neat  # noqa: E402
 from evoclaims.methods.neat.settings import Settings, Species  # noqa: E402
 from evoclaims.methods.neat.species import one_species  # noqa: E402
 from evoclaims.methods.tensorneat import NeatTensorneat, library, translated  # noqa: E402
 from evoclaims.networks.genome import Connections, Genome, Nodes  # noqa: E402
-from evoclaims.trials.budget import Budget  # noqa: E402
 from evoclaims.trials.lanes import Lanes  # noqa: E402
-from evoclaims.trials.spec import Condition  # noqa: E402
+from evoclaims.trials.spec import Budget, Condition  # noqa: E402
 
 TASK = NParity(bits=6)
 LINKS = 183  # connections of a full-size genome

@@ -34,13 +34,12 @@ from evoclaims.core.errors import UserError  # noqa: E402
 from evoclaims.core.files import write_atomically  # noqa: E402
 from evoclaims.envs.gates.parity import NParity  # noqa: E402
 from evoclaims.judging.exact import rank_test  # noqa: E402
-from evoclaims.methods.neat.neat import Neat  # noqa: E402
+from evoclaims.methods.neat.evolution import Neat  # noqa: E402
 from evoclaims.methods.neat.settings import Mutation, Settings, Species  # noqa: E402
 from evoclaims.methods.tensorneat import NeatTensorneat  # noqa: E402
-from evoclaims.trials.budget import Budget  # noqa: E402
 from evoclaims.trials.result import TrialResult  # noqa: E402
 from evoclaims.trials.runner import run  # noqa: E402
-from evoclaims.trials.spec import Condition  # noqa: E402
+from evoclaims.trials.spec import Budget, Condition  # noqa: E402
 from evoclaims.trials.store import Store  # noqa: E402
 
 SIDES: dict[str, Any] = {"ours": Neat, "theirs": NeatTensorneat}

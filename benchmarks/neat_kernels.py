@@ -28,12 +28,11 @@ from neat_against_tensorneat import TASK, random_genomes, sized, with_ours
 
 from evoclaims.kernels.call.grouped import GroupKernel
 from evoclaims.kernels.call.random_bits import kernel_prng
-from evoclaims.methods.neat.crossover import crossover
-from evoclaims.methods.neat.neat import Neat
+from evoclaims.methods.neat.evolution import Neat
+from evoclaims.methods.neat.homology import crossover
+from evoclaims.methods.neat.mutation import mutate_structure, mutate_values
 from evoclaims.methods.neat.population import first_population
 from evoclaims.methods.neat.species import one_species, speciate
-from evoclaims.methods.neat.structure import mutate_structure
-from evoclaims.methods.neat.values import mutate_values
 from evoclaims.networks.genome import Genome, resized
 from evoclaims.networks.graph import GraphNetwork
 

@@ -33,10 +33,9 @@ from brax.training.agents.ppo import networks, train  # noqa: E402
 from evoclaims.envs.gates.parity import NParity  # noqa: E402
 from evoclaims.judging.exact import rank_test  # noqa: E402
 from evoclaims.methods.ppo import LevelTest, Ppo  # noqa: E402
-from evoclaims.trials.budget import Budget  # noqa: E402
 from evoclaims.trials.lanes import Lanes  # noqa: E402
 from evoclaims.trials.runner import run  # noqa: E402
-from evoclaims.trials.spec import Condition  # noqa: E402
+from evoclaims.trials.spec import Budget, Condition  # noqa: E402
 from evoclaims.trials.store import Store  # noqa: E402
 
 

@@ -20,10 +20,9 @@ from pathlib import Path
 
 from evoclaims.envs.gates.parity import NParity
 from evoclaims.methods.hand_built import HandBuilt
-from evoclaims.trials.budget import Budget
 from evoclaims.trials.result import TrialResult, digest
 from evoclaims.trials.result_codec import dump
-from evoclaims.trials.spec import Condition, TrialSpec
+from evoclaims.trials.spec import Budget, Condition, TrialSpec
 from evoclaims.trials.store import Store
 
 CONDITIONS, POINTS = 1000, 50
@@ -41,7 +40,7 @@ from evoclaims.envs.gates.parity import NParity
 from evoclaims.judging.design import Design
 from evoclaims.methods.hand_built import HandBuilt
 from evoclaims.paper.reproduction import Reproduction, Tier
-from evoclaims.trials.budget import Budget
+from evoclaims.trials.spec import Budget
 from evoclaims.trials.spec import Condition
 
 CONDITIONS = {{

@@ -13,7 +13,7 @@ import numpy as np
 from approximations import on_a_processor
 
 from evoclaims.kernels.emit import machine_code
-from evoclaims.kernels.emit.block_shape import BlockShape
+from evoclaims.kernels.emit.block_kernel import BlockShape
 from evoclaims.kernels.emit.gpu_kernel import BLOCK, ENTRY, GpuProgram
 
 NOT_A_NUMBER = 0x7FC00000

@@ -14,9 +14,8 @@ from evoclaims.envs.gates.parity import NParity
 from evoclaims.judging.design import Design
 from evoclaims.methods.hand_built import HandBuilt
 from evoclaims.paper.reproduction import Reproduction, Tier
-from evoclaims.trials.budget import Budget
 from evoclaims.trials.result import Status, TrialResult
-from evoclaims.trials.spec import Condition
+from evoclaims.trials.spec import Budget, Condition
 from evoclaims.trials.store import Store
 
 CONDITIONS = {

@@ -43,8 +43,8 @@ from evoclaims.judging.design import Design
 from evoclaims.methods.base import Policy, Progress
 from evoclaims.methods.hand_built import HandBuilt
 from evoclaims.paper.reproduction import Reproduction, Tier
-from evoclaims.paper.variant import Variant, changed
-from evoclaims.trials.budget import Budget
+from evoclaims.paper.reproduction import Variant, changed
+from evoclaims.trials.spec import Budget
 from evoclaims.trials.spec import Condition
 
 
@@ -134,9 +134,8 @@ def trials_of_both(tmp_path_factory: pytest.TempPathFactory) -> Path:
     from evoclaims.envs.gates.parity import NParity
     from evoclaims.methods.hand_built import HandBuilt
     from evoclaims.trials import devices
-    from evoclaims.trials.budget import Budget
     from evoclaims.trials.runner import run
-    from evoclaims.trials.spec import Condition
+    from evoclaims.trials.spec import Budget, Condition
 
     store = Store(tmp_path_factory.mktemp("both") / "store")
     store.check_writable()

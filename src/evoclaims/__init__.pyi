@@ -13,13 +13,13 @@ from evoclaims.judging.measure import Measure as Measure
 from evoclaims.judging.measure import Profile as Profile
 from evoclaims.judging.verdict import Outcome as Outcome
 from evoclaims.methods.training_loop import TrainingLoop as TrainingLoop
-from evoclaims.paper.null_agent import NullAgent as NullAgent
+from evoclaims.paper.reproduction import NullAgent as NullAgent
 from evoclaims.paper.reproduction import Reproduction as Reproduction
 from evoclaims.paper.reproduction import Tier as Tier
+from evoclaims.paper.reproduction import Variant as Variant
+from evoclaims.paper.reproduction import changed as changed
 from evoclaims.paper.trial_group import TrialGroup as TrialGroup
-from evoclaims.paper.variant import Variant as Variant
-from evoclaims.paper.variant import changed as changed
-from evoclaims.trials.budget import Budget as Budget
 from evoclaims.trials.imported import Imported as Imported
+from evoclaims.trials.spec import Budget as Budget
 from evoclaims.trials.spec import Condition as Condition
 from evoclaims.trials.spec import Progression as Progression

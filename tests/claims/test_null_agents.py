@@ -13,8 +13,7 @@ from evoclaims.claims.collected import ClaimTest
 from evoclaims.claims.session import Session
 from evoclaims.core.errors import UserError
 from evoclaims.judging.assertion import Assertion
-from evoclaims.paper.null_agent import NullAgent
-from evoclaims.paper.reproduction import Reproduction
+from evoclaims.paper.reproduction import NullAgent, Reproduction
 from evoclaims.trials.spec import Condition
 from evoclaims.trials.store import Store
 from evoclaims.verdicts.claim_report import CONTROL

@@ -9,8 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from evoclaims.claims.order import Order
-from evoclaims.claims.workload import Work, Workload
+from evoclaims.claims.workload import Order, Work, Workload
 from evoclaims.paper.cost import Cost
 
 

@@ -9,16 +9,13 @@ from pathlib import Path
 import pytest
 from made_trials import trial_of
 
-from evoclaims.claims.overview import Watching, remaining
-from evoclaims.claims.workload import Work, Workload
+from evoclaims.claims.workload import Watching, Work, Workload, remaining
 from evoclaims.envs.gates.parity import NParity
 from evoclaims.methods.hand_built import HandBuilt
 from evoclaims.paper.cost import Basis, Cost
-from evoclaims.trials.budget import Budget
-from evoclaims.trials.notice import announced
+from evoclaims.trials.notice import Running, announced, shared
 from evoclaims.trials.progress import RunProgress
-from evoclaims.trials.shared_progress import Running, shared
-from evoclaims.trials.spec import Condition
+from evoclaims.trials.spec import Budget, Condition
 from evoclaims.trials.store import Store
 
 X, Y, Z = "a" * 64, "b" * 64, "c" * 64

@@ -21,12 +21,10 @@ from evoclaims.judging.design import SEQUENTIAL
 from evoclaims.judging.verdict import Outcome
 from evoclaims.paper import pilots, references
 from evoclaims.paper.archive import Archive
-from evoclaims.paper.reproduction import Reproduction
-from evoclaims.paper.variant import Variant
-from evoclaims.trials.budget import Budget
+from evoclaims.paper.reproduction import Reproduction, Variant
 from evoclaims.trials.progress import ignore
 from evoclaims.trials.result import TrialResult
-from evoclaims.trials.spec import Condition
+from evoclaims.trials.spec import Budget, Condition
 from evoclaims.trials.store import Store
 from evoclaims.verdicts import history
 from evoclaims.verdicts.history import AcceptedVerdict

@@ -11,7 +11,7 @@ from evoclaims.trials.store import Store
 
 AGENT = """
 
-from evoclaims.paper.null_agent import NullAgent
+from evoclaims.paper.reproduction import NullAgent
 
 REPRODUCTION = replace(
     REPRODUCTION, null_agents={"zero": NullAgent("no bit right", lambda c: {"metrics": {"furthest_solved": -1.0}})}

@@ -26,7 +26,7 @@ for _module in ("networkx", "evoclaims.cli.champion", "evoclaims.methods.cma_es"
 MORE = """
 from evoclaims.methods.cma_es import CmaEs
 from evoclaims.methods.hyperneat import HyperNeat
-from evoclaims.methods.neat.neat import Neat
+from evoclaims.methods.neat.evolution import Neat
 from evoclaims.methods.neat.settings import Settings, Species
 from evoclaims.networks.all_skips import AllSkips
 

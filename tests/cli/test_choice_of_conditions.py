@@ -7,7 +7,7 @@ from pathlib import Path
 import jax
 from tiny_project import Evoclaims
 
-from evoclaims.cli.chosen_conditions import named
+from evoclaims.cli.processes.job import named
 from evoclaims.cli.project import open_project
 from evoclaims.trials.result_making import make_unfinished
 from evoclaims.trials.spec import TrialSpec

@@ -18,9 +18,8 @@ import pytest
 import tiny_project
 from tiny_project import FILES, Evoclaims, Project
 
-from evoclaims.cli.episodes import run_again
 from evoclaims.cli.project import open_project
-from evoclaims.cli.stored_trial import load
+from evoclaims.cli.stored_trial import load, run_again
 from evoclaims.core.canonical import content_hash
 from evoclaims.core.drawing import optional
 from evoclaims.envs.ecorobot import physics

@@ -17,8 +17,8 @@ from tiny_project import BODIES, Evoclaims, Project, forget
 
 from evoclaims.core import files
 from evoclaims.trials.store import Store
+from evoclaims.verdicts.claim_report import Tried
 from evoclaims.verdicts.mutation_matrix import Fate, dump, load
-from evoclaims.verdicts.sensitivity import Tried
 
 BLIND = "parity: blind"
 Sentence = Callable[[pytest.RunResult, str], None]

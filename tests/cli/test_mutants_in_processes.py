@@ -12,8 +12,7 @@ from tiny_project import REPRODUCTION, Evoclaims, Project
 from evoclaims.cli.processes.job import Job, sharing_programs
 from evoclaims.envs.gates.parity import NParity
 from evoclaims.methods.hand_built import HandBuilt
-from evoclaims.trials.budget import Budget
-from evoclaims.trials.spec import Condition
+from evoclaims.trials.spec import Budget, Condition
 from evoclaims.trials.store import Store
 from evoclaims.verdicts.mutation_matrix import Fate, load
 

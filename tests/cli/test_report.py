@@ -10,16 +10,15 @@ import numpy as np
 import pytest
 from tiny_project import Evoclaims, Project
 
-from evoclaims.cli.episodes import Outings
 from evoclaims.cli.report import trajectory
+from evoclaims.cli.stored_trial import Outings
 from evoclaims.envs.ecorobot.stones import SteppingStones
 from evoclaims.envs.gates.parity import NParity
 from evoclaims.methods.random_search import RandomSearch
 from evoclaims.networks.mlp import Mlp
 from evoclaims.report.champion import network
 from evoclaims.report.model import Page
-from evoclaims.trials.budget import Budget
-from evoclaims.trials.spec import Condition
+from evoclaims.trials.spec import Budget, Condition
 
 
 @pytest.fixture(autouse=True)

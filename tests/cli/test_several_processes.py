@@ -18,19 +18,16 @@ from tiny_project import REPRODUCTION, Evoclaims, Project
 
 from evoclaims.cli.processes import workers
 from evoclaims.cli.processes.host import AUTO, Host, host_of
-from evoclaims.cli.processes.job import Job
-from evoclaims.cli.processes.missing_batches import MissingBatch
-from evoclaims.cli.processes.seats import Seat, seats_of, useful_processes
+from evoclaims.cli.processes.job import Job, MissingBatch
 from evoclaims.cli.processes.worker import Ended, WorkOrder
-from evoclaims.cli.processes.workers import ATTEMPTS, Workers, in_queue
+from evoclaims.cli.processes.workers import ATTEMPTS, Seat, Workers, in_queue, seats_of, useful_processes
 from evoclaims.core.errors import UserError
 from evoclaims.envs.gates.parity import NParity
 from evoclaims.methods.hand_built import HandBuilt
 from evoclaims.paper.cost import Cost
 from evoclaims.trials import gpus
-from evoclaims.trials.budget import Budget
 from evoclaims.trials.integrity import verify
-from evoclaims.trials.spec import Condition
+from evoclaims.trials.spec import Budget, Condition
 from evoclaims.trials.store import Store
 
 ORDER = WorkOrder("store", "smoke", "cpu", 0, 10)

@@ -21,13 +21,10 @@ from hypothesis import strategies as st
 from tiny_project import PYPROJECT, Evoclaims
 
 from evoclaims.cli import jobs, submit
-from evoclaims.cli.cluster import job_states
-from evoclaims.cli.cluster.batch_job import BatchJob
-from evoclaims.cli.cluster.job_request import minutes_of
-from evoclaims.cli.cluster.job_states import Seen, State
-from evoclaims.cli.cluster.submissions import load_all
-from evoclaims.cli.processes.job import Job
-from evoclaims.cli.processes.missing_batches import MissingBatch
+from evoclaims.cli.cluster import submissions
+from evoclaims.cli.cluster.job import BatchJob, minutes_of
+from evoclaims.cli.cluster.submissions import Seen, State, load_all
+from evoclaims.cli.processes.job import Job, MissingBatch
 from evoclaims.cli.submit import dealt
 from evoclaims.paper.cost import Cost
 from evoclaims.trials.notice import announced, notice_path
@@ -342,6 +339,6 @@ def test_a_job_s_failed_batches_are_counted_and_do_not_stop_the_others(
 
 
 def test_another_machine_s_process_may_still_run(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(job_states.socket, "gethostname", lambda: "here")
+    monkeypatch.setattr(submissions.socket, "gethostname", lambda: "here")
     local = submit.Submission(1, "local", "there", "smoke", ())
-    assert job_states.states(local, ["7"])["7"].state == "running"
+    assert submissions.states(local, ["7"])["7"].state == "running"

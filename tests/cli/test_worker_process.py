@@ -15,7 +15,7 @@ from tiny_project import REPRODUCTION, Evoclaims, Project
 
 from evoclaims.cli.processes.job import Job
 from evoclaims.cli.processes.worker import WorkOrder
-from evoclaims.cli.processes.worker_process import Process
+from evoclaims.cli.processes.workers import Process
 
 SLOW = """
 

@@ -9,7 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from evoclaims.core.batching import switch_together
+from evoclaims.methods.neat.capacity import switch_together
 
 BRANCHES = [lambda x, y: {"sum": x + y, "which": jnp.int32(0)}, lambda x, y: {"sum": x + 10 * y, "which": jnp.int32(1)}]
 

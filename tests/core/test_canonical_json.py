@@ -15,7 +15,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from evoclaims.core.canonical import as_plain, canonical_json, content_hash
-from evoclaims.trials.budget import Budget
+from evoclaims.trials.spec import Budget
 
 scalars = st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False, allow_infinity=False) | st.text()
 values = st.recursive(

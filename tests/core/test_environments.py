@@ -14,10 +14,10 @@ from types import SimpleNamespace
 import pytest
 from wheels import write_wheel
 
+from evoclaims.cli.elsewhere import between, released
 from evoclaims.core import environments
 from evoclaims.core.environments import Environment, NotInstallableError, Recipe, checked, make, reason
 from evoclaims.core.errors import UserError
-from evoclaims.core.releases import between, released
 
 Make = Callable[..., Environment]
 

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from evoclaims.core.file_names import LONGEST, file_name
+from evoclaims.core.files import LONGEST, file_name
 
 PIECES = ("", "a", "b", "-", "~", "/", " ", "日本", "中国", "\n", "\x1b", "\0", ".", "\ud800", "[", "a-b")
 

@@ -24,9 +24,9 @@ ELSEWHERE = {
     "report/html.py": ["(resources.files('evoclaims.report') / 'assets' / name).read_text"],
     # what the system says
     "core/provenance.py": ["Path('/proc/cpuinfo').read_text"],
-    "cli/cluster/job_states.py": ["Path(f'/proc/{job}/cmdline').read_bytes"],
-    "trials/notice.py": ["Path(f'/proc/{owner.pid}/stat').read_text"],
-    "trials/descendants.py": ["Path(f'/proc/{pid}/environ').read_bytes"],
+    "cli/cluster/submissions.py": ["Path(f'/proc/{job}/cmdline').read_bytes"],
+    "trials/notice.py": ["Path(f'/proc/{owner.pid}/stat').read_text", "open"],
+    "trials/loop_messages.py": ["Path(f'/proc/{pid}/environ').read_bytes"],
     "core/environments.py": ["distribution.read_text"],
     # standard streams, and nothing
     "cli/main.py": ["os.open"],
@@ -44,7 +44,6 @@ ELSEWHERE = {
     # written
     "cli/elsewhere.py": ["open"],
     "plugin/summary.py": ["open"],
-    "trials/shared_progress.py": ["open"],
 }
 """Calls that open or read files, by module."""
 

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
-from evoclaims.core.pins import without, without_hashes
+from evoclaims.core.environments import without, without_hashes
 
 NAMES = ("jax", "jaxlib", "Flax.Linen", "flax_linen", "evosax")
 BREAKS = st.sampled_from([" ", "  ", " \\\n    ", "\\\n  ", " \\\n"])

@@ -7,7 +7,7 @@ from pathlib import Path
 import jax
 import pytest
 
-from evoclaims.core.raised import in_one_line
+from evoclaims.core.errors import in_one_line
 
 
 def test_an_if_on_a_traced_number_leads_to_the_page_that_says_what_to_write_instead(tmp_path: Path) -> None:

@@ -15,10 +15,9 @@ from evoclaims import cli
 from evoclaims.envs.foreign.gymnasium_task import GymnasiumTask
 from evoclaims.envs.foreign.gymnax_task import GymnaxTask
 from evoclaims.methods.training_loop import TrainingLoop
-from evoclaims.trials.budget import Budget
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.runner import run
-from evoclaims.trials.spec import Condition
+from evoclaims.trials.spec import Budget, Condition
 from evoclaims.trials.store import Store
 
 GUIDE = Path(__file__).parents[2] / "docs" / "foreign.md"

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from evoclaims.mutants import catalogue
+from evoclaims.mutants import mutant
 from evoclaims.verdicts import history, mutation_matrix
-from evoclaims.verdicts.mutation_score import score
+from evoclaims.verdicts.mutation_matrix import score
 from reproductions.nisioti2025 import REPRODUCTION
 
 ROOT = Path(__file__).parents[2]
@@ -22,7 +22,7 @@ def test_the_committed_matrix_is_about_accepted_verdicts_and_known_mutants() -> 
     accepted = history.load(REPRODUCTION.folder / history.FILE)
     assert MATRIX.keys() <= accepted.keys()
     tried = {attempt.mutant for row in MATRIX.values() for attempt in row.attempts}
-    assert tried <= catalogue.load(REPRODUCTION).keys()
+    assert tried <= mutant.load(REPRODUCTION).keys()
 
 
 def test_the_committed_matrix_is_of_the_verdicts_that_are_accepted_now() -> None:

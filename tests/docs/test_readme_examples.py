@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from evoclaims import cli
-from evoclaims.report.verdict_marks import HEADINGS, WORDS
+from evoclaims.report.verdict_overview import HEADINGS, WORDS
 
 ROOT = Path(__file__).parents[2]
 README = (ROOT / "README.md").read_text(encoding="utf-8")

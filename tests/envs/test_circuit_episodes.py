@@ -19,9 +19,8 @@ from numpy.typing import NDArray
 from scipy.stats import chisquare
 
 from evoclaims.envs.base import Episode, averaged, share
-from evoclaims.envs.gates.circuit import Circuit, Sampling
+from evoclaims.envs.gates.circuit import Circuit, Sampling, TruthTable
 from evoclaims.envs.gates.parity import NParity
-from evoclaims.envs.gates.truth_table import TruthTable
 
 pytestmark = pytest.mark.newest
 

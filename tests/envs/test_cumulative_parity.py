@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from evoclaims.core.errors import UserError
-from evoclaims.envs.gates.cumulative import CumulativeParity
-from evoclaims.envs.gates.parity import NParity
+from evoclaims.envs.gates.parity import CumulativeParity, NParity
 
 
 @pytest.mark.parametrize("bits", [2, 3, 6])

@@ -16,15 +16,13 @@ from matplotlib.text import Text
 from evoclaims.envs.gates.parity import NParity
 from evoclaims.figures.bar_panel import Series
 from evoclaims.figures.figure import Drawing, Heading, Painter, Scope
-from evoclaims.figures.files import DOTS_PER_INCH, svg
-from evoclaims.figures.style import plain
+from evoclaims.figures.sheet import DOTS_PER_INCH, plain, svg
 from evoclaims.judging.design import Design
 from evoclaims.methods.hand_built import HandBuilt
 from evoclaims.paper.archive import Archive
 from evoclaims.paper.reproduction import Reproduction, Tier
-from evoclaims.trials.budget import Budget
 from evoclaims.trials.result import Status, TrialResult
-from evoclaims.trials.spec import Condition
+from evoclaims.trials.spec import Budget, Condition
 from evoclaims.trials.store import Store
 
 ONE, OTHER = Series("one", "The One", "#0072b2"), Series("other", "The Other", "#d55e00")

@@ -14,7 +14,7 @@ from small_paper import CONDITIONS, ONE, OTHER, collisions, told, words
 from evoclaims.figures.bar_panel import Series
 from evoclaims.figures.bars import BarChart, by_level, compared
 from evoclaims.figures.figure import Drawing
-from evoclaims.figures.files import contents
+from evoclaims.figures.sheet import contents
 from evoclaims.paper.reported import Published
 from evoclaims.trials.spec import TrialSpec
 

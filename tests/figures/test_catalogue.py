@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from evoclaims.core.errors import UnknownNameError, UserError
-from evoclaims.figures import catalogue
+from evoclaims.figures import figure
 
 FIGURE = """
 from evoclaims.figures.figure import Figure
@@ -32,23 +32,23 @@ def reproduction(paper: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
 
 
 def test_a_figure_is_imported_when_it_is_asked_for(reproduction: Any) -> None:
-    assert catalogue.names(reproduction) == ("fig1", "fig2", "fig3")
-    assert catalogue.load(reproduction, "fig1").title == "A title"
+    assert figure.names(reproduction) == ("fig1", "fig2", "fig3")
+    assert figure.load(reproduction, "fig1").title == "A title"
     assert "drawn_paper.fig2" not in sys.modules
 
 
 def test_an_unknown_figure_is_answered_with_the_known_ones(reproduction: Any) -> None:
     with pytest.raises(UnknownNameError, match="no figure named 'fig4'.*Known: fig1, fig2, fig3"):
-        catalogue.load(reproduction, "fig4")
+        figure.load(reproduction, "fig4")
 
 
 @pytest.mark.parametrize("name", ["fig2", "fig3"])
 def test_a_module_without_a_figure_of_its_name_is_said(reproduction: Any, name: str) -> None:
     with pytest.raises(UserError, match=f"'drawn_paper.{name}' has no FIGURE"):
-        catalogue.load(reproduction, name)
+        figure.load(reproduction, name)
 
 
 def test_a_reproduction_without_figures_says_so(paper: Any) -> None:
-    assert catalogue.names(paper.reproduction) == ()
+    assert figure.names(paper.reproduction) == ()
     with pytest.raises(UserError, match="'tiny' names no figures"):
-        catalogue.load(paper.reproduction, "fig1")
+        figure.load(paper.reproduction, "fig1")

@@ -14,10 +14,9 @@ from evoclaims.envs.ecorobot.stones import SteppingStones
 from evoclaims.figures.elites import ElitesMap, Ground
 from evoclaims.methods.map_elites import MapElites
 from evoclaims.networks.mlp import Mlp
-from evoclaims.trials.budget import Budget
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.result_making import named_leaves
-from evoclaims.trials.spec import Condition
+from evoclaims.trials.spec import Budget, Condition
 
 CELLS = (8, 7)
 METHOD = MapElites(Mlp((2,)), batch=2, initial=2, cells=CELLS)

@@ -12,7 +12,7 @@ from evoclaims.core.errors import UnknownNameError
 from evoclaims.figures.replication import Replication, counts, replications
 from evoclaims.judging.repetition import Agreement, Answer
 from evoclaims.paper.archive import Archive
-from evoclaims.paper.variant import Variant
+from evoclaims.paper.reproduction import Variant
 
 REPORTED = """
 trials = 10

@@ -7,13 +7,13 @@ from typing import Any
 import pytest
 from small_paper import collisions
 
-from evoclaims.figures import catalogue
+from evoclaims.figures import figure
 from evoclaims.figures.figure import Drawing
 from evoclaims.paper.archive import Archive
 from evoclaims.trials.store import Store
 from reproductions.nisioti2025 import REPRODUCTION
 
-FIGURES = catalogue.names(REPRODUCTION)
+FIGURES = figure.names(REPRODUCTION)
 
 
 @pytest.fixture(scope="module")
@@ -30,7 +30,7 @@ def _trials(drawing: Drawing) -> set[Any]:
 @pytest.mark.parametrize("tier", ["full", "smoke"])
 @pytest.mark.parametrize("name", FIGURES)
 def test_a_figure_draws_and_its_words_do_not_collide(archive: Archive, name: str, tier: str) -> None:
-    drawing = catalogue.load(REPRODUCTION, name).draw(archive, REPRODUCTION, tier)
+    drawing = figure.load(REPRODUCTION, name).draw(archive, REPRODUCTION, tier)
     assert collisions(drawing) == []
     assert len(drawing.table) > 0
 
@@ -43,7 +43,7 @@ def test_the_gates_figures_show_every_committed_trial(archive: Archive, tier: st
         "fig4": [(m, t) for m in ("neat", "ppo") for t in ("n_parity", "n_parity_direct")],
     }
     for name, names in shown.items():
-        drawing = catalogue.load(REPRODUCTION, name).draw(archive, REPRODUCTION, tier)
+        drawing = figure.load(REPRODUCTION, name).draw(archive, REPRODUCTION, tier)
         committed = [trial for pair in names for trial in archive.trials(conditions[pair], range(10))]
         assert _trials(drawing) == {trial.id for trial in committed if trial is not None} != set()
         complete = tier == "full"  # smoke has trials of the conditions that its claims read

@@ -7,7 +7,7 @@ from typing import Any
 from hypothesis import given
 from hypothesis import strategies as st
 
-from evoclaims.judging.changed_settings import MOST, changed_settings
+from evoclaims.judging.drift import MOST, changed_settings
 
 LEAVES = st.one_of(st.none(), st.booleans(), st.integers(-3, 3), st.text(max_size=3))
 SPECS = st.dictionaries(

@@ -7,8 +7,7 @@ from dataclasses import replace
 import pytest
 
 from evoclaims.judging.design import FIXED_10, Look
-from evoclaims.judging.fingerprint import fingerprint
-from evoclaims.judging.judge import judge
+from evoclaims.judging.judge import fingerprint, judge
 from evoclaims.judging.kinds.omnibus import any_differ
 from evoclaims.judging.window import Window
 
@@ -85,7 +84,7 @@ def test_the_trials_themselves_are_not_in_the_fingerprint(source) -> None:
 def test_the_judging_revision_is_in_the_fingerprint(source, monkeypatch: pytest.MonkeyPatch) -> None:
     import importlib
 
-    module = importlib.import_module("evoclaims.judging.fingerprint")
+    module = importlib.import_module("evoclaims.judging.judge")
     assertion = source("a", []).solved().stays()
     before = fingerprint(assertion, FIXED_10)
     monkeypatch.setattr(module, "JUDGING_REVISION", module.JUDGING_REVISION + 1)

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from evoclaims.judging.multiplicity import holm, smallest
+from evoclaims.judging.exact import holm, smallest
 
 
 @pytest.fixture(scope="module")

@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from evoclaims.judging.design import SEQUENTIAL, Look
-from evoclaims.judging.event_power import event_power
 from evoclaims.judging.exact import binomial_test
+from evoclaims.judging.power import event_power
 
 
 def _by_enumeration(looks: list[Look], p0: float, rate: float) -> float:

@@ -11,7 +11,7 @@ from scipy.stats import mannwhitneyu, norm
 
 from evoclaims.core.errors import UserError
 from evoclaims.judging.design import FIXED_10, SEQUENTIAL
-from evoclaims.judging.fingerprint import fingerprint
+from evoclaims.judging.judge import fingerprint
 from evoclaims.judging.telescope import _u_distribution, comparison_power, detectable_a12
 
 

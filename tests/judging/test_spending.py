@@ -13,8 +13,7 @@ from evoclaims.judging.design import FIXED_10
 from evoclaims.judging.judge import judge
 from evoclaims.judging.verdict import Outcome
 from evoclaims.methods.training_loop import TrainingLoop
-from evoclaims.trials.budget import Budget
-from evoclaims.trials.spec import Condition
+from evoclaims.trials.spec import Budget, Condition
 
 
 def trained(**further: Any) -> Condition:

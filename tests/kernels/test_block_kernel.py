@@ -18,11 +18,10 @@ from kernel_functions import FUNCTIONS
 from evoclaims.envs.ecorobot.robots import ANT
 from evoclaims.envs.ecorobot.stones import SteppingStones
 from evoclaims.kernels.call.kernel import Kernel
-from evoclaims.kernels.emit import block_kernel, block_shape
-from evoclaims.kernels.emit.block_shape import BlockShape
+from evoclaims.kernels.emit import block_kernel
+from evoclaims.kernels.emit.block_kernel import BlockShape
 from evoclaims.kernels.emit.shared_slots import slots
-from evoclaims.kernels.emit.warp_assignment import SLACK, STRETCHES, Group, assign
-from evoclaims.kernels.emit.warp_schedule import schedule
+from evoclaims.kernels.emit.warp_schedule import SLACK, STRETCHES, Group, assign, schedule
 
 
 def _kernel(function: Callable[..., Any], arguments: Any) -> Kernel:
@@ -90,8 +89,8 @@ def test_a_loop_in_a_loop_is_left_to_one_warp() -> None:
 def test_all_elements_are_computed_at_once_by_as_many_warps_as_have_registers(
     elements: int, warps: int, teams: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(block_shape, "SMALL", 10)
-    shape = block_shape.chosen(_kernel(lambda x: jnp.sin(x) * x[::-1], (jnp.ones((1, 4)),)).results, elements)
+    monkeypatch.setattr(block_kernel, "SMALL", 10)
+    shape = block_kernel.chosen(_kernel(lambda x: jnp.sin(x) * x[::-1], (jnp.ones((1, 4)),)).results, elements)
     assert shape is not None
     assert (shape.warps, shape.teams) == (warps, teams)
 
@@ -100,10 +99,10 @@ def test_a_warp_has_elements_of_its_own_where_sharing_is_no_faster_or_impossible
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     results = _kernel(lambda x: jnp.sin(x) * x[::-1], (jnp.ones((1, 4)),)).results
-    assert block_shape.chosen(results, 1) is None  # its code is small
-    monkeypatch.setattr(block_shape, "SMALL", 10)
-    assert block_shape.chosen(results, 1) is not None
-    assert block_shape.chosen(results, 3 * 132 * 32 + 1) is None  # elements enough for all warps
+    assert block_kernel.chosen(results, 1) is None  # its code is small
+    monkeypatch.setattr(block_kernel, "SMALL", 10)
+    assert block_kernel.chosen(results, 1) is not None
+    assert block_kernel.chosen(results, 3 * 132 * 32 + 1) is None  # elements enough for all warps
 
 
 def test_fewer_warps_share_the_work_where_shared_memory_is_scarce(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -111,18 +110,18 @@ def test_fewer_warps_share_the_work_where_shared_memory_is_scarce(monkeypatch: p
         sums = jnp.cumsum(jnp.sin(x) * x[::-1])
         return sums * jnp.cos(sums)
 
-    monkeypatch.setattr(block_shape, "SMALL", 10)
+    monkeypatch.setattr(block_kernel, "SMALL", 10)
     results = _kernel(function, (jnp.ones((1, 16)),)).results
-    widest = block_shape.chosen(results, 1)
+    widest = block_kernel.chosen(results, 1)
     assert widest is not None
     memory = widest.shared_bytes - 1
-    monkeypatch.setattr(block_shape, "_of_device", lambda name, usual: 132 if name == "core_count" else memory)
-    narrower = block_shape.chosen(results, 1)
+    monkeypatch.setattr(block_kernel, "_of_device", lambda name, usual: 132 if name == "core_count" else memory)
+    narrower = block_kernel.chosen(results, 1)
     assert narrower is not None
     assert (widest.warps, narrower.warps) == (8, 4)
     assert narrower.shared_bytes <= memory
     memory = 127  # not even one number for each of a team's elements
-    assert block_shape.chosen(results, 1) is None
+    assert block_kernel.chosen(results, 1) is None
 
 
 @st.composite

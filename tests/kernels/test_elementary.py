@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from evoclaims.kernels.call.one_kernel import one_kernel
+from evoclaims.kernels.call.kernel import one_kernel
 from evoclaims.kernels.trace.algebra import Algebra
 from evoclaims.kernels.trace.elementary import ELEMENTARY
 

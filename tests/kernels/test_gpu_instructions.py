@@ -18,10 +18,10 @@ from hypothesis import strategies as st
 
 from evoclaims.kernels.call.kernel import Kernel
 from evoclaims.kernels.emit import block_kernel, gpu_kernel, group_kernel, host_kernel, machine_code
-from evoclaims.kernels.emit.block_shape import BlockShape
+from evoclaims.kernels.emit.block_kernel import BlockShape
 from evoclaims.kernels.emit.gpu_instructions import GpuInstructions
 from evoclaims.kernels.emit.group_kernel import Rows, Sizes
-from evoclaims.kernels.emit.llvm_names import literal
+from evoclaims.kernels.emit.llvm_ir import literal
 from evoclaims.kernels.emit.shared_slots import slots
 from evoclaims.kernels.emit.warp_schedule import schedule
 from evoclaims.kernels.trace.expressions import Input, in_order

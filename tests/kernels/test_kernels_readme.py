@@ -9,9 +9,9 @@ from pathlib import Path
 import pytest
 
 from evoclaims import kernels
-from evoclaims.kernels.emit import llvm_names
+from evoclaims.kernels.emit import llvm_ir
 
-FOLDER = Path(llvm_names.__file__).parents[1]
+FOLDER = Path(llvm_ir.__file__).parents[1]
 README = (FOLDER / "README.md").read_text(encoding="utf-8")
 
 
@@ -34,4 +34,4 @@ def test_the_example_prints_a_kernel(tmp_path: Path, capsys: pytest.CaptureFixtu
 
 
 def test_the_limit_of_operations_is_the_one_that_is_checked() -> None:
-    assert f"{llvm_names.LARGEST:,} operations" in README.replace("\n", " ")
+    assert f"{llvm_ir.LARGEST:,} operations" in README.replace("\n", " ")

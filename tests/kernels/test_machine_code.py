@@ -20,8 +20,8 @@ import numpy as np
 import pytest
 from filelock import FileLock
 
-from evoclaims.core import private_files
-from evoclaims.kernels.call.one_kernel import one_kernel
+from evoclaims.core import files
+from evoclaims.kernels.call.kernel import one_kernel
 from evoclaims.kernels.emit import machine_code
 
 TEXT = "define i32 @seven(i32 %x) {\n%y = mul i32 %x, 7\nret i32 %y\n}\n"
@@ -120,7 +120,7 @@ def test_machine_code_another_user_could_have_written_is_not_run(
     for place in {"writable file": [path], "writable folder": [folder], "writable above": [tmp_path]}.get(fault, []):
         place.chmod(0o777)
     _forget(monkeypatch)
-    private_files.say_refused.cache_clear()
+    files.say_refused.cache_clear()
     if not fault:  # the planted code does run where nobody else could have written it
         assert (_seven_times(2), compiled) == (16, [])
         return
@@ -136,11 +136,11 @@ def test_refused_code_is_reported_once_and_never_an_error(
 ) -> None:
     (tmp_path / "kernels").mkdir(mode=0o700)
     (tmp_path / "kernels").chmod(0o777)
-    private_files.say_refused.cache_clear()
+    files.say_refused.cache_clear()
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         assert _seven_times(2) == 14  # as in a pytest run in which warnings are errors
-    private_files.say_refused.cache_clear()
+    files.say_refused.cache_clear()
     for _ in range(3):
         _forget(monkeypatch)
         assert _seven_times(2) == 14

@@ -16,9 +16,8 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from kernel_functions import FUNCTIONS, NO_KERNELS, X, Y
 
-from evoclaims.kernels.call.kernel import Kernel
-from evoclaims.kernels.call.one_kernel import one_kernel
-from evoclaims.kernels.emit import block_shape, gpu_kernel, machine_code
+from evoclaims.kernels.call.kernel import Kernel, one_kernel
+from evoclaims.kernels.emit import block_kernel, gpu_kernel, machine_code
 from evoclaims.kernels.trace.algebra import Algebra
 from evoclaims.kernels.trace.elementary import WIDEST
 
@@ -52,13 +51,13 @@ def test_a_kernel_is_named_after_what_it_computes_in_letters_that_the_assembler_
 
 def test_a_kernel_is_written_once_for_all_programs_that_call_it(monkeypatch: pytest.MonkeyPatch) -> None:
     calls: list[int] = []
-    chosen = block_shape.chosen
+    chosen = block_kernel.chosen
 
     def counted(results: Any, elements: int) -> Any:
         calls.append(elements)
         return chosen(results, elements)
 
-    monkeypatch.setattr(block_shape, "chosen", counted)
+    monkeypatch.setattr(block_kernel, "chosen", counted)
     run = jax.vmap(one_kernel(lambda x: x + 1, "This"))
     first, again = (kernels_for_gpus(lambda x, n=n: n * run(x), jnp.ones((5, 2))) for n in (2, 3))
     other = kernels_for_gpus(run, jnp.ones((6, 2)))

@@ -13,8 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from kernel_functions import FUNCTIONS, X
 
-from evoclaims.kernels.call.kernel import Kernel
-from evoclaims.kernels.call.one_kernel import one_kernel
+from evoclaims.kernels.call.kernel import Kernel, one_kernel
 from evoclaims.kernels.emit.machine_code import lanes
 from evoclaims.kernels.trace import seldom as seldom_conditions
 from evoclaims.kernels.trace.algebra import Algebra

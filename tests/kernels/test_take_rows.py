@@ -14,7 +14,7 @@ from hypothesis.extra import numpy as arrays
 
 from evoclaims.kernels.call.take_rows import take_rows
 from evoclaims.kernels.emit import machine_code
-from evoclaims.kernels.unsupported import Unsupported
+from evoclaims.kernels.trace.expressions import Unsupported
 
 taken = jax.jit(take_rows)
 

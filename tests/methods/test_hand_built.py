@@ -12,10 +12,10 @@ from probes import COPY
 
 from evoclaims.core.errors import UserError
 from evoclaims.envs.gates.alu import SimpleAlu
+from evoclaims.envs.gates.circuit import TruthTable
 from evoclaims.envs.gates.parity import NParity
-from evoclaims.envs.gates.truth_table import TruthTable
 from evoclaims.methods.hand_built import HandBuilt
-from evoclaims.trials.rollout import score_every_level
+from evoclaims.trials.program import score_every_level
 
 GATES = [
     *(NParity(bits) for bits in range(2, 9)),

@@ -14,9 +14,8 @@ from small_methods import METHODS, Entry
 
 from evoclaims.envs.base import Episode, PolicyFn
 from evoclaims.trials import lanes
-from evoclaims.trials.budget import Budget
 from evoclaims.trials.runner import run
-from evoclaims.trials.spec import Condition
+from evoclaims.trials.spec import Budget, Condition
 from evoclaims.trials.store import Store
 
 pytestmark = pytest.mark.slow

@@ -16,8 +16,7 @@ from evoclaims.envs.ecorobot.sensors import Rangefinders
 from evoclaims.envs.gates.parity import NParity
 from evoclaims.methods.training_loop import TrainingLoop
 from evoclaims.networks.mlp import Mlp
-from evoclaims.trials.budget import Budget
-from evoclaims.trials.spec import Condition
+from evoclaims.trials.spec import Budget, Condition
 
 
 def train(task: Any, seed: int, budget: Any, rate: float = 0.1) -> dict[str, float]:

@@ -17,13 +17,12 @@ from evoclaims.envs.gates.parity import NParity
 from evoclaims.methods.cma_es import CmaEs
 from evoclaims.methods.hand_built import HandBuilt
 from evoclaims.methods.random_search import RandomSearch
-from evoclaims.mutants import of_methods, of_tasks
+from evoclaims.mutants import faults
+from evoclaims.mutants.faults import plant
 from evoclaims.mutants.mutant import MUTANTS
-from evoclaims.mutants.planting import plant
 from evoclaims.networks.all_skips import AllSkips
-from evoclaims.trials.budget import Budget
 from evoclaims.trials.program import Program
-from evoclaims.trials.spec import Condition
+from evoclaims.trials.spec import Budget, Condition
 
 PARITY = NParity(3)
 CMA_ES = CmaEs(population=8, network=AllSkips(4))
@@ -64,10 +63,10 @@ def test_a_mutant_has_conditions_of_its_own_and_the_sound_ones_stay(name: str) -
 
 
 def test_equal_faulty_components_are_equal_and_differ_from_sound_ones() -> None:
-    blind = plant(of_tasks.Blind, PARITY)
-    assert blind == plant(of_tasks.Blind, NParity(3))
-    assert hash(blind) == hash(plant(of_tasks.Blind, NParity(3)))
-    assert len({id(plant(of_tasks.Blind, PARITY).__class__), id(blind.__class__)}) == 1
+    blind = plant(faults.Blind, PARITY)
+    assert blind == plant(faults.Blind, NParity(3))
+    assert hash(blind) == hash(plant(faults.Blind, NParity(3)))
+    assert len({id(plant(faults.Blind, PARITY).__class__), id(blind.__class__)}) == 1
     assert blind != PARITY
     assert isinstance(blind, NParity)
     assert blind.sound == PARITY
@@ -76,17 +75,17 @@ def test_equal_faulty_components_are_equal_and_differ_from_sound_ones() -> None:
 
 def test_two_faults_in_one_component_are_one_sentence() -> None:
     with pytest.raises(UserError, match="'n_parity that shows nothing' has a fault already"):
-        plant(of_tasks.Paralysed, plant(of_tasks.Blind, PARITY))
+        plant(faults.Paralysed, plant(faults.Blind, PARITY))
 
 
 @pytest.mark.parametrize(
     ("fault", "success", "fitness"),
     [
-        (of_tasks.Blind, 0.5, -0.5),
-        (of_tasks.Paralysed, 0.5, -0.5),
-        (of_tasks.PaysNothing, 1.0, 0.0),
-        (of_tasks.IgnoresAnInput, 0.5, -0.5),
-        (of_tasks.HasAWrongRow, 7 / 8, -1 / 8),
+        (faults.Blind, 0.5, -0.5),
+        (faults.Paralysed, 0.5, -0.5),
+        (faults.PaysNothing, 1.0, 0.0),
+        (faults.IgnoresAnInput, 0.5, -0.5),
+        (faults.HasAWrongRow, 7 / 8, -1 / 8),
     ],
 )
 def test_what_a_right_circuit_gets_from_faulty_parity(fault: type[Any], success: float, fitness: float) -> None:
@@ -96,12 +95,12 @@ def test_what_a_right_circuit_gets_from_faulty_parity(fault: type[Any], success:
 
 def test_a_reversed_reward_is_the_negative_of_the_right_one() -> None:
     always = lambda bits: jnp.ones(1)  # noqa: E731
-    assert float(examined(of_tasks.ReversesReward, always).fitness) == 0.5
+    assert float(examined(faults.ReversesReward, always).fitness) == 0.5
     assert float(PARITY.examine(always, KEY, LEVEL).fitness) == -0.5
 
 
 def test_a_random_payment_depends_on_the_key_alone() -> None:
-    task: Any = plant(of_tasks.PaysAtRandom, PARITY)
+    task: Any = plant(faults.PaysAtRandom, PARITY)
     paid = [float(task.episode(RIGHT, jax.random.key(seed), LEVEL).fitness) for seed in (0, 0, 1)]
     assert paid[0] == paid[1] != paid[2]
     assert 0 <= min(paid) <= max(paid) < 1
@@ -110,16 +109,16 @@ def test_a_random_payment_depends_on_the_key_alone() -> None:
 def test_the_level_is_the_first_one_whatever_is_asked() -> None:
     first_level_alone: Any = lambda bits: jnp.where(bits[:1] > 0, -1.0, RIGHT(bits))  # noqa: E731
     assert float(PARITY.examine(first_level_alone, KEY, LEVEL).success) < 1
-    assert float(examined(of_tasks.StaysAtFirstLevel, first_level_alone).success) == 1
+    assert float(examined(faults.StaysAtFirstLevel, first_level_alone).success) == 1
 
 
 @pytest.mark.parametrize(
     ("fault", "paid"),
     [
-        (of_tasks.Blind, -1.0),
-        (of_tasks.PaysNothing, 0.0),
-        (of_tasks.ReversesReward, 1.0),
-        (of_tasks.PaysAtRandom, None),
+        (faults.Blind, -1.0),
+        (faults.PaysNothing, 0.0),
+        (faults.ReversesReward, 1.0),
+        (faults.PaysAtRandom, None),
     ],
 )
 def test_steps_are_faulty_like_episodes(fault: type[Any], paid: float | None) -> None:
@@ -127,7 +126,7 @@ def test_steps_are_faulty_like_episodes(fault: type[Any], paid: float | None) ->
     sound = task.sound.reset(KEY, LEVEL)
     assert bool(jnp.any(sound.observation != 0))
     state = task.reset(KEY, LEVEL)
-    assert bool(jnp.any(state.observation != 0)) == (fault is not of_tasks.Blind)
+    assert bool(jnp.any(state.observation != 0)) == (fault is not faults.Blind)
     following = task.step(state, -RIGHT(sound.observation))  # a wrong answer, which costs 1
     assert float(following.reward) == paid if paid is not None else 0 <= float(following.reward) < 1
     assert bool(following.terminated)
@@ -135,13 +134,13 @@ def test_steps_are_faulty_like_episodes(fault: type[Any], paid: float | None) ->
 
 def test_an_alu_that_ignores_an_input_differs_from_the_right_one_in_targets_alone() -> None:
     alu = SimpleAlu(level_count=3)
-    faulty: Any = plant(of_tasks.IgnoresAnInput, alu)
+    faulty: Any = plant(faults.IgnoresAnInput, alu)
     np.testing.assert_array_equal(faulty.table.inputs, alu.table.inputs)
     assert (faulty.table.targets != alu.table.targets).any()
 
 
 def test_a_method_that_learns_nothing_keeps_its_state() -> None:
-    method: Any = plant(of_methods.LearnsNothing, CMA_ES)
+    method: Any = plant(faults.LearnsNothing, CMA_ES)
     state, _ = trained(method)
     np.testing.assert_array_equal(state.distribution.mean, method.init(KEY, PARITY).distribution.mean)
     moved, _ = trained(CMA_ES)
@@ -149,30 +148,30 @@ def test_a_method_that_learns_nothing_keeps_its_state() -> None:
 
 
 def test_a_method_that_minimizes_ends_with_the_worst_individual() -> None:
-    assert float(trained(CMA_ES)[1].fitness) > float(-trained(plant(of_methods.Minimizes, CMA_ES))[1].fitness)
+    assert float(trained(CMA_ES)[1].fitness) > float(-trained(plant(faults.Minimizes, CMA_ES))[1].fitness)
 
 
 def test_selection_at_random_does_not_follow_the_rewards() -> None:
-    _, progress = trained(plant(of_methods.SelectsAtRandom, CMA_ES))
+    _, progress = trained(plant(faults.SelectsAtRandom, CMA_ES))
     assert 0 <= float(progress.fitness) < 1
 
 
 def test_a_forgotten_champion_is_what_training_began_with() -> None:
-    method: Any = plant(of_methods.ForgetsChampion, CMA_ES)
+    method: Any = plant(faults.ForgetsChampion, CMA_ES)
     state, _ = trained(method)
     np.testing.assert_array_equal(method.best(PARITY, state).parameters, np.zeros_like(state.champion.parameters))
     assert (CMA_ES.best(PARITY, state).parameters != 0).any()
 
 
 def test_one_seed_gives_the_same_trial_whatever_the_seed() -> None:
-    method: Any = plant(of_methods.HasOneSeed, CMA_ES)
+    method: Any = plant(faults.HasOneSeed, CMA_ES)
     finals = [method.best(PARITY, trained(method, seed=seed)[0]).parameters for seed in (0, 1)]
     np.testing.assert_array_equal(*finals)
     assert (trained(CMA_ES, seed=0)[0].champion.parameters != trained(CMA_ES, seed=1)[0].champion.parameters).any()
 
 
 def test_the_step_size_stays_what_it_was() -> None:
-    method: Any = plant(of_methods.KeepsItsStepSize, CMA_ES)
+    method: Any = plant(faults.KeepsItsStepSize, CMA_ES)
     assert float(trained(method)[0].distribution.std) == float(method.init(KEY, PARITY).distribution.std)
     assert float(trained(CMA_ES)[0].distribution.std) != float(CMA_ES.init(KEY, PARITY).distribution.std)
 

@@ -14,15 +14,14 @@ from evoclaims.envs.base import Numbered
 from evoclaims.envs.ecorobot.obstacles import Obstacles
 from evoclaims.envs.ecorobot.pose import Pose
 from evoclaims.envs.ecorobot.stones import SteppingStones, StonesCrossed
-from evoclaims.mutants import catalogue
-from evoclaims.mutants.conditions import plantings
-from evoclaims.mutants.mutant import MUTANTS
+from evoclaims.mutants import mutant
+from evoclaims.mutants.mutant import MUTANTS, plantings
 from reproductions.nisioti2025 import REPRODUCTION
 from reproductions.nisioti2025.mutants import MUTANTS as OWN
 
 SMOKE = REPRODUCTION.tiers["smoke"].conditions
 STONES: Any = SMOKE["neat", "stones"].task
-EVERY = {one.name: one for one in plantings(SMOKE, catalogue.load(REPRODUCTION))}
+EVERY = {one.name: one for one in plantings(SMOKE, mutant.load(REPRODUCTION))}
 
 PLANTED_AT_FIRST = {
     "cma_es: minimizes",
@@ -159,4 +158,4 @@ def test_a_module_without_mutants_is_one_sentence(
     pytester.makepyfile(its_mutants=text)
     monkeypatch.syspath_prepend(pytester.path)
     with pytest.raises(UserError, match=said):
-        catalogue.load(_Reproduction())  # type: ignore[arg-type]
+        mutant.load(_Reproduction())  # type: ignore[arg-type]

@@ -10,10 +10,9 @@ from hand_made_verdicts import report, verdict
 from evoclaims.envs.gates.parity import NParity
 from evoclaims.judging.verdict import Outcome
 from evoclaims.methods.hand_built import HandBuilt
-from evoclaims.mutants.conditions import Planted
+from evoclaims.mutants.mutant import Planted
 from evoclaims.mutants.trying import Comparison, merged, noticed
-from evoclaims.trials.budget import Budget
-from evoclaims.trials.spec import Condition
+from evoclaims.trials.spec import Budget, Condition
 from evoclaims.verdicts.claim_report import ClaimReport
 from evoclaims.verdicts.history import key_of
 from evoclaims.verdicts.mutation_matrix import Attempt, Fate, Sensitivity

@@ -13,8 +13,7 @@ import pytest
 
 from evoclaims.core.errors import UnknownNameError
 from evoclaims.networks.genome import EMPTY, Connections, Genome, Nodes
-from evoclaims.networks.graph import GraphNetwork
-from evoclaims.networks.wiring import Wiring
+from evoclaims.networks.graph import GraphNetwork, Wiring
 
 pytestmark = pytest.mark.newest
 

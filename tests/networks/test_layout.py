@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.strategies import DrawFn
 
-from evoclaims.networks.layout import at_work, columns, positions, substrate_graph
+from evoclaims.networks.picture import at_work, columns, positions, substrate_graph
 from evoclaims.networks.substrate import Substrate
 
 

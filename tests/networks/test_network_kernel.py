@@ -20,7 +20,7 @@ from hypothesis import strategies as st
 from evoclaims.kernels.call import grouped
 from evoclaims.kernels.emit import group_kernel, machine_code
 from evoclaims.kernels.emit.gpu_kernel import GpuProgram
-from evoclaims.networks import graph, wiring
+from evoclaims.networks import graph
 from evoclaims.networks.genome import EMPTY, Connections, Genome, Nodes
 from evoclaims.networks.graph import GraphNetwork
 
@@ -172,7 +172,7 @@ def test_a_gpus_kernels_compute_the_same_bits() -> None:
     genes = genomes.connections
     arrays = [genes.source, genes.target, genes.weight, genomes.connection_count]
     for made, leaf in zip(
-        _on_a_gpu(wiring._sorting(NODES, LINKS), 9, 1, arrays),
+        _on_a_gpu(graph._sorting(NODES, LINKS), 9, 1, arrays),
         (wirings.source, wirings.weight, wirings.ends),
         strict=True,
     ):
@@ -229,7 +229,7 @@ def test_connections_are_sorted_by_the_slot_they_lead_to_and_equals_keep_their_o
 @pytest.fixture
 def no_llvm(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """A machine without llvmlite, which nothing knows yet."""
-    caches = (machine_code.lanes, grouped._warn_once, graph._kernel, wiring._sorting)
+    caches = (machine_code.lanes, grouped._warn_once, graph._kernel, graph._sorting)
     monkeypatch.setattr(machine_code, "llvm", None)
     for cached in caches:
         cached.cache_clear()

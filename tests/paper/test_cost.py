@@ -15,11 +15,9 @@ from evoclaims.judging.design import Design
 from evoclaims.methods.hand_built import HandBuilt
 from evoclaims.paper import references
 from evoclaims.paper.cost import COMPILE_SECONDS, Estimator, Owed, Wanted, of_names, took
-from evoclaims.paper.reproduction import Reproduction, Tier
-from evoclaims.paper.variant import Variant
-from evoclaims.trials.budget import Budget
+from evoclaims.paper.reproduction import Reproduction, Tier, Variant
 from evoclaims.trials.result import TrialResult
-from evoclaims.trials.spec import Condition
+from evoclaims.trials.spec import Budget, Condition
 from evoclaims.trials.store import Store
 
 CONDITION = Condition(HandBuilt(), NParity(2), "curriculum", Budget(generations=100))

@@ -22,11 +22,10 @@ from evoclaims.judging.verdict import Outcome
 from evoclaims.judging.window import Window
 from evoclaims.methods.hand_built import HandBuilt
 from evoclaims.paper.trial_group import TrialGroup
-from evoclaims.trials.budget import Budget
 from evoclaims.trials.imported import Imported
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.runner import run
-from evoclaims.trials.spec import Condition
+from evoclaims.trials.spec import Budget, Condition
 from evoclaims.trials.store import Store
 
 PLAIN = CONDITIONS["better", "small"]

@@ -9,7 +9,7 @@ import pytest
 from evoclaims.envs.ecorobot.maze import CELLS, Maze
 from evoclaims.envs.ecorobot.robots import ANT
 from evoclaims.envs.ecorobot.scene import box_geoms, scene
-from evoclaims.envs.ecorobot.views.marks import marks
+from evoclaims.envs.ecorobot.views.motion import marks
 from reproductions.nisioti2025.small_worlds import STONES, SmallDeceptiveMaze, ThreeStones
 
 ROOMS: dict[str, Maze] = {

@@ -13,9 +13,8 @@ from evoclaims.claims.session import Session
 from evoclaims.core.errors import UnknownNameError, UserError
 from evoclaims.judging.design import FIXED_10
 from evoclaims.judging.measure import Event, Measure
-from evoclaims.paper.reproduction import Reproduction, Tier
+from evoclaims.paper.reproduction import Reproduction, Tier, Variant
 from evoclaims.paper.trial_group import TrialGroup
-from evoclaims.paper.variant import Variant
 from evoclaims.trials.store import Store
 
 Served = Callable[..., Any]

@@ -7,7 +7,8 @@ from pathlib import Path
 import pytest
 
 from evoclaims.core.errors import UserError
-from evoclaims.paper.uncovered import FILE, Uncovered, uncovered
+from evoclaims.paper.reported import SENTENCES_FILE as FILE
+from evoclaims.paper.reported import Uncovered, uncovered
 
 ONE = '[[sentence]]\nline = {}\nsays = "a"\nbecause = "b"\n'
 

@@ -154,7 +154,7 @@ def test_reasons_that_cannot_be_found_are_an_error_after_the_verdicts(
         raise UserError("The disk is gone.")
 
     _edit(outcome=Outcome.REFUTED)
-    monkeypatch.setattr("evoclaims.verdicts.reasons.reason", fail)
+    monkeypatch.setattr("evoclaims.verdicts.regression.reason", fail)
     result = accepted.run()
     assert result.ret == 1
     sentence(result, "error: The disk is gone.")

@@ -15,24 +15,22 @@ from made_trials import trial_of
 from evoclaims.claims.claim import Claim
 from evoclaims.claims.collected import ClaimTest
 from evoclaims.claims.fetching import StoredOnly
-from evoclaims.claims.reporting import unjudged
-from evoclaims.claims.session import Session
+from evoclaims.claims.session import Session, unjudged
 from evoclaims.core.keys import TRAINING, trial_key
 from evoclaims.envs.gates.parity import NParity
 from evoclaims.judging.assertion import Assertion
 from evoclaims.judging.design import Design
 from evoclaims.judging.verdict import Outcome
 from evoclaims.methods.hand_built import HandBuilt
-from evoclaims.methods.neat.neat import Neat
+from evoclaims.methods.neat.evolution import Neat
 from evoclaims.methods.neat.settings import Settings, Species
 from evoclaims.paper.archive import Archive
 from evoclaims.paper.reproduction import Reproduction, Tier
 from evoclaims.report.build import gather
 from evoclaims.report.model import Page, Section
-from evoclaims.trials.budget import Budget
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.result_making import named_leaves
-from evoclaims.trials.spec import Condition
+from evoclaims.trials.spec import Budget, Condition
 from evoclaims.trials.store import Store
 from evoclaims.verdicts.claim_report import ClaimReport
 from evoclaims.verdicts.history import History

@@ -10,7 +10,7 @@ from laboratory import Laboratory
 from unpacked import whole
 
 from evoclaims.core.errors import UserError
-from evoclaims.report.across_shown import FILE, keep, last
+from evoclaims.report.across import FILE, keep, last
 from evoclaims.verdicts.across import Across, Judged, across
 
 HOSTILE = "evosax <script>alert(1)</script>"

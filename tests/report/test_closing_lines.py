@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 from hand_made_verdicts import report
 
-from evoclaims.report.closing_lines import closing_lines, without_smoke_test
+from evoclaims.report.run_summary import closing_lines, without_smoke_test
 
 GREEN = report("G1")
 RED = report("G2", "refuted")

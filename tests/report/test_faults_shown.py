@@ -17,10 +17,9 @@ from evoclaims.report.markdown import markdown
 from evoclaims.report.model import Board, Page, Section
 from evoclaims.report.run_summary import run_summary
 from evoclaims.report.terminal_table import verdict_table
-from evoclaims.verdicts.claim_report import CONTROL, ClaimReport
+from evoclaims.verdicts.claim_report import CONTROL, ClaimReport, Tally, Tried
 from evoclaims.verdicts.history import key_of
 from evoclaims.verdicts.mutation_matrix import Attempt, Fate, Matrix, Sensitivity, tried
-from evoclaims.verdicts.sensitivity import Tally, Tried
 
 SENSITIVE, INSENSITIVE = Tried.SENSITIVE, Tried.INSENSITIVE
 REPORTS = [

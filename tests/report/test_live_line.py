@@ -8,8 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from evoclaims.claims.overview import Overview
-from evoclaims.claims.workload import Work, Workload
+from evoclaims.claims.workload import Overview, Work, Workload
 from evoclaims.paper.cost import Cost
 from evoclaims.report.live_line import (
     LOG_SECONDS,
@@ -20,8 +19,8 @@ from evoclaims.report.live_line import (
     describe_all,
     duration,
 )
+from evoclaims.trials.notice import Running
 from evoclaims.trials.progress import RunProgress
-from evoclaims.trials.shared_progress import Running
 
 WAITING = RunProgress("ppo on n_parity", "compiling", trials=3)
 TRAINING = RunProgress("ppo on n_parity", "training", 3, 1, 2000, 4000, 0.75, 1, 5, 200.0)

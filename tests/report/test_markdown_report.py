@@ -10,9 +10,8 @@ from hypothesis import strategies as st
 from laboratory import HERE, Laboratory, better_solves, better_wins
 from markdown_it import MarkdownIt
 
-from evoclaims.report.formatting import clean
+from evoclaims.report.formatting import clean, literal
 from evoclaims.report.markdown import markdown
-from evoclaims.report.markdown_text import literal
 
 READER = MarkdownIt("commonmark").enable(["table", "strikethrough"])
 

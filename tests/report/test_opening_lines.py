@@ -9,9 +9,11 @@ import numpy as np
 from laboratory import Laboratory, better_solves, better_wins
 
 from evoclaims.judging.verdict import Bound, Outcome
+from evoclaims.report.charts import SPARK_DOTS as MOST_DOTS
+from evoclaims.report.charts import SPARK_WIDTH as WIDTH
+from evoclaims.report.charts import spark_svg
 from evoclaims.report.evidence import Dot, Part, Strip
-from evoclaims.report.opening_lines import findings, opening_lines
-from evoclaims.report.spark import MOST_DOTS, WIDTH, spark_svg
+from evoclaims.report.html import findings, opening_lines
 from evoclaims.verdicts.claim_report import ClaimReport
 from evoclaims.verdicts.robustness import Robustness
 

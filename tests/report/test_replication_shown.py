@@ -10,12 +10,13 @@ from laboratory import Laboratory, better_solves, better_wins
 from rich.console import Console
 from unpacked import whole
 
+from evoclaims.cli import replicate
 from evoclaims.figures.readings import Reading, Readings
 from evoclaims.figures.replication import Replication
 from evoclaims.judging.repetition import Agreement, PublishedMean, repetition
 from evoclaims.judging.verdict import Outcome
 from evoclaims.paper.reported import Reported
-from evoclaims.report import replication_blocks, replication_cells
+from evoclaims.report import replication_cells
 from evoclaims.report.build import gather
 from evoclaims.report.markdown import markdown
 from evoclaims.report.model import Page
@@ -60,7 +61,7 @@ def test_a_terminal_shows_a_block_for_each_condition_and_variant_and_breaks_only
     found = [one for pair in zip(_levels(2), _levels(2, "rows"), strict=True) for one in pair]
     console = Console(file=io.StringIO(), width=width)
     shown = {}
-    for heading, table in replication_blocks.blocks(found, width):
+    for heading, table in replicate.blocks(found, width):
         with console.capture() as capture:
             console.print(table)
         shown[heading] = [line.rstrip() for line in capture.get().splitlines()]
@@ -78,14 +79,14 @@ def test_a_terminal_shows_a_block_for_each_condition_and_variant_and_breaks_only
 def test_a_measure_may_have_at_in_its_name(name: str) -> None:
     first = _number([900.0] * 10)
     plain = replace(first, readings=replace(first.readings, name=name))
-    ((heading, table),) = replication_blocks.blocks([plain], 80)
+    ((heading, table),) = replicate.blocks([plain], 80)
     assert (heading, [*table.columns[1].cells], plain.measure) == (f"maze: {name}", ["<neat>"], name)
-    ((heading, table),) = replication_blocks.blocks([replace(plain, level=2)], 80)
+    ((heading, table),) = replicate.blocks([replace(plain, level=2)], 80)
     assert (heading, [*table.columns[1].cells]) == (f"<neat> on maze: {name}", ["level 2"])
 
 
 def test_a_block_says_why_a_number_has_no_interval() -> None:
-    ((heading, table),) = replication_blocks.blocks([_number([], error=None)], 80)
+    ((heading, table),) = replicate.blocks([_number([], error=None)], 80)
     assert heading == "maze: reward"
     assert [[*column.cells] for column in table.columns] == [["-"], ["<neat>"], ["900"], ["–"], ["not run"]]
 

@@ -9,7 +9,7 @@ from hand_made_verdicts import report
 from hypothesis import given
 from hypothesis import strategies as st
 
-from evoclaims.report.markdown_text import literal
+from evoclaims.report.formatting import literal
 from evoclaims.report.run_summary import run_summary
 
 HOSTILE = "a | b `c` <script>alert(1)</script> & *d* _e_ [f](http://g) \n| new row |\r\n# heading \x1b[2J www.h.i @all"

@@ -8,8 +8,7 @@ import pytest
 
 from evoclaims.judging.verdict import Outcome
 from evoclaims.report.tally import tally
-from evoclaims.verdicts.claim_report import CONTROL, ClaimReport
-from evoclaims.verdicts.sensitivity import Tried
+from evoclaims.verdicts.claim_report import CONTROL, ClaimReport, Tried
 
 
 def _reports(where: str, *outcomes: Outcome) -> list[ClaimReport]:

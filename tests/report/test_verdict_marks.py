@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from hand_made_verdicts import report
 
-from evoclaims.report.verdict_marks import mark
+from evoclaims.report.verdict_overview import mark
 
 
 def test_support_that_a_null_agent_has_too_is_in_brackets() -> None:

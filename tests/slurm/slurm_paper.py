@@ -10,8 +10,7 @@ from trial_toys import Walker
 from evoclaims.envs.gates.parity import NParity
 from evoclaims.judging.design import Design
 from evoclaims.paper.reproduction import Reproduction, Tier
-from evoclaims.trials.budget import Budget
-from evoclaims.trials.spec import Condition
+from evoclaims.trials.spec import Budget, Condition
 
 CONDITIONS = {
     (f"walker{number}", "parity"): Condition(

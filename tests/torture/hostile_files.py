@@ -52,7 +52,7 @@ def _lock_holder(bench: Bench, cache: Path) -> subprocess.Popen[str]:
     """Start a process that has the kernel's lock, as one within LLVM has."""
     code = (
         "import sys, time, filelock\nfrom pathlib import Path\n"
-        "from evoclaims.core.private_files import make_private\nfrom evoclaims.kernels.emit import machine_code\n"
+        "from evoclaims.core.files import make_private\nfrom evoclaims.kernels.emit import machine_code\n"
         f"folder = Path({str(cache)!r}) / 'kernels'\nmake_private(folder)\nmachine_code.lanes()\n"
         "text = 'define i32 @f(i32 %x) {\\n ret i32 %x\\n}\\n'\n"
         "machine_code._target()\n"

@@ -23,10 +23,9 @@ from evoclaims.envs.gates.parity import NParity
 from evoclaims.judging.design import Design
 from evoclaims.methods.base import Method
 from evoclaims.paper.reproduction import Reproduction, Tier
-from evoclaims.trials.budget import Budget
 from evoclaims.trials.progress import RunProgress, Watcher
 from evoclaims.trials.result import TrialResult
-from evoclaims.trials.spec import Condition
+from evoclaims.trials.spec import Budget, Condition
 from evoclaims.trials.store import Store
 
 METHODS: dict[str, Method[Any]] = {

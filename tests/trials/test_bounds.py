@@ -10,8 +10,8 @@ from trial_toys import walk
 
 from evoclaims.core.errors import UserError
 from evoclaims.trials import table_file, table_formats
-from evoclaims.trials.budget import Budget
 from evoclaims.trials.imported import Imported
+from evoclaims.trials.spec import Budget
 from evoclaims.trials.table_file import read_table
 from evoclaims.trials.table_formats import READERS
 

@@ -23,8 +23,7 @@ from evoclaims.methods.random_search import RandomSearch
 from evoclaims.methods.training_loop import TrainingLoop
 from evoclaims.networks.all_skips import AllSkips
 from evoclaims.networks.mlp import Mlp
-from evoclaims.trials.budget import Budget
-from evoclaims.trials.spec import Condition, TrialSpec
+from evoclaims.trials.spec import Budget, Condition, TrialSpec
 
 METHOD, TASK, BUDGET = RandomSearch(8, network=AllSkips(hidden=2)), NParity(3), Budget(generations=4)
 CONDITION = Condition(METHOD, TASK, "curriculum", BUDGET)
@@ -206,7 +205,7 @@ def test_the_id_changes_with_the_engine(monkeypatch: pytest.MonkeyPatch) -> None
 def test_the_id_is_that_of_every_process_whatever_its_hash_seed() -> None:
     script = (
         "from evoclaims.envs.gates.parity import NParity; from evoclaims.methods.random_search import RandomSearch\n"
-        "from evoclaims.networks.all_skips import AllSkips; from evoclaims.trials.budget import Budget\n"
+        "from evoclaims.networks.all_skips import AllSkips; from evoclaims.trials.spec import Budget\n"
         "from evoclaims.trials.spec import Condition, TrialSpec\n"
         "c = Condition(RandomSearch(8, network=AllSkips(hidden=2)), NParity(3), 'curriculum', Budget(generations=4))\n"
         "print(TrialSpec(c, 7).id)"

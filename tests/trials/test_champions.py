@@ -20,17 +20,16 @@ from evoclaims.envs.gates.parity import NParity
 from evoclaims.methods.cma_es import CmaEs
 from evoclaims.methods.hand_built import HandBuilt
 from evoclaims.methods.hyperneat import HyperNeat
-from evoclaims.methods.neat.neat import Neat
+from evoclaims.methods.neat.evolution import Neat
 from evoclaims.methods.neat.settings import Settings, Species
 from evoclaims.methods.ppo import Ppo
 from evoclaims.networks.all_skips import AllSkips
 from evoclaims.networks.genome import Genome
 from evoclaims.networks.graph import GraphNetwork
 from evoclaims.trials import champions
-from evoclaims.trials.budget import Budget
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.runner import run
-from evoclaims.trials.spec import Condition
+from evoclaims.trials.spec import Budget, Condition
 from evoclaims.trials.store import DamagedFileError, Store
 
 pytestmark = pytest.mark.newest

@@ -15,16 +15,15 @@ from trial_toys import Walker
 
 from evoclaims.core.errors import UserError
 from evoclaims.envs.base import Episode
+from evoclaims.envs.gates.circuit import TruthTable
 from evoclaims.envs.gates.parity import NParity
-from evoclaims.envs.gates.truth_table import TruthTable
 from evoclaims.methods.base import Policy, Progress
 from evoclaims.methods.hand_built import HandBuilt
 from evoclaims.methods.random_search import RandomSearch
-from evoclaims.trials.budget import Budget
 from evoclaims.trials.compatibility import CURVES, METRICS, traced_progress
 from evoclaims.trials.program import Program
 from evoclaims.trials.runner import run
-from evoclaims.trials.spec import Condition
+from evoclaims.trials.spec import Budget, Condition
 from evoclaims.trials.store import Store
 
 TASK = NParity(3)

@@ -12,8 +12,8 @@ from test_lanes import compilation_cache, tear
 
 from evoclaims.core import temporary
 from evoclaims.core.temporary import ALIVE, temporary_folder
-from evoclaims.trials import compiled_cache
-from evoclaims.trials.compiled_cache import sweep
+from evoclaims.trials import devices
+from evoclaims.trials.devices import sweep
 
 __all__ = ["compilation_cache"]  # a fixture
 
@@ -47,7 +47,7 @@ def test_damaged_entries_go_and_others_stay(tmp_path: Path) -> None:
     (tmp_path / name(11) / "file").touch()
     (tmp_path / "pip-cache").touch()  # of somebody else, in a folder that a user has named
     sweep(tmp_path)
-    left = {path.name for path in tmp_path.iterdir()} - {compiled_cache._SWEPT}
+    left = {path.name for path in tmp_path.iterdir()} - {devices._SWEPT}
     # Without the package nobody can say whether an entry of zstandard is whole.
     assert left - {name(4)} == {name(0), name(11), "pip-cache"}
     assert sound.read_bytes() == data
@@ -55,7 +55,7 @@ def test_damaged_entries_go_and_others_stay(tmp_path: Path) -> None:
 
 def test_only_what_is_new_is_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     read: list[str] = []
-    monkeypatch.setattr(compiled_cache, "_is_whole", lambda entry: bool(read.append(entry.name)) or True)
+    monkeypatch.setattr(devices, "_is_whole", lambda entry: bool(read.append(entry.name)) or True)
     for number in (0, 1):
         (tmp_path / name(number)).write_bytes(b"data")
         os.utime(tmp_path / name(number), (1.0, 1.0))
@@ -66,7 +66,7 @@ def test_only_what_is_new_is_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
 
 
 def test_beyond_a_bound_what_was_used_longest_ago_goes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(compiled_cache, "MOST_BYTES", 250)
+    monkeypatch.setattr(devices, "MOST_BYTES", 250)
     (tmp_path / "kernels").mkdir()
     made = [*(tmp_path / "kernels" / f"{age}.o" for age in range(4)), *(tmp_path / name(age) for age in range(4))]
     for age, path in enumerate(made):

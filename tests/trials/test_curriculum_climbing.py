@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from evoclaims.trials.curriculum import NEVER, Ascent, climb, start
+from evoclaims.trials.program import NEVER, Ascent, climb, start
 
 successes = st.lists(st.sampled_from([0.0, 0.5, float(np.nextafter(np.float32(1), np.float32(0))), 1.0]), max_size=12)
 _climb = jax.jit(climb)

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from evoclaims.core import private_files
+from evoclaims.core import files
 from evoclaims.core.errors import UserError
 from evoclaims.trials import devices
 
@@ -74,7 +74,7 @@ def test_a_cache_that_others_can_write_is_not_used(
     writable: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    private_files.say_refused.cache_clear()
+    files.say_refused.cache_clear()
     folder = tmp_path / "evoclaims" / "xla"
     previous = os.umask(0)
     try:

@@ -18,9 +18,8 @@ from evoclaims.envs.gates.parity import NParity
 from evoclaims.methods.ppo import Ppo
 from evoclaims.methods.random_search import RandomSearch
 from evoclaims.networks.all_skips import AllSkips
-from evoclaims.trials.budget import Budget
 from evoclaims.trials.program import Program
-from evoclaims.trials.spec import Condition
+from evoclaims.trials.spec import Budget, Condition
 
 pytestmark = pytest.mark.newest
 

@@ -16,11 +16,10 @@ from evoclaims.core.errors import UserError
 from evoclaims.envs.gates.parity import NParity
 from evoclaims.methods.hand_built import HandBuilt
 from evoclaims.trials import devices, jax_options
-from evoclaims.trials.budget import Budget
 from evoclaims.trials.jax_options import DEFAULTS, FREE, refuse_changed
-from evoclaims.trials.loop_examination import examined
+from evoclaims.trials.loop_process import examined
 from evoclaims.trials.runner import run
-from evoclaims.trials.spec import Condition
+from evoclaims.trials.spec import Budget, Condition
 from evoclaims.trials.store import Store
 
 

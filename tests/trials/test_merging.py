@@ -15,10 +15,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from evoclaims.cli.merge import Merged, merge_trials
 from evoclaims.core import files
 from evoclaims.core.files import write_once
 from evoclaims.trials.integrity import verify
-from evoclaims.trials.merging import Merged, merge_trials
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.store import Store
 
@@ -157,7 +157,7 @@ KILLED = """
 import os, signal, sys
 from pathlib import Path
 from evoclaims.trials import store as stores
-from evoclaims.trials.merging import merge_trials
+from evoclaims.cli.merge import merge_trials
 from evoclaims.trials.store import Store
 
 left, write = int(sys.argv[3]), stores.write_once

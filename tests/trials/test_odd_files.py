@@ -19,10 +19,9 @@ from evoclaims.paper.config import load_config
 from evoclaims.paper.reported import load_published
 from evoclaims.trials import checkpoint
 from evoclaims.trials.integrity import verify
-from evoclaims.trials.notice import progress_path
+from evoclaims.trials.notice import progress_path, shared
 from evoclaims.trials.progress import RunProgress, ignore
 from evoclaims.trials.result import TrialResult
-from evoclaims.trials.shared_progress import shared
 from evoclaims.trials.store import DamagedFileError, Store
 from evoclaims.verdicts import history
 from evoclaims.verdicts.claim_report import ClaimReport, evidence_path, save, succeeding

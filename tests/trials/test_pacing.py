@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from evoclaims.trials.pacing import AFFORDED, CALL_SECONDS, Rhythm, Strides
+from evoclaims.trials.runner import AFFORDED, CALL_SECONDS, Rhythm, Strides
 
 
 @given(st.floats(1e-6, 1e4), st.integers(1, 10**6))
@@ -38,7 +38,7 @@ def test_a_call_that_took_no_time_to_speak_of_is_followed_by_the_rest() -> None:
 class Clock:
     def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
         self.now = 100.0
-        monkeypatch.setattr("evoclaims.trials.pacing.time.monotonic", lambda: self.now)
+        monkeypatch.setattr("evoclaims.trials.runner.time.monotonic", lambda: self.now)
 
     def passes(self, seconds: float) -> None:
         self.now += seconds

@@ -17,10 +17,9 @@ from evoclaims.core.errors import UserError
 from evoclaims.envs.gates.parity import NParity
 from evoclaims.methods.base import Policy
 from evoclaims.methods.hand_built import HandBuilt
-from evoclaims.trials.budget import Budget
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.runner import run
-from evoclaims.trials.spec import Condition, TrialSpec
+from evoclaims.trials.spec import Budget, Condition, TrialSpec
 from evoclaims.trials.store import Store
 
 pytestmark = pytest.mark.oldest

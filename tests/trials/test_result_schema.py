@@ -15,8 +15,7 @@ from hypothesis import strategies as st
 from evoclaims.core.canonical import content_hash
 from evoclaims.trials.integrity import verify
 from evoclaims.trials.result import TrialResult
-from evoclaims.trials.result_codec import dump, parse
-from evoclaims.trials.result_schema import RecordError
+from evoclaims.trials.result_codec import RecordError, dump, parse
 from evoclaims.trials.store import DamagedFileError, Store
 
 Make = Callable[..., TrialResult]

@@ -14,10 +14,9 @@ from evoclaims.envs.gates.parity import NParity
 from evoclaims.methods.cma_es import CmaEs
 from evoclaims.networks.all_skips import AllSkips
 from evoclaims.trials import checkpoint
-from evoclaims.trials.budget import Budget
 from evoclaims.trials.lanes import Lanes
 from evoclaims.trials.result import TrialResult
-from evoclaims.trials.spec import Condition
+from evoclaims.trials.spec import Budget, Condition
 from evoclaims.trials.store import Store
 
 pytestmark = pytest.mark.newest
@@ -83,7 +82,7 @@ def test_a_run_that_is_killed_before_a_chunk_is_done_gets_further_each_time(
         return state, report
 
     monkeypatch.setattr(Lanes, "advance", mortal)
-    monkeypatch.setattr("evoclaims.trials.pacing.CALL_SECONDS", 0.0)  # a step a call
+    monkeypatch.setattr("evoclaims.trials.runner.CALL_SECONDS", 0.0)  # a step a call
     while lives < 6:
         lives += 1
         try:

@@ -12,9 +12,8 @@ from evoclaims.envs.ecorobot.obstacles import Heights, Obstacles
 from evoclaims.envs.ecorobot.stones import SteppingStones
 from evoclaims.methods.random_policy import RandomPolicy
 from evoclaims.networks.mlp import Mlp
-from evoclaims.trials.budget import Budget
 from evoclaims.trials.program import Program, TrialState
-from evoclaims.trials.spec import Condition
+from evoclaims.trials.spec import Budget, Condition
 
 pytestmark = pytest.mark.slow
 

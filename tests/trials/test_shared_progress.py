@@ -12,11 +12,10 @@ import pytest
 from climbers import CLIMBING, run_climbers
 from msgspec import json
 
-from evoclaims.trials import shared_progress as bulletins
+from evoclaims.trials import notice as bulletins
 from evoclaims.trials.integrity import verify
-from evoclaims.trials.notice import announced, notice_path, progress_path, sweep
+from evoclaims.trials.notice import Running, announced, notice_path, progress_path, running, shared, sweep
 from evoclaims.trials.progress import RunProgress, ignore
-from evoclaims.trials.shared_progress import Running, running, shared
 from evoclaims.trials.store import Store
 
 CONDITION, OTHER = "c0" * 32, "0c" * 32

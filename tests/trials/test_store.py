@@ -20,7 +20,7 @@ from hypothesis import strategies as st
 from evoclaims.core.errors import UserError
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.store import DamagedFileError, Store
-from evoclaims.trials.store_mark import mark
+from evoclaims.trials.store_files import mark
 
 pytestmark = pytest.mark.oldest
 

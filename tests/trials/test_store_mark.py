@@ -15,7 +15,7 @@ from evoclaims.core.errors import UserError
 from evoclaims.trials.integrity import verify
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.store import Store
-from evoclaims.trials.store_mark import MARK, check_store, mark
+from evoclaims.trials.store_files import MARK, check_store, mark
 
 pytestmark = pytest.mark.oldest
 

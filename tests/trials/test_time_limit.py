@@ -17,12 +17,12 @@ from hypothesis import strategies as st
 
 from evoclaims.core import waiting
 from evoclaims.core.errors import UserError
-from evoclaims.trials import allowance as allowances
-from evoclaims.trials.allowance import Allowance, OutOfTimeError
+from evoclaims.trials import stopping as allowances
+from evoclaims.trials.failed import DEFAULT_LIMIT, answers, is_final, seconds_of
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.runner import run
+from evoclaims.trials.stopping import Allowance, OutOfTimeError
 from evoclaims.trials.store import Store
-from evoclaims.trials.time_limit import DEFAULT_LIMIT, answers, is_final, seconds_of
 
 pytestmark = pytest.mark.oldest
 

@@ -23,14 +23,13 @@ from evoclaims.envs.foreign.gymnasium_task import GymnasiumTask
 from evoclaims.envs.gates.parity import NParity
 from evoclaims.judging.sample import UnreadableTrialError, checked
 from evoclaims.methods.training_loop import TrainingLoop
-from evoclaims.trials import crashes, loop_trials
-from evoclaims.trials.budget import Budget
-from evoclaims.trials.loop_child import Child
+from evoclaims.trials import failed, loop_trials
 from evoclaims.trials.loop_process import Reporter, actions_of
+from evoclaims.trials.loop_trials import Child
 from evoclaims.trials.progress import RunProgress
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.runner import run
-from evoclaims.trials.spec import Condition, TrialSpec
+from evoclaims.trials.spec import Budget, Condition, TrialSpec
 from evoclaims.trials.store import Store
 
 
@@ -84,16 +83,16 @@ def test_what_is_reported_becomes_curves_of_as_many_points_as_the_budget_says(al
 
 def test_a_crash_tells_the_last_words_of_its_process_safely(all_ends: Any) -> None:
     _, (_, raised, killed, *_), told = all_ends
-    assert crashes.why(raised) == "ValueError: the reactor is \\x1b[31mred"
+    assert failed.why(raised) == "ValueError: the reactor is \\x1b[31mred"
     assert "in in_every_way" in raised.provenance["crash"]
     lines = Path(str(toy_loops.__file__)).read_text().splitlines()
     (line,) = (number for number, text in enumerate(lines, start=1) if "the reactor is" in text)
-    assert crashes.place([killed, raised]) == f" (toy_loops.py, line {line})"
-    assert crashes.place([killed]) == ""
-    assert crashes.why(killed) == "its process ended with SIGSEGV"
+    assert failed.place([killed, raised]) == f" (toy_loops.py, line {line})"
+    assert failed.place([killed]) == ""
+    assert failed.why(killed) == "its process ended with SIGSEGV"
     assert "what it prints is no answer" in killed.provenance["crash"]
     assert {one.phase for one in told if one.remark} == {
-        f"seed {one.seed} crashed: {crashes.why(one)}" for one in (raised, killed)
+        f"seed {one.seed} crashed: {failed.why(one)}" for one in (raised, killed)
     }
 
 
@@ -106,7 +105,7 @@ def test_the_same_seed_gives_the_same_digest_and_another_process_tries_a_crash_a
     told = list[RunProgress]()
     run(IN_EVERY_WAY, range(5), first, cpus, told.append)
     assert told == []
-    monkeypatch.setattr(crashes, "_seen", set())  # as another process has it
+    monkeypatch.setattr(failed, "_seen", set())  # as another process has it
     run(IN_EVERY_WAY, range(5), first, cpus, told.append)
     assert {one.trials for one in told if not one.remark} == {2}
 
@@ -114,7 +113,7 @@ def test_the_same_seed_gives_the_same_digest_and_another_process_tries_a_crash_a
 def test_a_loop_may_fork_and_what_it_has_forked_ends_with_it(store: Store, cpus: list[Any]) -> None:
     forked, killed = run(condition(toy_loops.with_processes), range(2), store, cpus, time_limit=30.0)
     assert (forked.status, forked.metrics["last_fitness"]) == ("done", 1.0)
-    assert (killed.status, crashes.why(killed)) == ("crashed", "its process ended with SIGKILL")
+    assert (killed.status, failed.why(killed)) == ("crashed", "its process ended with SIGKILL")
 
 
 def test_what_a_loop_does_in_an_odd_way_is_understood_or_is_a_crash_that_says_what_it_was(
@@ -125,7 +124,7 @@ def test_what_a_loop_does_in_an_odd_way_is_understood_or_is_a_crash_that_says_wh
     assert (good.metrics["last_fitness"], good.metrics["clip"]) == (0.25, math.inf)
     assert good.metrics["environment_steps"] == 55
     assert [one.status for one in crashed] == ["crashed"] * 4
-    too_far, long, unnamed, reading = map(crashes.why, crashed)
+    too_far, long, unnamed, reading = map(failed.why, crashed)
     assert too_far.endswith(f"A training function reports {2**60} steps. Report a number from 0 to {2**53}.")
     assert long == "ValueError: " + "x" * 488
     assert unnamed.endswith(r"'a name that is no \udc80 text' is 1.0.")
@@ -135,7 +134,7 @@ def test_what_a_loop_does_in_an_odd_way_is_understood_or_is_a_crash_that_says_wh
 @pytest.mark.parametrize("name", ["mean_success", "last_success"])
 def test_a_success_that_is_no_share_is_a_crash_that_says_so(store: Store, cpus: list[Any], name: str) -> None:
     share = "A success is a share from 0 to 1, and a level is solved at exactly 1"
-    returned, reported = map(crashes.why, run(condition(toy_loops.in_points, **{name: 3.0}), range(2), store, cpus))
+    returned, reported = map(failed.why, run(condition(toy_loops.in_points, **{name: 3.0}), range(2), store, cpus))
     assert f"A training loop reports a {name} of 3. {share}: return such a share" in returned
     assert f"A training loop reports a success of 3. {share}: report such a share" in reported
     for fine in (1.0, 1.0 + 1e-7, 0.0):

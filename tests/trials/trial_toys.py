@@ -12,9 +12,8 @@ import jax.numpy as jnp
 from evoclaims.core.keys import streams
 from evoclaims.envs.gates.parity import NParity
 from evoclaims.methods.base import Policy, Progress
-from evoclaims.trials.budget import Budget
 from evoclaims.trials.progress import RunProgress
-from evoclaims.trials.spec import Condition
+from evoclaims.trials.spec import Budget, Condition
 
 
 @dataclass(frozen=True)

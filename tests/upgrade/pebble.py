@@ -25,7 +25,7 @@ from evoclaims.envs.gates.parity import NParity
 from evoclaims.judging.design import Design
 from evoclaims.methods.hand_built import HandBuilt, circuit_for
 from evoclaims.paper.reproduction import Reproduction, Tier
-from evoclaims.trials.budget import Budget
+from evoclaims.trials.spec import Budget
 from evoclaims.trials.spec import Condition
 
 

@@ -35,7 +35,7 @@ from evoclaims.methods.ppo import Ppo
 from evoclaims.methods.random_policy import RandomPolicy
 from evoclaims.networks.mlp import Mlp
 from evoclaims.paper.reproduction import Reproduction, Tier
-from evoclaims.trials.budget import Budget
+from evoclaims.trials.spec import Budget
 from evoclaims.trials.spec import Condition
 
 HINGE = """<mujoco><worldbody><body><joint name="hinge" axis="0 1 0"/>

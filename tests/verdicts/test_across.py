@@ -15,13 +15,12 @@ from made_trials import trial_of
 from evoclaims.core.packages import recorded
 from evoclaims.envs.gates.parity import NParity
 from evoclaims.methods.hand_built import HandBuilt
-from evoclaims.report import across_table
-from evoclaims.report.charts_of_verdicts import across_chart
+from evoclaims.report import across as across_report
+from evoclaims.report.across import across_chart
 from evoclaims.report.console import PlainSpokenConsole
 from evoclaims.report.verdict_chart import svg
-from evoclaims.trials.budget import Budget
 from evoclaims.trials.result import TrialResult
-from evoclaims.trials.spec import Condition
+from evoclaims.trials.spec import Budget, Condition
 from evoclaims.trials.store import Store
 from evoclaims.verdicts.across import Across, Judged, across, judged
 from evoclaims.verdicts.source_trials import SourceTrials
@@ -75,7 +74,7 @@ def found(store: Store) -> Across:
 
 def test_each_cell_tells_verdict_drift_and_bits_against_the_first_environment(found: Across) -> None:
     told = {
-        label.removeprefix("jax "): across_table.cell_lines(cell)
+        label.removeprefix("jax "): across_report.cell_lines(cell)
         for (claim, label), cell in found.cells.items()
         if claim == "ours"
     }
@@ -83,7 +82,7 @@ def test_each_cell_tells_verdict_drift_and_bits_against_the_first_environment(fo
     assert told["2"] == ("✓ supported", "same to the bit")
     assert told["3"] == ("✗ refuted, CHANGED", "A12 0.00, p 5e-05, DRIFT", "10 of 10 differ")
     assert told["4"] == ("✓ supported", "A12 0.50, p 1", "10 of 10 differ")
-    assert across_table.cell_lines(found.cells["plain", "jax 3"]) == ("- not run", "–")
+    assert across_report.cell_lines(found.cells["plain", "jax 3"]) == ("- not run", "–")
     assert found.changed == {"jax 3": ["ours"]}
 
 
@@ -102,7 +101,7 @@ def test_lines_say_why_one_has_no_verdicts_which_changed_and_what_drifted_how_fa
 def test_trials_that_are_the_same_records_are_not_compared(store: Store) -> None:
     again = replace(_environment(store, "1"), label="again")
     cell = across([_environment(store, "1"), again]).cells["ours", "again"]
-    assert across_table.cell_lines(cell) == ("✓ supported", "the same trials")
+    assert across_report.cell_lines(cell) == ("✓ supported", "the same trials")
 
 
 def test_the_first_environment_is_the_first_that_has_verdicts(store: Store) -> None:
@@ -115,7 +114,7 @@ def test_the_first_environment_is_the_first_that_has_verdicts(store: Store) -> N
 @pytest.mark.parametrize("width", [40, 80, 200])
 def test_the_table_shows_every_environment_at_any_width(found: Across, width: int) -> None:
     console = PlainSpokenConsole(width=width, record=True, file=io.StringIO())
-    for part in across_table.terminal(found, width):
+    for part in across_report.terminal(found, width):
         console.print(part)
     text = console.export_text()
     assert all(f"jax {version}" in text for version in "12345")
@@ -124,7 +123,7 @@ def test_the_table_shows_every_environment_at_any_width(found: Across, width: in
 
 
 def test_the_text_of_an_issue_begins_with_what_changed_and_ends_with_the_command(found: Across) -> None:
-    text = across_table.markdown(found, "evoclaims across --package jax 1 2")
+    text = across_report.markdown(found, "evoclaims across --package jax 1 2")
     assert text.startswith(
         "# jax 3 changes ours; jax 5 has no verdicts.\n\n| claim | jax 1 | jax 2 | jax 5 | jax 3 | jax 4 |\n"
     )
@@ -149,7 +148,7 @@ def test_the_chart_marks_each_cell_as_high_as_its_effect_and_drift_by_a_ring(fou
 
 
 def test_rows_for_programs_have_numbers_and_one_for_each_environment_without_verdicts(found: Across) -> None:
-    rows = across_table.rows(found)
+    rows = across_report.rows(found)
     (three,) = (row for row in rows if row["environment"] == "jax 3" and row["claim"] == "ours")
     assert (three["drift_median_ref"], three["drift_median_new"]) == pytest.approx((0.545, 0.295))
     assert (three["versions"], three["verdict_changed"], three["bits_changed"]) == ({"jax": ["3"]}, True, 10)

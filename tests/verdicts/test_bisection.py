@@ -7,7 +7,7 @@ from math import ceil, log2
 from hypothesis import given
 from hypothesis import strategies as st
 
-from evoclaims.verdicts.bisection import Change, bisect
+from evoclaims.cli.bisect import Change, bisect
 
 
 @st.composite

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from evoclaims.core.errors import UserError
-from evoclaims.verdicts.git_revision import find_revision
+from evoclaims.verdicts.comparison import find_revision
 
 Git = Callable[..., str]
 
@@ -124,7 +124,7 @@ def test_a_git_that_does_not_answer_is_given_up(tmp_path: Path, git: Git, monkey
     slow.write_text("#!/bin/sh\nsleep 60\n")
     slow.chmod(0o755)
     monkeypatch.setenv("PATH", f"{slow.parent}:{os.environ['PATH']}")
-    monkeypatch.setattr("evoclaims.verdicts.git_revision.GIT_SECONDS", 0.2)
+    monkeypatch.setattr("evoclaims.verdicts.comparison.GIT_SECONDS", 0.2)
     with pytest.raises(UserError, match="git gave no answer within 0.2 seconds"):
         find_revision("HEAD", tmp_path)
 

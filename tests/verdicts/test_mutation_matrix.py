@@ -10,6 +10,7 @@ from hand_made_verdicts import report, verdict
 
 from evoclaims.core.errors import UserError
 from evoclaims.judging.verdict import Outcome
+from evoclaims.verdicts.claim_report import Tried
 from evoclaims.verdicts.mutation_matrix import (
     Attempt,
     Fate,
@@ -20,10 +21,9 @@ from evoclaims.verdicts.mutation_matrix import (
     dump,
     fate,
     load,
+    score,
     tried,
 )
-from evoclaims.verdicts.mutation_score import score
-from evoclaims.verdicts.sensitivity import Tried
 
 SUPPORTED, REFUTED = Outcome.SUPPORTED, Outcome.REFUTED
 

@@ -11,7 +11,7 @@ from evoclaims.judging.drift_report import DriftReport, DriftRow
 from evoclaims.judging.tripwire import DigestChange, DigestCheck
 from evoclaims.judging.verdict import Outcome
 from evoclaims.verdicts.history import AcceptedVerdict
-from evoclaims.verdicts.reasons import reason
+from evoclaims.verdicts.regression import reason
 from evoclaims.verdicts.source_trials import SourceTrials
 
 REPORT = replace(report(), sources=(SourceTrials("a", "t", "c" * 64, ("1",), {}, ()),))

@@ -11,8 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from evoclaims.judging.verdict import Outcome
-from evoclaims.verdicts.claim_report import CONTROL, Attainable, ClaimReport
-from evoclaims.verdicts.sensitivity import Tally
+from evoclaims.verdicts.claim_report import CONTROL, Attainable, ClaimReport, Tally
 from evoclaims.verdicts.sentences import chance, sentences
 
 

@@ -9,10 +9,10 @@ import pytest
 
 from evoclaims.core.errors import UnknownNameError, UserError
 from evoclaims.judging.verdict import Outcome
-from evoclaims.report.charts_of_verdicts import timeline_chart
+from evoclaims.report.across import timeline_chart
 from evoclaims.report.verdict_chart import svg
+from evoclaims.verdicts.acceptance import timeline
 from evoclaims.verdicts.history import AcceptedVerdict
-from evoclaims.verdicts.timeline import timeline
 
 SVG = "{http://www.w3.org/2000/svg}"
 VERSIONS = {"jax": "0.10.2", "python": "3.11.7", "numpy": "2.4"}

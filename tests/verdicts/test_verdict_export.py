@@ -21,9 +21,8 @@ from hypothesis import strategies as st
 
 from evoclaims.core.errors import UserError
 from evoclaims.core.printable import printable
-from evoclaims.paper.condition_names import Name, names_of
-from evoclaims.paper.reproduction import Reproduction, Tier
-from evoclaims.paper.variant import Variant
+from evoclaims.paper.archive import Name, names_of
+from evoclaims.paper.reproduction import Reproduction, Tier, Variant
 from evoclaims.trials.result import TrialResult
 from evoclaims.verdicts.export import FORMS, as_csv, as_json, as_parquet, columns_of, trial_rows, verdict_rows
 

@@ -19,7 +19,7 @@ from evoclaims.judging.judge import decide, fetch_from
 from evoclaims.judging.kinds.greater import Greater
 from evoclaims.judging.sample import Source
 from evoclaims.judging.verdict import Outcome
-from evoclaims.paper.null_agent import NullAgent
+from evoclaims.paper.reproduction import NullAgent
 from evoclaims.paper.trial_group import TrialGroup
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.spec import TrialSpec
@@ -59,7 +59,6 @@ def claimed(assertion: Assertion) -> frozenset[str]:
 
 
 def _satisfies(agent: NullAgent, assertion: Assertion, design: Design, others: OtherTrials | None) -> bool:
-    """Whether an agent's trials support an assertion."""
     if agent.method and others is None:
         return False
     every = frozenset(source.fingerprint for source in assertion.sources())

@@ -5,21 +5,18 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
-from evoclaims.claims.collected import ClaimTest
-from evoclaims.claims.reporting import judged
-from evoclaims.claims.selection import selected
-from evoclaims.claims.session import Reading, Session
+from evoclaims.claims.collected import ClaimTest, selected
+from evoclaims.claims.session import Reading, Session, judged
 from evoclaims.judging.assertion import Assertion
 from evoclaims.judging.design import Look
-from evoclaims.judging.fingerprint import fingerprint
+from evoclaims.judging.judge import fingerprint
 from evoclaims.judging.power import Draws, Power, power
 from evoclaims.judging.reading import TrialReading
 from evoclaims.judging.sample import Source
 from evoclaims.judging.verdict import Outcome, Verdict
 from evoclaims.paper import pilots
-from evoclaims.paper.reproduction import Reproduction
+from evoclaims.paper.reproduction import Names, Reproduction
 from evoclaims.paper.trial_group import TrialGroup
-from evoclaims.paper.variant import Names
 from evoclaims.trials.result import TrialResult
 from evoclaims.verdicts.claim_report import ClaimReport, named
 
@@ -141,7 +138,6 @@ class Pilots:
         return str(path)
 
     def _read(self, names: Names) -> None:
-        """Read a pilot, and whether it is one."""
         found = pilots.load(pilots.path_of(self._folder, self._tier, *names))
         self._unfit[names] = pilots.unfit(found, self.groups[names].condition, self._design, self._readings[names])
         if self.groups[names].existing is not None:
@@ -157,7 +153,6 @@ class Pilots:
         return [self._power(one, drawn) for one in claims]
 
     def _power(self, one: Asserted, draws: Draws) -> ClaimPower:
-        """Return the power of one claim."""
         name, expected = one.report.name, one.expected
         if one.assertion is None:
             return ClaimPower(name, expected, None, f"its test broke: {one.report.reason}")

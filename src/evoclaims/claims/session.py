@@ -12,27 +12,86 @@ from evoclaims.claims.claim import Expectation
 from evoclaims.claims.collected import ClaimTest
 from evoclaims.claims.fetching import NotStoredError, RunMissing, StoredOnly
 from evoclaims.claims.null_agents import satisfied_by
-from evoclaims.claims.reporting import expecting, judged
+from evoclaims.core.canonical import content_hash
 from evoclaims.core.errors import UserError
 from evoclaims.judging.assertion import Assertion
 from evoclaims.judging.design import Design, Look
-from evoclaims.judging.fingerprint import fingerprint
-from evoclaims.judging.judge import decide, judge
+from evoclaims.judging.judge import attainability, decide, fingerprint, judge
 from evoclaims.judging.measure import Event, Measure, Profile
 from evoclaims.judging.power import Draws
 from evoclaims.judging.verdict import Outcome, Verdict
 from evoclaims.paper import pilots
 from evoclaims.paper.archive import Archive
+from evoclaims.paper.pilots import read_of
 from evoclaims.paper.reproduction import Reproduction
 from evoclaims.paper.trial_group import Fetch, TrialGroup
 from evoclaims.trials.result import TrialResult
+from evoclaims.trials.spec import TrialSpec
 from evoclaims.trials.store import Store
 from evoclaims.verdicts import history, mutation_matrix
-from evoclaims.verdicts.claim_report import CONTROL, ClaimReport, located, named, save, succeeding
-from evoclaims.verdicts.history import key_of
+from evoclaims.verdicts.claim_report import CONTROL, Attainable, ClaimReport, located, named, save, succeeding
+from evoclaims.verdicts.history import following, key_of
 from evoclaims.verdicts.mutation_matrix import Matrix
 from evoclaims.verdicts.readings import ReadAs, moment
-from evoclaims.verdicts.repeated_runs import following
+from evoclaims.verdicts.source_trials import SourceTrials, found_in
+
+
+def judged(
+    test: ClaimTest, assertion: Assertion, design: Design, verdict: Verdict, again: Mapping[str, Collection[int]]
+) -> ClaimReport:
+    """Build the report of a claim that was judged; `again` holds the seeds that were run again, by condition id."""
+    groups = [source for source in assertion.sources() if isinstance(source, TrialGroup)]
+    seeds = design.seeds(verdict.n)
+    return replace(
+        unjudged(test, verdict.outcome, verdict.reason),
+        verdict=verdict,
+        asserts=content_hash(assertion.plain()),
+        sources=tuple(_source(group, seeds, again.get(group.fingerprint, ()), assertion) for group in groups),
+        attainable=tuple(
+            Attainable(look.n, look.alpha, p.supported, p.refuted, p.smaller)
+            for look, p in attainability(assertion, design)
+        ),
+    )
+
+
+def unjudged(test: ClaimTest, outcome: Outcome, reason: str, *, has_test: bool = True) -> ClaimReport:
+    """Build the report of a claim without a verdict: its test broke or was skipped, or this tier has no test."""
+    return ClaimReport(
+        claim=test.claim.id,
+        case=test.case,
+        tier=test.tier,
+        statement=test.claim.statement(test.tier) if has_test else test.claim.says,
+        where=test.claim.where,
+        outcome=outcome,
+        reason=reason,
+        has_test=has_test,
+        line=test.claim.line,
+    )
+
+
+def expecting(report: ClaimReport, expectation: Expectation | None) -> ClaimReport:
+    """Add an accepted outcome to a report; what is accepted for the protocol is not for its variants."""
+    if expectation is None or report.variant:
+        return report
+    return replace(report, expected=expectation.outcome, because=expectation.because)
+
+
+def _source(group: TrialGroup, seeds: Sequence[int], again: Collection[int], assertion: Assertion) -> SourceTrials:
+    """Describe one condition of a report."""
+    condition = group.condition
+    trials = group.fetch(seeds) if seeds else ()
+    readings = [reading for reading in assertion.readings() if reading.source.fingerprint == group.fingerprint]
+    finished = [trial for trial in trials if trial.status == "done"]
+    return SourceTrials(
+        method=group.method,
+        task=group.task,
+        condition=group.fingerprint,
+        trials=tuple(TrialSpec(condition, seed).id for seed in seeds),
+        versions=found_in(trials, condition.packages) if seeds else {},
+        again=tuple(sorted(again)),
+        edited=condition.edited_since(trials),
+        reads=read_of(finished[0], readings) if finished else (),
+    )
 
 
 @dataclass(frozen=True)

@@ -1,13 +1,15 @@
-"""What a run of claims has to do: the conditions that each claim needs, and what is known of how long they take."""
+"""What a run of claims has to do: the conditions that each claim needs, in which order, and how far the run is."""
 
 from __future__ import annotations
 
 import inspect
+import time
 import warnings
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from typing import Any
+from pathlib import Path
+from typing import Any, Generic, TypeVar
 
 import pytest
 
@@ -19,8 +21,11 @@ from evoclaims.judging.assertion import Assertion
 from evoclaims.paper.cost import Cost, Estimator, Wanted
 from evoclaims.paper.trial_group import TrialGroup
 from evoclaims.trials import devices
+from evoclaims.trials.devices import usable_cores
+from evoclaims.trials.notice import Running, running
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.spec import Condition, TrialSpec
+from evoclaims.trials.store import DamagedFileError, Store
 
 
 @dataclass(frozen=True)
@@ -152,3 +157,174 @@ def _works(
         missing = tuple(str(path.relative_to(store.root)) for path in files)
         works[name] = Work(group.label, condition.programs, len(seeds) - len(missing), missing, owed.cost)
     return works
+
+
+W = TypeVar("W", bound=Hashable)
+
+
+class Order(Generic[W]):
+    """Chooses the next claim for a worker.
+
+    The first claim is the one with trials that is judged soonest, so that a verdict is there early. Then come those
+    whose trials are there; then those with the longest condition, and nothing besides it if possible, so that the
+    workers end together; or, for one worker alone, those that take the least. A worker that has begun with a condition
+    keeps the claims on it, and on conditions that share its compiled programs, while others have anything else to do.
+    """
+
+    def __init__(self, load: Workload, workers: int) -> None:
+        """Give out nothing yet."""
+        self._needs = load.claims
+        self._alone = workers < 2
+        self._seconds = {name: work.seconds for name, work in load.conditions.items()}
+        self._programs = {name: work.programs for name, work in load.conditions.items()}
+        self._begun: dict[str, W] = {}
+        self._ended: set[str] = set()
+        self._first = True
+
+    def knows(self, claim: str) -> bool:
+        """Whether `claim` is the name of a claim test of this run."""
+        return claim in self._needs
+
+    def next(self, worker: W, claims: Sequence[str]) -> str:
+        """Return which of the claims that nobody has yet (at least one) a worker is to judge next."""
+        soonest = [claim for claim in claims if self._needs[claim]] if self._first else []
+        if soonest:
+            self._first = False
+            claim = min(soonest, key=lambda one: self._new_seconds(self._needs[one]))
+        else:
+            claim = min(claims, key=lambda one: self._rank(worker, one))
+        for condition in self._needs[claim]:
+            self._begun.setdefault(condition, worker)
+        return claim
+
+    def ended(self, claim: str) -> None:
+        """Note that a claim has been judged, so that the trials that it needs are there."""
+        self._ended.update(self._needs[claim])
+
+    def lost(self, worker: W) -> None:
+        """Note that a worker has died: another one may run what it had begun."""
+        self._begun = {name: one for name, one in self._begun.items() if one != worker or name in self._ended}
+
+    def _rank(self, worker: W, claim: str) -> tuple[int, float, float]:
+        """Return the place of a claim among those that a worker could judge next; the lowest comes first."""
+        needs = self._needs[claim]
+        new = self._new_seconds(needs)
+        if any(self._begun.get(name, worker) != worker and name not in self._ended for name in needs):
+            conflict = 2  # the worker would wait for another one's trials
+        elif new and any(self._owner(name) not in (None, worker) for name in needs if name not in self._begun):
+            conflict = 1  # another one has the programs
+        else:
+            conflict = 0
+        longest = max((self._seconds[name] for name in needs if name not in self._begun), default=0.0)
+        return conflict, 0.0 if self._alone or not new else 1 / longest, new
+
+    def _new_seconds(self, needs: Sequence[str]) -> float:
+        """Return the seconds of what nobody has begun with."""
+        return sum(self._seconds[name] for name in needs if name not in self._begun)
+
+    def _owner(self, condition: str) -> W | None:
+        """Return the worker that was the first to begin with a condition of the same programs."""
+        programs = self._programs[condition]
+        return next((one for name, one in self._begun.items() if self._programs[name] == programs), None)
+
+
+@dataclass(frozen=True)
+class Overview:
+    """How far a run of claims is.
+
+    Attributes:
+        judged: claims, of `claims`.
+        done: trials in the store, of the `trials` that the claims need at most.
+        running: the batches under way.
+        seconds_left: about how long the run will still take; None without a timing from this machine.
+    """
+
+    judged: int
+    claims: int
+    done: int
+    trials: int
+    running: Sequence[Running]
+    seconds_left: float | None
+
+
+class Watching:
+    """Looks now and then how far a run is."""
+
+    def __init__(self, load: Workload, workers: int) -> None:
+        """Begin with what was known before the run."""
+        self._load = load
+        self._workers = workers
+        self._store = Store(Path(load.storage))
+        self._waiting = set(load.claims)
+        self._missing = {name: list(work.missing) for name, work in load.conditions.items()}
+        share = max(usable_cores() // workers, 1)
+        self._seconds = {name: work.cost.seconds(share) for name, work in load.conditions.items()}
+        self._took: dict[str, float] = {}
+
+    def judged(self, claim: str) -> None:
+        """Note that a claim has been judged."""
+        self._waiting.discard(claim)
+
+    def look(self) -> Overview:
+        """Look into the store."""
+        conditions = self._load.conditions
+        for name, files in self._missing.items():
+            left = [file for file in files if not (self._store.root / file).exists()]
+            if files and not left:
+                self._learn(name)
+            self._missing[name] = left
+        owed = {name for claim in self._waiting for name in self._load.claims[claim] if self._missing[name]}
+        done = sum(work.stored + len(work.missing) - len(self._missing[name]) for name, work in conditions.items())
+        now = [self._named(one) for one in running(self._store.root)]
+        return Overview(
+            judged=len(self._load.claims) - len(self._waiting),
+            claims=len(self._load.claims),
+            done=done,
+            trials=done + sum(len(self._missing[name]) for name in owed),
+            running=now,
+            seconds_left=self._seconds_left(owed, {one.condition: one for one in now}),
+        )
+
+    def _named(self, one: Running) -> Running:
+        """Return a batch under the name that claims have for its condition."""
+        work = self._load.conditions.get(one.condition)
+        return one if work is None else replace(one, progress=replace(one.progress, condition=work.label))
+
+    def _learn(self, name: str) -> None:
+        """Note how long a condition took, whose last trial has been stored."""
+        with suppress(DamagedFileError):
+            record = self._store.read(self._store.root / self._load.conditions[name].missing[-1])
+            if record is not None:
+                self._took[name] = float(record.timing["compile"]) + float(record.timing["run"])
+
+    def _seconds_left(self, owed: Iterable[str], now: Mapping[str, Running]) -> float | None:
+        """Return how long the workers will still take; None if a missing condition has no timing.
+
+        Timings of other machines count as soon as a condition that they are of has ended here.
+        """
+        bases = {name: work.cost.basis for name, work in self._load.conditions.items()}
+        compared = [name for name in self._took if bases[name] == "elsewhere"]
+        whole = sum(self._seconds[name] for name in compared)
+        scale = {"here": 1.0, "elsewhere": sum(self._took[name] for name in compared) / whole if whole else None}
+        left: list[float] = []
+        for name in owed:
+            one = remaining(self._seconds[name], scale.get(bases[name]), now.get(name))
+            if one is None:
+                return None
+            left.append(one)
+        return max(sum(left) / min(self._workers, len(left)), *left) if left else None
+
+
+def remaining(seconds: float, scale: float | None, now: Running | None) -> float | None:
+    """Return about how many seconds a condition will still take; None without a timing from this machine.
+
+    Args:
+        seconds: the estimate for the whole.
+        scale: how many times as long it takes here; None while unknown.
+        now: the batch, if it is running: its own speed is the best estimate.
+    """
+    if now is not None and now.progress.seconds_left is not None:
+        return now.progress.seconds_left
+    if scale is None:
+        return None
+    return seconds * scale if now is None else max(seconds * scale - (time.time() - now.since), 0.0)

@@ -13,24 +13,21 @@ from typing import Final
 
 from packaging.utils import canonicalize_name
 
-from evoclaims.cli.elsewhere import opened
-from evoclaims.cli.output_files import REPORT, write
-from evoclaims.cli.terminal import styled
+from evoclaims.cli.elsewhere import opened, released
+from evoclaims.cli.terminal import REPORT, styled, write
 from evoclaims.core.environments import Recipe, checked, checked_name, installed_here
 from evoclaims.core.errors import UnknownNameError, UserError
-from evoclaims.core.releases import released
-from evoclaims.report import across_shown, across_table
-from evoclaims.report.charts_of_verdicts import across_chart
+from evoclaims.report import across as across_report
 from evoclaims.report.console import PlainSpokenConsole
 from evoclaims.report.verdict_chart import svg
 from evoclaims.verdicts import export
 from evoclaims.verdicts.across import Across, across
 
 FORMS: Final[Mapping[str, Callable[[Across], bytes]]] = {
-    "markdown": lambda found: across_table.markdown(found, _command()).encode(),
-    "csv": lambda found: export.as_csv(across_table.rows(found)),
-    "json": lambda found: export.as_json(across_table.rows(found)),
-    "svg": lambda found: svg(across_chart(found)).encode(),
+    "markdown": lambda found: across_report.markdown(found, _command()).encode(),
+    "csv": lambda found: export.as_csv(across_report.rows(found)),
+    "json": lambda found: export.as_json(across_report.rows(found)),
+    "svg": lambda found: svg(across_report.across_chart(found)).encode(),
 }
 """Writers by the names of their forms."""
 
@@ -47,13 +44,13 @@ def main(options: argparse.Namespace) -> int:
     found = across([elsewhere.judge(recipe) for recipe in recipes])
     if not found.claims:
         raise UserError("No claim was judged in any of these environments; the reasons are above.")
-    across_shown.keep(found, elsewhere.store.root, datetime.now(UTC).isoformat(" ", "minutes"), _command())
+    across_report.keep(found, elsewhere.store.root, datetime.now(UTC).isoformat(" ", "minutes"), _command())
     console = PlainSpokenConsole(file=styled())
-    for part in across_table.terminal(found, console.width):
+    for part in across_report.terminal(found, console.width):
         console.print()
         console.print(part)
-    print(f"\n{across_table.LEGEND}")
-    for line in (*found.lines, *_unused(found, options.package), across_table.headline(found)):
+    print(f"\n{across_report.LEGEND}")
+    for line in (*found.lines, *_unused(found, options.package), across_report.headline(found)):
         print(line)
     if options.form is not None:
         out = Path(options.out or REPORT / f"across.{'md' if options.form == 'markdown' else options.form}")
@@ -63,7 +60,6 @@ def main(options: argparse.Namespace) -> int:
 
 
 def _command() -> str:
-    """Return the command that runs."""
     return shlex.join(["evoclaims", *sys.argv[1:]])
 
 

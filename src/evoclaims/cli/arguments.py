@@ -66,7 +66,6 @@ def parser() -> argparse.ArgumentParser:
 
 
 def _running(add: _Add) -> None:
-    """Add what runs trials, or shows what running them takes."""
     plan = add("plan", "show what a tier would run, what it costs here, and what its verdicts can show")
     plan.add_argument("--variant", metavar="NAME", default="", help="only what this variant of the protocol changes")
     plan.add_argument("--like", metavar="KIND", help="use times of trials made on this device, such as 'NVIDIA H200'")
@@ -136,7 +135,6 @@ def _running(add: _Add) -> None:
 
 
 def _reading(add: _Add) -> None:
-    """Add what shows verdicts, trials and figures."""
     status = add("status", "show the verdicts that the stored trials give, one line for each claim; run nothing")
     status.add_argument("--only", metavar="IDS", help="only these claims, such as G1,G7; G: all of G1, G2, …")
     status.add_argument(
@@ -207,7 +205,6 @@ def _reading(add: _Add) -> None:
 
 
 def _keeping(add: _Add) -> None:
-    """Add what checks, joins and accepts what is stored."""
     verify = add(
         "verify",
         "check every stored trial, champion and checkpoint; bad files are moved aside, and their trials run again; "
@@ -229,7 +226,6 @@ def _keeping(add: _Add) -> None:
 
 
 def _comparing(add: _Add) -> None:
-    """Add what compares verdicts, of dates or of environments."""
     compare = add(
         "compare",
         "compare the current verdicts with the accepted ones; or a git revision with the working tree; or a store "

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 
 from evoclaims.cli.project import open_project
-from evoclaims.paper.uncovered import uncovered
+from evoclaims.paper.reported import uncovered
 from evoclaims.report import audit
 
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from evoclaims.cli.output_files import REPORT, write
 from evoclaims.cli.project import open_project
+from evoclaims.cli.terminal import REPORT, write
 from evoclaims.report.badge import colour_of, message_of, svg
 
 

@@ -8,10 +8,9 @@ from functools import partial
 from pathlib import Path
 from typing import Final, get_args
 
-from evoclaims.cli.output_files import FIGURES, write
 from evoclaims.cli.project import open_project
 from evoclaims.cli.stored_trial import Stored, describe, load
-from evoclaims.cli.terminal import styled
+from evoclaims.cli.terminal import FIGURES, styled, write
 from evoclaims.core.drawing import Format
 from evoclaims.core.errors import UnknownNameError, UserError
 from evoclaims.networks import export

@@ -12,21 +12,20 @@ from pathlib import Path
 from evoclaims.claims.fetching import StoredOnly
 from evoclaims.claims.session import Session
 from evoclaims.cli.judging import judge
-from evoclaims.cli.output_files import write
 from evoclaims.cli.project import Project, open_project
 from evoclaims.cli.store_folder import open_store
+from evoclaims.cli.terminal import write
 from evoclaims.core.errors import UserError
 from evoclaims.judging.drift_report import DriftReport
 from evoclaims.judging.tripwire import DigestCheck
 from evoclaims.paper.archive import Archive
-from evoclaims.report.charts_of_verdicts import timeline_chart
+from evoclaims.report.across import timeline_chart
 from evoclaims.report.verdict_chart import svg
 from evoclaims.trials.store import Store
 from evoclaims.verdicts import comparison, history, transitions
-from evoclaims.verdicts.comparison import Side
-from evoclaims.verdicts.git_revision import GitRevision, find_revision
-from evoclaims.verdicts.mixed_versions import listed
-from evoclaims.verdicts.timeline import timeline
+from evoclaims.verdicts.acceptance import timeline
+from evoclaims.verdicts.comparison import GitRevision, Side, find_revision
+from evoclaims.verdicts.other_code import listed
 from evoclaims.verdicts.transitions import Kind
 
 UNSAID = (Kind.SAME, Kind.NOT_RUN)
@@ -132,7 +131,6 @@ def _stores(project: Project, tiers: Sequence[str], old: Store, new: Store) -> t
 
 
 def _drift_lines(drift: DriftReport, digests: DigestCheck, new: Side) -> Iterator[str]:
-    """Yield what the comparison of trials found."""
     names = {trials[0].condition: name for name, trials in new.trials.items() if trials}
     yield f"trials: {drift.counts}"
     yield from (f"  {line}" for line in drift.lines)

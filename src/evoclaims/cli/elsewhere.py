@@ -6,6 +6,7 @@ import argparse
 import os
 import re
 import subprocess
+import sys
 import tempfile
 import time
 from collections.abc import Mapping
@@ -13,11 +14,13 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-from evoclaims.claims.selection import selected
+from packaging.version import Version
+
+from evoclaims.claims.collected import selected
 from evoclaims.cli.project import open_project
 from evoclaims.cli.store_folder import open_store
 from evoclaims.cli.terminal import terminal
-from evoclaims.core.environments import Environment, NotInstallableError, Recipe, ending, make, reason
+from evoclaims.core.environments import PIP, Environment, NotInstallableError, Recipe, ending, make, reason
 from evoclaims.core.errors import UnknownNameError, UserError
 from evoclaims.core.files import at_once, read_json
 from evoclaims.core.printable import printable
@@ -105,7 +108,6 @@ class Elsewhere:
         return reports
 
     def _command(self, environment: Environment, store: Store, verdicts: Path) -> list[str]:
-        """Return the command that judges."""
         claims = os.path.join(os.curdir, os.path.relpath(self.claims, self.root))  # as in `judging`
         return [
             *(str(environment.python), "-m", "pytest", claims, f"--rootdir={os.curdir}"),
@@ -203,3 +205,31 @@ def _claims(options: argparse.Namespace) -> set[str]:
     except UserError:
         return set()
     return {name for report in reports for name in (report.claim, report.name)}
+
+
+def released(package: str) -> list[str]:
+    """Return all final releases that this Python can use.
+
+    Raises:
+        UserError: when pip finds none.
+    """
+    command = [sys.executable, *PIP, "index", "versions", package]
+    done = subprocess.run(command, capture_output=True, text=True, errors="replace", check=False)
+    listed = re.search(r"^Available versions: (.*)$", done.stdout, re.MULTILINE)
+    if listed is None:
+        why = reason(done.stdout + done.stderr)
+        raise UserError(f"pip lists no releases of {package} ({why}). Name them on the command line.")
+    return sorted(listed[1].split(", "), key=Version)
+
+
+def between(first: str, last: str, releases: list[str]) -> list[str]:
+    """Return releases from one to another, both included, in order.
+
+    Raises:
+        UserError: when the first is not older than the last.
+    """
+    low, high = Version(first), Version(last)
+    if not low < high:
+        raise UserError(f"{first} is not older than {last}. Name the older release first.")
+    inner = sorted((one for one in releases if low < Version(one) < high), key=Version)
+    return [first, *inner, last]

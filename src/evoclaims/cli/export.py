@@ -6,12 +6,12 @@ import argparse
 import sys
 from pathlib import Path
 
-from evoclaims.cli.output_files import REPORT, write
 from evoclaims.cli.project import ALL_TIERS, Project, open_project
+from evoclaims.cli.terminal import REPORT, write
 from evoclaims.core.canonical import content_hash
 from evoclaims.core.errors import UnknownNameError, UserError
 from evoclaims.paper import references
-from evoclaims.paper.condition_names import names_of
+from evoclaims.paper.archive import names_of
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.store import DamagedFileError
 from evoclaims.verdicts import export

@@ -9,8 +9,17 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from evoclaims.cli.cluster.job_states import GONE, Seen, State, states
-from evoclaims.cli.cluster.submissions import Submission, SubmittedBatch, SubmittedJob, load_all, log_of
+from evoclaims.cli.cluster.submissions import (
+    GONE,
+    Seen,
+    State,
+    Submission,
+    SubmittedBatch,
+    SubmittedJob,
+    load_all,
+    log_of,
+    states,
+)
 from evoclaims.cli.project import Project, open_project
 from evoclaims.core.errors import UserError
 from evoclaims.core.files import open_file

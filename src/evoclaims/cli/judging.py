@@ -15,14 +15,13 @@ import pytest
 
 from evoclaims.claims.collected import claim_tests
 from evoclaims.claims.session import Session
-from evoclaims.core.errors import UserError
-from evoclaims.core.raised import in_one_line
+from evoclaims.core.errors import UserError, in_one_line
 from evoclaims.paper.config import SuiteConfig
-from evoclaims.plugin.run_session import SESSION
+from evoclaims.plugin.options import SESSION
 from evoclaims.plugin.summary import ATTRIBUTE
 from evoclaims.verdicts import history
 from evoclaims.verdicts.claim_report import ClaimReport
-from evoclaims.verdicts.repeated_runs import last_runs
+from evoclaims.verdicts.history import last_runs
 
 _ENVIRONMENT: Final = ("PYTEST_ADDOPTS", "PYTEST_PLUGINS", "PYTEST_DISABLE_PLUGIN_AUTOLOAD")
 """Variables that change which tests a run of pytest collects, and when it stops."""

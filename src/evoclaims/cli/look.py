@@ -11,16 +11,14 @@ from typing import Any, Final, get_args
 
 import numpy as np
 
-from evoclaims.cli.episodes import Outings, run_again
-from evoclaims.cli.output_files import FIGURES, write
 from evoclaims.cli.project import Project, open_project
-from evoclaims.cli.stored_trial import Stored, describe, load
+from evoclaims.cli.stored_trial import Outings, Stored, describe, load, run_again
+from evoclaims.cli.terminal import FIGURES, write
 from evoclaims.core.drawing import Format
 from evoclaims.core.errors import UnknownNameError, UserError
 from evoclaims.envs.ecorobot.robot_task import RobotTask
-from evoclaims.envs.ecorobot.views import film, page, pictures
-from evoclaims.envs.ecorobot.views.marks import marks
-from evoclaims.envs.ecorobot.views.motion import Motion, motion
+from evoclaims.envs.ecorobot.views import page, pictures
+from evoclaims.envs.ecorobot.views.motion import Motion, marks, motion
 from evoclaims.methods.map_elites import MapElites
 from evoclaims.paper.reproduction import Tier
 from evoclaims.trials import devices
@@ -146,7 +144,6 @@ def _champion(options: argparse.Namespace, project: Project) -> tuple[Path, byte
 
 
 def _with_robot(tier: Tier, name: str, task: Any) -> RobotTask:
-    """Return the task as one with a robot."""
     if not isinstance(task, RobotTask):
         known = sorted({on for (_, on), condition in tier.conditions.items() if isinstance(condition.task, RobotTask)})
         others = f"Tasks with one: {', '.join(known)}." if known else "No task of this tier has one."
@@ -155,7 +152,6 @@ def _with_robot(tier: Tier, name: str, task: Any) -> RobotTask:
 
 
 def _target(out: str | None, default: str, endings: tuple[str, ...]) -> tuple[Path, str]:
-    """Return the file to write, and its ending, which selects the format."""
     path = FIGURES / f"{default}.{endings[0]}" if out is None else Path(out)
     ending = path.suffix.removeprefix(".").lower()
     if ending not in endings:
@@ -167,7 +163,6 @@ def _target(out: str | None, default: str, endings: tuple[str, ...]) -> tuple[Pa
 
 
 def _path(subject: Subject, ending: str) -> bytes:
-    """Draw the paths of all episodes."""
     outings = subject.outings
     count = f"{sum(outings.reached)} of {len(outings.reached)} episodes reach the goal"
     title = f"{subject.title}\n{count}" if marks(subject.task) else subject.title
@@ -192,6 +187,6 @@ def _elites(subject: Subject, ending: str) -> bytes:
 FORMS: Final[Mapping[str, Form]] = {
     "path": Form(PICTURE, _path),
     "page": Form(("html",), lambda one, _: page.page(one.task, one.motion, one.episode_title)),
-    "gif": Form(("gif",), lambda one, _: film.film(one.task, one.motion, one.episode_title)),
+    "gif": Form(("gif",), lambda one, _: pictures.film(one.task, one.motion, one.episode_title)),
     "elites": Form(PICTURE, _elites, episodes=False),
 }

@@ -14,8 +14,7 @@ from pathlib import Path
 from evoclaims.cli.arguments import IN_PROCESSES, parser
 from evoclaims.cli.terminal import OutputError, plain_output
 from evoclaims.core.errors import UserError
-from evoclaims.trials.allowance import end_without
-from evoclaims.trials.stopping import interrupted_by
+from evoclaims.trials.stopping import end_without, interrupted_by
 
 USER_ERROR, INTERRUPTED, CLOSED_PIPE = 2, 130, 141
 
@@ -71,8 +70,8 @@ def _ended(arguments: Sequence[str] | None) -> int:
 
 def _raised_in_project(error: Exception) -> str:
     """Return in one line what the project's own code has raised; empty for an error that may be of evoclaims."""
+    from evoclaims.core.errors import in_one_line, is_of_project
     from evoclaims.core.printable import printable
-    from evoclaims.core.raised import in_one_line, is_of_project
     from evoclaims.paper.config import find_root
 
     try:

@@ -6,12 +6,151 @@ import argparse
 import os
 from collections import Counter
 from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Literal
 
 from evoclaims.cli.store_folder import open_store
+from evoclaims.core.canonical import canonical_json
 from evoclaims.core.errors import UserError
-from evoclaims.trials.merging import Merged, merge_trials
-from evoclaims.trials.store import Store
-from evoclaims.verdicts.merging import merge_evidence
+from evoclaims.core.files import read_json
+from evoclaims.core.printable import printable
+from evoclaims.trials.failed import time_allowed
+from evoclaims.trials.result import COMPLETE, TrialResult
+from evoclaims.trials.store import DamagedFileError, Store
+from evoclaims.verdicts.claim_report import ClaimReport, evidence_path, save
+
+Fate = Literal["copied", "there", "differs", "damaged"]
+"""What became of a file: copied; there already, alike; there and different, so that it stays; left out."""
+
+
+@dataclass(frozen=True)
+class Merged:
+    """What became of one file of a store.
+
+    Attributes:
+        path: the file.
+        fate: see `Fate`.
+        reason: a clause that says what differs or what is damaged; empty otherwise.
+    """
+
+    path: Path
+    fate: Fate
+    reason: str = ""
+
+    def __str__(self) -> str:
+        """Return one line for the terminal."""
+        return printable(f"{self.path}: {self.reason or self.fate}")
+
+
+def merge_trials(source: Store, into: Store, dry_run: bool = False) -> Iterator[Merged]:
+    """Copy the trials of a store with their champions; what is in the other store stays.
+
+    A trial that timed out or crashed has no outcome: it gives way to one that has, or that had more time.
+
+    Raises:
+        UserError: when the disk is full or read-only.
+    """
+    for path in source.record_paths():
+        try:
+            result = source.read(path)
+            if result is None:
+                continue
+            packed = source.whole_champion(path, result)
+        except DamagedFileError as error:
+            yield Merged(error.path, "damaged", f"it is left out: {error.reason}")
+            continue
+        try:
+            present = into.present(result)
+            if not (present is None or _gives_way(present, result)):
+                yield _compared(path, result, into, present)
+            elif dry_run or into.put_packed(result, packed) == "stored":
+                yield Merged(path, "copied")
+            else:  # a running process has stored the trial meanwhile
+                yield _compared(path, result, into, into.present(result))
+        except DamagedFileError as error:
+            yield Merged(error.path, "damaged", f"it stays as it is, and {path} is left out: {error.reason}")
+
+
+def _gives_way(present: TrialResult, result: TrialResult) -> bool:
+    """Whether a record without an outcome is replaced."""
+    if present.status in COMPLETE:
+        return False
+    longer = present.status == result.status == "timeout" and time_allowed(result) > time_allowed(present)
+    return result.status in COMPLETE or longer
+
+
+def _compared(path: Path, result: TrialResult, into: Store, present: TrialResult | None) -> Merged:
+    """Return whether a record and the one that is there have the same outcome, and else what differs."""
+    if present is None or present.digest == result.digest or not {present.status, result.status} <= set(COMPLETE):
+        return Merged(path, "there")
+    home = into.home(present)
+    return Merged(
+        path, "differs", f"another record of this trial is in {home} and stays: {_difference(result, present)}"
+    )
+
+
+def _difference(one: TrialResult, other: TrialResult) -> str:
+    """Say how two records of one trial differ, the values of the first first."""
+    parts = [f"{one.status} and {other.status}"] if one.status != other.status else []
+    for name in ("metrics", "levels", "curves"):
+        here, there = getattr(one, name), getattr(other, name)
+        keys = [key for key in sorted({*here, *there}) if not _same(here.get(key), there.get(key))]
+        scalars = (
+            [f"{key} {here.get(key, '–')} and {there.get(key, '–')}" for key in keys] if name == "metrics" else keys
+        )
+        parts += [f"{name} ({', '.join(scalars)})"] if keys else []
+    parts += ["champions"] if one.champion != other.champion else []
+    devices = [str(trial.device.get("kind", "an unknown device")) for trial in (one, other)]
+    machines = [str(trial.provenance.get("machine", "an unknown machine")) for trial in (one, other)]
+    where = devices if devices[0] != devices[1] else machines
+    made = f"; made on {where[0]} and {where[1]}" if where[0] != where[1] else "; made on machines of one kind"
+    return f"{', '.join(parts) or 'digests'} differ{made}"
+
+
+def _same(one: Any, other: Any) -> bool:
+    """Whether two values of records are equal; NaN equals NaN."""
+    return canonical_json(one) == canonical_json(other)
+
+
+def merge_evidence(source: Store, into: Store, dry_run: bool = False) -> Iterator[Merged]:
+    """Copy the last verdict of each claim, where the other store has none.
+
+    Nothing is judged from these files: the next run with all trials writes them anew.
+
+    Raises:
+        UserError: when the disk is full or read-only.
+    """
+    for path in sorted((source.root / "verdicts").rglob("*.json")):
+        if path.name.startswith("."):
+            continue
+        report = _read(path, source.root)
+        if report is None:
+            yield Merged(path, "damaged", "it is left out: it holds no verdict of the claim that it is named after")
+            continue
+        target = evidence_path(report, into.root)
+        if target.exists():
+            there = _read(target, into.root)
+            if there is None or replace(there, evidence="") == replace(report, evidence=""):
+                yield Merged(path, "there")
+            else:
+                note = f"{report.outcome}, and {there.outcome} in {target}, which stays until claims are judged again"
+                yield Merged(path, "differs", note)
+            continue
+        if not dry_run:
+            saved = save(report, into.root)
+            if saved.unsaved:
+                raise UserError(saved.unsaved)
+        yield Merged(path, "copied")
+
+
+def _read(path: Path, root: Path) -> ClaimReport | None:
+    """Read a file of evidence; None where it is damaged, or in a place that is not its claim's."""
+    try:
+        report = ClaimReport.from_json(read_json(path))
+    except (OSError, ValueError):
+        return None
+    return report if evidence_path(report, root) == path else None
 
 
 def main(options: argparse.Namespace) -> int:

@@ -15,15 +15,13 @@ from evoclaims.cli.processes.worker import Ended, WorkOrder
 from evoclaims.cli.project import Project, open_project
 from evoclaims.core.errors import UnknownNameError, UserError
 from evoclaims.core.files import write_atomically
-from evoclaims.mutants import catalogue
-from evoclaims.mutants.conditions import Planted, plantings
+from evoclaims.mutants.mutant import Planted, load, plantings
 from evoclaims.mutants.trying import Comparison, merged, noticed, under_faults
 from evoclaims.trials.spec import Condition
 from evoclaims.verdicts import mutation_matrix
+from evoclaims.verdicts.claim_report import Tried
 from evoclaims.verdicts.history import key_of
-from evoclaims.verdicts.mutation_matrix import Fate, Sensitivity
-from evoclaims.verdicts.mutation_score import score
-from evoclaims.verdicts.sensitivity import Tried
+from evoclaims.verdicts.mutation_matrix import Fate, Sensitivity, score
 
 
 def main(options: argparse.Namespace) -> int:
@@ -35,7 +33,7 @@ def main(options: argparse.Namespace) -> int:
     if not used:
         raise UserError(f"No claim of the {options.tier} tier reads trials, so no fault could change a verdict.")
     every = plantings(
-        {names: one for names, one in tier.conditions.items() if names in used}, catalogue.load(project.reproduction)
+        {names: one for names, one in tier.conditions.items() if names in used}, load(project.reproduction)
     )
     planted = _chosen(every, options)
     failed: tuple[Ended, ...] = ()

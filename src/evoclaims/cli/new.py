@@ -53,7 +53,6 @@ def main(options: argparse.Namespace) -> int:
 
 
 def _starter(kind: str) -> list[Path]:
-    """Return the layers of a starter project."""
     require_known("kind of starter project", kind, KINDS)
     return [STARTERS / layer for layer in KINDS[kind]]
 

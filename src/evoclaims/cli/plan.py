@@ -13,16 +13,14 @@ from rich.table import Table
 from evoclaims.claims.fetching import NotStoredError, StoredOnly
 from evoclaims.cli.project import open_project
 from evoclaims.cli.terminal import styled
-from evoclaims.core.errors import UserError
+from evoclaims.core.errors import UserError, in_one_line
 from evoclaims.core.printable import printable
-from evoclaims.core.raised import in_one_line
 from evoclaims.envs.base import Checked
 from evoclaims.judging.verdict import Outcome
 from evoclaims.methods.training_loop import TrainingLoop
 from evoclaims.paper import references
 from evoclaims.paper.cost import Estimator, Owed, Wanted, measured, took
-from evoclaims.paper.reproduction import Tier
-from evoclaims.paper.variant import Names
+from evoclaims.paper.reproduction import Names, Tier
 from evoclaims.report.console import PlainSpokenConsole, plain_table
 from evoclaims.report.live_line import duration
 from evoclaims.trials import devices
@@ -221,7 +219,6 @@ def _took(costs: Costs, names: Sequence[Names], kind: str) -> str:
 
 
 def _claims(reports: Sequence[ClaimReport], costs: Costs) -> Table:
-    """Build the table of claims."""
     kinds = _kinds(costs)
     heads = [f"took on one\n{kind}" for kind in kinds]
     table = plain_table(("claim", "n", "α", "p for", "p\nagainst", "can\nend", *heads), (), names=0)

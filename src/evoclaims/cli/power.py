@@ -6,9 +6,10 @@ import argparse
 import shlex
 import sys
 from collections.abc import Mapping, Sequence
+from typing import Final
 
 from evoclaims.claims.fetching import StoredOnly
-from evoclaims.claims.power import Asserted, Listening, Pilots, asserted, only
+from evoclaims.claims.power import Asserted, ClaimPower, Listening, Pilots, asserted, only
 from evoclaims.cli.processes.execution import Execution
 from evoclaims.cli.processes.job import Job
 from evoclaims.cli.processes.worker import WorkOrder
@@ -16,15 +17,62 @@ from evoclaims.cli.project import Project, open_project
 from evoclaims.cli.terminal import styled
 from evoclaims.core.errors import UserError
 from evoclaims.core.packages import recorded
-from evoclaims.judging.counting import MAX_TRIALS
 from evoclaims.judging.design import Design
+from evoclaims.judging.exact import MAX_TRIALS
+from evoclaims.judging.power import ENOUGH
+from evoclaims.judging.verdict import Outcome
 from evoclaims.paper import references
-from evoclaims.paper.variant import Names
-from evoclaims.report import power_cells
+from evoclaims.paper.reproduction import Names
 from evoclaims.report.console import PlainSpokenConsole, plain_table
+from evoclaims.report.formatting import number, plural
+from evoclaims.report.table_cells import NONE
+from evoclaims.trials.failed import is_final
 from evoclaims.trials.spec import Condition, TrialSpec
-from evoclaims.trials.time_limit import is_final
-from evoclaims.verdicts.versions import change
+from evoclaims.verdicts.source_trials import change
+
+_OUTCOMES: Final = tuple(outcome for outcome in Outcome if outcome.judged)
+
+HEADINGS: Final = ("claim", "expected", "power", "95%", *(one.symbol for one in _OUTCOMES), "flips", "needs")
+
+
+def cells(one: ClaimPower) -> tuple[str, ...]:
+    """Return a row, a cell per heading."""
+    found = one.power
+    if found is None:
+        return (one.name, str(one.expected), "unknown", *(NONE,) * (len(HEADINGS) - 3))
+    low, high = found.interval
+    needs = NONE if one.expected is Outcome.INCONCLUSIVE else f"> {found.most}"
+    return (
+        one.name,
+        str(one.expected),
+        f"{found.power:.3f}" + " below" * (not found.suffices),
+        f"{low:.3f}–{high:.3f}",
+        *(f"{found.share(outcome):.3f}" for outcome in _OUTCOMES),
+        f"{found.flips:.3f}",
+        needs if found.needed is None else str(found.needed),
+    )
+
+
+def about(claims: Sequence[ClaimPower], n: int) -> list[str]:
+    """Say how to read the table, and how many verdicts of a run end otherwise."""
+    known = [one.power for one in claims if one.power]
+    if not known:
+        return []
+    missed, flipped = sum(1 - found.power for found in known), sum(found.flips for found in known)
+    below = sum(not found.suffices for found in known)
+    outcomes = ", ".join(f"{outcome.symbol} {outcome}" for outcome in _OUTCOMES)
+    return [
+        f"Power: the share of {known[0].draws:,} draws of {plural(n, 'trial')} a condition, with replacement from its "
+        f"pilot, in which the claim ends as expected ({outcomes}); flips: in which it ends the other way; needs: about "
+        f"how many trials {ENOUGH:g} takes. The interval is what draws leave open, not the pilot's size.",
+        f"Of {plural(len(known), 'verdict')} of a run, {number(missed)} end otherwise than expected on average, "
+        f"{number(flipped)} of them the other way. {plural(below, 'claim')} below {ENOUGH:g}.",
+    ]
+
+
+def troubles(claims: Sequence[ClaimPower]) -> list[str]:
+    """Return a line for each claim whose power is unknown."""
+    return [f"{one.name}: {one.trouble}" for one in claims if one.trouble]
 
 
 def main(options: argparse.Namespace) -> int:
@@ -43,21 +91,20 @@ def main(options: argparse.Namespace) -> int:
     imported = bool(wanted) and all(condition.existing is not None for condition in wanted.values())
     advice = [] if imported else [_advice(options)]
     if not any(one.power for one in powers):
-        first = "; ".join(power_cells.troubles(powers)[:1]) or "no claim has a test"
+        first = "; ".join(troubles(powers)[:1]) or "no claim has a test"
         raise UserError(" ".join([f"No power can be computed at the {options.tier} tier: {first}.", *advice]))
     console = PlainSpokenConsole(file=styled())
-    console.print_whole(plain_table(power_cells.HEADINGS, map(power_cells.cells, powers)))
-    for sentence in (*power_cells.about(powers, design.last.n), *power_cells.troubles(powers)):
+    console.print_whole(plain_table(HEADINGS, map(cells, powers)))
+    for sentence in (*about(powers, design.last.n), *troubles(powers)):
         console.print(sentence)
     for sentence in _versions(pilots, wanted):
         print(sentence)
-    if advice and power_cells.troubles(powers):
+    if advice and troubles(powers):
         print(*advice, file=sys.stderr)
     return int(not all(one.suffices for one in powers))
 
 
 def _claims(project: Project, tier: str) -> tuple[Asserted, ...]:
-    """Return the claims that have a test at a tier."""
     store = project.archive.store
     listening = Listening(project.reproduction, store, StoredOnly(project.archive))
     (reports,) = project.judge_sessions([(listening, tier)])
@@ -100,7 +147,6 @@ def _make(
 
 
 def _write(project: Project, pilots: Pilots, names: Names, condition: Condition, seeds: Sequence[int]) -> None:
-    """Write a pilot from stored trials of one environment, if all of them are there."""
     stored = [record for seed in seeds for record in project.store.records(TrialSpec(condition, seed).id)]
     trials = references.of_one_environment([*filter(is_final, stored)], condition, seeds, len(seeds))
     if not trials:

@@ -11,10 +11,10 @@ from evoclaims.core.printable import printable
 from evoclaims.judging.drift import MIN_REFERENCES
 from evoclaims.judging.verdict import Outcome
 from evoclaims.paper import references
+from evoclaims.trials.failed import is_final
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.spec import TrialSpec
-from evoclaims.trials.time_limit import is_final
-from evoclaims.verdicts.versions import change
+from evoclaims.verdicts.source_trials import change
 
 
 def main(options: argparse.Namespace) -> int:

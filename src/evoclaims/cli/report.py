@@ -9,25 +9,53 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-from evoclaims.cli.episodes import run_again
-from evoclaims.cli.output_files import REPORT, write
 from evoclaims.cli.project import ALL_TIERS, Project, open_project
 from evoclaims.cli.store_folder import APART
-from evoclaims.cli.stored_trial import Stored
+from evoclaims.cli.stored_trial import Stored, run_again
+from evoclaims.cli.terminal import REPORT, write
+from evoclaims.core.errors import UserError
 from evoclaims.envs.ecorobot.robot_task import RobotTask
 from evoclaims.envs.ecorobot.views import pictures
+from evoclaims.figures import figure
 from evoclaims.figures.replication import replications
-from evoclaims.report import across_shown, table_cells
+from evoclaims.figures.sheet import svg
+from evoclaims.paper.archive import Archive
+from evoclaims.paper.reproduction import Reproduction
+from evoclaims.report import across, table_cells
 from evoclaims.report.build import gather
 from evoclaims.report.champion import network
+from evoclaims.report.formatting import listed
 from evoclaims.report.html import html
 from evoclaims.report.markdown import markdown
-from evoclaims.report.paper_figures import paper_figures
+from evoclaims.report.model import PaperFigure
 from evoclaims.trials import devices
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.spec import Condition
 from evoclaims.verdicts import history, mutation_matrix
 from evoclaims.verdicts.robustness import matrix
+
+
+def paper_figures(
+    reproduction: Reproduction, archive: Archive, tier: str
+) -> tuple[tuple[PaperFigure, ...], tuple[str, ...]]:
+    """Return the figures with something to draw at a tier, and sentences about the others."""
+    drawn: list[PaperFigure] = []
+    empty: list[str] = []
+    broken: dict[str, list[str]] = {}
+    for name in figure.names(reproduction):
+        try:
+            drawing = figure.load(reproduction, name).draw(archive, reproduction, tier)
+            if drawing.shown:
+                says = " ".join((*drawing.caption, *drawing.missing))
+                drawn.append(PaperFigure(drawing.title, says, svg(drawing).encode()))
+            else:
+                empty.append(name)
+        except UserError as error:
+            broken.setdefault(str(error), []).append(name)
+    sentences = [f"Not drawn ({listed(names)}): {reason}" for reason, names in broken.items()]
+    if empty:
+        sentences.append(f"Not drawn, for want of trials at the {tier} tier: {listed(empty)}.")
+    return tuple(drawn), tuple(sentences)
 
 
 def main(options: argparse.Namespace) -> int:
@@ -65,7 +93,7 @@ def main(options: argparse.Namespace) -> int:
         missing=missing,
         robustness=tuple(robustness),
         numbers=replications(archive, reproduction, tiers[0], ("", *reproduction.variants)),
-        across=across_shown.last({project.store.root.absolute(), project.config.root / APART["across"]}),
+        across=across.last({project.store.root.absolute(), project.config.root / APART["across"]}),
         generated=f"Written on {datetime.now(UTC):%Y-%m-%d %H:%M} UTC by evoclaims {metadata.version('evoclaims')}.",
     )
     folder = Path(options.out or REPORT)
@@ -78,7 +106,6 @@ def main(options: argparse.Namespace) -> int:
 
 
 def _tried(project: Project, tier: str) -> list[str]:
-    """Return the variants that have run at a tier."""
     reproduction = project.reproduction
     seeds = reproduction.tier(tier).design.seeds(1)
     return [

@@ -8,11 +8,11 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from evoclaims.cli.output_files import FIGURES, write
 from evoclaims.cli.project import open_project
-from evoclaims.figures import catalogue, files
-from evoclaims.figures.figure import Drawing
-from evoclaims.paper.variant import Conditions
+from evoclaims.cli.terminal import FIGURES, write
+from evoclaims.figures.figure import Drawing, load, names
+from evoclaims.figures.sheet import contents
+from evoclaims.paper.reproduction import Conditions
 
 ALL = "all"
 
@@ -22,15 +22,15 @@ def main(options: argparse.Namespace) -> int:
     project = open_project(options.storage)
     reproduction = project.reproduction
     reproduction.tier(options.tier, options.variant)
-    known = catalogue.names(reproduction)
-    names = known if options.figure == ALL and known else (options.figure,)
-    figures = [catalogue.load(reproduction, name) for name in names]
+    known = names(reproduction)
+    chosen = known if options.figure == ALL and known else (options.figure,)
+    figures = [load(reproduction, name) for name in chosen]
     at = f"{options.tier}-{options.variant}" if options.variant else options.tier
     folder = FIGURES / at if options.out is None else Path(options.out)
     shown = 0
     for figure in figures:
         drawing = figure.draw(project.archive, reproduction, options.tier, options.variant)
-        for ending, data in files.contents(drawing).items():
+        for ending, data in contents(drawing).items():
             write(folder / f"{figure.name}.{ending}", data, "folder", ours=options.out is None)
         print(f"{figure.name}: wrote {folder / figure.name}.png, .svg and .csv")
         if options.variant and not _changed(drawing, reproduction.changed_by(options.variant, options.tier)):
@@ -40,7 +40,7 @@ def main(options: argparse.Namespace) -> int:
         shown += drawing.shown
     if not shown:
         print(
-            f"Nothing could be drawn: of {', '.join(names)} no trial of the {options.tier} tier is at hand. "
+            f"Nothing could be drawn: of {', '.join(chosen)} no trial of the {options.tier} tier is at hand. "
             f"`evoclaims run --tier {options.tier}{f' --variant {options.variant}' * bool(options.variant)}` runs them."
         )
     return int(not shown)

@@ -6,23 +6,55 @@ import argparse
 import sys
 from collections.abc import Sequence
 
-from evoclaims.cli.chosen_conditions import choose
 from evoclaims.cli.processes.execution import Execution
-from evoclaims.cli.processes.job import Job
+from evoclaims.cli.processes.job import Job, choose
 from evoclaims.cli.processes.worker import WorkOrder
 from evoclaims.cli.project import Project, open_project
 from evoclaims.cli.stored_trial import describe
-from evoclaims.cli.variant_cost import to_run
 from evoclaims.core.errors import UserError
-from evoclaims.judging.counting import MAX_TRIALS
+from evoclaims.judging.exact import MAX_TRIALS
 from evoclaims.judging.verdict import Outcome
+from evoclaims.paper import references
+from evoclaims.paper.cost import Estimator, Wanted
+from evoclaims.paper.reproduction import Names
+from evoclaims.report.formatting import plural
+from evoclaims.report.live_line import duration
 from evoclaims.trials.batches import StoredTrials
-from evoclaims.trials.crashes import last_said
+from evoclaims.trials.devices import usable_cores
+from evoclaims.trials.failed import last_said
 from evoclaims.trials.imported import where_from
+from evoclaims.trials.result import COMPLETE
 from evoclaims.trials.spec import Condition, TrialSpec
 from evoclaims.trials.store import Store
-from evoclaims.verdicts import edited_code
+from evoclaims.verdicts import other_code
 from evoclaims.verdicts.robustness import matrix
+
+
+def to_run(running: Execution, names: Sequence[Names]) -> list[Names]:
+    """Print what the conditions of a variant cost here, and return those that are not committed."""
+    reproduction, store = running.project.reproduction, running.project.store
+    tier, variant, seeds = running.order.tier, running.order.variant, running.order.seeds
+    varied = reproduction.tier(tier, variant)
+    wanted = {one: Wanted(one, varied.condition(*one), seeds) for one in names}
+    owed = Estimator(store, reproduction, tier, running.platform, time_limit=running.limit).owed(wanted)
+    chosen, seconds, unknown = [], 0.0, 0
+    print(f"{variant}: {reproduction.variants[variant].says}")
+    for one, lacking in owed.items():
+        committed = references.of_condition(reproduction.references, tier, *one, wanted[one].condition.id)
+        if lacking.seeds and {trial.seed for trial in committed if trial.status in COMPLETE} >= set(seeds):
+            says = "committed, so not run; name method and task to run it here"
+        else:
+            chosen.append(one)
+            says = "stored"
+            if lacking.seeds:
+                known, took = lacking.cost.basis != "budget", lacking.cost.seconds(usable_cores())
+                seconds, unknown = seconds + took * known, unknown + (not known)
+                about = f"about {duration(took)}" if known else "time unknown"
+                says = f"{plural(len(lacking.seeds), 'trial')} to run, {about}"
+        print(f"  {' on '.join(one)} ({tier}): {says}")
+    more = f", and {plural(unknown, 'condition')} of unknown time" * bool(unknown)
+    print(f"about {duration(seconds)} on such a device ({running.platform}){more}", flush=True)
+    return chosen
 
 
 def main(options: argparse.Namespace) -> int:
@@ -68,14 +100,13 @@ def main(options: argparse.Namespace) -> int:
 
 
 def _print_trials(store: Store, name: str, condition: Condition, seeds: Sequence[int], note: str) -> bool:
-    """List the trials of a condition, and return whether one of them has crashed."""
     print(name)
     if note:
         print(f"  {note}")
     found = (store.get(TrialSpec(condition, seed).id, condition.versions) for seed in seeds)
     results = [result for result in found if result is not None]
     for name in condition.edited_since(results):
-        print(f"  {edited_code.summary(name)}")
+        print(f"  {other_code.summary(name)}")
     for result in results:
         print(f"  {describe(result)}")
     crashed = [result for result in results if result.status == "crashed"]
@@ -86,7 +117,6 @@ def _print_trials(store: Store, name: str, condition: Condition, seeds: Sequence
 
 
 def _print_matrix(project: Project, tier: str, variant: str) -> None:
-    """Print how claims end under the protocol and under a variant of it."""
     plain, varied = project.judge_variants([(tier, ""), (tier, variant)])
     rows = matrix(plain, {variant: varied})
     print(f"\n{variant}: {project.reproduction.variants[variant].says}")

@@ -14,11 +14,9 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
-from evoclaims.cli.chosen_conditions import choose
-from evoclaims.cli.cluster.batch_job import SIGNAL_SECONDS, BatchJob
-from evoclaims.cli.cluster.job_request import JobRequest, clock, requested
-from evoclaims.cli.cluster.job_states import JOB_NAME
+from evoclaims.cli.cluster.job import SIGNAL_SECONDS, BatchJob, JobRequest, clock, requested
 from evoclaims.cli.cluster.submissions import (
+    JOB_NAME,
     SCHEMA,
     Submission,
     SubmittedBatch,
@@ -28,8 +26,7 @@ from evoclaims.cli.cluster.submissions import (
     save,
 )
 from evoclaims.cli.jobs import active
-from evoclaims.cli.processes.job import Job
-from evoclaims.cli.processes.missing_batches import MissingBatch, missing_batches
+from evoclaims.cli.processes.job import Job, MissingBatch, choose, missing_batches
 from evoclaims.cli.project import Project, open_project
 from evoclaims.core.canonical import content_hash
 from evoclaims.core.errors import UserError
@@ -70,7 +67,6 @@ def main(options: argparse.Namespace) -> int:
 def _plan(
     project: Project, options: argparse.Namespace, request: JobRequest, conditions: Mapping[Job, Condition]
 ) -> list[list[MissingBatch]]:
-    """Print and return the jobs that are to be submitted, each with its batches."""
     design = project.reproduction.tier(options.tier).design
     seeds, limit = design.seeds(design.last.n), project.config.seconds(None)
     has_gpu = request.gpus or (request.cluster == "local" and gpus("auto"))  # jobs here see what this process sees
@@ -101,7 +97,6 @@ def _plan(
 
 
 def _cost(seconds: Sequence[float], request: JobRequest, platform: str) -> str:
-    """Return a sentence on the hours of all batches."""
     each = f"{request.gpus} GPUs" if request.gpus > 1 else "a GPU" if platform == "gpu" else "a job"
     hours = max(sum(seconds) / 3600, 0.1)
     sentence = (

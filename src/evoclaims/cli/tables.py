@@ -22,31 +22,74 @@ from __future__ import annotations
 import argparse
 import re
 import tempfile
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import Final
 
-from evoclaims.cli import commands
-from evoclaims.cli.output_files import write
+from evoclaims.cli.arguments import parser
 from evoclaims.cli.project import Project, open_project
+from evoclaims.cli.terminal import write
 from evoclaims.core.errors import UnknownNameError, UserError
 from evoclaims.core.files import read_text
 from evoclaims.figures.replication import replications
 from evoclaims.judging.verdict import Outcome
-from evoclaims.paper.uncovered import uncovered
-from evoclaims.report import readings_table, replication_cells, vocabulary
-from evoclaims.report.formatting import plural
+from evoclaims.paper.reported import uncovered
+from evoclaims.report import replication_cells, verdict_overview, vocabulary
+from evoclaims.report.formatting import literal, plural, table
 from evoclaims.report.markdown import numbers, robustness
-from evoclaims.report.markdown_text import literal, table
 from evoclaims.report.table_cells import NONE
 from evoclaims.report.tally import by_sentence, tally
 from evoclaims.report.trial_summary import Reader
-from evoclaims.report.verdict_marks import marks, short_sentences
-from evoclaims.report.verdict_overview import overview
+from evoclaims.report.verdict_overview import marks, overview, short_sentences
 from evoclaims.verdicts.claim_report import ClaimReport
 from evoclaims.verdicts.robustness import Robustness, matrix
 from evoclaims.verdicts.sentences import sentences
+
+
+def reference() -> str:
+    """Return a list of all commands, and a section for each with its usage and its options."""
+    commands = _commands(parser())
+    index = table(("command", "purpose"), ((f"[`{name}`](#{name})", literal(says)) for name, says, _ in commands))
+    return "\n\n".join([index, *(_section(name, command) for name, _, command in commands)])
+
+
+def _commands(whole: argparse.ArgumentParser) -> list[tuple[str, str, argparse.ArgumentParser]]:
+    """Return name, help and parser of each command, in the order of `evoclaims --help`."""
+    (chosen,) = (action for action in whole._actions if isinstance(action, argparse._SubParsersAction))
+    return [(str(one.dest), str(one.help), chosen.choices[one.dest]) for one in chosen._choices_actions]
+
+
+def _section(name: str, command: argparse.ArgumentParser) -> str:
+    says = literal(_sentence(str(command.description)))
+    return f"## {name}\n\n{says}\n\n{table(('argument', 'meaning'), _rows(command))}"
+
+
+def _rows(command: argparse.ArgumentParser) -> Iterator[tuple[str, str]]:
+    for action in command._actions:
+        if not isinstance(action, argparse._HelpAction):
+            yield f"`{_written(action)}`", literal(str(action.help))
+
+
+def _written(action: argparse.Action) -> str:
+    """Return an argument as it is written, such as "--tier TIER"."""
+    value = action.metavar or action.dest.upper()
+    values = " ".join(value) if isinstance(value, tuple) else value
+    if not action.option_strings:
+        return f"[{values}]" if action.nargs in ("?", "*") and "[" not in values else values
+    if action.nargs == 0:
+        return action.option_strings[0]
+    if action.nargs == "?":
+        values = f"[{values}]"
+    elif action.nargs == "+" and not isinstance(value, tuple):
+        values = f"{values} …"
+    return f"{action.option_strings[0]} {values}"
+
+
+def _sentence(text: str) -> str:
+    """Return a text that begins with a capital letter and ends with a full stop."""
+    return f"{text[:1].upper()}{text[1:]}".removesuffix(".") + "."
+
 
 _TABLE: Final = re.compile(
     r"(?P<begin>^<!-- evoclaims: (?P<kind>\w+) (?P<words>[^>]*?) ?-->\n)"
@@ -109,7 +152,6 @@ def filled(text: str, project: Project) -> str:
 
 
 def _made(found: re.Match[str], project: Project) -> str:
-    """Return one table."""
     kind, words = found["kind"], found["words"].split()
     if kind not in _KINDS:
         raise UnknownNameError("kind of table", kind, _KINDS)
@@ -117,7 +159,6 @@ def _made(found: re.Match[str], project: Project) -> str:
 
 
 def _verdicts(project: Project, words: list[str], *_: str) -> str:
-    """Return the verdicts with what decided them."""
     return overview(*_columns(project, words), Reader(project.archive))
 
 
@@ -157,9 +198,8 @@ def _sentences(project: Project, words: list[str], *_: str) -> str:
 
 
 def _readings(project: Project, words: list[str], *_: str) -> str:
-    """Return the readings of each sentence that a tier judges."""
     (reports,) = project.judge_variants([(_tier(project, words), "")])
-    return readings_table.readings(reports)
+    return verdict_overview.readings(reports)
 
 
 def _details(project: Project, words: list[str], *_: str) -> str:
@@ -172,7 +212,6 @@ def _details(project: Project, words: list[str], *_: str) -> str:
 
 
 def _refutations(project: Project, words: list[str], *_: str) -> str:
-    """Return which refuted claims of a tier have which other verdict under a variant."""
     rows, variants = _under_variants(project, _tier(project, words))
     refuted = [row for row in rows if row.plain is Outcome.REFUTED and row.hangs_on]
     others = [one for one in Outcome if any(row.outcomes[name] is one for row in refuted for name in row.hangs_on)]
@@ -220,9 +259,9 @@ _KINDS: Final[Mapping[str, Callable[[Project, list[str], str], str]]] = {
     "refutations": _refutations,
     "numbers": _numbers,
     "readings": _readings,
-    "uncovered": lambda project, *_: readings_table.without_claims(uncovered(project.reproduction.folder)),
+    "uncovered": lambda project, *_: verdict_overview.without_claims(uncovered(project.reproduction.folder)),
     "measures": lambda project, *_: vocabulary.measures(project.reproduction.trials),
     "assertions": lambda *_: vocabulary.assertions(),
-    "commands": lambda *_: commands.reference(),
+    "commands": lambda *_: reference(),
 }
 """What makes each kind of table, from the project, the words behind its name, and the table that was there before."""

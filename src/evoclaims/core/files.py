@@ -1,15 +1,22 @@
-"""Files that are whole or absent: written to a temporary file, flushed, then renamed; reading never blocks."""
+"""Files that are whole or absent: written to a temporary file, flushed, then renamed; reading never blocks.
+
+Files whose contents are run, such as compiled programs, are used only if no other user could have written them.
+"""
 
 from __future__ import annotations
 
 import contextlib
 import errno
+import hashlib
 import io
 import json
 import os
+import re
 import secrets
 import stat
+import warnings
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 from typing import Any, BinaryIO, Final
 
@@ -156,3 +163,95 @@ def _unwritten(path: Path, error: OSError, elsewhere: str) -> StorageError:
     """Return the error that says why a file was not written, and what to do."""
     way = f"Free some space, or {elsewhere}" if error.errno in _FULL else f"{elsewhere[0].upper()}{elsewhere[1:]}"
     return StorageError(f"Cannot write {path}: {error.strerror or error}. {way}")
+
+
+LONGEST: Final = 120
+"""Most characters in a name; file systems allow 255 bytes, and suffixes and temporary names need some."""
+
+_HASH_DIGITS: Final = 16
+_WORD: Final = r"[A-Za-z0-9_][A-Za-z0-9_.]*"
+_PLAIN: Final = re.compile(rf"{_WORD}(-[A-Za-z0-9_.-]+)?")
+
+
+def file_name(first: str, second: str = "") -> str:
+    """Return a name, without a suffix, for one text or two: "G1-n_parity" for "G1" and "n_parity".
+
+    A name that would be ambiguous (characters dropped, text cut short, or a dash in the first text) ends in "~" and
+    a hash of both texts; no other name contains a "~".
+    """
+    joined = f"{first}-{second}" if second else first
+    if "-" not in first and len(joined) <= LONGEST and _PLAIN.fullmatch(joined):
+        return joined
+    slug = re.sub(r"[^A-Za-z0-9_.-]+", "-", joined).strip("-.") or "_"
+    # The length of the first text says where it ends, so two pairs never hash the same text.
+    whole = f"{len(first)}:{first}{second}".encode("utf-8", errors="surrogatepass")
+    mark = f"~{hashlib.sha256(whole).hexdigest()[:_HASH_DIGITS]}"
+    return f"{slug[: LONGEST - len(mark)]}{mark}"
+
+
+class ForeignFileError(OSError):
+    """Another user may have written a file; the message is a clause that says why."""
+
+
+def make_private(folder: Path) -> None:
+    """Make a folder and its missing parents, into which only this user may write, whatever the umask.
+
+    Raises:
+        OSError: when one cannot be made.
+    """
+    for missing in reversed([one for one in (folder, *folder.parents) if not one.exists()]):
+        with contextlib.suppress(FileExistsError):  # another process was faster
+            missing.mkdir(mode=0o700)
+
+
+def doubt(folder: Path) -> str:
+    """Return a clause that says who else may write into a folder or exchange it, empty if only this user and root.
+
+    Access lists and the owners of the folders above are not looked at.
+
+    Raises:
+        OSError: when the folder is missing or cannot be looked at.
+    """
+    if clause := _doubt(os.stat(folder)):
+        return f"{folder} {clause}"
+    for above in Path(os.path.realpath(folder)).parents:
+        mode = os.stat(above).st_mode
+        # Everybody could rename what is in it, and put another folder into its place; not with the sticky bit of /tmp.
+        if mode & stat.S_IWOTH and not mode & stat.S_ISVTX and hasattr(os, "getuid"):
+            return f"{above} is writable by all users"
+    return ""
+
+
+def read_private(path: Path) -> bytes:
+    """Return the bytes of a regular file that only this user or root may have written.
+
+    Raises:
+        ForeignFileError: when another user owns it or may write it.
+        OSError: as `read_file` does.
+    """
+    with open_file(path) as file:
+        if clause := _doubt(os.fstat(file.fileno())):  # of the file that is read, whatever its name stands for by now
+            raise ForeignFileError(f"it {clause}")
+        return file.read()
+
+
+@cache
+def say_refused(path: Path, why: str) -> None:
+    """Warn, at most once in a process, that compiled programs are not used: `why` is a clause on who may write them."""
+    text = (
+        f"Not using compiled programs in {path}: {why}, who could run any program here. They are compiled again. "
+        "Use a cache folder that only you can write (XDG_CACHE_HOME), or remove the others' rights (chmod -R go-w)."
+    )
+    with contextlib.suppress(UserWarning):  # where warnings are errors: what is refused costs time alone
+        warnings.warn(text, stacklevel=3)
+
+
+def _doubt(status: os.stat_result) -> str:
+    """Return a clause that says why other users may have written a file or folder."""
+    if not hasattr(os, "getuid"):  # Windows has access lists instead
+        return ""
+    if status.st_uid not in (0, os.getuid()):
+        return f"belongs to another user (uid {status.st_uid})"
+    if status.st_mode & (stat.S_IWGRP | stat.S_IWOTH):
+        return f"is writable by other users (mode {stat.S_IMODE(status.st_mode):04o})"
+    return ""

@@ -15,7 +15,7 @@ from types import ModuleType
 from typing import Any, Final
 
 from evoclaims.core.canonical import content_hash, is_own
-from evoclaims.core.raised import PACKAGE_FOLDERS
+from evoclaims.core.errors import PACKAGE_FOLDERS
 
 CODE: Final = "code_hashes"
 """Key under which a trial's provenance has these hashes."""

@@ -10,8 +10,7 @@ from evoclaims.core.drawing import optional
 from evoclaims.figures import brackets
 from evoclaims.figures.brackets import PairTest
 from evoclaims.figures.readings import NOT_RUN, MeasureOf, Readings
-from evoclaims.figures.sheet import PanelRow, measured
-from evoclaims.figures.style import FAINT, INK, SMALL, TEXT, lighter
+from evoclaims.figures.sheet import FAINT, INK, SMALL, TEXT, PanelRow, lighter, measured
 from evoclaims.paper.reported import Reported
 
 GAP: Final = 0.7
@@ -222,7 +221,6 @@ _CROSS: Final = {"marker": "x", "markersize": 4.0, "markeredgewidth": 1.0, "colo
 
 
 def _paint_bar(axis: Any, filled: Filled, middle: float, width: float) -> None:
-    """Paint one bar with its dots, or the words "not run"."""
     readings, colour = filled.readings, filled.bar.series.colour
     if readings.values:
         style = {"facecolor": lighter(colour), "edgecolor": colour, "linewidth": 0.8, "zorder": 2}

@@ -12,7 +12,7 @@ from evoclaims.figures import bar_panel, brackets, sheet
 from evoclaims.figures.bar_panel import Bar, BarPanel, Filled, Measured, Series
 from evoclaims.figures.figure import Drawing, Heading, Scope
 from evoclaims.figures.readings import MeasureOf, absences, frame, read
-from evoclaims.figures.style import COLUMN, plain
+from evoclaims.figures.sheet import COLUMN, plain
 from evoclaims.paper.reported import Published
 
 PanelOf = Callable[[Scope], BarPanel]
@@ -124,7 +124,6 @@ def compared(
 
 
 def _success_at(level: int, group: Any) -> Any:
-    """Return the measure of success at a level."""
     return group.mean_success if group.condition.task.levels == 1 else group.success.at(level)
 
 

@@ -9,7 +9,7 @@ from typing import Any, Final
 
 from scipy.stats import kruskal, mannwhitneyu
 
-from evoclaims.figures.style import INK, TEXT
+from evoclaims.figures.sheet import INK, TEXT
 
 ASTERISKS: Final = ((0.0005, "***"), (0.005, "**"), (0.05, "*"))
 """The paper's thresholds: one, two and three asterisks for p below 0.05, 0.005 and 0.0005."""

@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 from evoclaims.core.errors import UserError
 from evoclaims.envs.ecorobot.maze import Maze
-from evoclaims.envs.ecorobot.views.painting import paint_elites, paint_ground
+from evoclaims.envs.ecorobot.views.pictures import paint_elites, paint_ground
 from evoclaims.figures import sheet
 from evoclaims.figures.figure import Drawing, Heading, Scope
 from evoclaims.figures.readings import MeasureOf, Readings, absences, frame, read
-from evoclaims.figures.style import FAINT, SMALL, TEXT, plain
+from evoclaims.figures.sheet import FAINT, SMALL, TEXT, plain
 from evoclaims.trials import champions
 
 LINE: Final = 0.12
@@ -85,7 +85,6 @@ class ElitesMap:
 
 
 def _task(scope: Scope, ground: Ground) -> Maze:
-    """Return the maze of a panel."""
     task = scope.tier.condition(ground.method, ground.task).task
     if not isinstance(task, Maze):
         raise UserError(f"A map of elites needs the area of a maze; {ground.task!r} is not a maze.")
@@ -132,7 +131,6 @@ def _paint(
 
 
 def _summary(readings: Readings) -> str:
-    """Return a measure of all trials in words."""
     if not readings.values:
         return "no values"
     spread = f" ± {_text(readings.deviation)}" if len(readings.values) > 1 else ""

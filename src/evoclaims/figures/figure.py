@@ -6,7 +6,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
+from evoclaims.core.errors import UnknownNameError, UserError
 from evoclaims.paper.archive import Archive
+from evoclaims.paper.config import import_module
 from evoclaims.paper.reproduction import Reproduction, Tier
 from evoclaims.paper.trial_group import TrialGroup
 from evoclaims.trials.result import TrialResult
@@ -121,3 +123,27 @@ class Figure:
         reproduction.tier(tier, variant)
         under = f", under {variant}" if variant else ""
         return self.paint(scope, Heading(self.title, f"{self.where} – {SIZES.get(tier, tier)}{under}"))
+
+
+def names(reproduction: Reproduction) -> tuple[str, ...]:
+    """Return the names of all figures, in the order of the paper."""
+    return tuple(module.rpartition(".")[2] for module in reproduction.figures)
+
+
+def load(reproduction: Reproduction, name: str) -> Figure:
+    """Return a figure by its name, that of its module.
+
+    Raises:
+        UnknownNameError: for another name; it lists the known ones.
+        UserError: when the module does not import, or holds no figure of this name.
+    """
+    if not reproduction.figures:
+        raise UserError(f"The reproduction {reproduction.name!r} names no figures: Reproduction(figures=...) is empty.")
+    modules = dict(zip(names(reproduction), reproduction.figures, strict=True))
+    if name not in modules:
+        raise UnknownNameError("figure", name, modules)
+    module = import_module(modules[name], reproduction.folder, f"the reproduction {reproduction.name!r}")
+    figure = getattr(module, "FIGURE", None)
+    if not isinstance(figure, Figure) or figure.name != name:
+        raise UserError(f"The module {modules[name]!r} has no FIGURE = Figure(name={name!r}, ...).")
+    return figure

@@ -12,7 +12,7 @@ from evoclaims.figures import sheet
 from evoclaims.figures.bar_panel import Series
 from evoclaims.figures.figure import Drawing, Heading, Scope
 from evoclaims.figures.readings import NOT_RUN, MeasureOf, Readings, absences, frame, read
-from evoclaims.figures.style import COLUMN, FAINT, SMALL, VERMILION, lighter, plain
+from evoclaims.figures.sheet import COLUMN, FAINT, SMALL, VERMILION, lighter, plain
 
 BINS: Final = 24
 HEIGHT: Final = 0.85

@@ -9,7 +9,7 @@ from typing import Any, Final
 from evoclaims.core.errors import UserError
 from evoclaims.figures import sheet
 from evoclaims.figures.figure import Drawing, Heading, Scope
-from evoclaims.figures.style import FAINT, INK, SMALL, TEXT, plain
+from evoclaims.figures.sheet import FAINT, INK, SMALL, TEXT, plain
 from evoclaims.paper.reported import Published
 from evoclaims.trials.spec import Condition
 

@@ -134,7 +134,6 @@ def absences(readings: Iterable[Readings]) -> tuple[str, ...]:
 
 
 def _reading(measure: Measure, seed: int, trial_id: str, trial: TrialResult | None) -> Reading:
-    """Read one trial."""
     if trial is None:
         return Reading(seed, trial_id, NOT_RUN, None, None)
     if trial.status == "crashed":  # an accident of the machine, which says nothing about the method
@@ -153,12 +152,10 @@ def _reading(measure: Measure, seed: int, trial_id: str, trial: TrialResult | No
 
 
 def _count(readings: Readings, status: str) -> int:
-    """Return how many trials have a status."""
     return sum(reading.status == status for reading in readings.each)
 
 
 def _name(readings: Readings) -> str:
-    """Return a condition's name."""
     return printable(f"{readings.method} on {readings.task}")
 
 

@@ -163,7 +163,6 @@ def _together(levels: Sequence[Replication]) -> Agreement:
 
 
 def _by_variant(found: Sequence[Replication]) -> Mapping[str, list[Replication]]:
-    """Return the numbers by variant."""
     by_variant: dict[str, list[Replication]] = {}
     for one in found:
         by_variant.setdefault(one.variant, []).append(one)

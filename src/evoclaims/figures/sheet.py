@@ -1,4 +1,4 @@
-"""The page of a figure: heading, legend, rows of panels, notes; sizes in inches, so that nothing is squeezed.
+"""The page of a figure (heading, legend, panels, notes; sizes in inches, so that all fits), and how figures look.
 
 Matplotlib's constrained layout divides a page of a given height among panels, and cannot wrap text into lines; here the
 page is as high as its contents.
@@ -7,13 +7,66 @@ page is as high as its contents.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, Final
 
-from evoclaims.core.drawing import optional
-from evoclaims.figures.figure import Heading
-from evoclaims.figures.style import FAINT, SMALL, TEXT, TITLE
+from evoclaims.core.drawing import Format, optional, own_style, saved
+from evoclaims.figures.figure import Drawing, Heading
+
+BLUE, SKY, GREEN, ORANGE, VERMILION, PURPLE, YELLOW = (
+    "#0072b2",
+    "#56b4e9",
+    "#009e73",
+    "#e69f00",
+    "#d55e00",
+    "#cc79a7",
+    "#f0e442",
+)
+"""The palette of Okabe and Ito (2008), which readers with any colour vision can tell apart."""
+INK, FAINT = "#222222", "#5f5f5f"
+TITLE, TEXT, SMALL = 8.5, 7.0, 6.5
+"""Sizes of letters, pt."""
+COLUMN: Final = 3.5
+"""Width of a column of a page, inches: the default width of a figure."""
+_SETTINGS: Final[dict[str, Any]] = {
+    "text.parse_math": False,  # dollar signs are plain text
+    "font.size": TEXT,
+    "text.color": INK,
+    "axes.edgecolor": INK,
+    "axes.labelcolor": INK,
+    "axes.linewidth": 0.6,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.titlesize": TEXT,
+    "axes.labelsize": TEXT,
+    "axes.formatter.limits": (-9, 9),
+    "xtick.labelsize": TEXT,
+    "ytick.labelsize": TEXT,
+    "xtick.major.width": 0.6,
+    "ytick.major.width": 0.6,
+    "xtick.major.size": 2.5,
+    "ytick.major.size": 2.5,
+    "legend.fontsize": TEXT,
+    "hatch.linewidth": 0.6,
+}
+
+
+def plain() -> AbstractContextManager[None]:
+    """Draw, or write, in this module's style.
+
+    Raises:
+        UserError: when matplotlib is not installed.
+    """
+    return own_style(**_SETTINGS)
+
+
+def lighter(colour: str) -> str:
+    """Return a colour mixed with as much white."""
+    channels = [int(colour[i : i + 2], 16) for i in (1, 3, 5)]
+    return "#" + "".join(f"{round((c + 255) / 2):02x}" for c in channels)
+
 
 LEFT, RIGHT, EDGE = 0.56, 0.1, 0.06
 LINE: Final = 1.3 / 72
@@ -126,8 +179,26 @@ def _columns(legend: Sequence[Any], room: float) -> int:
 
 
 def _write(figure: Any, lines: Sequence[str], left: float, top: float, size: float, **style: Any) -> None:
-    """Write lines of text, one below the other."""
     width, height = figure.get_size_inches()
     for number, line in enumerate(lines):
         y = 1 - (top + number * size * LINE) / height
         figure.text(left / width, y, line, fontsize=size, va="top", ha="left", **style)
+
+
+DOTS_PER_INCH = 220
+
+
+def svg(drawing: Drawing) -> str:
+    """Return the drawing as the text of an SVG file; words in it are text, and escaped."""
+    return _picture(drawing, "svg").decode()
+
+
+def contents(drawing: Drawing) -> dict[str, bytes]:
+    """Return the contents of the drawing's files by their endings: pictures, on white, and every number drawn."""
+    table: str = drawing.table.to_csv(index=False, lineterminator="\n")
+    return {"png": _picture(drawing, "png"), "svg": _picture(drawing, "svg"), "csv": table.encode()}
+
+
+def _picture(drawing: Drawing, file_format: Format) -> bytes:
+    with plain():
+        return saved(drawing.figure, file_format, drawing.title, dpi=DOTS_PER_INCH)

@@ -12,11 +12,29 @@ from typing import Any, ClassVar, NoReturn
 from evoclaims.core.errors import UserError
 from evoclaims.judging.design import Design, Look
 from evoclaims.judging.effect import a12, a12_interval, cliffs_delta
-from evoclaims.judging.entry import Entry
-from evoclaims.judging.multiplicity import smallest
+from evoclaims.judging.exact import smallest
 from evoclaims.judging.reading import TrialReading
 from evoclaims.judging.sample import Sample, Source, Trials
 from evoclaims.judging.verdict import Bound, Direction, Evidence, Interval, PValues
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A kind's entry in the vocabulary; each text is one or more sentences.
+
+    Attributes:
+        syntax: how it is written in a claim, where `a` and `b` are trials of a method on a task.
+        null: what is rejected for the claim to be supported, or why nothing is.
+        supported: when the claim is.
+        refuted: when the claim is, or is smaller than claimed.
+        source: where the test is published.
+    """
+
+    syntax: tuple[str, ...]
+    null: str
+    supported: str
+    refuted: str
+    source: str
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from itertools import pairwise
 from typing import Final
 
 from evoclaims.core.errors import UserError
-from evoclaims.judging.counting import MAX_TRIALS
+from evoclaims.judging.exact import MAX_TRIALS
 from evoclaims.judging.telescope import detectable_a12
 
 PAPER_TRIALS: Final = 10

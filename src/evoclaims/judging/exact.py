@@ -1,4 +1,8 @@
-"""What decides claims: the exact rank and binomial tests, and a bound for all pairs of trials. Float64 on the host."""
+"""What decides claims: the exact rank and binomial tests, and a bound for all pairs of trials. Float64 on the host.
+
+Counts are polynomials packed into one integer: with a base above every coefficient, adding and multiplying the packed
+integers adds and multiplies the polynomials (Kronecker's substitution); with Python's integers this is exact and fast.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +13,41 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Literal, get_args
 
-from evoclaims.judging.counting import Counts, digit_width
+MAX_TRIALS = 100
+"""Maximum trials per side for the exact counts (about a second at 100 against 100)."""
+
+
+def digit_width(total: int) -> int:
+    """Return the bits per digit for counts that add up to `total`."""
+    return total.bit_length() + 1
+
+
+@dataclass(frozen=True)
+class Counts:
+    """How many of equally likely cases have X = 0, 1, 2, ...
+
+    Attributes:
+        packed: the counts, `width` bits each.
+        width: see `digit_width`.
+        total: number of cases.
+    """
+
+    packed: int
+    width: int
+    total: int
+
+    @property
+    def largest(self) -> int:
+        """The largest possible X."""
+        return (self.packed.bit_length() - 1) // self.width
+
+    def tail(self, least: int) -> float:
+        """Return P(X >= least), for `least` from 0 to `largest`."""
+        # A number's remainder modulo its base minus one is the sum of its digits (here below the base minus one).
+        cases = (self.packed >> (self.width * least)) % ((1 << self.width) - 1)
+        # Division of Python integers rounds correctly, so 1 in 20 is the float 0.05 and compares equal to it.
+        return cases / self.total
+
 
 Alternative = Literal["greater", "less"]
 
@@ -144,3 +182,21 @@ def clopper_pearson(k: int, n: int, alpha: float = 0.05) -> tuple[float, float]:
 
     interval = binomtest(k, n).proportion_ci(confidence_level=1 - 2 * alpha, method="exact")
     return float(interval.low), float(interval.high)
+
+
+def holm(ps: Sequence[float]) -> tuple[float, ...]:
+    """Return the Holm-adjusted `ps`; rejecting those of at most alpha has the familywise error alpha."""
+    return _holm(tuple(ps)) if len(ps) else ()
+
+
+def smallest(ps: Sequence[float]) -> float:
+    """Return the smallest Holm-adjusted p, which is at most alpha if any is: the smallest times their number."""
+    return min(1.0, len(ps) * min(ps))
+
+
+@lru_cache(maxsize=1024)
+def _holm(ps: tuple[float, ...]) -> tuple[float, ...]:
+    """Return the adjusted p; cached, since statsmodels runs the garbage collector in every call (tens of ms)."""
+    from statsmodels.stats.multitest import multipletests  # takes a second: it imports pandas
+
+    return tuple(float(p) for p in multipletests(list(ps), method="holm")[1])

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evoclaims.judging.drift_report import FOUND, DriftRow
-from evoclaims.judging.multiplicity import holm
+from evoclaims.judging.exact import holm
 
 PERMUTATIONS: Final = 19_999
 """Fewest of a joint test, whose p is at least about 3 / 20,000; of many methods there are more."""

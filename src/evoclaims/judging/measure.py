@@ -12,7 +12,6 @@ from operator import and_
 from typing import NoReturn, TypeGuard
 
 from evoclaims.core.errors import UserError
-from evoclaims.judging.as_written import product
 from evoclaims.judging.assertion import Assertion
 from evoclaims.judging.kinds.band import Band
 from evoclaims.judging.kinds.equivalent import Equivalent
@@ -24,6 +23,7 @@ from evoclaims.judging.kinds.threshold import Threshold
 from evoclaims.judging.kinds.trend import Trend
 from evoclaims.judging.reading import EventReading, LevelsReading, NumberReading, comparable
 from evoclaims.judging.sample import UnreadableTrialError
+from evoclaims.judging.window import product
 from evoclaims.trials.result import TrialResult
 
 
@@ -89,7 +89,6 @@ class Measure(NumberReading):
         return SelfComparison(self)
 
     def _measure(self, other: object) -> Measure:
-        """Return `other`, which must be a measure."""
         if not isinstance(other, Measure):
             raise UserError(f"{self.describe()!r} is compared with {other!r}. Use another measure or a number.")
         return other
@@ -106,7 +105,6 @@ class Measure(NumberReading):
 
 
 def _is_number(value: object) -> TypeGuard[float]:
-    """Whether a value is a number, of Python or of numpy."""
     return isinstance(value, Real) and not isinstance(value, bool)
 
 

@@ -9,15 +9,15 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, partial
 from itertools import islice
+from math import comb
 from typing import Final
 
 import numpy as np
 
 from evoclaims.core.canonical import content_hash
 from evoclaims.judging.assertion import Assertion
-from evoclaims.judging.counting import MAX_TRIALS
 from evoclaims.judging.design import Design, Look
-from evoclaims.judging.exact import clopper_pearson
+from evoclaims.judging.exact import MAX_TRIALS, binomial_test, clopper_pearson
 from evoclaims.judging.judge import decide
 from evoclaims.judging.sample import Source, Trials, UnreadableTrialError, checked
 from evoclaims.judging.verdict import Outcome
@@ -154,3 +154,28 @@ def _needed(assertion: Assertion, design: Design, draws: Draws, found: Power) ->
             if suffices(upper):
                 break
     return lower + 1 + bisect_left(range(lower + 1, upper), True, key=suffices)
+
+
+RATES: Final = (0.8, 0.9, 0.95)
+"""Rates of an event for which its power is shown."""
+
+
+def event_power(looks: Sequence[Look], p0: float, rate: float) -> float:
+    """Return the probability that an event with this rate is supported in most trials (against `p0`).
+
+    Exact: a look that supports or refutes ends it, others leave it open.
+    """
+    open_, before, supported = {0: 1.0}, 0, 0.0
+    for look in looks:
+        more, grown = look.n - before, dict[int, float]()
+        for held, chance in open_.items():
+            for k in range(more + 1):
+                grown[held + k] = grown.get(held + k, 0.0) + chance * comb(more, k) * rate**k * (1 - rate) ** (more - k)
+        open_ = {}
+        for held, chance in grown.items():
+            if binomial_test(held, look.n, p0, "greater").p <= look.alpha:
+                supported += chance
+            elif binomial_test(held, look.n, p0, "less").p > look.alpha:
+                open_[held] = chance
+        before = look.n
+    return supported

@@ -16,8 +16,7 @@ from typing import Final
 
 from scipy.stats import t as student
 
-from evoclaims.judging.counting import MAX_TRIALS
-from evoclaims.judging.exact import binomial_test
+from evoclaims.judging.exact import MAX_TRIALS, binomial_test
 from evoclaims.judging.telescope import POWER, detectable_a12
 
 LEVEL: Final = 0.95

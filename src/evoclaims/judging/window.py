@@ -5,10 +5,26 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from decimal import Decimal
 from typing import Final
 
 from evoclaims.core.errors import UserError
-from evoclaims.judging.as_written import product
+
+
+def product(factor: float, value: float) -> float:
+    """Return the product: 0.1 times 3 is 0.3."""
+    return float(_written(factor) * _written(value))
+
+
+def total(value: float, other: float) -> float:
+    """Return the sum: 0.1 and 0.2 make 0.3."""
+    return float(_written(value) + _written(other))
+
+
+def _written(value: float) -> Decimal:
+    """Return the shortest decimal number that is read as this float."""
+    return Decimal(repr(float(value)))
+
 
 _ROUNDING: Final = 1e-9
 """A share of a step that floating-point numbers may be off by."""

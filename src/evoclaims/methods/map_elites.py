@@ -271,7 +271,6 @@ def beaten(cell: Int[Array, " batch"], fitness: Float[Array, " batch"]) -> Bool[
 
 
 def _mapped(task: Task) -> MappedTask:
-    """Return the task as one with an area."""
     if not isinstance(task, MappedTask):
         raise UserError(
             f"MAP-Elites maps where episodes end, and the task {task.name!r} has no area to map; use a task with "

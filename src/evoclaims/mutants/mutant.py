@@ -6,14 +6,17 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Final
 
+from evoclaims.core.errors import UserError
 from evoclaims.envs.gates.circuit import Circuit
 from evoclaims.methods.cma_es import CmaEs
 from evoclaims.methods.map_elites import MapElites
 from evoclaims.methods.training_loop import TrainingLoop
-from evoclaims.mutants import of_methods, of_tasks
-from evoclaims.mutants.planting import Fault, plant
-from evoclaims.paper.variant import Conditions, Names
+from evoclaims.mutants import faults
+from evoclaims.mutants.faults import Fault, plant
+from evoclaims.paper.config import import_module
+from evoclaims.paper.reproduction import Conditions, Names, Reproduction
 from evoclaims.trials.spec import Condition
+from evoclaims.verdicts.claim_report import ClaimReport
 from evoclaims.verdicts.mutation_matrix import Part
 
 
@@ -76,25 +79,72 @@ def _staying(one: Condition) -> Condition | None:
     """Training and examinations that stay at the first level of several."""
     if one.task.levels == 1:
         return None
-    faulty: Any = plant(of_tasks.StaysAtFirstLevel, one.task)
+    faulty: Any = plant(faults.StaysAtFirstLevel, one.task)
     return replace(one, task=faulty)
 
 
 MUTANTS: Final[Mapping[str, Mutant]] = {
-    "learns-nothing": of_method(of_methods.LearnsNothing),
-    "minimizes": of_method(of_methods.Minimizes),
-    "selects-at-random": of_method(of_methods.SelectsAtRandom),
-    "forgets-champion": of_method(of_methods.ForgetsChampion),
-    "one-seed": of_method(of_methods.HasOneSeed),
-    "fixed-step-size": of_method(of_methods.KeepsItsStepSize, CmaEs),
+    "learns-nothing": of_method(faults.LearnsNothing),
+    "minimizes": of_method(faults.Minimizes),
+    "selects-at-random": of_method(faults.SelectsAtRandom),
+    "forgets-champion": of_method(faults.ForgetsChampion),
+    "one-seed": of_method(faults.HasOneSeed),
+    "fixed-step-size": of_method(faults.KeepsItsStepSize, CmaEs),
     "random-archive": with_method("varies no elite", lambda method: replace(method, initial=2**30), MapElites),
-    "blind": of_task(of_tasks.Blind),
-    "paralysed": of_task(of_tasks.Paralysed),
-    "pays-nothing": of_task(of_tasks.PaysNothing),
-    "reverses-rewards": of_task(of_tasks.ReversesReward),
-    "pays-at-random": of_task(of_tasks.PaysAtRandom),
-    "first-level-only": _where_compiled(Mutant(of_tasks.StaysAtFirstLevel.says, "task", _staying)),
-    "ignores-an-input": of_task(of_tasks.IgnoresAnInput, Circuit),
-    "wrong-row": of_task(of_tasks.HasAWrongRow, Circuit),
+    "blind": of_task(faults.Blind),
+    "paralysed": of_task(faults.Paralysed),
+    "pays-nothing": of_task(faults.PaysNothing),
+    "reverses-rewards": of_task(faults.ReversesReward),
+    "pays-at-random": of_task(faults.PaysAtRandom),
+    "first-level-only": _where_compiled(Mutant(faults.StaysAtFirstLevel.says, "task", _staying)),
+    "ignores-an-input": of_task(faults.IgnoresAnInput, Circuit),
+    "wrong-row": of_task(faults.HasAWrongRow, Circuit),
 }
 """Faults that any paper's methods and tasks may have; a reproduction may declare further ones."""
+
+
+def load(reproduction: Reproduction) -> Mapping[str, Mutant]:
+    """Return all mutants by name, the reproduction's own last.
+
+    Raises:
+        UserError: when the module of its own does not import, holds no mutants, or one of another's name.
+    """
+    if not reproduction.mutants:
+        return MUTANTS
+    module = import_module(reproduction.mutants, reproduction.folder, f"the reproduction {reproduction.name!r}")
+    own = getattr(module, "MUTANTS", None)
+    if not isinstance(own, Mapping) or not all(isinstance(one, Mutant) for one in own.values()):
+        raise UserError(f"The module {reproduction.mutants!r} has no MUTANTS = {{name: Mutant(...), ...}}.")
+    taken = sorted(own.keys() & MUTANTS.keys())
+    if taken:
+        raise UserError(f"The module {reproduction.mutants!r} has a mutant called {taken[0]!r}, as every paper has.")
+    return {**MUTANTS, **own}
+
+
+@dataclass(frozen=True)
+class Planted:
+    """A fault in one method, or one task, of a tier, with the faulty conditions."""
+
+    mutant: str
+    part: Part
+    target: str
+    conditions: Conditions
+
+    @property
+    def name(self) -> str:
+        """A name such as "cma_es: minimizes"."""
+        return f"{self.target}: {self.mutant}"
+
+    def touching(self, report: ClaimReport) -> tuple[Names, ...]:
+        """Return the faulty conditions that a claim is about, by the names under which it asks for them."""
+        asked = {(source.method, source.task) for source in report.sources}
+        return tuple(names for names in self.conditions if names in asked)
+
+
+def plantings(sound: Conditions, mutants: Mapping[str, Mutant]) -> tuple[Planted, ...]:
+    """Return every fault in every method or task that it can be planted in."""
+    return tuple(
+        Planted(name, mutant.part, target, mutant.conditions(sound, target))
+        for name, mutant in mutants.items()
+        for target in mutant.targets(sound)
+    )

@@ -8,11 +8,10 @@ from functools import cache
 
 from evoclaims.judging.drift import ALPHA, DriftCase, check_drift
 from evoclaims.judging.verdict import Outcome
-from evoclaims.mutants.conditions import Planted
+from evoclaims.mutants.mutant import Planted
 from evoclaims.paper.archive import Archive
 from evoclaims.paper.references import METRICS, load, path_of
-from evoclaims.paper.reproduction import Reproduction
-from evoclaims.paper.variant import Names, Variant
+from evoclaims.paper.reproduction import Names, Reproduction, Variant
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.spec import Condition
 from evoclaims.verdicts.claim_report import ClaimReport
@@ -62,7 +61,6 @@ class Comparison:
         return check_drift([case], ALPHA / max(1, len(self.used))).drifted
 
     def _sound(self, names: Names) -> Condition:
-        """Return a condition without a fault."""
         return self.reproduction.tier(self.tier).condition(*names)
 
     def _trials(self, condition: Condition) -> tuple[TrialResult | None, ...]:

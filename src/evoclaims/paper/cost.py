@@ -22,8 +22,7 @@ import numpy as np
 from evoclaims.core.errors import UserError
 from evoclaims.core.provenance import machine_class
 from evoclaims.paper import references
-from evoclaims.paper.reproduction import Reproduction
-from evoclaims.paper.variant import Names
+from evoclaims.paper.reproduction import Names, Reproduction
 from evoclaims.trials.batches import StoredTrials
 from evoclaims.trials.devices import layout_on, usable_cores
 from evoclaims.trials.lanes import Lanes
@@ -279,5 +278,4 @@ def _best(batches: Sequence[Batch], condition: Condition) -> Batch | None:
 
 
 def _cost(batch: Batch, condition: Condition, trials: int, basis: Basis) -> Cost:
-    """Return what so many trials of a condition cost by a batch."""
     return Cost(batch.compile, batch.work(condition, trials), trials, batch.layout, basis)

@@ -140,7 +140,6 @@ def _kept(trial: TrialResult, readings: Iterable[TrialReading]) -> TrialResult:
 
 
 def _result(shared: _Shared, trial: _Trial) -> TrialResult:
-    """Return a line as a trial."""
     spec = {**shared.spec, "seed": trial.seed}
     return TrialResult(
         id=content_hash(spec),
@@ -159,5 +158,4 @@ def _own(trial: TrialResult | _Trial) -> dict[str, Any]:
 
 
 def _fail(path: Path, why: str) -> NoReturn:
-    """Raise the error of a file that is no pilot."""
     raise UserError(f"{path} is not a pilot: {printable(why).removesuffix('.')}. {_MEND}")

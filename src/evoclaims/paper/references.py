@@ -15,11 +15,10 @@ from evoclaims.core.provenance import what_fixes_bits
 from evoclaims.judging.drift import DriftCase, check_drift
 from evoclaims.judging.drift_report import DriftReport
 from evoclaims.judging.tripwire import DigestCheck, compare_digests
+from evoclaims.trials.failed import is_final
 from evoclaims.trials.result import TrialResult
-from evoclaims.trials.result_codec import dump, parse
-from evoclaims.trials.result_schema import RecordError
+from evoclaims.trials.result_codec import RecordError, dump, parse
 from evoclaims.trials.spec import Condition
-from evoclaims.trials.time_limit import is_final
 
 METRICS = ("mean_success", "last_fitness", "environment_steps")
 """Metrics that the drift check compares besides what claims read: final success, final reward, environment steps."""

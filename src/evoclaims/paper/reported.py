@@ -9,8 +9,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final, TypeGuard
 
+from msgspec import ValidationError, convert
+
 from evoclaims.core.errors import UserError, require_known
-from evoclaims.core.files import read_text
+from evoclaims.core.files import read_file, read_text
 
 FILE: Final = "reported.toml"
 """Name of the file in a reproduction's folder."""
@@ -138,5 +140,41 @@ def _is_plot(plot: Any) -> bool:
 
 
 def _are_numbers(found: Any) -> TypeGuard[list[float]]:
-    """Whether something is a list of numbers."""
     return isinstance(found, list) and all(isinstance(one, int | float) for one in found)
+
+
+SENTENCES_FILE: Final = "sentences.toml"
+
+
+@dataclass(frozen=True)
+class Uncovered:
+    """A sentence without a claim: its line in the paper's source, its words, and why no claim judges it."""
+
+    line: int
+    says: str
+    because: str
+
+
+@dataclass(frozen=True)
+class _File:
+    """The whole file."""
+
+    sentence: tuple[Uncovered, ...]
+
+
+def uncovered(folder: Path) -> tuple[Uncovered, ...]:
+    """Return the sentences without a claim, in the paper's order; none without a file of them.
+
+    Raises:
+        UserError: when the file cannot be read.
+    """
+    path = folder / SENTENCES_FILE
+    if not path.exists():
+        return ()
+    try:
+        found = convert(tomllib.loads(read_file(path).decode()), _File).sentence
+    except (OSError, ValueError, ValidationError) as error:
+        raise UserError(
+            f"Cannot read {path}: {error}. Each [[sentence]] has line (a number), says and because."
+        ) from error
+    return tuple(sorted(found, key=lambda one: one.line))

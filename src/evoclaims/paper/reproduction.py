@@ -6,16 +6,74 @@ from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 from evoclaims.core.errors import UnknownNameError, UserError, require_known
 from evoclaims.core.tiers import TIERS
 from evoclaims.judging.design import Design
-from evoclaims.paper.null_agent import NullAgent
 from evoclaims.paper.reported import FILE, Published, load_published
 from evoclaims.paper.trial_group import TrialGroup
-from evoclaims.paper.variant import Conditions, Names, Variant
 from evoclaims.trials.imported import Imported
 from evoclaims.trials.spec import Condition
+
+Names = tuple[str, str]
+"""A method and a task, as claims name them."""
+
+Conditions = Mapping[Names, Condition]
+
+
+@dataclass(frozen=True)
+class Variant:
+    """The same claims, judged from trials that differ in one detail.
+
+    Attributes:
+        says: the detail, in a sentence.
+        conditions: by tier, the conditions that the detail changes; all others stay as they are.
+    """
+
+    says: str
+    conditions: Mapping[str, Conditions]
+
+
+def changed(conditions: Conditions, change: Callable[[str, str, Condition], Any]) -> dict[Names, Condition]:
+    """Return the new conditions where `change(method, task, condition)` returns a different one.
+
+    `change` returns a condition, or None where the detail does not matter.
+    """
+    found = {names: change(*names, condition) for names, condition in conditions.items()}
+    return {names: new for names, new in found.items() if new is not None and new.id != conditions[names].id}
+
+
+Numbers = Mapping[str, Mapping[str, Any]]
+"""What a record has in each of its parts (metrics, levels, curves), by name."""
+
+
+@dataclass(frozen=True)
+class NullAgent:
+    """Something that has not learnt what claims are about, such as a robot that takes no action.
+
+    An assertion that its trials satisfy is vacuous. It has numbers of its own, or the trials of a method.
+
+    Attributes:
+        says: what it is, in a few words.
+        numbers: returns the numbers of its trials of a condition; None where it cannot stand for one.
+        method: a method of the same tier whose committed trials on the same task are its trials.
+        everywhere: it stands for every condition of an assertion at once, as a counter at its limit does; else also for
+            the claimed ones alone (see `claims.null_agents`).
+
+    Raises:
+        UserError: when it has both or neither.
+    """
+
+    says: str
+    numbers: Callable[[Condition], Numbers | None] | None = None
+    method: str = ""
+    everywhere: bool = False
+
+    def __post_init__(self) -> None:
+        """Check that it has trials of one kind."""
+        if (self.numbers is None) == (not self.method):
+            raise UserError(f"The null agent {self.says!r} needs either numbers=... or method=..., and not both.")
 
 
 class OtherTierError(UnknownNameError):

@@ -66,7 +66,7 @@ def is_ordered(config: pytest.Config) -> bool:
 
 def in_order(items: list[pytest.Item], load: Workload) -> list[pytest.Item]:
     """Return tests in the order for one process: the claims change places among themselves, all others stay."""
-    from evoclaims.claims.order import Order
+    from evoclaims.claims.workload import Order
 
     order, claims = Order[str](load, 1), dict[str, pytest.Item]()
     first = {id(claims.setdefault(item.nodeid, item)) for item in items if item.nodeid in load.claims}

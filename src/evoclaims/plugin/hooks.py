@@ -5,7 +5,10 @@ Nothing heavy is imported here at the top: pytest loads this file in every run o
 
 from __future__ import annotations
 
+import inspect
+import os
 import signal
+import unittest
 from collections.abc import Callable, Generator
 from typing import TYPE_CHECKING, Any
 
@@ -15,26 +18,87 @@ from evoclaims.core.errors import UserError
 from evoclaims.core.tiers import TIERS
 from evoclaims.plugin import options
 from evoclaims.plugin.distribution import Distribution, prepare
+from evoclaims.plugin.options import import_from_root, make_session
 from evoclaims.plugin.options import pytest_addoption as pytest_addoption
 from evoclaims.plugin.outcomes import VERDICTS
 from evoclaims.plugin.outcomes import pytest_report_teststatus as pytest_report_teststatus
 from evoclaims.plugin.outcomes import pytest_runtest_call as pytest_runtest_call
 from evoclaims.plugin.outcomes import pytest_runtest_makereport as pytest_runtest_makereport
 from evoclaims.plugin.outcomes import pytest_runtest_setup as pytest_runtest_setup
-from evoclaims.plugin.overlooked import pytest_pycollect_makeitem as pytest_pycollect_makeitem
-from evoclaims.plugin.own_gpu import pytest_load_initial_conftests as pytest_load_initial_conftests
-from evoclaims.plugin.own_gpu import pytest_xdist_auto_num_workers as pytest_xdist_auto_num_workers
 from evoclaims.plugin.progress import QUIET, ProgressLine, progress_of
-from evoclaims.plugin.run_session import import_from_root, make_session
 from evoclaims.plugin.summary import KNOWN, TROUBLE, Summary
-from evoclaims.trials.allowance import end_without
-from evoclaims.trials.stopping import interrupted_by
+from evoclaims.trials.gpus import environment_of_worker, gpus
+from evoclaims.trials.stopping import end_without, interrupted_by
 
 if TYPE_CHECKING:
     from evoclaims.claims.collected import ClaimTest
     from evoclaims.claims.session import Verdicts
     from evoclaims.paper.trial_group import TrialGroup
     from evoclaims.verdicts.claim_report import ClaimReport
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_pycollect_makeitem(collector: pytest.Module | pytest.Class, name: str, obj: object) -> None:
+    """Refuse a claim on a function, or in a class, that pytest does not collect under the run's settings."""
+    if inspect.isclass(obj):
+        if any(map(_is_claim, vars(obj).values())) and _is_left_out(collector, name, obj):
+            begun = " or ".join(collector.config.getini("python_classes"))
+            raise collector.CollectError(
+                f"{collector.nodeid}: the class {name} has a function with @claim(...), and pytest takes none of this "
+                f"name for one of tests, so that its claim would never be judged: begin its name with {begun}."
+            )
+        return
+    if not inspect.isfunction(obj) or collector.funcnamefilter(name):
+        return
+    if _is_claim(obj):
+        begun = " or ".join(collector.config.getini("python_functions"))
+        raise collector.CollectError(
+            f"{collector.nodeid}: the function {name} has @claim(...), and pytest takes none of this name for a test, "
+            f"so that its claim would never be judged: begin its name with {begun}."
+        )
+
+
+def _is_claim(obj: object) -> bool:
+    """Whether something in a module or a class is a function with @claim(...)."""
+    return inspect.isfunction(obj) and any(mark.name == "claim" for mark in getattr(obj, "pytestmark", ()))
+
+
+def _is_left_out(collector: pytest.Module | pytest.Class, name: str, one: type) -> bool:
+    """Whether pytest collects no tests from a class that was written here: neither its own nor as those of an heir."""
+    return (
+        one.__module__ == collector.module.__name__
+        and getattr(one, "__test__", True)
+        and not collector.classnamefilter(name)
+        and not issubclass(one, unittest.TestCase)
+        and not one.__subclasses__()
+    )
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_load_initial_conftests(early_config: pytest.Config) -> None:
+    """Let a worker of a project with claims see its GPU alone, before anything can import jax; options are parsed."""
+    environment = environment_of_worker(early_config.known_args_namespace.claims_device, os.environ)
+    if environment and _has_claims(early_config):
+        os.environ.update(environment)
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_auto_num_workers(config: pytest.Config) -> int | None:
+    """Return how many workers `-n auto` means in a project with claims: one for each GPU; None without GPUs."""
+    found = gpus(config.getoption("claims_device"))
+    return len(found) if found and _has_claims(config) else None
+
+
+def _has_claims(config: pytest.Config) -> bool:
+    """Whether the project is one with claims: other projects that have evoclaims installed are left alone."""
+    from evoclaims.paper.config import load_config
+
+    try:
+        load_config(config.rootpath)
+    except UserError:
+        return False
+    return True
+
 
 _ended: pytest.StashKey[pytest.Session] = pytest.StashKey()
 

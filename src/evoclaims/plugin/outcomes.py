@@ -12,16 +12,40 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from evoclaims.core.errors import UserError
+from evoclaims.core.errors import UserError, in_one_line, is_in_project
 from evoclaims.core.printable import shown
-from evoclaims.core.raised import in_one_line
-from evoclaims.plugin.run_session import make_session
+from evoclaims.plugin.options import make_session
 from evoclaims.plugin.summary import ATTRIBUTE
-from evoclaims.plugin.tracebacks import shortened
 
 if TYPE_CHECKING:
     from evoclaims.claims.session import Verdicts
     from evoclaims.verdicts.claim_report import ClaimReport
+
+
+def shortened(excinfo: pytest.ExceptionInfo[BaseException], item: pytest.Item) -> Any:
+    """Return how pytest shows an exception, without the frames of other files before the project's last one.
+
+    None where only one of the project's files, the claim's, is among the frames: the error may be of evoclaims, and all
+    that pytest shows stays. So it does with --full-trace, and without pytest's terminal, which defines how it is shown.
+    """
+    if not item.config.pluginmanager.has_plugin("terminal"):
+        return None
+    root, style = item.config.rootpath, item.config.getoption("tbstyle")
+    files = {entry.path for entry in excinfo.traceback if is_in_project(Path(entry.path), root)}
+    if item.config.getoption("fulltrace") or len(files) < 2:
+        return None
+
+    def kept(info: pytest.ExceptionInfo[BaseException]) -> Any:
+        """Return the frames to show, also of an exception that caused this one."""
+        entries = list(info.traceback)
+        of_project = [place for place, entry in enumerate(entries) if is_in_project(Path(entry.path), root)]
+        last = of_project[-1] if of_project else 0
+        shown = {id(entry) for place, entry in enumerate(entries) if place in of_project or place >= last}
+        return info.traceback.filter(lambda entry: id(entry) in shown)
+
+    showlocals = item.config.getoption("showlocals")
+    return excinfo.getrepr(style="long" if style == "auto" else style, showlocals=showlocals, tbfilter=kept)
+
 
 VERDICTS: pytest.StashKey[Verdicts] = pytest.StashKey()
 """Under which a claim's test keeps what its fixture `verdict` has judged."""
@@ -128,7 +152,6 @@ def _give_outcome(
     report: pytest.TestReport,
     claimed: ClaimReport,
 ) -> None:
-    """Turn the outcome of a test into that of its claim."""
     vars(report).pop("wasxfail", None)  # only expect=... accepts a verdict, and no mark of pytest's
     sentence = f"{claimed.name} ({claimed.tier}) is {claimed.outcome}: {claimed.reason}"
     undecided = claimed.outcome == "inconclusive" and item.config.getoption("claims_undecided") == "fail"
@@ -163,7 +186,7 @@ def _claim_report(
     """Return the report of a claim test: its verdict, the error that prevented one, or why it was skipped."""
     from evoclaims.claims.claim import expectation_of
     from evoclaims.claims.collected import ClaimTest
-    from evoclaims.claims.reporting import unjudged
+    from evoclaims.claims.session import unjudged
     from evoclaims.judging.verdict import Outcome
 
     test, verdicts = ClaimTest.of(item), item.stash.get(VERDICTS, None)

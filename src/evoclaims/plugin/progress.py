@@ -13,8 +13,7 @@ from typing import TYPE_CHECKING, Any, Final
 import pytest
 
 if TYPE_CHECKING:
-    from evoclaims.claims.overview import Watching
-    from evoclaims.claims.workload import Workload
+    from evoclaims.claims.workload import Watching, Workload
     from evoclaims.report.live_line import LiveLine
     from evoclaims.trials.progress import RunProgress
 
@@ -47,7 +46,7 @@ class ProgressLine:
 
         A run that takes hours on a processor is announced beforehand.
         """
-        from evoclaims.claims.overview import Watching
+        from evoclaims.claims.workload import Watching
         from evoclaims.report.live_line import beforehand
 
         if notice := beforehand(load):

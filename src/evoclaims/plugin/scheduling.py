@@ -1,4 +1,4 @@
-"""How xdist gives claims to its workers: one ahead of the one that runs, in the order of `claims.order`."""
+"""How xdist gives claims to its workers: one ahead of the one that runs, in the order of `claims.workload`."""
 
 from __future__ import annotations
 
@@ -7,8 +7,7 @@ from typing import Any
 import pytest
 from xdist.scheduler import LoadScheduling
 
-from evoclaims.claims.order import Order
-from evoclaims.claims.workload import Workload
+from evoclaims.claims.workload import Order, Workload
 
 LOAD: pytest.StashKey[Workload] = pytest.StashKey()
 """Where xdist's controller keeps what its workers have to do."""

@@ -15,7 +15,7 @@ import pytest
 from evoclaims.core.errors import UserError
 from evoclaims.core.printable import shown, spelled
 from evoclaims.core.tiers import TIERS
-from evoclaims.plugin.run_session import make_session
+from evoclaims.plugin.options import make_session
 
 if TYPE_CHECKING:
     from evoclaims.judging.drift_report import DriftReport
@@ -107,7 +107,7 @@ class Summary:
 
     def _last_runs(self) -> list[ClaimReport]:
         """Return one report for each claim: of its last run, whatever ran it again."""
-        from evoclaims.verdicts.repeated_runs import last_runs
+        from evoclaims.verdicts.history import last_runs
 
         known, last = self.reports, last_runs(self.reports)
         for at, report in enumerate(last):
@@ -133,7 +133,6 @@ class Summary:
             self._regression = regression(folder, self.reports, self._config.getoption("claims_compare_fail"))
 
     def _status(self) -> pytest.ExitCode:
-        """Return the exit status of a run in which no test failed."""
         unjudged = self.reports and not self._judged
         if (
             self._troubles
@@ -162,7 +161,7 @@ class Summary:
                 terminalreporter.write_line(self._safe(self._choices()), yellow=True)
             return
         from evoclaims.report import table_cells, terminal_table
-        from evoclaims.report.closing_lines import without_smoke_test
+        from evoclaims.report.run_summary import without_smoke_test
 
         writer = self._config.get_terminal_writer()
         width, colour = writer.fullwidth, writer.hasmarkup
@@ -198,7 +197,7 @@ class Summary:
 
     def _closing_lines(self) -> list[str]:
         """Return what failed, what changed, and what to do next."""
-        from evoclaims.report.closing_lines import closing_lines
+        from evoclaims.report.run_summary import closing_lines
 
         changed = None
         if self._regression and self._regression.transitions:
@@ -226,7 +225,6 @@ class Summary:
         return f" by {' with '.join(options)}{two}" if options else ""
 
     def _safe(self, text: str) -> str:
-        """Return a line that is safe for the terminal."""
         return self._drawn(shown(text))
 
     def _drawn(self, text: str) -> str:
@@ -242,7 +240,7 @@ class Summary:
     def _notes(self) -> list[str]:
         """Return lines on what comparisons found: with reference trials, trials of other versions, and verdicts."""
         from evoclaims.report import terminal_table
-        from evoclaims.verdicts.repeated_runs import changed_by_repetition
+        from evoclaims.verdicts.history import changed_by_repetition
         from evoclaims.verdicts.upgrade import verdict_changes
 
         notes = [line for report in self.reports if (line := changed_by_repetition(report))]
@@ -263,7 +261,7 @@ class Summary:
             return {}
         from evoclaims.verdicts.acceptance import entry_of
         from evoclaims.verdicts.history import key_of
-        from evoclaims.verdicts.reasons import reason
+        from evoclaims.verdicts.regression import reason
 
         judged_from = make_session(self._config).judged_from
         judged = {key_of(report): report for report in self.reports if report.n}

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 
-from evoclaims.paper.null_agent import NullAgent
-from evoclaims.paper.uncovered import Uncovered
+from evoclaims.paper.reported import Uncovered
+from evoclaims.paper.reproduction import NullAgent
 from evoclaims.report import replication_cells, table_cells
 from evoclaims.report.formatting import plural
 from evoclaims.report.tally import tally

@@ -10,8 +10,7 @@ from typing import Final
 from evoclaims.core.printable import printable
 from evoclaims.judging.verdict import Outcome
 from evoclaims.report import table_cells
-from evoclaims.verdicts.claim_report import ClaimReport
-from evoclaims.verdicts.sensitivity import Tally
+from evoclaims.verdicts.claim_report import ClaimReport, Tally
 
 GREEN, BLUE, RED, ORANGE, GREY = "#2e7d32", "#1565c0", "#c62828", "#a04000", "#616161"
 _NARROW: Final = frozenset("fijlrtI.,:;|!'()[]{}/ ")

@@ -13,16 +13,16 @@ from evoclaims.judging.design import Design
 from evoclaims.judging.verdict import Outcome
 from evoclaims.paper.archive import Archive
 from evoclaims.paper.reproduction import Reproduction
-from evoclaims.report import audit, origin, replication_cells, table_cells, training_curves
+from evoclaims.report import audit, replication_cells, table_cells, training_curves, trial_summary
+from evoclaims.report.across import timeline_chart
 from evoclaims.report.champion import Draw, champion_of, network
-from evoclaims.report.charts_of_verdicts import timeline_chart
 from evoclaims.report.evidence import Part, judged_parts, unjudged_part
 from evoclaims.report.fault_grid import fault_grid
 from evoclaims.report.formatting import Anchors, clean, counted, listed, places, plural
 from evoclaims.report.model import Board, ConditionTrials, Page, Section, ShownChampion
 from evoclaims.report.trial_summary import Reader, TrialSummary
 from evoclaims.trials.store import Store
-from evoclaims.verdicts import edited_code
+from evoclaims.verdicts import other_code
 from evoclaims.verdicts.claim_report import ClaimReport
 from evoclaims.verdicts.history import AcceptedVerdict, History, eras, key_of
 from evoclaims.verdicts.mutation_matrix import Matrix, described
@@ -83,7 +83,6 @@ def gather(
 
 
 def _notices(boards: Sequence[Board], reader: Reader) -> list[str]:
-    """Return notices about the whole report."""
     sections = [section for board in boards for section in board.sections]
     notices = []
     if not sections:
@@ -137,7 +136,7 @@ class _Gathering:
             made=made,
             warnings=(
                 *_broken(every),
-                *origin.warnings(made),
+                *trial_summary.warnings(made),
                 *_edited(report),
                 *_overspent(report),
                 *filter(None, [failing]),
@@ -186,7 +185,7 @@ def _overspent(report: ClaimReport) -> tuple[str, ...]:
 
 def _edited(report: ClaimReport) -> list[str]:
     """Return a sentence for each method or task that was edited after trials of a claim had run."""
-    lines = [clean(edited_code.summary(name)) for name in edited_code.edited(report)]
+    lines = [clean(other_code.summary(name)) for name in other_code.edited(report)]
     return [f"{words[0].upper()}{words[1:]}." for words in lines]
 
 
@@ -219,7 +218,6 @@ def _broken(trials: Sequence[TrialSummary]) -> tuple[str, ...]:
 
 
 def _in_words(design: Design) -> str:
-    """Return a design in a sentence."""
     looks = ", then ".join(f"{look.n} trials a side at α = {look.alpha:g}" for look in design.looks)
     return (
         f"Looks at {looks}; seeds from {design.first_seed} up; p0 = {design.p0:g} for “most trials”; "
@@ -240,7 +238,6 @@ def _flat(plain: Mapping[str, Any], prefix: str = "") -> tuple[tuple[str, str], 
 
 
 def _setting(value: Any) -> str:
-    """Return one setting as text."""
     if isinstance(value, list):
         return listed(map(_setting, value), most=20) or "none"
     return "–" if value is None else clean(value)

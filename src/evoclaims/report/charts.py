@@ -301,3 +301,57 @@ def _svg(width: float, height: float, pieces: Sequence[Markup], name: str) -> Ma
     role = Markup('role="img" aria-label="{}"').format(name) if name else Markup('aria-hidden="true"')
     inside = Markup("").join(pieces)
     return Markup('<svg viewBox="0 0 {} {}" {}>{}</svg>').format(_at(width), _at(height), role, escape(inside))
+
+
+SPARK_WIDTH, SPARK_HEIGHT, SPARK_EDGE = 36, 14, 2.5
+SPARK_DOTS: Final = 40
+"""Most trials a strip that are drawn one by one; beyond that, the span of the middle nine tenths and the median."""
+
+MOST_STRIPS: Final = 4
+
+
+def spark_svg(parts: Sequence[Part]) -> Markup:
+    """Draw the trials of the part that decided; nothing where there are none.
+
+    An event is a bar, as long as the share of trials in which it holds; other samples are a row of dots each, the
+    first on top, with a line where they are compared with a number.
+    """
+    part = next((part for part in parts if part.decided), parts[0] if parts else None)
+    if part is None or not any(strip.dots for strip in part.strips):
+        return Markup("")
+    inside = Markup("").join(_share(part.strips[0]) if part.event else _rows(part))
+    return Markup('<svg class="spark" viewBox="0 0 {} {}" aria-hidden="true">{}</svg>').format(
+        SPARK_WIDTH, SPARK_HEIGHT, inside
+    )
+
+
+def _share(strip: Strip) -> Iterator[Markup]:
+    """Yield the bar of an event, over one as long as all trials."""
+    length = SPARK_WIDTH - 2 * SPARK_EDGE
+    held = sum(dot.value for dot in strip.dots) / strip.n * length
+    for kind, long in (("all", length), ("held", held)):
+        yield Markup('<path class="{}" d="M{} {}h{}"/>').format(kind, SPARK_EDGE, SPARK_HEIGHT / 2, f"{long:.3g}")
+
+
+def _rows(part: Part) -> Iterator[Markup]:
+    """Yield what is compared with, and a row for each sample; of many, as for a trend, the medians alone."""
+    low, high = part_scale(part)
+
+    def at(value: float) -> str:
+        shown = min(max(value, low), high)
+        return f"{SPARK_EDGE + (shown - low) / ((high - low) or 1.0) * (SPARK_WIDTH - 2 * SPARK_EDGE):.3g}"
+
+    for bound in part.bounds:
+        yield Markup('<path class="compared" d="M{} 0V{}"/>').format(at(bound.value), SPARK_HEIGHT)
+    rows = [[dot.value for dot in strip.dots] for strip in part.strips]
+    if len(rows) > MOST_STRIPS:
+        rows = [[strip.median] if strip.median is not None else [] for strip in part.strips]
+    for index, values in enumerate(rows):
+        up = f"{(index + 0.5) * SPARK_HEIGHT / len(rows):.3g}"
+        if len(values) <= SPARK_DOTS:
+            places = "".join(f"M{at(value)} {up}h0" for value in sorted(values))
+        else:
+            first, middle, last = (at(float(one)) for one in np.quantile(values, [0.05, 0.5, 0.95]))
+            yield Markup('<path class="middle" d="M{} {}H{}"/>').format(first, up, last)
+            places = f"M{middle} {up}h0"
+        yield Markup('<path class="trials" d="{}"/>').format(places)

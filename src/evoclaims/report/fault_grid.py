@@ -9,8 +9,7 @@ from typing import Final
 from evoclaims.verdicts import history
 from evoclaims.verdicts.claim_report import ClaimReport
 from evoclaims.verdicts.history import key_of
-from evoclaims.verdicts.mutation_matrix import Attempt, Fate, Matrix, current
-from evoclaims.verdicts.mutation_score import score
+from evoclaims.verdicts.mutation_matrix import Attempt, Fate, Matrix, current, score
 
 LEGEND: Final = ", ".join(f"{fate.symbol} {fate}" for fate in Fate)
 """What the symbols of a cell say."""
@@ -68,7 +67,6 @@ def fault_grid(matrix: Matrix, tier: str, reports: Iterable[ClaimReport]) -> Fau
 
 
 def _cells(attempts: Sequence[Attempt]) -> dict[str, list[Attempt]]:
-    """Return the attempts by mutant."""
     by_mutant: dict[str, list[Attempt]] = {}
     for attempt in attempts:
         by_mutant.setdefault(attempt.mutant, []).append(attempt)

@@ -1,4 +1,4 @@
-"""Numbers and texts as readers see them."""
+"""Numbers, texts and Markdown as readers see them."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import math
 import re
 from collections import Counter
 from collections.abc import Iterable
+from html import escape
 from itertools import chain, count
 from typing import Final
 
@@ -86,3 +87,28 @@ class Anchors:
         new = next(one for one in chain([name], again) if one not in self._given)
         self._given.add(new)
         return new
+
+
+_MARKS: Final = re.compile(r"([\\`*_\[\]#|~$@]|^[-+=]|:(?=[/\w]))")
+"""Characters with a meaning in Markdown, or on a forge that links names and addresses."""
+
+_ITEM: Final = re.compile(r"^(\d+)([.)])(?=\s|$)")
+
+
+def literal(text: str) -> str:
+    """Escape a text so that Markdown, and HTML in it, shows it unchanged, on one line."""
+    marked = escape(_MARKS.sub(r"\\\1", clean(text)), quote=False)
+    return _ITEM.sub(r"\1\\\2", marked).replace("www.", "www\\.")
+
+
+def table(header: Iterable[str], rows: Iterable[Iterable[str]], numbers: Iterable[str] = ()) -> str:
+    """Return a table of cells that are Markdown already.
+
+    Args:
+        header: one heading per column.
+        rows: one cell per column.
+        numbers: headings of columns that are aligned right.
+    """
+    head, right = list(header), set(numbers)
+    lines = [head, ["---:" if name in right else "---" for name in head], *map(list, rows)]
+    return "\n".join(f"| {' | '.join(line)} |" for line in lines)

@@ -9,8 +9,7 @@ import time
 from collections.abc import Callable
 from typing import Final
 
-from evoclaims.claims.overview import Overview
-from evoclaims.claims.workload import Workload
+from evoclaims.claims.workload import Overview, Workload
 from evoclaims.core.printable import printable
 from evoclaims.trials.progress import RunProgress
 

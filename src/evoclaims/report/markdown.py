@@ -7,12 +7,11 @@ from collections.abc import Iterable, Iterator, Sequence
 from evoclaims.figures.replication import Replication
 from evoclaims.report import replication_cells, table_cells
 from evoclaims.report.fault_grid import LEGEND
-from evoclaims.report.formatting import plural
-from evoclaims.report.markdown_text import literal, table
+from evoclaims.report.formatting import literal, plural, table
 from evoclaims.report.model import Board, Page, Section
 from evoclaims.report.table_cells import NONE
+from evoclaims.verdicts.claim_report import Tally
 from evoclaims.verdicts.robustness import Robustness
-from evoclaims.verdicts.sensitivity import Tally
 
 
 def markdown(page: Page) -> str:
@@ -35,7 +34,6 @@ def markdown(page: Page) -> str:
 
 
 def _scoreboard(page: Page) -> str:
-    """Count verdicts by tier."""
     boards = [board for board in page.boards if board.sections]
     tallies = [tally for tally in Tally if any(tally in board.counts for board in boards)]
     return table(
@@ -70,7 +68,6 @@ def _faults(page: Page) -> Iterator[str]:
 
 
 def _details(page: Page) -> str:
-    """List the variants."""
     return "\n".join(f"* {literal(name)}: {literal(says)}" for name, says in page.tried.items())
 
 
@@ -119,7 +116,6 @@ def _overview(board: Board) -> str:
 
 
 def _section(section: Section, page: Page) -> Iterator[str]:
-    """Yield the blocks of one claim."""
     report = section.report
     heading = literal(f"{report.name} ({report.tier}): {table_cells.verdict(report)}")
     yield f'<a id="{section.anchor}"></a>\n\n### {heading}'

@@ -9,17 +9,16 @@ from dataclasses import dataclass, field
 from evoclaims.figures.replication import Replication
 from evoclaims.judging.verdict import Outcome
 from evoclaims.report import table_cells
-from evoclaims.report.across_shown import AcrossShown
+from evoclaims.report.across import AcrossShown
 from evoclaims.report.evidence import Part
 from evoclaims.report.fault_grid import FaultGrid
 from evoclaims.report.formatting import counted
-from evoclaims.report.origin import Origin
 from evoclaims.report.training_curves import CurvePanel
+from evoclaims.report.trial_summary import Origin
 from evoclaims.report.verdict_chart import VerdictChart
-from evoclaims.verdicts.claim_report import ClaimReport
+from evoclaims.verdicts.claim_report import APART, ClaimReport, Tally
 from evoclaims.verdicts.history import AcceptedVerdict
 from evoclaims.verdicts.robustness import Robustness
-from evoclaims.verdicts.sensitivity import APART, Tally
 
 
 @dataclass(frozen=True)

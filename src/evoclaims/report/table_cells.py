@@ -6,15 +6,14 @@ from collections import Counter
 from collections.abc import Iterable, Sequence
 
 from evoclaims.judging.design import Look
-from evoclaims.judging.event_power import RATES, event_power
 from evoclaims.judging.kinds.greater import Greater
+from evoclaims.judging.power import RATES, event_power
 from evoclaims.judging.telescope import comparison_power
 from evoclaims.judging.verdict import Direction, Outcome
 from evoclaims.report.formatting import p_value, place_key, places
-from evoclaims.verdicts import mixed_versions
-from evoclaims.verdicts.claim_report import ClaimReport
+from evoclaims.verdicts import other_code
+from evoclaims.verdicts.claim_report import ClaimReport, Tally, Tried
 from evoclaims.verdicts.history import ordered
-from evoclaims.verdicts.sensitivity import Tally, Tried
 
 NONE = "–"
 """Not measured."""
@@ -73,8 +72,8 @@ def power(report: ClaimReport) -> str:
 
 
 def verdict_of_versions(report: ClaimReport) -> str:
-    """Return the outcome with a dagger if trials are of mixed versions (see `mixed_versions.lines`)."""
-    return verdict(report) + mixed_versions.MARK * mixed_versions.is_mixed(report)
+    """Return the outcome with a dagger if trials are of mixed versions (see `other_code.lines`)."""
+    return verdict(report) + other_code.MARK * other_code.is_mixed(report)
 
 
 def trials(report: ClaimReport) -> str:

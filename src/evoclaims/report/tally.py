@@ -7,8 +7,7 @@ from collections.abc import Iterable, Sequence
 
 from evoclaims.report import table_cells
 from evoclaims.report.formatting import plural
-from evoclaims.verdicts.claim_report import ClaimReport
-from evoclaims.verdicts.sensitivity import Tally
+from evoclaims.verdicts.claim_report import ClaimReport, Tally
 from evoclaims.verdicts.sentences import Sentence, chance, sentences
 
 

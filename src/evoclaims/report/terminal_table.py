@@ -19,9 +19,8 @@ from evoclaims.judging.drift_report import DriftReport
 from evoclaims.judging.verdict import Outcome
 from evoclaims.report import table_cells
 from evoclaims.report.console import PlainSpokenConsole
-from evoclaims.verdicts import edited_code, history, mixed_versions
-from evoclaims.verdicts.claim_report import ClaimReport
-from evoclaims.verdicts.sensitivity import Tried
+from evoclaims.verdicts import history, other_code
+from evoclaims.verdicts.claim_report import ClaimReport, Tried
 
 SENTENCE: Final = 16
 """Columns of the terminal that other columns leave to the sentence, if they can."""
@@ -77,7 +76,7 @@ def verdict_table(reports: Sequence[ClaimReport], width: int, colour: bool, enco
         captions.append("vacuous: a null agent, which has learnt nothing, is supported as well, so it is no support")
     if any(report.depends_on_the_reading for report in reports):
         captions.append("by reading: another reading of the sentence ends otherwise (evoclaims audit)")
-    captions += mixed_versions.lines(reports) + edited_code.lines(reports)
+    captions += other_code.lines(reports)
     below = _rendered("\n".join(captions), width, colour).splitlines() if captions else []
     return "\n".join([*(_rendered(line, width, colour).rstrip() for line in lines), *map(str.rstrip, below)])
 

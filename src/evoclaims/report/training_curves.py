@@ -85,7 +85,6 @@ def _constant(trials: Sequence[TrialSummary], name: str) -> float | None:
 
 
 def _panel(trials: Sequence[TrialSummary], name: str) -> CurvePanel:
-    """Return one quantity's panel."""
     broken = sum(not np.isfinite(trial.curves[name]).all() for trial in trials)
     if len(trials) <= MOST_LINES:
         lines = tuple(Line(f"seed {t.seed}", t.curves[AXES[0]], t.curves[name]) for t in trials)

@@ -1,7 +1,8 @@
-"""Trials for a report: each is read once, and only what is shown is kept."""
+"""Trials for a report: what is shown of each, and where it was made, in words."""
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
@@ -10,10 +11,98 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evoclaims.core.errors import UserError
-from evoclaims.core.packages import Versions
+from evoclaims.core.packages import DEPENDS_ON, Versions
 from evoclaims.paper.archive import Archive
-from evoclaims.report.origin import Origin
+from evoclaims.report.formatting import clean, counted, listed, plural
 from evoclaims.trials.result import TrialResult
+
+SHORT: Final = 9
+"""Digits of a revision that are shown."""
+
+
+@dataclass(frozen=True)
+class Origin:
+    """What a trial's provenance says.
+
+    Attributes:
+        device: such as "NVIDIA H200 (gpu)".
+        machine: operating system, architecture and processor.
+        revision: of the code; empty when unknown.
+        dirty: whether the code differed from that revision; None when unknown.
+        versions: of packages, by name; those that are absent are left out.
+        settings: what else results depend on, by name.
+    """
+
+    device: str
+    machine: str
+    revision: str
+    dirty: bool | None
+    versions: tuple[tuple[str, str], ...]
+    settings: tuple[tuple[str, str], ...]
+
+    @staticmethod
+    def of(provenance: Mapping[str, Any]) -> Origin:
+        """Read a record's provenance."""
+        device, git = _mapping(provenance.get("device")), _mapping(provenance.get("git"))
+        kind, platform = clean(device.get("kind") or ""), clean(device.get("platform") or "")
+        known = " ".join([kind, f"({platform})" if platform not in ("", kind) else ""]).strip()
+        dirty = git.get("dirty")
+        rest = provenance.keys() - {"device", "git", "machine", "versions", "seed_in_table", DEPENDS_ON}
+        return Origin(
+            device=known or _imported(_mapping(provenance.get("imported"))) or "unknown device",
+            machine=clean(provenance.get("machine") or "unknown machine"),
+            revision=clean(git.get("sha") or ""),
+            dirty=dirty if isinstance(dirty, bool) else None,
+            versions=_pairs(_mapping(provenance.get("versions"))),
+            settings=_pairs({name: provenance[name] for name in sorted(rest)}),
+        )
+
+    @property
+    def code(self) -> str:
+        """The revision in short, with what is known about changes to it."""
+        state = {True: "with uncommitted changes", False: "clean", None: "changes unknown"}[self.dirty]
+        return f"{self.revision[:SHORT]}, {state}" if self.revision else "unknown revision"
+
+
+def warnings(made: Counter[Origin]) -> tuple[str, ...]:
+    """Return what a reader should know before trusting the trials together: sentences, none when all is well."""
+    every = list(made.elements())
+    found = []
+    if len({origin.device for origin in every}) > 1:
+        found.append(f"Trials from mixed devices: {counted(origin.device for origin in every)}.")
+    dirty = sum(origin.dirty is True for origin in every)
+    if dirty:
+        found.append(f"{plural(dirty, 'trial')} of {len(every)} ran code with uncommitted changes.")
+    unknown = sum(not origin.revision for origin in every)
+    if unknown:
+        found.append(f"{plural(unknown, 'trial')} of {len(every)} ran code of unknown revision.")
+    return tuple(found)
+
+
+def _imported(table: Mapping[str, Any]) -> str:
+    """Say where imported trials come from; empty for others."""
+    if not table:
+        return ""
+    digits = str(table.get("sha256", ""))[:SHORT]
+    return clean(f"an unknown device (imported from {table.get('file')}, sha256 {digits}, by {table.get('by')})")
+
+
+def _mapping(value: object) -> Mapping[str, Any]:
+    """Return a JSON object; an empty one for anything else."""
+    return value if isinstance(value, dict) else {}
+
+
+def _pairs(values: Mapping[str, Any]) -> tuple[tuple[str, str], ...]:
+    """Return names and values as texts, without absent ones."""
+    return tuple((clean(name), _text(value)) for name, value in values.items() if value not in (None, "", {}, []))
+
+
+def _text(value: Any) -> str:
+    """Return a JSON value in a few words."""
+    if isinstance(value, dict):
+        return listed((f"{name} {_text(part)}" for name, part in value.items()), most=40)
+    return clean(value)
+
 
 POINTS: Final = 100
 """Most points of a training curve that are kept."""

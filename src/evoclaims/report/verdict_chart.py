@@ -115,5 +115,4 @@ def _x(column: int) -> float:
 
 
 def _text(text: str) -> str:
-    """Return a text for SVG, on one line."""
     return escape(printable(" ".join(text.split())))

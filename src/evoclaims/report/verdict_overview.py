@@ -1,19 +1,22 @@
-"""All verdicts as a Markdown table: a line per sentence of the paper, a column per tier or variant; controls below."""
+"""All verdicts as Markdown tables: by sentence, as marks alone, and by the readings of each sentence."""
 
 from __future__ import annotations
 
+import math
 import string
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Final
 
 from evoclaims.judging.verdict import Outcome
+from evoclaims.paper.reported import Uncovered
 from evoclaims.report import table_cells
-from evoclaims.report.formatting import plural
-from evoclaims.report.markdown_text import literal, table
+from evoclaims.report.formatting import literal, plural, table
 from evoclaims.report.table_cells import NONE, in_the_papers_order
 from evoclaims.report.trial_summary import Reader
-from evoclaims.verdicts.claim_report import ClaimReport
+from evoclaims.verdicts.claim_report import APART, ClaimReport, Tally, named
+from evoclaims.verdicts.history import ordered
+from evoclaims.verdicts.readings import ReadAs
 
 Versions = dict[str, str]
 _Rows = dict[tuple[str, str], dict[str, list[ClaimReport]]]
@@ -113,7 +116,6 @@ def _shown(versions: Iterable[tuple[str, str]], needed: Iterable[str]) -> Versio
 
 
 def _table(name: str, says: str, columns: Iterable[str], rows: _Rows, made: Environments) -> str:
-    """Return a table with a line for each sentence."""
     lines = [
         (literal(claim), literal(sentence), *(_cell(found[heading], made) for heading in columns))
         for (claim, sentence), found in rows.items()
@@ -140,7 +142,6 @@ def _verdict(report: ClaimReport, made: Environments) -> str:
 
 
 def _evidence(report: ClaimReport) -> str:
-    """Return what the part that decided has found."""
     part = report.verdict.deciding_part if report.verdict else None
     trials = plural(report.n, "trial")
     if report.verdict is None or part is None:
@@ -154,3 +155,116 @@ def _evidence(report: ClaimReport) -> str:
     ends = [f"{bound.value:g}" for bound in part.bounds]
     within = f" [{', '.join(ends)}]" if len(ends) == 2 else ""
     return f"{what}{part.detail}{within}; {trials}" if part.detail else trials
+
+
+WORDS: Final = 10
+"""Words of a sentence that has no short form."""
+
+HEADINGS: Final = ("claim", "the paper says")
+
+
+def marks(
+    columns: Mapping[str, Sequence[ClaimReport]], sentences: Mapping[str, str], short: Mapping[str, str] | None = None
+) -> str:
+    """Return the table of the paper's own claims; controls are left out.
+
+    Args:
+        columns: reports by heading.
+        sentences: the paper's own by claim and case, such as "G1[n_parity]".
+        short: the sentences to show, in a short form, by the first column; without any all, cut after `WORDS` words.
+    """
+    cases: dict[tuple[str, str], dict[str, list[ClaimReport]]] = {}
+    for heading, reports in columns.items():
+        for report in in_the_papers_order(reports):
+            if not report.is_control:
+                line = cases.setdefault((report.claim, sentences[report.name]), defaultdict(list))
+                line[heading].append(report)
+    several = {claim for claim, count in Counter(claim for claim, _ in cases).items() if count > 1}
+    rows = []
+    for (claim, sentence), found in cases.items():
+        named_cases = dict.fromkeys(report.case for reports in found.values() for report in reports)
+        name = literal(named(claim, ", ".join(named_cases) if claim in several else ""))
+        if not short or name in short:
+            text = short[name] if short else literal(_cut(sentence))
+            rows.append((name, text, *(mark(found[heading]) for heading in columns)))
+    return table((*HEADINGS, *map(literal, columns)), rows)
+
+
+def mark(reports: Iterable[ClaimReport]) -> str:
+    """Return the mark of a sentence's cases, such as "✓"; with numbers of cases where they differ, such as "✓1 ✗3".
+
+    Support that is counted apart is in brackets.
+    """
+    tallies = Counter(report.counted_as for report in reports if report.outcome is not Outcome.NOT_RUN)
+    found: Counter[str] = Counter()
+    for tally in Tally:
+        found[f"({tally.symbol})" if tally in APART else tally.symbol] += tallies[tally]
+    shown = {symbol: count for symbol, count in found.items() if count}
+    if len(shown) < 2:
+        return next(iter(shown), NONE)
+    return " ".join(f"{symbol}{count}" for symbol, count in shown.items())
+
+
+def short_sentences(text: str) -> dict[str, str]:
+    """Return the sentences of a table that was written before, by the first column."""
+    _, _, *lines = [line for line in text.splitlines() if line.startswith("|")] or ["", ""]  # two are the heading
+    rows = (line.strip("|\n ").split(" | ") for line in lines)
+    return {cells[0]: cells[1] for cells in rows if len(cells) >= len(HEADINGS)}
+
+
+def _cut(sentence: str) -> str:
+    """Return the first words of a sentence."""
+    words = sentence.split()
+    return sentence if len(words) <= WORDS else " ".join(words[:WORDS]) + " …"
+
+
+YOUNGER: Final = "†"
+HOW_JUDGED: Final = (
+    "The first reading of a sentence is the one that its claim judges; the others are judged from the same trials, and "
+    f"decide nothing. {YOUNGER}: the reading is younger than the first of its trials, and may have been chosen by what "
+    "they show."
+)
+"""How to read the table."""
+
+
+def readings(reports: Iterable[ClaimReport]) -> str:
+    """Return one line for each reading of a sentence, in the order of the paper's lines, with the cases' verdicts."""
+    papers = [report for report in ordered(reports) if report.readings and not report.is_control]
+    papers.sort(key=lambda one: math.inf if one.line is None else one.line)
+    rows: dict[tuple[str, str, str], list[tuple[ClaimReport, ReadAs]]] = defaultdict(list)
+    for report in papers:
+        for one in report.readings:
+            rows[report.claim, report.statement, one.name].append((report, one))
+    shown: set[tuple[str, str]] = set()
+    lines = []
+    for (claim, sentence, name), found in rows.items():
+        new = (claim, sentence) not in shown
+        shown.add((claim, sentence))
+        line = "" if found[0][0].line is None else str(found[0][0].line)
+        head = (literal(claim), line, literal(sentence)) if new else ("", "", "")
+        lines.append((*head, literal(name), _since(found), _verdicts(found)))
+    headings = ("claim", "line", "the paper says", "read as", "since", "verdict")
+    return f"{table(headings, lines)}\n\n{HOW_JUDGED}" if lines else "No reading is judged."
+
+
+def without_claims(sentences: Sequence[Uncovered]) -> str:
+    """Return a table of the sentences that no claim judges."""
+    lines = [(str(one.line), literal(one.says), literal(one.because)) for one in sentences]
+    return table(("line", "the paper says", "no claim, because"), lines) if lines else "Every sentence has a claim."
+
+
+def _since(found: Sequence[tuple[ClaimReport, ReadAs]]) -> str:
+    """Return when a reading was written, with a mark if it is younger than some case's trials."""
+    since = found[0][1].since or "–"
+    return f"{literal(since)} {YOUNGER}" if any(one.late for _, one in found) else literal(since)
+
+
+def _verdicts(found: Sequence[tuple[ClaimReport, ReadAs]]) -> str:
+    """Return a reading's verdicts, one for all cases that are alike."""
+    alike: dict[str, list[str]] = defaultdict(list)
+    for report, one in found:
+        vacuous = ", vacuous" * (report.is_vacuous and one is report.readings[0])
+        alike[f"{literal(one.outcome)}{vacuous}"].append(literal(report.case))
+    if len(alike) == 1:
+        return next(iter(alike))
+    return "<br>".join(f"{', '.join(cases)}: {outcome}" for outcome, cases in alike.items())

@@ -13,7 +13,7 @@ from evoclaims.judging import assertion, kinds
 from evoclaims.judging.assertion import Assertion
 from evoclaims.judging.measure import Measure, Profile
 from evoclaims.paper.trial_group import TrialGroup
-from evoclaims.report.markdown_text import literal, table
+from evoclaims.report.formatting import literal, table
 
 _READS: Final = {"Measure": "a number", "Event": "true or false", "Profile": "a number per level"}
 """What is read from each trial, by the class that a property returns."""
@@ -54,7 +54,6 @@ def declared_kinds() -> Iterator[type[Assertion]]:
 
 
 def _section(kind: type[Assertion]) -> str:
-    """Return what there is to say of one kind."""
     entry, file = kind.entry, kind.__module__.replace(".", "/") + ".py"
     assert entry is not None
     return "\n\n".join(

@@ -24,10 +24,9 @@ from evoclaims.networks.graph import GraphNetwork
 from evoclaims.networks.substrate import Substrate
 from evoclaims.trials.devices import MATMUL_PRECISION, layout_on
 from evoclaims.trials.lanes import options_for
-from evoclaims.trials.program import over_trials
+from evoclaims.trials.program import over_trials, score_every_level
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.result_making import named_leaves, provenance
-from evoclaims.trials.rollout import score_every_level
 from evoclaims.trials.spec import Condition
 from evoclaims.trials.store import Store
 

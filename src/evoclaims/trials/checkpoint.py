@@ -20,7 +20,7 @@ from evoclaims.trials.arrays import Packed, pack
 from evoclaims.trials.program import TrialState
 from evoclaims.trials.result_codec import is_hash
 from evoclaims.trials.store import DamagedFileError
-from evoclaims.trials.store_mark import ELSEWHERE
+from evoclaims.trials.store_files import ELSEWHERE
 
 SCHEMA: Final = 1
 _HEADER: Final = "header"

@@ -21,7 +21,7 @@ from evoclaims.core.pytree import strong
 from evoclaims.envs.base import Episode, MisfitError, Task, TaskState, fitting
 from evoclaims.kernels import kernel_prng
 from evoclaims.methods.base import Method, Policy, Progress
-from evoclaims.trials.success import SHARES
+from evoclaims.trials.result import SHARES
 
 _NUMBER = jax.ShapeDtypeStruct((), jnp.int32)
 
@@ -175,7 +175,6 @@ def _check_task_state(task: Task, function: str, state: TaskState) -> None:
 
 
 def _checked_progress(method: Method[Any], progress: object) -> Progress:
-    """Check and return what a step reports to the engine."""
     what = f"a step of {method.name!r} reports"
     if not isinstance(progress, Progress):
         raise MisfitError(f"{what} {_kind(progress)}, and the engine takes a Progress")
@@ -203,7 +202,6 @@ def _check_numbers(what: str, metrics: object, shape: tuple[int, ...], taken: Co
 
 
 def _check(what: str, leaf: Any, shape: tuple[int, ...], dtype: Any) -> None:
-    """Check one array's shape and type."""
     if not _is_array(leaf) or (leaf.shape, leaf.dtype) != (shape, np.dtype(dtype)):
         raise MisfitError(f"{what} of {_described(leaf)}, not of shape {shape} and type {np.dtype(dtype)}")
 
@@ -233,5 +231,4 @@ def _kind(value: object) -> str:
 
 
 def _described(leaf: Any) -> str:
-    """Return shape and type in words."""
     return f"shape {leaf.shape} and type {leaf.dtype}" if _is_array(leaf) else f"{_kind(leaf)}, which is not an array"

@@ -103,7 +103,6 @@ def _records(store: Store) -> Iterator[Problem]:
 
 
 def _named(store: Store, trial_id: str) -> set[Path]:
-    """Return the champions that the readable records of a trial name."""
     records = store.results([], store.record_files(trial_id))
     return {store.champion_file(result) for result in records if result.champion}
 

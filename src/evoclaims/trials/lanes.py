@@ -194,7 +194,6 @@ class Lanes:
         return jax.jit(laid_out, donate_argnums=(0,) if donate else ()).lower(*placed)
 
     def _finished(self, lowered: Any) -> Any:
-        """Compile a program."""
         return lowered.compile(options_for(self.condition, self.layout))
 
     def _compile(self, size: int, homes: Sequence[jax.Device]) -> dict[jax.Device, Compiled]:

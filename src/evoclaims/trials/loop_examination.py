@@ -17,7 +17,7 @@ from evoclaims.kernels import kernel_prng
 from evoclaims.trials.devices import MATMUL_PRECISION
 from evoclaims.trials.jax_options import refuse_changed
 from evoclaims.trials.loop_messages import Scores
-from evoclaims.trials.rollout import score_every_level
+from evoclaims.trials.program import score_every_level
 
 
 def examined(task: Task, policy: Callable[[Any], Any], seed: int) -> Scores:

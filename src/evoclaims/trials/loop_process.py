@@ -26,8 +26,8 @@ from evoclaims.core.portable import from_plain, resolve
 from evoclaims.core.waiting import report_to
 from evoclaims.envs.foreign.scoring import ForeignTask
 from evoclaims.methods.training_loop import wants_report
-from evoclaims.trials.descendants import MARK, end_marked
 from evoclaims.trials.loop_messages import (
+    MARK,
     Answer,
     Failed,
     LoopReport,
@@ -36,9 +36,10 @@ from evoclaims.trials.loop_messages import (
     Trained,
     Waiting,
     encode,
+    end_marked,
     last_lines,
 )
-from evoclaims.trials.success import check_shares, check_success
+from evoclaims.trials.result import check_shares, check_success
 
 COUNTS: Final = ("steps", "environment_steps")
 """Metrics that are counts; all others are any numbers."""

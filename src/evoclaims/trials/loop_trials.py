@@ -6,31 +6,176 @@ import contextlib
 import math
 import os
 import queue
+import secrets
+import signal
+import subprocess
 import sys
 import threading
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from typing import Any, Final, Literal
 
 import jax
+import msgspec
 
+from evoclaims.core.canonical import content_hash
 from evoclaims.core.errors import UserError
 from evoclaims.core.portable import to_plain
 from evoclaims.core.waiting import waiting, working_time
 from evoclaims.methods.training_loop import TrainingLoop
-from evoclaims.trials import crashes
-from evoclaims.trials.allowance import Allowance, OutOfTimeError
+from evoclaims.trials import failed
 from evoclaims.trials.batches import StoredTrials
 from evoclaims.trials.devices import layout_on, usable_cores
-from evoclaims.trials.loop_child import Child
-from evoclaims.trials.loop_messages import Failed, LoopReport, LoopRequest, Trained, Waiting
-from evoclaims.trials.loop_record import trained_record
+from evoclaims.trials.loop_messages import (
+    MARK,
+    Answer,
+    Failed,
+    LoopReport,
+    LoopRequest,
+    Trained,
+    Waiting,
+    decode,
+    encode,
+    end_marked,
+    last_lines,
+)
 from evoclaims.trials.progress import RunProgress, Watcher
-from evoclaims.trials.result_making import make_unfinished
+from evoclaims.trials.result import RETURNED, TRAINED_BY, Status, TrialResult
+from evoclaims.trials.result_making import make_record, make_unfinished
 from evoclaims.trials.spec import TrialSpec
+from evoclaims.trials.stopping import Allowance, OutOfTimeError
+
+_READ: Final = 4000
+_KEPT: Final = 2**16
+"""Bytes at the end of what a process prints that are kept."""
+_PATIENCE: Final = 5.0
+"""Seconds to wait for the end of that, which something that it has started may hold open."""
+
+
+class Child:
+    """A process that runs one trial."""
+
+    def __init__(self, request: LoopRequest, environment: Mapping[str, str]) -> None:
+        """Start it, as the leader of a group of its own, with these environment variables besides this process's."""
+        self._mark = secrets.token_hex(16)
+        self._process = subprocess.Popen(
+            # Modules are where this process has them, and what was printed is there when the process is killed.
+            [sys.executable, "-P", "-u", "-m", "evoclaims.trials.loop_process"],
+            stdin=subprocess.PIPE,  # stays open as long as this process lives
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            env={**os.environ, **environment, MARK: self._mark},
+            start_new_session=True,
+        )
+        self._printed = bytearray()
+        self._listener = threading.Thread(target=self._listen, daemon=True)
+        self._listener.start()
+        assert self._process.stdin is not None
+        with contextlib.suppress(OSError):  # one that has died at once is found when it does not answer
+            self._process.stdin.write(encode(request))
+            self._process.stdin.flush()
+
+    def answers(self) -> Iterator[Answer]:
+        """Iterate over its answers, up to the last one; what it has started may keep the pipe open after that."""
+        assert self._process.stdout is not None
+        for line in self._process.stdout:
+            try:
+                answer = decode(line)
+            except (msgspec.MsgspecError, ValueError):  # it died in the middle of a line
+                return
+            yield answer
+            if not isinstance(answer, LoopReport | Waiting):
+                return
+
+    def stop(self) -> None:
+        """End it, whatever it does, and what it has started; its number is not given away before it is closed."""
+        with contextlib.suppress(OSError):
+            os.killpg(self._process.pid, signal.SIGKILL)
+        end_marked(self._mark)
+
+    def _listen(self) -> None:
+        """Keep the end of what it prints: a progress bar of a day would fill the disk."""
+        assert self._process.stderr is not None
+        with contextlib.suppress(OSError, ValueError):  # closed meanwhile
+            while part := os.read(self._process.stderr.fileno(), _KEPT):
+                self._printed += part
+                del self._printed[:-_KEPT]
+
+    def close(self) -> str:
+        """End it, and return why it ended without an answer: its last lines, and its signal or status."""
+        self.stop()
+        status = self._process.wait()
+        for pipe in (self._process.stdin, self._process.stdout):
+            assert pipe is not None
+            with contextlib.suppress(OSError):
+                pipe.close()
+        self._listener.join(_PATIENCE)
+        last = last_lines(bytes(self._printed[-_READ:]).decode(errors="replace"))
+        if not self._listener.is_alive() and self._process.stderr is not None:
+            self._process.stderr.close()
+        how = signal.Signals(-status).name if -status in set(signal.Signals) else f"status {status}"
+        return f"{last}\nits process ended with {how}".lstrip()
+
+
+SCORED_BY: Final = "scored_by"
+"""Key of a provenance that says who has scored the final policy: "examination", or the "training function" itself."""
+
+
+def trained_record(
+    spec: TrialSpec,
+    trained: Trained,
+    curves: Mapping[str, Sequence[float]],
+    timing: Mapping[str, Any],
+    devices: Sequence[jax.Device],
+) -> TrialResult:
+    """Return the record of a trial whose function has returned.
+
+    The metrics are those of the function, those of every method (see `result_making.make_result`) and the task's own.
+    The examination's numbers count, not the function's. Without one, those that the function does not return
+    are NaN: a claim that reads such a number is an error. A trial has diverged when its function returned a NaN, or
+    reported a number that is not finite, or its policy's scores are not.
+    """
+    assert isinstance(spec.condition.method, TrainingLoop)
+    returned, scores = trained.metrics, trained.scores
+    broken = not trained.finite or any(map(math.isnan, returned.values()))
+    if scores is None:  # the last level at most is known
+        unknown = (math.nan,) * (spec.condition.task.levels - 1)
+        levels = {name: (*unknown, returned.get(f"last_{name}", math.nan)) for name in ("success", "fitness")}
+    else:
+        levels = {"success": scores.success, "fitness": scores.fitness}
+        broken = broken or not all(map(math.isfinite, (*scores.success, *scores.fitness)))
+    steps = returned.get("environment_steps", spec.condition.steps if trained.step is None else trained.step)
+    success = levels["success"]
+    solved = [level for level, value in enumerate(success) if value == 1.0]
+    metrics = {
+        "mean_success": math.fsum(success) / len(success),
+        "last_success": success[-1],
+        "last_fitness": levels["fitness"][-1],
+        "furthest_solved": math.nan if math.isnan(success[-1]) else float(max(solved, default=-1)),
+        "furthest_reached": math.nan,
+        "steps": float(returned.get("steps", steps)),
+        "environment_steps": float(steps),
+    }
+    if scores is None:
+        metrics |= returned
+    else:
+        known = {name: value for name, value in metrics.items() if not math.isnan(value)}
+        metrics |= returned | known | scores.metrics
+    status: Status = "diverged" if broken else "done"
+    origin = {
+        TRAINED_BY: spec.condition.method.place,
+        SCORED_BY: "training function" if scores is None else "examination",
+        RETURNED: {
+            "metrics": content_hash(dict(returned)),
+            "actions": trained.actions,
+            "graded": trained.graded,
+        },
+    }
+    return make_record(spec, status, metrics, levels, curves, b"", timing, devices, origin)
+
 
 _ONE_THREAD: Final = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 """Each trial has a core, and sums that are split among threads would have other roundings on other machines."""
@@ -174,25 +319,23 @@ class LoopTrials:
         return {**chosen, "XLA_PYTHON_CLIENT_PREALLOCATE": "false"}  # this process has taken most of the memory
 
     def _store(self, one: RunningLoop, tell: Watcher) -> None:
-        """Store a trial that has ended."""
         timing = {"run": one.seconds, "compile": 0.0, "batch": 1, "started": one.began}
-        failed = ""
+        ending = ""
         if isinstance(one.outcome, Trained):
             result = trained_record(one.spec, one.outcome, one.curves, timing, self._devices)
         elif isinstance(one.outcome, Failed):
             result = make_unfinished(one.spec, "crashed", one.curves, timing, self._devices, one.outcome.reason)
-            crashes.remember(result)
-            failed = f"crashed: {crashes.why(result)}"
+            failed.remember(result)
+            ending = f"crashed: {failed.why(result)}"
         else:
             limit = self._stored.time_limit
             result = make_unfinished(one.spec, "timeout", one.curves, {**timing, "limit": limit}, self._devices)
-            failed = f"is out of time after {limit:g} s"
-        if failed:
-            tell(RunProgress(self._stored.condition.label, f"seed {one.spec.seed} {failed}", 0, remark=True))
+            ending = f"is out of time after {limit:g} s"
+        if ending:
+            tell(RunProgress(self._stored.condition.label, f"seed {one.spec.seed} {ending}", 0, remark=True))
         self._stored.store.put(result, {})
 
     def _progress(self, running: Sequence[RunningLoop], ended: int, seconds: float) -> RunProgress:
-        """Return how far all trials are."""
         condition = self._stored.condition
         steps = [condition.steps if one.outcome else one.newest.step if one.newest else 0 for one in running]
         reached = [min(step, condition.steps) for step in steps]

@@ -1,8 +1,8 @@
-"""Notices that a condition is running, so that processes that share a store do not run the same trials twice.
+"""Notices that a condition is running, with its progress, so that processes that share a store do not repeat trials.
 
 A notice is a filelock lease on a file in `running/`, which a thread refreshes while the condition runs. Notices are
 hints, not locks: a missed or lost notice costs repeated work, never a wrong record, so failures to write one are
-ignored.
+ignored. A lost file of progress costs a line of progress.
 """
 
 from __future__ import annotations
@@ -12,11 +12,16 @@ import os
 import socket
 import time
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
 import filelock
+import msgspec
 
+from evoclaims.core.errors import UserError
+from evoclaims.core.files import at_once, read_file
+from evoclaims.trials.progress import RunProgress, Watcher
 from evoclaims.trials.result_codec import checked_id
 
 FRESH_SECONDS: Final = 60.0
@@ -106,7 +111,6 @@ def sweep(store_root: Path) -> None:
 
 
 def _lease(path: Path) -> filelock.SoftFileLease:
-    """Return a lease that is not taken yet."""
     return filelock.SoftFileLease(path, lease_duration=FRESH_SECONDS, heartbeat_interval=REFRESH_SECONDS)
 
 
@@ -155,3 +159,55 @@ def _exists(pid: int) -> bool:
     except (PermissionError, OverflowError):
         pass
     return True
+
+
+WRITE_SECONDS: Final = 0.5
+"""Least time between two writings, unless the phase changes."""
+
+
+@dataclass(frozen=True)
+class Running:
+    """A batch that some process is running.
+
+    Attributes:
+        condition: id of its condition.
+        since: when that process began with the condition, in seconds of the epoch by its own clock.
+        progress: the newest.
+    """
+
+    condition: str
+    since: float
+    progress: RunProgress
+
+
+@contextlib.contextmanager
+def shared(store_root: Path, condition_id: str, watch: Watcher) -> Iterator[Watcher]:
+    """Give a watcher that passes on to `watch`, and shares the progress until the `with` block ends."""
+    path, since = progress_path(store_root, condition_id), time.time()
+    written, phase = -WRITE_SECONDS, ""
+
+    def tell(progress: RunProgress) -> None:
+        nonlocal written, phase
+        if progress.phase != phase or time.monotonic() - written >= WRITE_SECONDS:
+            written, phase = time.monotonic(), progress.phase
+            with contextlib.suppress(OSError), open(path, "wb", opener=at_once) as file:
+                file.write(msgspec.json.encode(Running(condition_id, since, progress)))
+        watch(progress)
+
+    try:
+        yield tell
+    finally:
+        with contextlib.suppress(OSError):
+            path.unlink(missing_ok=True)
+
+
+def running(store_root: Path) -> list[Running]:
+    """Return what processes that share a store are running, those that began first in front."""
+    found = []
+    for path in (store_root / "running").glob("*.progress"):
+        # It may be written just now, gone, or damaged.
+        with contextlib.suppress(OSError, ValueError, RecursionError, UserError):
+            one = msgspec.json.decode(read_file(path), type=Running)
+            if one.condition == path.stem and is_announced(store_root, one.condition):
+                found.append(one)
+    return sorted(found, key=lambda one: (one.since, one.condition))

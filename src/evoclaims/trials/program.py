@@ -9,17 +9,64 @@ from typing import Any
 
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Bool, Float, Int
+from jaxtyping import Array, Bool, Float, Int, PRNGKeyArray
 
 from evoclaims.core.keys import EVALUATION, TRAINING, streams, trial_key
 from evoclaims.core.pytree import pytree, strong
-from evoclaims.envs.base import Episode, Numbered, Task
+from evoclaims.envs.base import Episode, Numbered, PolicyFn, Task
 from evoclaims.kernels import kernel_prng
 from evoclaims.methods.base import Progress
-from evoclaims.trials import curriculum
 from evoclaims.trials.compatibility import both_named, check_scores, traced_progress
-from evoclaims.trials.rollout import score_every_level
 from evoclaims.trials.spec import Condition
+
+NEVER = -1
+
+
+@pytree
+class Ascent:
+    """A trial's position in its task's levels.
+
+    Attributes:
+        level: the current training level.
+        solved_at: for each level, the number of method steps when it was first solved, or `NEVER`.
+        finished: whether the last level is solved.
+    """
+
+    level: Int[Array, ""]
+    solved_at: Int[Array, " levels"]
+    finished: Bool[Array, ""]
+
+
+def start(levels: int, progression: Any) -> Ascent:
+    """Begin at level 0 ("curriculum") or at the last ("direct", "whole_budget")."""
+    first = {"curriculum": 0, "direct": levels - 1, "whole_budget": levels - 1}[progression]
+    return Ascent(
+        level=jnp.array(first, jnp.int32),
+        solved_at=jnp.full((levels,), NEVER, jnp.int32),
+        finished=jnp.zeros((), bool),
+    )
+
+
+def climb(ascent: Ascent, success: Float[Array, ""], steps: Int[Array, ""]) -> Ascent:
+    """Move up one level when `success` is exactly 1 after `steps` steps; finish when the last is solved."""
+    last = ascent.solved_at.shape[0] - 1
+    solved = success == 1.0
+    before = ascent.solved_at[ascent.level]
+    return Ascent(
+        level=jnp.minimum(ascent.level + solved.astype(jnp.int32), last),
+        solved_at=ascent.solved_at.at[ascent.level].set(jnp.where(solved & (before == NEVER), steps, before)),
+        finished=ascent.finished | (solved & (ascent.level == last)),
+    )
+
+
+def score_every_level(task: Task, policy: PolicyFn, key: PRNGKeyArray) -> Episode:
+    """Examine a policy on each level separately; the leaves of the result have shape [levels].
+
+    The key must come from the trial's evaluation stream, which training never draws from.
+    """
+    levels = jnp.arange(task.levels, dtype=jnp.int32)
+    keys = jax.random.split(key, task.levels)
+    return jax.vmap(lambda k, level: task.examine(policy, k, level))(keys, levels)
 
 
 @pytree
@@ -39,7 +86,7 @@ class TrialState:
 
     seed: Int[Array, ""]
     method: Any
-    ascent: curriculum.Ascent
+    ascent: Ascent
     steps: Int[Array, ""]
     last: Progress
     diverged: Bool[Array, ""]
@@ -93,7 +140,7 @@ class Program:
         return TrialState(
             seed=seed,
             method=strong(method.init(init_key, task)),
-            ascent=curriculum.start(task.levels, self.condition.progression),
+            ascent=start(task.levels, self.condition.progression),
             steps=jnp.zeros((), jnp.int32),
             last=jax.tree.map(lambda leaf: jnp.zeros(leaf.shape, leaf.dtype), progress),
             diverged=jnp.zeros((), bool),
@@ -119,7 +166,7 @@ class Program:
             return replace(
                 trial,
                 method=strong(state),
-                ascent=curriculum.climb(trial.ascent, jnp.where(healthy, progress.success, 0.0), steps),
+                ascent=climb(trial.ascent, jnp.where(healthy, progress.success, 0.0), steps),
                 steps=steps,
                 last=strong(progress),
                 diverged=~healthy,
@@ -151,7 +198,6 @@ class Program:
         return traced_progress(self.condition.method, self.condition.task)
 
     def _task(self, trial: TrialState) -> Task:
-        """Return the task with the trial's numbers."""
         task = self.condition.task
         return task.with_numbers(trial.numbers) if isinstance(task, Numbered) else task
 

@@ -16,12 +16,10 @@ from evoclaims.core.provenance import collect, device_of
 from evoclaims.core.source_code import CODE
 from evoclaims.methods.base import Method, PartlyUsed
 from evoclaims.trials.arrays import pack
-from evoclaims.trials.curriculum import NEVER
 from evoclaims.trials.devices import MATMUL_PRECISION
-from evoclaims.trials.program import Report, Score
-from evoclaims.trials.result import Status, TrialResult, digest
+from evoclaims.trials.program import NEVER, Report, Score
+from evoclaims.trials.result import Status, TrialResult, check_success, digest
 from evoclaims.trials.spec import Condition, TrialSpec
-from evoclaims.trials.success import check_success
 
 
 def curve_point(spec_cost: int, report: Report, lane: int) -> dict[str, float]:

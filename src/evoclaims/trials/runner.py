@@ -5,7 +5,9 @@ from __future__ import annotations
 import logging
 import math
 import time
-from collections.abc import Callable, Sequence
+import warnings
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from typing import Any, Final
 
@@ -17,27 +19,117 @@ from evoclaims.core.packages import absent
 from evoclaims.core.waiting import working_time
 from evoclaims.methods.training_loop import TrainingLoop
 from evoclaims.trials import checkpoint
-from evoclaims.trials.allowance import Allowance, OutOfTimeError
-from evoclaims.trials.batches import Batch, Run, StoredTrials, batches, drop_finished_checkpoints
+from evoclaims.trials.batches import Batch, Run, StoredTrials, batches, drop_finished_checkpoints, halved, is_exhausted
 from evoclaims.trials.checkpoint import Header
-from evoclaims.trials.devices import single_threaded_linear_algebra
-from evoclaims.trials.edited_bodies import warn_of_edited_bodies
-from evoclaims.trials.halving import halved, is_exhausted
+from evoclaims.trials.devices import give_back, single_threaded_linear_algebra
 from evoclaims.trials.imported import into_store
 from evoclaims.trials.lanes import Lanes, picked
 from evoclaims.trials.loop_trials import LoopTrials
-from evoclaims.trials.memory import give_back
-from evoclaims.trials.notice import announced
-from evoclaims.trials.pacing import Rhythm, Strides
+from evoclaims.trials.notice import announced, shared
 from evoclaims.trials.program import Report
 from evoclaims.trials.progress import RunProgress, Watcher, ignore
-from evoclaims.trials.result import TrialResult
+from evoclaims.trials.result import TrialResult, check_success
 from evoclaims.trials.result_making import curve_point, make_result, make_unfinished
-from evoclaims.trials.shared_progress import shared
 from evoclaims.trials.spec import Condition, TrialSpec
-from evoclaims.trials.stopping import postponed
-from evoclaims.trials.store import Store
-from evoclaims.trials.success import check_success
+from evoclaims.trials.stopping import Allowance, OutOfTimeError, postponed
+from evoclaims.trials.store import DamagedFileError, Store
+
+CALL_SECONDS: Final = 1.0
+"""Approximate length of one device call: a checkpoint can only be written after one."""
+
+AFFORDED: Final = 0.03
+"""Seconds that a checkpoint may take per second between two checkpoints; slower ones are written less often."""
+
+
+class Strides:
+    """How many steps to run per device call: one at first, then as many as the last call's speed allows.
+
+    Attributes:
+        seconds: duration of the last call.
+    """
+
+    def __init__(self) -> None:
+        """Start without a measured speed."""
+        self.seconds = 0.0
+        self._per_step = math.inf
+
+    def after(self, reached: int, until: int) -> int:
+        """Return the step to run to from step `reached`, at most `until`."""
+        return min(until, reached + max(int(CALL_SECONDS / self._per_step), 1))
+
+    def seconds_for(self, steps: int) -> float | None:
+        """Return how long `steps` steps will take; None before the first call."""
+        return None if math.isinf(self._per_step) else steps * self._per_step
+
+    def took(self, steps: int, seconds: float) -> None:
+        """Measure the speed from a call of `steps` steps (at least one)."""
+        self.seconds = seconds
+        self._per_step = max(seconds, 1e-9) / steps
+
+
+class Rhythm:
+    """When the next checkpoint is due: some seconds after the last one, or later if writing is slow."""
+
+    def __init__(self, seconds: float) -> None:
+        """Begin now; `seconds` is the time between two cheap checkpoints, 0 for one after every call."""
+        self._seconds = seconds
+        self._cost = 0.0
+        self._last = time.monotonic()
+
+    @property
+    def due(self) -> bool:
+        """Whether a checkpoint is due."""
+        return time.monotonic() - self._last >= self._seconds * max(1.0, self._cost / AFFORDED)
+
+    @contextmanager
+    def saving(self) -> Iterator[None]:
+        """Time the writing of a checkpoint."""
+        began = time.monotonic()
+        yield
+        self._last = time.monotonic()
+        self._cost = self._last - began
+
+
+def warn_of_edited_bodies(condition: Condition, store: Store) -> None:
+    """Warn when the store has trials of the condition whose robot had the same file and another body."""
+    now = dict(_bodies(condition.plain))
+    if not now:
+        return
+    errors: list[DamagedFileError] = []
+    here = _without_bodies(condition.plain)
+    old = [
+        result
+        for result in store.results(errors)
+        if result.condition != condition.id
+        and _without_bodies({name: part for name, part in result.spec.items() if name != "seed"}) == here
+    ]
+    if old:
+        names = sorted({name for result in old for name, body in _bodies(result.spec) if now.get(name) != body})
+        warnings.warn(
+            f"The model of the robot {', '.join(names)} was edited: {len(old)} stored trials of {condition.label} are "
+            "of the old body and do not count, so they run again.",
+            stacklevel=2,
+        )
+
+
+def _bodies(plain: Any) -> Iterator[tuple[str, str]]:
+    """Yield names and body hashes of the custom robots in a condition's plain form."""
+    if isinstance(plain, Mapping):
+        if {"xml", "body", "name"} <= plain.keys():
+            yield plain["name"], plain["body"]
+        for part in plain.values():
+            yield from _bodies(part)
+    elif isinstance(plain, list | tuple):
+        for part in plain:
+            yield from _bodies(part)
+
+
+def _without_bodies(plain: Any) -> Any:
+    """Return a condition's plain form without its robots' body hashes."""
+    if isinstance(plain, Mapping):
+        return {name: _without_bodies(part) for name, part in plain.items() if not (name == "body" and "xml" in plain)}
+    return [_without_bodies(part) for part in plain] if isinstance(plain, list | tuple) else plain
+
 
 _log = logging.getLogger(__name__)
 
@@ -187,7 +279,6 @@ def _go_on(run: Run, batch: Batch, allowance: Allowance, strides: Strides) -> tu
 
 
 def _save(run: Run, batch: Batch) -> None:
-    """Write a checkpoint."""
     spent = batch.header.compile_seconds + run.lanes.seconds
     state = run.lanes.gather(batch.state)
     checkpoint.save(run.store.checkpoints, replace(batch.header, compile_seconds=spent), state)
@@ -245,7 +336,6 @@ def _store_ended(run: Run, batch: Batch, report: Report, ended: Sequence[int], a
 
 
 def _give_up(run: Run, header: Header) -> None:
-    """Store the unfinished trials of a batch as timed out."""
     limit = run.stored.time_limit
     timing = {**_timing(run, header), "limit": limit}
     owed = [seed for seed in header.seeds if not run.stored.has(seed)]

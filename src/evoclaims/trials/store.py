@@ -25,12 +25,10 @@ from evoclaims.core.errors import StorageError
 from evoclaims.core.files import read_file, write_atomically, write_once
 from evoclaims.core.packages import Versions, agree, depends_on, recorded, without_flags
 from evoclaims.trials.arrays import pack, unpack
+from evoclaims.trials.failed import time_allowed
 from evoclaims.trials.result import TrialResult, matches_digest
-from evoclaims.trials.result_codec import dump, parse
-from evoclaims.trials.result_schema import RecordError
-from evoclaims.trials.store_files import DEFAULT_ROOT, StoreFiles, record_id
-from evoclaims.trials.store_mark import ELSEWHERE, check_store, mark
-from evoclaims.trials.time_limit import time_allowed
+from evoclaims.trials.result_codec import RecordError, dump, parse
+from evoclaims.trials.store_files import DEFAULT_ROOT, ELSEWHERE, StoreFiles, check_store, mark, record_id
 
 Put = Literal["stored", "present", "differs"]
 """Result of storing a trial: written; already there, bit-identical; already there with another digest."""

@@ -86,7 +86,6 @@ class TableFile:
         return [self._number(name, row, cells[row], rounded) for row in rows]
 
     def _number(self, name: str, row: int, cell: Any, rounded: bool) -> float | None:
-        """Return the number in a cell."""
         if cell is None or (isinstance(cell, str) and not cell.strip()):
             return None
         try:

@@ -112,7 +112,6 @@ def _without_comments(text: str, delimiter: str) -> str:
 
 
 def _is_number(text: str) -> bool:
-    """Whether a text is a number."""
     try:
         float(text)
     except ValueError:
@@ -161,7 +160,6 @@ def _whole(digits: str) -> int | str:
 
 
 def _row(number: int, line: str) -> Any:
-    """Return the object of a line."""
     try:
         return _loaded(line)
     except (ValueError, RecursionError) as error:
@@ -209,7 +207,6 @@ def _of_object(whole: _Pairs) -> Columns:
 
 
 def _of_lists(columns: _Pairs) -> Columns:
-    """Return columns that are lists."""
     lengths = {len(cells) for _, cells in columns}
     if len(lengths) > 1:
         raise NoTableError(f"its columns have different lengths ({', '.join(map(str, sorted(lengths)))})")

@@ -183,7 +183,6 @@ def _successions(first: Judged, now: Judged) -> Iterable[Succession]:
 
 
 def _cell(report: ClaimReport, before: ClaimReport | None, found: Upgrade | None) -> Cell:
-    """Return the cell of one claim."""
     cell = Cell(report.outcome, report.n, before.outcome if before else None)
     if found is None:
         return cell

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 from dataclasses import dataclass, replace
+from enum import StrEnum
 from pathlib import Path
 from typing import Any, Final
 
@@ -12,13 +13,10 @@ from msgspec import convert
 
 from evoclaims.core.canonical import as_plain
 from evoclaims.core.errors import UserError
-from evoclaims.core.file_names import file_name
-from evoclaims.core.files import read_json, write_atomically
+from evoclaims.core.files import file_name, read_json, write_atomically
 from evoclaims.judging.verdict import Outcome, Verdict
 from evoclaims.verdicts.readings import ReadAs, depends
-from evoclaims.verdicts.sensitivity import Tally, Tried
-from evoclaims.verdicts.source_trials import SourceTrials, versions_of
-from evoclaims.verdicts.versions import Several
+from evoclaims.verdicts.source_trials import Several, SourceTrials, versions_of
 
 CONTROL: Final = "control"
 """What a claim says in `where` that is not the paper's, but a check of the benchmark itself."""
@@ -62,6 +60,36 @@ class EarlierRun:
     outcome: Outcome
     reason: str
     p: float | None
+
+
+class Tried(StrEnum):
+    """The result of trying planted faults on a claim."""
+
+    SENSITIVE = "sensitive"
+    INSENSITIVE = "insensitive"
+    NOT_TRIED = "not tried"
+
+
+class Tally(StrEnum):
+    """What a claim counts as: its outcome, unless no planted fault changes its support, or a null agent has it, too."""
+
+    SUPPORTED = "supported"
+    INSENSITIVE = "supported but insensitive"
+    VACUOUS = "supported but vacuous"
+    REFUTED = "refuted"
+    SMALLER = "smaller than claimed"
+    INCONCLUSIVE = "inconclusive"
+    ERROR = "error"
+    NOT_RUN = "not run"
+
+    @property
+    def symbol(self) -> str:
+        """One character for tables: the outcome's."""
+        return (Outcome.SUPPORTED if self in APART else Outcome(self.value)).symbol
+
+
+APART: Final = (Tally.INSENSITIVE, Tally.VACUOUS)
+"""Support that is counted apart; tables leave it out where it is 0."""
 
 
 @dataclass(frozen=True)

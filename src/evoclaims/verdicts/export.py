@@ -15,7 +15,7 @@ from typing import Any, Final
 from evoclaims.core.canonical import as_plain
 from evoclaims.core.errors import UserError
 from evoclaims.core.printable import printable
-from evoclaims.paper.condition_names import Name
+from evoclaims.paper.archive import Name
 from evoclaims.trials.result import TrialResult
 from evoclaims.verdicts.claim_report import ClaimReport
 
@@ -123,7 +123,6 @@ def columns_of(rows: Sequence[Row]) -> list[str]:
 
 
 def _trial_row(trial: TrialResult, names: Sequence[Name]) -> Row:
-    """Return one trial."""
     of = trial.spec
     return {
         "id": trial.id,

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
+import json
 import tomllib
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from datetime import date
 from pathlib import Path
 from typing import Annotated, Any, Final
@@ -19,7 +20,7 @@ from evoclaims.core.errors import UserError
 from evoclaims.core.files import read_file
 from evoclaims.core.printable import printable
 from evoclaims.judging.verdict import Outcome
-from evoclaims.verdicts.claim_report import ClaimReport
+from evoclaims.verdicts.claim_report import ClaimReport, EarlierRun
 
 SCHEMA: Final = 1
 FILE: Final = "verdicts.toml"
@@ -140,7 +141,6 @@ def dump(history: History) -> str:
 
 
 def _entry(row: object, environments: Mapping[str, Any], name: str, claim: str) -> AcceptedVerdict:
-    """Return one accepted verdict, with every field checked."""
     plain = _table(row, name, claim)
     expected = {field.name for field in fields(AcceptedVerdict)} - {"versions"} | {"environment"}
     if plain.keys() | {"p"} != expected:
@@ -158,7 +158,6 @@ def _entry(row: object, environments: Mapping[str, Any], name: str, claim: str) 
 
 
 def _table(value: object, name: str, part: str) -> dict[str, Any]:
-    """Return a TOML table."""
     if not isinstance(value, dict):
         raise _torn(name, f"{part} is no table")
     return value
@@ -167,3 +166,36 @@ def _table(value: object, name: str, part: str) -> dict[str, Any]:
 def _torn(name: str, reason: str) -> UserError:
     """Return the error for a file without a history."""
     return UserError(f"{name} holds no accepted verdicts: {reason}. {_MEND}")
+
+
+def following(report: ClaimReport, last: ClaimReport | None) -> ClaimReport:
+    """Return the report of a claim's newest run with the runs before it, of which `last` was the newest."""
+    if last is None:
+        return report
+    known = (*last.earlier, EarlierRun(last.outcome, last.reason, last.p))
+    own = report.earlier[len(known) :] if report.earlier[: len(known)] == known else report.earlier
+    return replace(report, earlier=(*known, *own), before=last.before)
+
+
+def last_runs(reports: Iterable[ClaimReport]) -> list[ClaimReport]:
+    """Return one report for each claim and tier: of its last run, with the others in `earlier`.
+
+    A report that comes twice is of one run: pytest makes several reports of a test.
+    """
+    last: dict[tuple[str, str], ClaimReport] = {}
+    seen = set[str]()
+    for report in reports:
+        key, content = key_of(report), json.dumps(report.to_json(), sort_keys=True)
+        if content not in seen:
+            seen.add(content)
+            last[key] = following(report, last.get(key))
+    return list(last.values())
+
+
+def changed_by_repetition(report: ClaimReport) -> str:
+    """Return a line about a claim whose runs ended differently; empty where they agree, or there is one."""
+    outcomes = dict.fromkeys([*(run.outcome for run in report.earlier), report.outcome])
+    if len(outcomes) < 2:
+        return ""
+    ends = " -> ".join([*(run.outcome for run in report.earlier), report.outcome])
+    return f"{report.name} ({report.tier}) ran {len(report.earlier) + 1} times, {ends}: the last run counts"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tomllib
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
@@ -16,9 +17,8 @@ from evoclaims.core.errors import UserError
 from evoclaims.core.files import read_file
 from evoclaims.core.printable import printable
 from evoclaims.judging.verdict import Outcome
-from evoclaims.verdicts.claim_report import ClaimReport
+from evoclaims.verdicts.claim_report import ClaimReport, Tried
 from evoclaims.verdicts.history import key_of
-from evoclaims.verdicts.sensitivity import Tried
 
 FILE: Final = "mutants.toml"
 SCHEMA: Final = 1
@@ -213,7 +213,6 @@ class _Written:
 
 
 def _written(row: Sensitivity) -> _Written:
-    """Return a row as the file has it."""
     written = _Written(row.outcome, row.fingerprint, row.untried, {name: {} for name in row.methods}, {})
     for one in row.attempts:
         text = str(one.outcome if one.fate is Fate.KILLED else one.fate)
@@ -236,3 +235,26 @@ def _read(written: _Written) -> Sensitivity:
         for mutant, text in faults.items()
     )
     return Sensitivity(written.outcome, written.fingerprint, tuple(written.method), tuple(attempts), written.untried)
+
+
+def score(matrix: Matrix, tier: str) -> str:
+    """Return in a sentence how many planted faults change the verdict of some claim, or are found by drift alone.
+
+    Equivalent and broken mutants do not count; a fault in two targets counts twice. Claims are insensitive whose
+    verdicts no mutant changes; others may name a method none of whose own mutants changes their verdicts.
+    """
+    rows = [row for (one, _), row in matrix.items() if one == tier]
+    fates: dict[tuple[str, str], set[Fate]] = {}
+    for attempt in (attempt for row in rows for attempt in row.attempts if attempt.fate.counts):
+        fates.setdefault((attempt.mutant, attempt.target), set()).add(attempt.fate)
+    if not fates:
+        return f"Mutation score ({tier}): not tried."
+    by_verdict = sum(Fate.KILLED in found for found in fates.values())
+    by_drift = sum(Fate.DRIFTED in found and Fate.KILLED not in found for found in fates.values())
+    found = Counter(row.tried for row in rows)
+    partly = sum(row.tried is Tried.SENSITIVE and bool(row.unnoticed) for row in rows)
+    return (
+        f"Mutation score ({tier}): {by_verdict} of {len(fates)} planted faults change a verdict, "
+        f"{by_drift} more are found by the drift check; of {len(rows) - found[Tried.NOT_TRIED]} claims "
+        f"{found[Tried.INSENSITIVE]} are insensitive, and {partly} notice faults in some of their methods alone."
+    )

@@ -7,9 +7,8 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from evoclaims.judging.verdict import Outcome
-from evoclaims.verdicts.claim_report import ClaimReport
+from evoclaims.verdicts.claim_report import ClaimReport, Tally
 from evoclaims.verdicts.history import ordered
-from evoclaims.verdicts.sensitivity import Tally
 
 
 @dataclass(frozen=True)

@@ -145,7 +145,6 @@ def describe(transition: Transition) -> str:
 
 
 def _change(old: Standing | None, new: Standing | None, kind: Kind) -> str:
-    """Describe how a verdict changed."""
     if old is None or new is None:
         return f"{new.outcome}, new" if new else f"gone; it was {old.outcome}" if old else "no verdict"
     if kind is Kind.NEW_HISTORY:

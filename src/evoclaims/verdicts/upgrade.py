@@ -15,7 +15,7 @@ from evoclaims.judging.verdict import Outcome
 from evoclaims.paper import references
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.store import newest
-from evoclaims.verdicts import versions
+from evoclaims.verdicts import source_trials
 from evoclaims.verdicts.claim_report import ClaimReport
 from evoclaims.verdicts.source_trials import versions_of
 
@@ -45,7 +45,7 @@ class Succession:
     @property
     def change(self) -> str:
         """Which versions differ, in words."""
-        return versions.change(self.old, self.new)
+        return source_trials.change(self.old, self.new)
 
     @property
     def pairs(self) -> list[tuple[TrialResult, TrialResult]]:
@@ -150,7 +150,7 @@ def verdict_changes(reports: Iterable[ClaimReport]) -> list[str]:
             continue
         if (before.fingerprint or "") != report.fingerprint:
             continue
-        moved = versions.moved(before.versions, versions_of(report.sources))
+        moved = source_trials.moved(before.versions, versions_of(report.sources))
         by = f" ({moved})" if moved else ""
         lines.append(
             printable(f"verdict changed: {report.name} ({report.tier}): {before.outcome} -> {report.outcome}{by}")

@@ -14,15 +14,14 @@ from evoclaims.core.canonical import as_plain, content_hash
 from evoclaims.core.errors import UserError
 from evoclaims.envs.ecorobot import model_files
 from evoclaims.envs.ecorobot.boxes import Box
-from evoclaims.envs.ecorobot.locomotion import Locomotion
+from evoclaims.envs.ecorobot.obstacles import Locomotion
 from evoclaims.envs.ecorobot.robots import ROBOTS, Robot
 from evoclaims.envs.ecorobot.scene import Scene
 from evoclaims.methods.random_search import RandomSearch
 from evoclaims.networks import Mlp
-from evoclaims.trials.budget import Budget
-from evoclaims.trials.edited_bodies import warn_of_edited_bodies
 from evoclaims.trials.result import TrialResult
-from evoclaims.trials.spec import Condition
+from evoclaims.trials.runner import warn_of_edited_bodies
+from evoclaims.trials.spec import Budget, Condition
 
 
 @pytest.fixture

@@ -23,9 +23,8 @@ from evoclaims.envs.gates.parity import NParity
 from evoclaims.methods.random_search import RandomSearch
 from evoclaims.methods.training_loop import TrainingLoop
 from evoclaims.networks.mlp import Mlp
-from evoclaims.trials.budget import Budget
 from evoclaims.trials.runner import run
-from evoclaims.trials.spec import Condition
+from evoclaims.trials.spec import Budget, Condition
 from evoclaims.trials.store import Store
 
 CART = GymnasiumTask("CartPole-v1", solved_at=100, examined_episodes=4)

@@ -16,22 +16,20 @@ import numpy as np
 import pytest
 
 from evoclaims.core.errors import UnknownNameError, UserError
-from evoclaims.envs.foreign.actions import Choice, Range, actions_of
 from evoclaims.envs.foreign.brax_task import BraxTask
 from evoclaims.envs.foreign.gymnax_task import GymnaxTask
-from evoclaims.envs.foreign.jax_task import Descriptor
+from evoclaims.envs.foreign.jax_task import Choice, Descriptor, Range, actions_of
 from evoclaims.methods.cma_es import CmaEs
 from evoclaims.methods.map_elites import MapElites
-from evoclaims.methods.neat.neat import Neat
+from evoclaims.methods.neat.evolution import Neat
 from evoclaims.methods.neat.settings import Settings, Species
 from evoclaims.methods.ppo import Ppo
 from evoclaims.methods.random_search import RandomSearch
 from evoclaims.networks.mlp import Mlp
-from evoclaims.trials.budget import Budget
 from evoclaims.trials.compatibility import traced_progress
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.runner import run
-from evoclaims.trials.spec import Condition
+from evoclaims.trials.spec import Budget, Condition
 from evoclaims.trials.store import Store
 
 with_gymnax = pytest.mark.skipif(importlib.util.find_spec("gymnax") is None, reason="gymnax is not installed")

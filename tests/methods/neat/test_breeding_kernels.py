@@ -21,9 +21,9 @@ from without_kernels import BREEDING, without_kernels
 from evoclaims.envs.gates.parity import NParity
 from evoclaims.kernels.emit import group_kernel
 from evoclaims.kernels.emit.gpu_kernel import GpuProgram
-from evoclaims.methods.neat.neat import Neat
+from evoclaims.methods.neat.evolution import Neat
+from evoclaims.methods.neat.mutation import _ordering, _removal, order_for, without_node
 from evoclaims.methods.neat.settings import Attribute, Mutation, Settings, Species
-from evoclaims.methods.neat.structure import _ordering, _removal, order_for, without_node
 from evoclaims.networks.genome import Genome
 
 

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from reference import Node
 from scipy.stats import binomtest
 
-from evoclaims.methods.neat.crossover import crossover
+from evoclaims.methods.neat.homology import crossover
 from evoclaims.networks.genome import Genome
 
 _crossover = jax.jit(crossover)

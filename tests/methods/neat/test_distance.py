@@ -11,7 +11,7 @@ from history import History
 from hypothesis import given, settings
 from reference import Node
 
-from evoclaims.methods.neat.distance import distance
+from evoclaims.methods.neat.homology import distance
 from evoclaims.methods.neat.settings import Species
 from evoclaims.networks.genome import Genome
 

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from evoclaims.envs.gates.parity import NParity
-from evoclaims.methods.neat.evolution import Evolution
-from evoclaims.methods.neat.neat import Neat
+from evoclaims.methods.neat.evolution import Evolution, Neat
 from evoclaims.methods.neat.settings import Mutation, Settings, Species
 
 pytestmark = pytest.mark.slow

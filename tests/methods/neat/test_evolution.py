@@ -14,8 +14,7 @@ from genomes import at, read, read_all, same
 
 from evoclaims.envs.gates.parity import NParity
 from evoclaims.methods.neat import capacity
-from evoclaims.methods.neat.evolution import Evolution
-from evoclaims.methods.neat.neat import Neat
+from evoclaims.methods.neat.evolution import Evolution, Neat
 from evoclaims.methods.neat.settings import Attribute, LevelUp, Mutation, Settings, Species
 from evoclaims.networks.genome import resized
 

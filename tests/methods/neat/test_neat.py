@@ -14,14 +14,13 @@ from probes import Probe
 
 from evoclaims.core.errors import UserError
 from evoclaims.envs.gates.parity import NParity
-from evoclaims.methods.neat.neat import Neat
+from evoclaims.methods.neat.evolution import Neat
 from evoclaims.methods.neat.settings import PAPER, Mutation, Settings, Species
-from evoclaims.trials.budget import Budget
 from evoclaims.trials.lanes import Lanes
 from evoclaims.trials.progress import RunProgress
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.runner import run
-from evoclaims.trials.spec import Condition
+from evoclaims.trials.spec import Budget, Condition
 from evoclaims.trials.store import Store
 
 pytestmark = pytest.mark.newest

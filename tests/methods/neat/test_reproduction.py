@@ -15,7 +15,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import binomtest
 
-from evoclaims.methods.neat.reproduction import choose_parents, offspring, survive
+from evoclaims.methods.neat.population import choose_parents, offspring, survive
 from evoclaims.methods.neat.settings import Species
 from evoclaims.methods.neat.species import SpeciesState
 

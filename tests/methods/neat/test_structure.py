@@ -17,8 +17,7 @@ from hypothesis import strategies as st
 from reference import Genes, Node
 from scipy.stats import binomtest
 
-from evoclaims.methods.neat.settings import Mutation
-from evoclaims.methods.neat.structure import (
+from evoclaims.methods.neat.mutation import (
     add_connection,
     add_node,
     delete_connection,
@@ -27,6 +26,7 @@ from evoclaims.methods.neat.structure import (
     order_for,
     without_node,
 )
+from evoclaims.methods.neat.settings import Mutation
 from evoclaims.networks.genome import Genome
 
 pytestmark = pytest.mark.newest

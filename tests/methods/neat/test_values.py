@@ -11,8 +11,8 @@ from genomes import made, same
 from reference import Node
 from scipy.stats import binomtest, kstest
 
+from evoclaims.methods.neat.mutation import draw, mutate, mutate_values
 from evoclaims.methods.neat.settings import Attribute, Mutation
-from evoclaims.methods.neat.values import draw, mutate, mutate_values
 from evoclaims.networks.genome import Genome, resized
 
 pytestmark = pytest.mark.newest

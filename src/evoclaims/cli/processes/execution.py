@@ -9,11 +9,9 @@ from dataclasses import dataclass, field
 
 from evoclaims.claims.fetching import RunMissing
 from evoclaims.cli.processes.host import Host
-from evoclaims.cli.processes.job import Job
-from evoclaims.cli.processes.missing_batches import missing_batches
-from evoclaims.cli.processes.seats import seats_of
+from evoclaims.cli.processes.job import Job, missing_batches
 from evoclaims.cli.processes.worker import Ended, WorkOrder, run_jobs
-from evoclaims.cli.processes.workers import Workers, in_queue
+from evoclaims.cli.processes.workers import Workers, in_queue, seats_of
 from evoclaims.cli.project import Project
 from evoclaims.cli.terminal import terminal
 from evoclaims.report.live_line import LiveLine, duration
@@ -65,7 +63,6 @@ class Execution:
             yield ended
 
     def _in_processes(self, wanted: Mapping[Job, Condition], tell: Callable[[str], None]) -> Iterator[Ended]:
-        """Run conditions in worker processes."""
         seeds, tier = self.order.seeds, self.order.tier
         batches = missing_batches(self.project, tier, wanted, seeds, self.limit, self.platform)
         seconds = {batch.job: batch.cost.seconds() for batch in batches}

@@ -21,11 +21,10 @@ import msgspec
 from evoclaims.claims.fetching import RunMissing
 from evoclaims.cli.processes.job import Job, jobs
 from evoclaims.cli.project import Project, open_project
-from evoclaims.core.errors import StorageError, UserError
+from evoclaims.core.errors import StorageError, UserError, in_one_line
 from evoclaims.core.printable import printable
-from evoclaims.core.raised import in_one_line
-from evoclaims.mutants import catalogue
-from evoclaims.mutants.conditions import plantings
+from evoclaims.mutants import mutant
+from evoclaims.mutants.mutant import plantings
 from evoclaims.report.live_line import LiveLine
 from evoclaims.trials.progress import RunProgress
 from evoclaims.trials.spec import Condition
@@ -96,7 +95,7 @@ def condition_of(project: Project, order: WorkOrder, job: Job) -> Condition:
     sound = {job.names: project.reproduction.tier(order.tier, order.variant).condition(*job.names)}
     if not job.fault:
         return sound[job.names]
-    return jobs(sound, plantings(sound, catalogue.load(project.reproduction)))[job]
+    return jobs(sound, plantings(sound, mutant.load(project.reproduction)))[job]
 
 
 def run_jobs(project: Project, order: WorkOrder, asked: Iterable[Job], line: LiveLine) -> Iterator[Ended]:

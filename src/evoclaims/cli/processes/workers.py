@@ -2,19 +2,100 @@
 
 from __future__ import annotations
 
+import contextlib
+import os
 import queue
+import signal
+import subprocess
 import sys
 import threading
 from collections import Counter, deque
-from collections.abc import Callable, Iterator, Sequence
-from typing import Final
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import IO, Any, Final
 
-from evoclaims.cli.processes.job import Job, sharing_programs
-from evoclaims.cli.processes.missing_batches import MissingBatch
-from evoclaims.cli.processes.seats import Seat
-from evoclaims.cli.processes.worker import Ended, WorkOrder
-from evoclaims.cli.processes.worker_process import Process
-from evoclaims.paper.variant import Conditions
+import msgspec
+
+from evoclaims.cli.processes.host import AUTO, Host
+from evoclaims.cli.processes.job import Job, MissingBatch, sharing_programs
+from evoclaims.cli.processes.worker import Ended, Reply, Told, WorkOrder
+from evoclaims.paper.reproduction import Conditions
+from evoclaims.trials import devices, gpus
+
+
+class Process:
+    """A process that runs one condition after the other, as it is asked to."""
+
+    def __init__(self, order: WorkOrder, environment: Mapping[str, str]) -> None:
+        """Start it, with these environment variables besides the command's own."""
+        # A process inherits what is blocked here: Ctrl-C cannot end it before `worker.main` ignores it.
+        blocked = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+        try:
+            self._process = subprocess.Popen(
+                [sys.executable, "-m", "evoclaims.cli.processes.worker"],
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.PIPE,
+                env={**os.environ, **environment},
+            )
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, blocked)
+        process: Any = self._process
+        pipes: tuple[IO[bytes], ...] = process.stdin, process.stdout, process.stderr
+        self._input, self._output, self._error_output = pipes
+        self._errors = threading.Thread(target=self._pass_errors_on, daemon=True)
+        self._errors.start()
+        self._ask(order)
+
+    def is_ready(self) -> bool:
+        """Wait until it can run conditions; False where it has died before."""
+        return isinstance(self._reply(), Told)
+
+    def run(self, job: Job, tell: Callable[[str], None]) -> Ended | None:
+        """Run a condition to its end; None where the process died of it."""
+        self._ask(job)
+        while isinstance(reply := self._reply(), Told):
+            tell(reply.text)
+        return reply
+
+    def why(self) -> str:
+        """Return how it has ended, such as "status 7"."""
+        status = self._process.wait()
+        if status == -signal.SIGKILL:
+            return "SIGKILL: the system sends that where memory runs out"
+        return signal.Signals(-status).name if -status in set(signal.Signals) else f"status {status}"
+
+    def close(self) -> None:
+        """Give it nothing more to do, and wait for its end."""
+        with contextlib.suppress(OSError):  # it is dead already
+            self._input.close()
+        self._process.wait()
+        self._errors.join()
+        self._output.close()
+        self._error_output.close()
+
+    def stop(self) -> None:
+        """End it, whatever it does; it is still to be closed."""
+        self._process.terminate()
+
+    def _ask(self, what: WorkOrder | Job) -> None:
+        """Write a line to its standard input; a dead process is found when it does not reply."""
+        with contextlib.suppress(OSError):
+            self._input.write(msgspec.json.encode(what) + b"\n")
+            self._input.flush()
+
+    def _reply(self) -> Reply | None:
+        """Wait for its next reply; None where it has died."""
+        line = self._output.readline()
+        try:
+            return msgspec.json.decode(line, type=Reply) if line else None
+        except msgspec.DecodeError:  # it died in the middle of a line
+            return None
+
+    def _pass_errors_on(self) -> None:
+        for line in self._error_output:
+            print(line.decode(errors="replace"), end="", file=sys.stderr, flush=True)
+
 
 ATTEMPTS: Final = 3
 """How often a condition is begun whose process dies: the first may have been killed by chance."""
@@ -80,7 +161,6 @@ class Workers:
             self._stop()
 
     def _sit(self, seats: Sequence[Seat]) -> None:
-        """Start a thread for each seat."""
         with self._changed:
             self._taken += len(seats)
             self._running += sum(seat.first is not None for seat in seats)
@@ -184,3 +264,53 @@ class Workers:
             thread.join()
         for process in tuple(self._processes):  # those of threads that have failed
             self._dismiss(process)
+
+
+@dataclass(frozen=True)
+class Seat:
+    """A place for one worker process at a time.
+
+    Attributes:
+        environment: what its process sets.
+        first: a condition that it runs before all others, if any.
+        then: the seats that it becomes when that has ended: one for each of its GPUs.
+    """
+
+    environment: Mapping[str, str] = field(default_factory=dict)
+    first: Job | None = None
+    then: tuple[Seat, ...] = ()
+
+
+def seats_of(host: Host, batches: Sequence[MissingBatch]) -> list[Seat]:
+    """Return the seats of the processes that run some batches; none where there is nothing to run."""
+    if not batches:
+        return []
+    if host.gpus and host.processes == AUTO:
+        return _a_gpu_each(host.gpus, batches)
+    if host.gpus:
+        return [Seat(environment) for environment in gpus.shared(host.gpus, host.processes)]
+    processes = host.processes or useful_processes(batches, devices.usable_cores())
+    return [Seat() for _ in range(min(processes, len(batches)))]
+
+
+def useful_processes(batches: Sequence[MissingBatch], cores: int) -> int:
+    """Return how many processes keep some cores busy: compiling takes one, running as many as there are trials."""
+    alone = sum(batch.cost.seconds() for batch in batches)
+    in_parallel = sum(batch.cost.seconds(cores) for batch in batches)
+    return max(round(cores * in_parallel / alone), 1)
+
+
+def _a_gpu_each(found: Sequence[str], batches: Sequence[MissingBatch]) -> list[Seat]:
+    """Return a seat for each GPU, save for batches that would take two GPUs' share or more: these have several.
+
+    A batch that takes k shares of the whole time has k GPUs, which are single seats when it has ended. So no more GPUs
+    are asked for than there are.
+    """
+    share, free, seats = sum(batch.cost.seconds() for batch in batches) / len(found), list(found), []
+    for batch in batches:
+        wide = min(int(batch.cost.seconds() / share), batch.cost.trials, len(free))
+        if wide < 2:
+            continue
+        taken, free = free[:wide], free[wide:]
+        seats.append(Seat(gpus.only(taken), batch.job, tuple(Seat(gpus.only([one])) for one in taken)))
+    return [*seats, *(Seat(gpus.only([one])) for one in free)]

@@ -23,8 +23,7 @@ from numpy.typing import NDArray
 from evoclaims import kernels
 from evoclaims.core.canonical import as_plain, content_hash
 from evoclaims.core.errors import UserError
-from evoclaims.core.files import read_file, write_atomically
-from evoclaims.core.private_files import doubt, make_private, read_private
+from evoclaims.core.files import doubt, make_private, read_file, read_private, write_atomically
 from evoclaims.core.provenance import versions
 from evoclaims.envs.ecorobot import physics
 from evoclaims.envs.ecorobot.physics import Body

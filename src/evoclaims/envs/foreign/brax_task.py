@@ -14,8 +14,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, PRNGKeyArray
 
 from evoclaims.core.errors import UserError, require_known
-from evoclaims.envs.foreign.actions import Range
-from evoclaims.envs.foreign.jax_task import JaxTask, Moment
+from evoclaims.envs.foreign.jax_task import JaxTask, Moment, Range
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -11,8 +11,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, PRNGKeyArray
 
 from evoclaims.core.errors import UserError
-from evoclaims.envs.foreign.actions import Choice, Range, actions_of
-from evoclaims.envs.foreign.jax_task import JaxTask, Moment
+from evoclaims.envs.foreign.jax_task import Choice, JaxTask, Moment, Range, actions_of
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -9,8 +9,7 @@ from typing import ClassVar, Literal, get_args
 import numpy as np
 
 from evoclaims.core.errors import UserError, require_known
-from evoclaims.envs.gates.circuit import Circuit, Sampling
-from evoclaims.envs.gates.truth_table import Operation, TruthTable, bits_of, number_of
+from evoclaims.envs.gates.circuit import Circuit, Operation, Sampling, TruthTable, bits_of, number_of
 
 WIDTH = 4
 """Number of data input, data output and control bits."""

@@ -9,8 +9,7 @@ from typing import ClassVar
 import numpy as np
 
 from evoclaims.core.errors import UserError
-from evoclaims.envs.gates.circuit import Circuit, Sampling
-from evoclaims.envs.gates.truth_table import TruthTable, bits_of
+from evoclaims.envs.gates.circuit import Circuit, Sampling, TruthTable, bits_of
 
 
 @dataclass(frozen=True)
@@ -44,4 +43,29 @@ class NParity(Circuit):
             targets=(rows.sum(axis=1, keepdims=True) % 2).astype(bool),
             active=np.ones((len(rows), 1), dtype=bool),
             rows_at_level=tuple(2 ** (level + 2) for level in range(self.bits - 1)),
+        )
+
+
+@dataclass(frozen=True)
+class CumulativeParity(NParity):
+    """Level k asks the tables of levels 0 … k of N-parity, one after the other.
+
+    One of the published environments can do so; no published script does with the curriculum. Rows of early levels are
+    asked once for every level so far, so forgetting them costs more than in `NParity`, and success weighs them the same
+    way.
+    """
+
+    name: ClassVar[str] = "cumulative_parity"
+    revision: ClassVar[int] = 1
+
+    @cached_property
+    def table(self) -> TruthTable:
+        """The levels in order, so that level k is a prefix: the first 4 + 8 + … + 2^(k + 2) rows."""
+        plain = NParity(self.bits).table
+        rows = np.concatenate([np.arange(count) for count in plain.rows_at_level])
+        return TruthTable(
+            inputs=plain.inputs[rows],
+            targets=plain.targets[rows],
+            active=plain.active[rows],
+            rows_at_level=tuple(int(end) for end in np.cumsum(plain.rows_at_level)),
         )

@@ -8,10 +8,9 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from evoclaims.core.errors import UserError
-from evoclaims.judging.assertion import Assertion, Finding
+from evoclaims.judging.assertion import Assertion, Entry, Finding
 from evoclaims.judging.design import Design
 from evoclaims.judging.effect import median_interval
-from evoclaims.judging.entry import Entry
 from evoclaims.judging.exact import sign_test
 from evoclaims.judging.reading import NumberReading
 from evoclaims.judging.sample import Sample, Trials

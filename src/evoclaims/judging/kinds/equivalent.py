@@ -8,14 +8,13 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from evoclaims.core.errors import UserError
-from evoclaims.judging.as_written import total
-from evoclaims.judging.assertion import Assertion, Finding
+from evoclaims.judging.assertion import Assertion, Entry, Finding
 from evoclaims.judging.design import Design
-from evoclaims.judging.entry import Entry
 from evoclaims.judging.exact import ExactTest, rank_attainable, rank_test
 from evoclaims.judging.reading import NumberReading, require_independent
 from evoclaims.judging.sample import Trials
 from evoclaims.judging.verdict import Bound, PValues
+from evoclaims.judging.window import total
 
 
 @dataclass(frozen=True)

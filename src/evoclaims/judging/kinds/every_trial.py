@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from evoclaims.judging.assertion import Assertion, Finding
+from evoclaims.judging.assertion import Assertion, Entry, Finding
 from evoclaims.judging.design import Design, Look
-from evoclaims.judging.entry import Entry
 from evoclaims.judging.reading import EventReading
 from evoclaims.judging.sample import Source, Trials
 from evoclaims.judging.verdict import PValues

@@ -8,9 +8,8 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import ClassVar
 
-from evoclaims.judging.assertion import Assertion, Finding
+from evoclaims.judging.assertion import Assertion, Entry, Finding
 from evoclaims.judging.design import Design
-from evoclaims.judging.entry import Entry
 from evoclaims.judging.exact import ExactTest, pairs_test, rank_attainable, rank_test
 from evoclaims.judging.reading import NumberReading, require_independent
 from evoclaims.judging.sample import Trials

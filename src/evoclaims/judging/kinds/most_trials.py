@@ -6,9 +6,8 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from evoclaims.core.errors import UserError
-from evoclaims.judging.assertion import Assertion, Finding
+from evoclaims.judging.assertion import Assertion, Entry, Finding
 from evoclaims.judging.design import Design
-from evoclaims.judging.entry import Entry
 from evoclaims.judging.exact import binomial_test, clopper_pearson
 from evoclaims.judging.reading import EventReading
 from evoclaims.judging.sample import Trials

@@ -13,10 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evoclaims.core.errors import UserError
-from evoclaims.judging.assertion import Assertion, Finding
+from evoclaims.judging.assertion import Assertion, Entry, Finding
 from evoclaims.judging.design import Design
 from evoclaims.judging.effect import epsilon_squared
-from evoclaims.judging.entry import Entry
 from evoclaims.judging.exact import ExactTest, rank_attainable
 from evoclaims.judging.kinds.equivalent import Equivalent, equivalence_tests
 from evoclaims.judging.reading import NumberReading, comparable, require_independent

@@ -10,9 +10,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from evoclaims.judging.assertion import Assertion, Finding
+from evoclaims.judging.assertion import Assertion, Entry, Finding
 from evoclaims.judging.design import Design, Look
-from evoclaims.judging.entry import Entry
 from evoclaims.judging.exact import binomial_test, rank_attainable
 from evoclaims.judging.kinds.greater import GreaterTests
 from evoclaims.judging.reading import NumberReading

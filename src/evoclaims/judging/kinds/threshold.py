@@ -7,9 +7,8 @@ from dataclasses import dataclass
 from typing import ClassVar, Literal
 
 from evoclaims.core.errors import UserError, require_known
-from evoclaims.judging.assertion import Assertion, Finding
+from evoclaims.judging.assertion import Assertion, Entry, Finding
 from evoclaims.judging.design import Design
-from evoclaims.judging.entry import Entry
 from evoclaims.judging.exact import sign_test
 from evoclaims.judging.kinds.band import span_of_median
 from evoclaims.judging.reading import NumberReading

@@ -8,9 +8,8 @@ from itertools import combinations
 from typing import ClassVar, Literal
 
 from evoclaims.core.errors import require_known
-from evoclaims.judging.assertion import Assertion, Finding
+from evoclaims.judging.assertion import Assertion, Entry, Finding
 from evoclaims.judging.design import Design
-from evoclaims.judging.entry import Entry
 from evoclaims.judging.kinds.threshold import sign_tests
 from evoclaims.judging.reading import LevelsReading
 from evoclaims.judging.sample import Trials

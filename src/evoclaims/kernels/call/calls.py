@@ -16,7 +16,7 @@ from jaxtyping import Array
 
 from evoclaims.kernels.emit import gpu_kernel, machine_code
 from evoclaims.kernels.emit.gpu_kernel import GpuProgram
-from evoclaims.kernels.emit.xla_handler import ENTRY
+from evoclaims.kernels.emit.host_kernel import ENTRY
 
 GPU_TARGET: Final = "__gpu$xla.gpu.ptx"
 """XLA's name for a kernel given as PTX."""

@@ -16,7 +16,7 @@ from jaxtyping import Array
 from evoclaims.kernels.call import calls
 from evoclaims.kernels.emit import gpu_kernel, group_kernel, machine_code
 from evoclaims.kernels.emit.group_kernel import Sizes, Writer
-from evoclaims.kernels.unsupported import Unsupported
+from evoclaims.kernels.trace.expressions import Unsupported
 
 Shapes = tuple[jax.ShapeDtypeStruct, ...]
 

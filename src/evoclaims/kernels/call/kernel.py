@@ -1,11 +1,14 @@
-"""A function as a kernel: what it computes, and how a batch of it is called on processors and GPUs."""
+"""A function as a kernel: what it computes, and how a batch of it is called on processors and GPUs.
+
+XLA splits a robot's time step into some hundred kernels. Here the whole step is computed in registers.
+"""
 
 from __future__ import annotations
 
 import math
 import warnings
 from collections.abc import Callable, Sequence
-from functools import cached_property
+from functools import cache, cached_property
 from typing import Any
 
 import jax
@@ -14,12 +17,11 @@ from jax.extend.core import jaxpr_as_fun
 from jaxtyping import Array
 
 from evoclaims.kernels.call import calls
-from evoclaims.kernels.emit import block_kernel, block_shape, gpu_kernel, host_kernel, llvm_names, machine_code
-from evoclaims.kernels.emit.llvm_names import ArrayRow
-from evoclaims.kernels.trace.expressions import Input, everything
+from evoclaims.kernels.emit import block_kernel, gpu_kernel, host_kernel, llvm_ir, machine_code
+from evoclaims.kernels.emit.llvm_ir import ArrayRow
+from evoclaims.kernels.trace.expressions import Input, Unsupported, everything
 from evoclaims.kernels.trace.interpreter import Numbers
 from evoclaims.kernels.trace.scalarize import scalarize
-from evoclaims.kernels.unsupported import Unsupported
 
 Shapes = tuple[jax.ShapeDtypeStruct, ...]
 
@@ -48,7 +50,7 @@ class Kernel:
         """Whether it can be a kernel; a warning says once why not."""
         try:
             machine_code.lanes()
-            llvm_names.check([number for result in self.results for number in result.flat])
+            llvm_ir.check([number for result in self.results for number in result.flat])
         except Unsupported as reason:
             warnings.warn(f"{self.name} is not one kernel, and slower, because of {reason}.", stacklevel=5)
             return False
@@ -130,7 +132,7 @@ class Kernel:
         """Return the kernel for NVIDIA's GPUs: for how many elements, how many of which share a row of each array."""
         if (rows, shared) not in self._gpu_programs:  # a legged robot's takes seconds
             results, given = [self.results[i] for i in self.written], dict(zip(self.read, shared, strict=True))
-            shape = block_shape.chosen(results, rows)
+            shape = block_kernel.chosen(results, rows)
             if shape is None:
                 made = gpu_kernel.program(gpu_kernel.text(results, self.read, given, rows), self.name)
             else:
@@ -158,3 +160,29 @@ class Kernel:
         for place, made in zip(self.written, call(rows, shared, shapes), strict=True):
             results[place] = made.reshape(results[place].shape)
         return results
+
+
+def one_kernel(function: Callable[..., Any], name: str) -> Callable[..., Any]:
+    """Return `function`, run as one kernel on processors and NVIDIA's GPUs.
+
+    It may be batched, any number of times; derivatives are those of the function itself. If it cannot be one kernel
+    (`Unsupported`), it runs unchanged, and a warning says why.
+
+    Args:
+        function: takes trees of small arrays (float32, int32, bool); pure.
+        name: what it computes, for the warning and for profilers.
+    """
+
+    @cache
+    def kernel(treedef: Any, shapes: Shapes) -> Kernel:
+        return Kernel(function, name, treedef, shapes)
+
+    def run(*arguments: Any) -> Any:
+        leaves, treedef = jax.tree.flatten(arguments)
+        leaves = [jnp.asarray(leaf) for leaf in leaves]
+        made = kernel(treedef, tuple(jax.ShapeDtypeStruct(leaf.shape, leaf.dtype) for leaf in leaves))
+        if not leaves or not made.supported:
+            return function(*arguments)
+        return jax.tree.unflatten(made.structure, calls.CALL.bind(*leaves, kernel=made))
+
+    return run

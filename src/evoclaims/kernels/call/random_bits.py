@@ -20,12 +20,10 @@ from jaxtyping import Array, Int32, PRNGKeyArray, UInt32
 from evoclaims.kernels.call import calls
 from evoclaims.kernels.call.grouped import GroupKernel
 from evoclaims.kernels.emit import machine_code
-from evoclaims.kernels.emit.control import repeat
+from evoclaims.kernels.emit.control import at, load, repeat, store
 from evoclaims.kernels.emit.group_kernel import LANES, Rows
-from evoclaims.kernels.emit.host_kernel import WIDE
+from evoclaims.kernels.emit.host_kernel import WIDE, handler
 from evoclaims.kernels.emit.llvm_ir import Instructions
-from evoclaims.kernels.emit.words import at, load, store
-from evoclaims.kernels.emit.xla_handler import handler
 
 ROTATIONS: Final = ((13, 15, 26, 6), (17, 29, 16, 24))
 """Of the rounds of Threefry-2x32 (Salmon et al. 2011, Table 2)."""

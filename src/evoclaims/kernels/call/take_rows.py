@@ -14,11 +14,10 @@ from jaxtyping import Array, Int
 
 from evoclaims.kernels.call import calls
 from evoclaims.kernels.emit import machine_code
-from evoclaims.kernels.emit.control import repeat
+from evoclaims.kernels.emit.control import load, repeat
+from evoclaims.kernels.emit.host_kernel import handler
 from evoclaims.kernels.emit.llvm_ir import Instructions
-from evoclaims.kernels.emit.words import load
-from evoclaims.kernels.emit.xla_handler import handler
-from evoclaims.kernels.unsupported import Unsupported
+from evoclaims.kernels.trace.expressions import Unsupported
 
 T = TypeVar("T")
 COPIED: Final = frozenset("biuf")

@@ -1,4 +1,4 @@
-"""Loops and choices in LLVM's text, whose bounds are only known when the kernel runs; all lanes go the same way."""
+"""Loops, choices and memory in LLVM's text, at bounds and places that are known when the kernel runs."""
 
 from __future__ import annotations
 
@@ -90,3 +90,24 @@ def when(page: Instructions, condition: str, type_: str, yes: Callable[[], str],
     value = page.register()
     page.write(either(value, type_, (made, after), (no, before)))
     return value
+
+
+def at(page: Instructions, array: str, place: str) -> str:
+    """Return the address of a number of an array."""
+    return page.put(f"getelementptr i32, ptr {array}, i32 {place}")
+
+
+def load(page: Instructions, array: str, place: str = "0") -> str:
+    """Return a number of an array."""
+    return page.put(f"load i32, ptr {at(page, array, place)}, align 4")
+
+
+def store(page: Instructions, value: str, array: str, place: str) -> None:
+    """Change a number of an array."""
+    page.write(f"store i32 {value}, ptr {at(page, array, place)}, align 4")
+
+
+def fill(page: Instructions, array: str, byte: int, count: int) -> None:
+    """Set every byte of the first `count` numbers of an array; a GPU's thread sets one after the other."""
+    operands = [("ptr", array), ("i8", str(byte)), ("i64", str(4 * count)), ("i1", "false")]
+    page.call("llvm.memset.p0.i64", "void", operands)

@@ -24,8 +24,7 @@ from typing import Final
 
 import numpy as np
 
-from evoclaims.kernels.emit.llvm_ir import Instructions
-from evoclaims.kernels.emit.llvm_names import literal, of_literal
+from evoclaims.kernels.emit.llvm_ir import Instructions, literal, of_literal
 from evoclaims.kernels.trace.expressions import Number
 
 SCALE: Final = np.float32(4)

@@ -9,8 +9,7 @@ from functools import cache
 from typing import Any, Final
 
 from evoclaims.kernels.emit.gpu_instructions import GpuInstructions
-from evoclaims.kernels.emit.llvm_ir import Instructions
-from evoclaims.kernels.emit.llvm_names import BYTES, STORED, ArrayRow
+from evoclaims.kernels.emit.llvm_ir import BYTES, STORED, ArrayRow, Instructions
 from evoclaims.kernels.emit.machine_code import llvm
 from evoclaims.kernels.trace.expressions import Input, everything, in_order
 from evoclaims.kernels.trace.interpreter import Numbers

@@ -12,9 +12,8 @@ from typing import Final
 
 from evoclaims.kernels.emit import gpu_kernel
 from evoclaims.kernels.emit.gpu_instructions import GpuInstructions
-from evoclaims.kernels.emit.host_kernel import WIDE
+from evoclaims.kernels.emit.host_kernel import WIDE, handler
 from evoclaims.kernels.emit.llvm_ir import Instructions
-from evoclaims.kernels.emit.xla_handler import handler
 
 BYTES: Final = 4
 """Of a number: float32 or int32."""

@@ -13,10 +13,9 @@ import jax
 from filelock import FileLock
 
 from evoclaims.core.errors import UserError
-from evoclaims.core.files import write_atomically
-from evoclaims.core.private_files import ForeignFileError, doubt, make_private, read_private, say_refused
+from evoclaims.core.files import ForeignFileError, doubt, make_private, read_private, say_refused, write_atomically
 from evoclaims.core.waiting import waiting
-from evoclaims.kernels.unsupported import Unsupported
+from evoclaims.kernels.trace.expressions import Unsupported
 
 try:
     import llvmlite.binding as binding

@@ -8,10 +8,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Final
 
-from evoclaims.kernels.emit.control import repeat, walk, when
+from evoclaims.kernels.emit.control import at, fill, load, repeat, store, walk, when
 from evoclaims.kernels.emit.group_kernel import Rows
 from evoclaims.kernels.emit.llvm_ir import Instructions
-from evoclaims.kernels.emit.words import at, fill, load, store
 
 NAN: Final = str(0x7FC00000)
 """The bits of a float32."""

@@ -16,10 +16,9 @@ import jax.numpy as jnp
 from jaxtyping import Array
 
 from evoclaims.kernels.call.grouped import GroupKernel
-from evoclaims.kernels.emit.control import repeat, walk, when
+from evoclaims.kernels.emit.control import load, repeat, store, walk, when
 from evoclaims.kernels.emit.group_kernel import Rows
 from evoclaims.kernels.emit.llvm_ir import Instructions
-from evoclaims.kernels.emit.words import load, store
 
 Function = Callable[..., Sequence[Array]]
 PASSED_OVER: Final = -1

@@ -8,8 +8,16 @@ from typing import Any, Final
 
 import numpy as np
 
-from evoclaims.kernels.trace.expressions import COMPARISONS, FUSED, KNOWN, Expression, Number, ScalarOperation, is_known
-from evoclaims.kernels.unsupported import Unsupported
+from evoclaims.kernels.trace.expressions import (
+    COMPARISONS,
+    FUSED,
+    KNOWN,
+    Expression,
+    Number,
+    ScalarOperation,
+    Unsupported,
+    is_known,
+)
 
 Rule = Callable[..., Number | None]
 COMMUTATIVE: Final = frozenset({"add", "and", "eq", "max", "min", "mul", "ne", "or", "xor"})

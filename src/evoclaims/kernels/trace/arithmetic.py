@@ -11,8 +11,8 @@ from jax.lax import RoundingMethod
 
 from evoclaims.kernels.trace import expressions as ex
 from evoclaims.kernels.trace.elementary import power
+from evoclaims.kernels.trace.expressions import Unsupported
 from evoclaims.kernels.trace.interpreter import Numbers, Scalars, check, filled, listed, primitive
-from evoclaims.kernels.unsupported import Unsupported
 
 
 @primitive("integer_pow")

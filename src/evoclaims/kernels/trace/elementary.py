@@ -11,8 +11,7 @@ import numpy as np
 from evoclaims.kernels.trace import exponentials
 from evoclaims.kernels.trace.algebra import Algebra
 from evoclaims.kernels.trace.exponentials import polynomial
-from evoclaims.kernels.trace.expressions import Number, is_known
-from evoclaims.kernels.unsupported import Unsupported
+from evoclaims.kernels.trace.expressions import Number, Unsupported, is_known
 
 F = np.float32
 LARGEST_POWER: Final = 16

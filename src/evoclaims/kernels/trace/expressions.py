@@ -226,3 +226,7 @@ COMPARISONS: Final = frozenset({"eq", "ge", "gt", "le", "lt", "ne"})
 """Operations that return a bool."""
 FUSED: Final = ("fma", "fms", "fnma")
 """Of floats c, a and b, rounded once: c + a · b, a · b - c, and c - a · b."""
+
+
+class Unsupported(Exception):  # noqa: N818  (not an error: the function runs without a kernel)
+    """A function uses something that kernels do not support; the message says what."""

@@ -8,9 +8,8 @@ from typing import Any
 import numpy as np
 from jax.lax import GatherScatterMode
 
-from evoclaims.kernels.trace.expressions import Number, is_known
+from evoclaims.kernels.trace.expressions import Number, Unsupported, is_known
 from evoclaims.kernels.trace.interpreter import Numbers, Scalars, filled, known, listed, primitive
-from evoclaims.kernels.unsupported import Unsupported
 
 Place = tuple[int, Number, int]
 """A dimension, a window's start position along it, and the last possible start."""

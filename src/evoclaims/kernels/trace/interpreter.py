@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 from evoclaims.kernels.trace import expressions as ex
 from evoclaims.kernels.trace.algebra import Algebra
 from evoclaims.kernels.trace.elementary import ELEMENTARY
-from evoclaims.kernels.trace.expressions import Number
-from evoclaims.kernels.unsupported import Unsupported
+from evoclaims.kernels.trace.expressions import Number, Unsupported
 
 Numbers = NDArray[Any]
 """An array of objects, each a `Number`."""

@@ -1,4 +1,4 @@
-from evoclaims.methods.neat.neat import Neat as Neat
+from evoclaims.methods.neat.evolution import Neat as Neat
 from evoclaims.methods.neat.settings import Attribute as Attribute
 from evoclaims.methods.neat.settings import Mutation as Mutation
 from evoclaims.methods.neat.settings import Settings as Settings

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from dataclasses import dataclass
 from functools import partial
-from typing import Any, Protocol
+from typing import Any, ClassVar, Protocol
 
 import jax
 import jax.numpy as jnp
@@ -18,7 +19,7 @@ from evoclaims.methods.base import Policy, Progress
 from evoclaims.methods.champion import no_episode
 from evoclaims.methods.neat.capacity import capacities, in_capacity
 from evoclaims.methods.neat.population import Population, first_population, forget_records, next_population
-from evoclaims.methods.neat.settings import Settings
+from evoclaims.methods.neat.settings import PAPER, Settings
 from evoclaims.networks.genome import Genome, resized
 from evoclaims.networks.graph import GraphNetwork
 
@@ -130,3 +131,18 @@ def _evaluate(
 
     small = resized(genomes, nodes, connections)
     return jax.vmap(evaluate)(jax.random.split(key, small.node_count.shape[0]), small)
+
+
+@dataclass(frozen=True)
+class Neat(GenomeMethod):
+    """NEAT whose genomes are the policies' networks."""
+
+    name: ClassVar[str] = "neat"
+    revision: ClassVar[int] = 1
+    packages: ClassVar[tuple[str, ...]] = ("llvmlite",)
+
+    settings: Settings = PAPER
+
+    def network(self, task: Task) -> GraphNetwork:
+        """Return the policy's network."""
+        return GraphNetwork(task.observation_size, task.action_size, self.settings.activations, self.settings.output)

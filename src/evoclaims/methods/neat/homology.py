@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import cache, partial
 from typing import Final
 
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Bool, Float, Int
+from jaxtyping import Array, Bool, Float, Int, PRNGKeyArray
 
+from evoclaims.core.keys import streams
 from evoclaims.core.pytree import pytree
 from evoclaims.kernels import GroupKernel, one_kernel
 from evoclaims.kernels.genomes.homology import write_look_up, write_search
+from evoclaims.methods.neat.settings import Species
 from evoclaims.networks.genome import Connections, Genome, Nodes
 
 Weights = Callable[[Genome, Array, Array], Array]
@@ -148,4 +151,49 @@ def _look_up(connections: int) -> GroupKernel:
     write = partial(write_look_up, STEP, NOWHERE)
     return GroupKernel(
         "The breeding of genomes", function, (full, weights, one), (one,), (weight,), write, one_lane=True
+    )
+
+
+def crossover(key: PRNGKeyArray, fitter: Genome, other: Genome) -> Genome:
+    """Return a child with the fitter parent's structure; each attribute of a homologous gene is either parent's."""
+    node_key, connection_key = streams(key, "node", "connection")
+    found = counterparts_in_pairs(fitter, other)
+    nodes, genes = fitter.nodes, fitter.connections
+    coins = jax.random.bernoulli(node_key, shape=(nodes.key.shape[0], 3)) & found.has_node[:, None]
+    coin = jax.random.bernoulli(connection_key, shape=genes.weight.shape) & found.has_connection
+    return replace(
+        fitter,
+        nodes=Nodes(
+            key=nodes.key,
+            bias=jnp.where(coins[:, 0], found.nodes.bias, nodes.bias),
+            response=jnp.where(coins[:, 1], found.nodes.response, nodes.response),
+            activation=jnp.where(coins[:, 2], found.nodes.activation, nodes.activation),
+        ),
+        connections=replace(genes, weight=jnp.where(coin, found.weight, genes.weight)),
+    )
+
+
+def distance(settings: Species, genome: Genome, other: Genome) -> Float[Array, ""]:
+    """Return the distance of nodes plus that of connections.
+
+    Each is (c_disjoint · D + c_difference · Σ |Δ attributes|) / max(n₁, n₂), where D counts the genes without a
+    counterpart and the sum is over homologous genes; 0 when neither genome has such genes.
+    """
+    found = counterparts(genome, other)
+    nodes = genome.nodes
+    node_difference = (
+        jnp.abs(nodes.bias - found.nodes.bias)
+        + jnp.abs(nodes.response - found.nodes.response)
+        + (nodes.activation != found.nodes.activation).astype(jnp.float32)
+    )
+    weight_difference = jnp.abs(genome.connections.weight - found.weight)
+
+    def part(has: Array, difference: Array, count: Array, other_count: Array) -> Array:
+        shared = jnp.sum(has, dtype=jnp.int32)
+        total = settings.disjoint * (count + other_count - 2 * shared).astype(jnp.float32)
+        total += settings.difference * jnp.sum(jnp.where(has, difference, 0.0))
+        return total / jnp.maximum(jnp.maximum(count, other_count), 1).astype(jnp.float32)
+
+    return part(found.has_node, node_difference, genome.node_count, other.node_count) + part(
+        found.has_connection, weight_difference, genome.connection_count, other.connection_count
     )

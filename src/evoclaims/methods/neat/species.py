@@ -14,7 +14,7 @@ from jaxtyping import Array, Bool, Float, Int
 
 from evoclaims.core.pytree import pytree
 from evoclaims.kernels import take_rows
-from evoclaims.methods.neat.distance import distance
+from evoclaims.methods.neat.homology import distance
 from evoclaims.methods.neat.settings import Species
 from evoclaims.networks.genome import Genome
 
@@ -128,7 +128,6 @@ def speciate(settings: Species, species: SpeciesState, population: Genome, gener
 
 
 def _at(genomes: Genome, place: Any) -> Genome:
-    """Return the genome or genomes at `place`."""
     return take_rows(genomes, place)
 
 

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from evoclaims.core.drawing import optional
 from evoclaims.envs.ecorobot.obstacles import Obstacles
 from evoclaims.envs.ecorobot.stones import SteppingStones
-from evoclaims.envs.ecorobot.views import film as films
-from evoclaims.envs.ecorobot.views.film import FRAME, film
+from evoclaims.envs.ecorobot.views import pictures as films
 from evoclaims.envs.ecorobot.views.motion import motion
+from evoclaims.envs.ecorobot.views.pictures import FRAME, film
 
 MAZE, RUN = SteppingStones(), Obstacles()
 ROLLING = np.stack([np.linspace(-3.0, 3.0, 7), np.full(7, 1.5), np.zeros(7)], axis=1)

@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 from evoclaims.envs.ecorobot.obstacles import Obstacles
 from evoclaims.envs.ecorobot.stones import STONES, SteppingStones
 from evoclaims.envs.ecorobot.views import page as pages
-from evoclaims.envs.ecorobot.views.marks import Mark
-from evoclaims.envs.ecorobot.views.motion import Motion, motion
+from evoclaims.envs.ecorobot.views.motion import Mark, Motion, motion
 from evoclaims.envs.ecorobot.views.page import page
 
 MAZE, RUN = SteppingStones(), Obstacles()

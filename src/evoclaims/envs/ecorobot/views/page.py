@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 from evoclaims.core.content_policy import exactly
 from evoclaims.envs.ecorobot.maze import Maze
 from evoclaims.envs.ecorobot.robot_task import RobotTask
-from evoclaims.envs.ecorobot.views.marks import marks
-from evoclaims.envs.ecorobot.views.motion import Motion, Shape
+from evoclaims.envs.ecorobot.views.motion import Motion, Shape, marks
 
 ASSETS: Final = resources.files("evoclaims.envs.ecorobot.views") / "assets"
 DIGITS: Final = 6

@@ -1,4 +1,4 @@
-"""Lines on claims whose trials were made with mixed versions of a package, or not with the installed ones."""
+"""Lines on claims whose trials ran other code than is there now: of a package, or the project's methods and tasks."""
 
 from __future__ import annotations
 
@@ -9,8 +9,7 @@ from typing import Final
 from evoclaims.core.packages import installed
 from evoclaims.core.printable import printable
 from evoclaims.verdicts.claim_report import ClaimReport
-from evoclaims.verdicts.source_trials import versions_of
-from evoclaims.verdicts.versions import different, in_words
+from evoclaims.verdicts.source_trials import different, in_words, versions_of
 
 MARK: Final = "†"
 """Marks a verdict whose trials were made with mixed versions."""
@@ -25,11 +24,14 @@ def is_mixed(report: ClaimReport) -> bool:
 
 
 def lines(reports: Sequence[ClaimReport]) -> list[str]:
-    """Return lines on claims judged from mixed versions, or from other versions than the installed ones, if any."""
+    """Return lines on claims judged from mixed or other versions of packages, or from code that was edited since."""
     mixed: dict[str, list[str]] = defaultdict(list)
     foreign: dict[str, list[str | None]] = defaultdict(list)
+    edits: dict[str, list[str]] = defaultdict(list)
     elsewhere = []
     for report in reports:
+        for name in edited(report):
+            edits[name].append(f"{report.name} ({report.tier})")
         versions = versions_of(report.sources)
         several = [f"{name} {in_words(those)}" for name, those in versions.items() if len(those) > 1]
         if several:
@@ -49,6 +51,7 @@ def lines(reports: Sequence[ClaimReport]) -> list[str]:
             for name, those in sorted(foreign.items())
         )
         lines.append(f"not made with the installed versions: {', '.join(packages)}: {listed(elsewhere)}")
+    lines += [f"{summary(name)}: {listed(names)}" for name, names in sorted(edits.items())]
     return [printable(line) for line in lines]
 
 
@@ -56,3 +59,16 @@ def listed(names: Sequence[str]) -> str:
     """Return the first names, and how many more there are."""
     rest = len(names) - MOST_NAMES
     return ", ".join(names[:MOST_NAMES]) + (f" and {rest} more" if rest > 0 else "")
+
+
+def edited(report: ClaimReport) -> list[str]:
+    """Return the methods and tasks that were edited after trials behind a claim had run."""
+    return sorted({name for source in report.sources for name in source.edited})
+
+
+def summary(name: str) -> str:
+    """Return a sentence about an edited method or task, without its trials."""
+    return (
+        f"the code of {name} was edited after trials had run, and they still count: if it computes something else now, "
+        "raise its `revision`, and they run again"
+    )

@@ -1,19 +1,67 @@
-"""Faults of tasks: bugs in an environment's observations, actions, rewards and levels."""
+"""Faults that are planted in a method or a task: the same parameters, with one of its functions replaced by a bug."""
 
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import ClassVar
+from functools import cache
+from typing import Any, ClassVar, TypeVar
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, Int, PRNGKeyArray
 
+from evoclaims.core.errors import UserError
 from evoclaims.core.keys import stream
-from evoclaims.envs.base import Episode, PolicyFn, TaskState, fitting
-from evoclaims.envs.gates.truth_table import TruthTable
-from evoclaims.mutants.planting import Fault
+from evoclaims.envs.base import Episode, PolicyFn, Task, TaskState, fitting
+from evoclaims.envs.gates.circuit import TruthTable
+from evoclaims.methods.base import Policy, Progress
+from evoclaims.methods.cma_es import CmaEsState
+
+F = TypeVar("F", bound="Fault")
+
+
+class Fault:
+    """What a fault replaces; a subclass overrides functions of the method or task that it is planted in.
+
+    A faulty component is also an instance of the sound one's class, since methods and reports check a task's class. Its
+    name differs, so that it has its own trials, and code for sound components has no switch for faults.
+    """
+
+    says: ClassVar[str]
+    _sound_class: ClassVar[type]
+
+    @property
+    def sound(self) -> Any:
+        """The component without the fault."""
+        made: Any = object.__new__(self._sound_class)
+        made.__dict__.update(self.__dict__)
+        return made
+
+    @property
+    def name(self) -> str:
+        """The sound component's name, and what is wrong."""
+        return f"{self.sound.name} that {self.says}"
+
+
+@cache
+def _faulty(fault: type[Fault], sound: type) -> type:
+    """Return the class of a faulty component; cached, so that equal components have one class."""
+    return type(f"{fault.__name__}{sound.__name__}", (fault, sound), {"_sound_class": sound})
+
+
+def plant(fault: type[F], component: Any) -> F:
+    """Return a component with the same parameters and the fault.
+
+    Raises:
+        UserError: when there is a fault in it already: a combination of two has no clear meaning.
+    """
+    if isinstance(component, Fault):
+        raise UserError(f"{component.name!r} has a fault already. Plant each fault in a component without one.")
+    kinds: Any = fault, type(component)
+    made: F = object.__new__(_faulty(*kinds))
+    made.__dict__.update(component.__dict__)
+    return made
 
 
 class FaultyTask(Fault):
@@ -156,3 +204,82 @@ class HasAWrongRow(Fault):
         targets = right.targets.copy()
         targets[right.rows_at_level[0] - 1] ^= True
         return replace(right, targets=targets)
+
+
+class LearnsNothing(Fault):
+    """Every step is discarded."""
+
+    says: ClassVar[str] = "learns nothing"
+
+    def step(self, key: PRNGKeyArray, task: Task, level: Int[Array, ""], state: Any) -> tuple[Any, Progress]:
+        """Take a step, but keep the old state."""
+        return state, self.sound.step(key, task, level, state)[1]
+
+
+class Minimizes(Fault):
+    """Fitness is minimized instead of maximized."""
+
+    says: ClassVar[str] = "minimizes"
+
+    def step(self, key: PRNGKeyArray, task: Task, level: Int[Array, ""], state: Any) -> tuple[Any, Progress]:
+        """Train on the reversed reward."""
+        stepped: tuple[Any, Progress] = self.sound.step(key, plant(ReversesReward, task), level, state)
+        return stepped
+
+
+class SelectsAtRandom(Fault):
+    """Selection, or the gradient, uses random numbers instead of rewards."""
+
+    says: ClassVar[str] = "selects at random"
+
+    def step(self, key: PRNGKeyArray, task: Task, level: Int[Array, ""], state: Any) -> tuple[Any, Progress]:
+        """Train on random rewards."""
+        stepped: tuple[Any, Progress] = self.sound.step(key, plant(PaysAtRandom, task), level, state)
+        return stepped
+
+
+class ForgetsChampion(Fault):
+    """The untrained policy is judged in the end."""
+
+    says: ClassVar[str] = "forgets its champion"
+
+    def best(self, task: Task, state: Any) -> Policy:
+        """Return the policy of an untrained state."""
+        policy: Policy = self.sound.best(task, self.sound.init(jax.random.key(0), task))
+        return policy
+
+
+class HasOneSeed(Fault):
+    """All trials draw the same random numbers, whatever their seeds."""
+
+    says: ClassVar[str] = "has one seed"
+
+    def init(self, key: PRNGKeyArray, task: Task) -> tuple[Int[Array, ""], Any]:
+        """Start from a fixed key, and count steps from now on."""
+        return jnp.zeros((), jnp.int32), self.sound.init(jax.random.key(0), task)
+
+    def step(
+        self, key: PRNGKeyArray, task: Task, level: Int[Array, ""], state: tuple[Int[Array, ""], Any]
+    ) -> tuple[tuple[Int[Array, ""], Any], Progress]:
+        """Take a step with a key that depends only on its number."""
+        number, inner = state
+        inner, progress = self.sound.step(jax.random.fold_in(jax.random.key(1), number), task, level, inner)
+        return (number + 1, inner), progress
+
+    def best(self, task: Task, state: tuple[Int[Array, ""], Any]) -> Policy:
+        """Return the policy of the sound method's state."""
+        policy: Policy = self.sound.best(task, state[1])
+        return policy
+
+
+class KeepsItsStepSize(Fault):
+    """CMA-ES whose step size never changes."""
+
+    says: ClassVar[str] = "keeps its step size"
+
+    def step(
+        self, key: PRNGKeyArray, task: Task, level: Int[Array, ""], state: CmaEsState
+    ) -> tuple[CmaEsState, Progress]:
+        """Take a step, and restore the step size."""
+        after, progress = self.sound.step(key, task, level, state)
+        return replace(after, distribution=after.distribution.replace(std=state.distribution.std)), progress
