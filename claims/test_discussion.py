@@ -6,10 +6,10 @@ from evoclaims import Outcome, claim, expected, third_look
 
 AUDIT = "2026-11-26"
 """When an audit made these sentences claims, after all trials had run."""
+CMA_ES_ABOVE = expected(Outcome.REFUTED, because="CMA-ES collects more among stones: see S4")
 OVER_TASKS = "it is about the tasks at their own sizes; each task's own claims have smoke tests"
 
 
-@third_look
 @claim(
     "T1",
     says="architecture search (through NEAT) performing in general on par with CMA-ES",
@@ -20,7 +20,9 @@ OVER_TASKS = "it is about the tasks at their own sizes; each task's own claims h
     smoke=None,
     because=OVER_TASKS,
 )
-@pytest.mark.parametrize("task", ["n_parity", "simple_alu", "stones", "obstacles"])
+@pytest.mark.parametrize(
+    "task", ["n_parity", "simple_alu", pytest.param("stones", marks=[third_look, CMA_ES_ABOVE]), "obstacles"]
+)
 def test_neat_is_on_par_with_cma_es(trials, verdict, task):
     neat, cma_es = trials("neat", on=task), trials("cma_es", on=task)
     if task in ("stones", "obstacles"):
@@ -41,7 +43,6 @@ def test_neat_is_on_par_with_cma_es(trials, verdict, task):
         verdict(neat.last_success.equivalent_to(cma_es.last_success, margin=0.1))
 
 
-@third_look
 @claim(
     "T2",
     says="direct encodings fair better in transfer learning",
@@ -52,7 +53,7 @@ def test_neat_is_on_par_with_cma_es(trials, verdict, task):
     smoke=None,
     because=OVER_TASKS,
 )
-@pytest.mark.parametrize("task", ["stones", "obstacles"])
+@pytest.mark.parametrize("task", [pytest.param("stones", marks=third_look), "obstacles"])
 @pytest.mark.parametrize("direct", ["neat", "cma_es"])
 def test_direct_encodings_fare_better_in_transfer_learning(trials, verdict, direct, task):
     """On the gates it is G6."""

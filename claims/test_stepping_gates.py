@@ -26,9 +26,9 @@ PPO_SOLVES_SMALL_GATES = without_smoke(
 )
 PAIRS = [
     pytest.param("cma_es", "hyperneat", "n_parity", marks=[PARITY_BY_SINES, SMALL_PARITY_BY_SINES]),
-    ("cma_es", "hyperneat", "simple_alu"),
+    pytest.param("cma_es", "hyperneat", "simple_alu", marks=third_look),
     pytest.param("cma_es", "ppo", "n_parity", marks=PPO_SOLVES_SMALL_GATES),
-    pytest.param("cma_es", "ppo", "simple_alu", marks=PPO_SOLVES_SMALL_GATES),
+    pytest.param("cma_es", "ppo", "simple_alu", marks=[PPO_SOLVES_SMALL_GATES, third_look]),
     pytest.param("neat", "hyperneat", "n_parity", marks=[PARITY_BY_SINES, SMALL_PARITY_BY_SINES]),
     pytest.param(
         "neat",
@@ -105,7 +105,6 @@ def test_neat_solves_parity(trials, verdict):
     verdict(neat.solves_every_level.in_most_trials())
 
 
-@third_look
 @claim(
     "G3",
     says="NEAT ... stops at level 5 of the Simple ALU task",
@@ -180,7 +179,13 @@ def test_hyperneat_drops_with_the_levels(trials, verdict, task):
     since=FIRST,
     smoke=None,
     because="PPO solves 3-parity and two operations of the ALU, and 4-parity in half of the trials: small gates do not "
-    "stop it. Full is undecided, with 5 of 10 and 4 of 10 trials staying at the first level",
+    "stop it",
+)
+@expected(
+    Outcome.REFUTED,
+    tier="full",
+    because="more than half of thirty trials solve a further level. The published code never trains on one, and then "
+    "no trial does (docs/protocol.md, first_level)",
 )
 @pytest.mark.parametrize("task", TASKS)
 def test_ppo_stays_at_the_first_level(trials, verdict, task):
@@ -255,7 +260,6 @@ def test_ppo_is_better_without_the_curriculum(trials, verdict):
     verdict(direct.last_success_is(1).in_most_trials() & curriculum.solves_no_level_beyond(0).stays())
 
 
-@third_look
 @claim(
     "G6",
     says="Direct encodings perform best in this benchmark",
@@ -394,7 +398,6 @@ def test_neat_s_networks_stay_small_in_the_maze(trials, verdict, claim_tier, tas
     verdict(small & neat.stones.between(1.25, 3) if claim_tier == "smoke" else small)
 
 
-@third_look
 @claim(
     "G11",
     says="the Simple ALU task is more challenging",
@@ -418,7 +421,7 @@ def test_neat_s_networks_stay_small_in_the_maze(trials, verdict, claim_tier, tas
             ),
         ),
         "hyperneat",
-        "ppo",
+        pytest.param("ppo", marks=third_look),
     ],
 )
 def test_the_alu_is_harder_than_parity(trials, verdict, method):

@@ -99,7 +99,6 @@ def test_others_reach_three_stones(trials, verdict, claim_tier, method):
     verdict((evolved.stones < neat.stones) & (evolved.stones > random_policy.stones))
 
 
-@third_look
 @claim(
     "S3",
     says="Both RL methods get stuck at the first stepping stone",
@@ -126,7 +125,6 @@ def test_ppo_stays_at_the_first_stone(trials, verdict, claim_tier, method):
     verdict(about_one & (ppo.stones < neat.stones))
 
 
-@third_look
 @claim(
     "S4",
     says="NEAT accrues the highest rewards",
@@ -139,7 +137,7 @@ def test_ppo_stays_at_the_first_stone(trials, verdict, claim_tier, method):
 @pytest.mark.parametrize(
     "other",
     [
-        "hyperneat",
+        pytest.param("hyperneat", marks=third_look),
         pytest.param("cma_es", marks=expected(Outcome.REFUTED, tier="full", because=LUCKY)),
         "map_elites",
         "ppo",
@@ -162,7 +160,6 @@ def test_neat_collects_more_reward(trials, verdict, claim_tier, other):
     verdict(says)
 
 
-@third_look
 @claim(
     "S5",
     says="MAP-Elites performs equally bad but exhibits a drastically different behavior",
@@ -193,7 +190,6 @@ def test_map_elites_collects_few_stones(trials, verdict, claim_tier):
     verdict(map_elites.reward.equivalent_to(ppo.reward, margin=400) & some & (map_elites.reward < neat.reward))
 
 
-@third_look
 @claim(
     "S6",
     says="The agent has explored the whole maze (in contrast to PPO that only reached the first stepping stone)",
@@ -329,7 +325,6 @@ def test_map_elites_covers_both_mazes(trials, verdict):
     verdict(stones.archive_coverage.between(0.95, 1) & plain.archive_coverage.between(0.95, 1))
 
 
-@third_look
 @claim(
     "S11",
     says="NEAT and CMA-ES perform best",
