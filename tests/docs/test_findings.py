@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+from importlib.metadata import version
+
+import pytest
+
 from evoclaims.judging.exact import rank_test
-from reproductions.nisioti2025 import findings
+from reproductions.nisioti2025 import findings, findings_pictures
 
 
 def test_the_tables_of_the_findings_are_those_of_the_committed_trials() -> None:
@@ -30,3 +34,13 @@ def test_no_composite_passes_the_rule_for_a_hit() -> None:
         )
         assert max(hyperneat) < 1.5  # three are published
         assert rank_test(neat, cma_es).p > 0.05 / findings.TRIED
+
+
+@pytest.mark.oldest
+@pytest.mark.parametrize("name", findings_pictures.PICTURES)
+def test_the_pictures_of_the_findings_are_drawn_from_the_committed_trials(name: str) -> None:
+    committed = (findings.PAGE.parent / f"findings-{name}.svg").read_text(encoding="utf-8")
+    if f"Matplotlib v{version('matplotlib')}," not in committed:
+        pytest.skip("another release of Matplotlib draws other paths")
+    assert findings_pictures.drawn(name).decode() == committed
+    assert f"(findings-{name}.svg)" in findings.PAGE.read_text(encoding="utf-8")

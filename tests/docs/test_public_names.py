@@ -27,7 +27,14 @@ PYTHON = [
 ]
 INSIDE = {
     Path("reproductions/nisioti2025") / name
-    for name in ("findings.py", "other_champions.py", "other_ppo.py", "other_stones.py")
+    for name in (
+        "findings.py",
+        "findings_pictures.py",
+        "other_champions.py",
+        "other_mazes.py",
+        "other_ppo.py",
+        "other_stones.py",
+    )
 }
 """Modules that change the inside of this package's own methods and tasks, as a user's project need not."""
 GUIDES = [Path("README.md"), *(path.relative_to(ROOT) for path in sorted((ROOT / "docs").glob("*.md")))]
