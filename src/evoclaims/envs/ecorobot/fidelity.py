@@ -149,8 +149,8 @@ def _cause(scene: Scene, made: Frames, ours: Numbers, row: int) -> str:
     theirs, _ = _stepped(to_minimum, made, row)
     if _off(ours[row, : len(theirs)], theirs) <= TOLERANCE:
         return (
-            f"MuJoCo's solver stops before the minimum there (tolerance={scene.whole.opt.tolerance:g}), and a step here "
-            'does not: write <option tolerance="1e-14"/>.'
+            f"MuJoCo's solver stops before the minimum there (tolerance={scene.whole.opt.tolerance:g}), and a step "
+            'here does not: write <option tolerance="1e-14"/>.'
         )
     wider, narrower = copy(scene.whole), copy(scene.whole)
     for model, by in ((wider, EDGE), (narrower, -EDGE)):
