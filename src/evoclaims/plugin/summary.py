@@ -62,7 +62,12 @@ class Summary:
     def pytest_testnodedown(self, node: Any, error: object) -> None:
         """Note why an xdist worker ran nothing; they all give the same reason."""
         trouble = getattr(node, "workeroutput", {}).get(TROUBLE)
-        if trouble is not None and trouble not in self._troubles:
+        if trouble is not None:
+            self.report_trouble(trouble)
+
+    def report_trouble(self, trouble: str) -> None:
+        """Keep a sentence for the end of the run, which fails; each once."""
+        if trouble not in self._troubles:
             self._troubles.append(trouble)
 
     @pytest.hookimpl(optionalhook=True)
