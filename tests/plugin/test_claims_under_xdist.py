@@ -144,3 +144,24 @@ def test_each_worker_has_its_own_gpu_before_a_conftest_is_loaded(project: Any, m
         "seen-gw0": "GPU-a",
         "seen-gw1": "GPU-b",
     }
+
+
+def test_a_worker_that_dies_while_starting_is_one_sentence(project: Any) -> None:
+    project.write(a="supported")
+    (project.path / "conftest.py").write_text("import os\n\nif 'PYTEST_XDIST_WORKER' in os.environ:\n    os._exit(3)\n")
+    result = project.run_apart("-n1", "--max-worker-restart=0")
+    assert result.ret == pytest.ExitCode.USAGE_ERROR
+    shown = " ".join(result.stdout.str().split())
+    assert "ERROR: The worker gw0 of pytest-xdist died while starting, so that no test has run (Not properly" in shown
+    assert "Traceback" not in shown
+
+
+def test_a_worker_whose_process_does_not_start_is_one_sentence(project: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    project.write(a="supported")
+    (project.path / "sitecustomize.py").write_text("import os, sys\nif '-c' in sys.orig_argv:\n    os._exit(1)\n")
+    monkeypatch.setenv("PYTHONPATH", str(project.path), prepend=":")
+    result = project.run_apart("-n1")
+    assert result.ret == pytest.ExitCode.USAGE_ERROR
+    shown = result.stdout.str() + result.stderr.str()
+    assert "A worker of pytest-xdist died while starting, so that no test has run (EOFError: " in shown
+    assert "Traceback" not in shown

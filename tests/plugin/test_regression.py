@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import shutil
+import sys
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
-from tiny_project import aged, forget, spoiled, trials_of
+from tiny_project import REPRODUCTION, aged, forget, spoiled, trials_of
 
 from evoclaims.claims.session import Session
 from evoclaims.cli import main
@@ -174,8 +175,26 @@ def test_a_claim_that_is_judged_otherwise_begins_a_new_history(accepted: Any) ->
     result.stdout.fnmatch_lines(
         [
             "against the accepted verdicts: 1 the same, 1 under changed rules",
-            "a (smoke): a new history begins, since what is judged has changed *",
+            "a (smoke): a new history begins, since what is judged has changed *: its trials are of the same "
+            "conditions, but its assertion, *",
         ]
+    )
+
+
+def test_a_new_history_names_the_changed_setting(accepted: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delitem(sys.modules, "tiny_paper", raising=False)
+    edited = REPRODUCTION.replace('"right": HandBuilt()', '"right": HandBuilt(negated=True)')
+    accepted.pytester.makepyfile(tiny_paper=edited)
+    accepted.run().stdout.fnmatch_lines(
+        ["a (smoke): a new history begins, *: of right on parity, method.name *, *.negated False -> True"]
+    )
+
+
+def test_a_new_history_of_unknown_trials_has_fingerprints_alone(accepted: Any) -> None:
+    accepted.write(a=ALMOST)
+    _edit(outcome=Outcome.REFUTED, trials="0" * 64)
+    accepted.run().stdout.fnmatch_lines(
+        ["a (smoke): a new history begins, *: supported now, refuted under the old rules"]
     )
 
 

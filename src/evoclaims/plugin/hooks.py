@@ -17,6 +17,7 @@ import pytest
 from evoclaims.core.errors import UserError
 from evoclaims.core.tiers import TIERS
 from evoclaims.plugin import options
+from evoclaims.plugin.dead_workers import DeadWorkers
 from evoclaims.plugin.distribution import Distribution, prepare
 from evoclaims.plugin.options import import_from_root, make_session
 from evoclaims.plugin.options import pytest_addoption as pytest_addoption
@@ -116,7 +117,9 @@ def pytest_configure(config: pytest.Config) -> None:
     ):
         config.addinivalue_line("markers", line)
     if not hasattr(config, "workerinput"):  # an xdist worker leaves the summary to its controller
-        config.pluginmanager.register(Summary(config), "claims-summary")
+        summary = Summary(config)
+        config.pluginmanager.register(summary, "claims-summary")
+        config.pluginmanager.register(DeadWorkers(config, summary.report_trouble), "claims-dead-workers")
         config.pluginmanager.register(Distribution(config), "claims-distribution")
         if config.pluginmanager.has_plugin("terminal") and config.get_verbosity() > QUIET:
             config.pluginmanager.register(ProgressLine(config), "claims-progress")

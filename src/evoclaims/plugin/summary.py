@@ -62,7 +62,12 @@ class Summary:
     def pytest_testnodedown(self, node: Any, error: object) -> None:
         """Note why an xdist worker ran nothing; they all give the same reason."""
         trouble = getattr(node, "workeroutput", {}).get(TROUBLE)
-        if trouble is not None and trouble not in self._troubles:
+        if trouble is not None:
+            self.report_trouble(trouble)
+
+    def report_trouble(self, trouble: str) -> None:
+        """Keep a sentence for the end of the run, which fails; each once."""
+        if trouble not in self._troubles:
             self._troubles.append(trouble)
 
     @pytest.hookimpl(optionalhook=True)
@@ -256,19 +261,19 @@ class Summary:
 
     def _why_changed(self) -> dict[tuple[str, str], str]:
         """Return why verdicts may differ from the accepted ones, by tier and claim."""
-        changed = self._regression.changed if self._regression else {}
-        if not changed or self._drift is None:
+        if self._regression is None or self._drift is None:
             return {}
+        from evoclaims.claims import new_histories
         from evoclaims.verdicts.acceptance import entry_of
         from evoclaims.verdicts.history import key_of
         from evoclaims.verdicts.regression import reason
 
-        judged_from = make_session(self._config).judged_from
+        session = make_session(self._config)
         judged = {key_of(report): report for report in self.reports if report.n}
         upgraded = self._upgrade.drift if self._upgrade else None
-        return {
-            key: reason(judged[key], old, entry_of(judged[key], judged_from, ""), *self._drift, upgraded)
-            for key, old in changed.items()
+        return new_histories.changes(session, list(judged.values()), self._regression.accepted) | {
+            key: reason(judged[key], old, entry_of(judged[key], session.judged_from, ""), *self._drift, upgraded)
+            for key, old in self._regression.changed.items()
             if key in judged
         }
 

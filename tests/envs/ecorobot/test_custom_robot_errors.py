@@ -96,6 +96,13 @@ def test_a_built_in_robot_s_start_is_checked_with_its_task() -> None:
         (('joint="x"', 'joint="z"'), "cannot be compiled: .*"),
         (('axis="1 0 0"', 'axis="1 0 0" limited="true" range="2 1"'), "cannot be compiled: .*"),
         (('gear="10"', 'gear="10" ctrllimited="true" ctrlrange="1 -1"'), "cannot be compiled: .*"),
+        (('axis="1 0 0"', 'axis="1 0 0" range="2 1"'), r"a reversed range in jnt_range \(2 1\)"),
+        (('gear="10"', 'gear="10" ctrlrange="1 -1"'), r"a reversed range in actuator_ctrlrange \(1 -1\)"),
+        (('gear="10"', 'gear="10" forcerange="1 -1"'), r"a reversed range in actuator_forcerange \(1 -1\)"),
+        (('timestep="0.01"', 'timestep="0"'), "has timestep=0, so that"),
+        (('timestep="0.01"', 'timestep="-0.01"'), "has timestep=-0.01, so that"),
+        (('timestep="0.01"', 'timestep="inf"'), "has the option timestep, which is not finite"),
+        (('timestep="0.01"', 'timestep="0.01" wind="0 inf 0"'), "has the option wind, which is not finite"),
         (("<worldbody>", '<include file="no.xml"/><worldbody>'), "cannot be read: .*no.xml"),
         (('type="sphere" size="0.2"', 'type="mesh" mesh="m"'), "cannot be compiled: .*"),
         (

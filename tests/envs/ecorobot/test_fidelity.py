@@ -20,6 +20,22 @@ from evoclaims.envs.ecorobot.obstacles import Locomotion
 from evoclaims.envs.ecorobot.robots import ANT
 from evoclaims.envs.ecorobot.scene import Scene
 
+SLIDER = """
+<mujoco>
+  <option timestep="0.02"/>
+  <worldbody>
+    <geom name="floor" type="plane" size="9 9 1"/>
+    <body>
+      <joint name="x" type="slide" axis="1 0 0" limited="true" range="-1 1" damping="1"/>
+      <joint name="turn" type="hinge" axis="0 0 1" limited="true" range="-90 90" damping="1"/>
+      <geom name="ball" type="sphere" pos="0.2 0 {height}" size="0.1"/>
+    </body>
+  </worldbody>
+  <actuator><motor joint="x" gear="100" ctrllimited="true" ctrlrange="-3 3"/></actuator>
+</mujoco>
+"""
+"""A ball that cannot leave its height."""
+
 
 def test_a_step_that_differs_by_a_millionth_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     scene = Scene(Texts(tmp_path, monkeypatch).robot(BASE), ())
@@ -33,6 +49,21 @@ def test_a_step_that_differs_by_a_millionth_is_refused(tmp_path: Path, monkeypat
     monkeypatch.setattr(physics, "_frame", faulty)
     with pytest.raises(UserError, match="rover is not simulated here as its file says: in .* random states a frame"):
         check(scene)
+
+
+def test_contact_at_distance_zero_is_refused_naming_geoms(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As Gymnasium's point: it slides on the floor, and MuJoCo in C itself goes elsewhere by rounding errors."""
+    text = SLIDER.format(height=0.1)
+    with pytest.raises(UserError, match="decided by rounding errors there, since the geoms floor and ball are exactly"):
+        check(Scene(Texts(tmp_path, monkeypatch).robot(text)))
+
+
+def test_a_solver_that_stops_early_is_refused_naming_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    texts = Texts(tmp_path, monkeypatch)
+    loose = SLIDER.format(height=0.0999)
+    with pytest.raises(UserError, match=r"stops before the minimum there \(tolerance=1e-08\)"):
+        check(Scene(texts.robot(loose)))
+    check(Scene(texts.robot(loose.replace('timestep="0.02"', 'timestep="0.02" tolerance="1e-14"'))))
 
 
 def test_a_robot_is_checked_once_a_machine(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

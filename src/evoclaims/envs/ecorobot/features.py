@@ -138,6 +138,8 @@ FLAGS: Final = {
 """Flags that may be set."""
 LARGEST_TOLERANCE: Final = 1e-8
 """MuJoCo's own: with larger ones C stops before the minimum, which a step here reaches."""
+RANGES: Final = ("actuator_ctrlrange", "actuator_forcerange", "jnt_range", "jnt_actfrcrange")
+"""MuJoCo's arrays of limits, of two columns."""
 TRANSMISSIONS: Final = ("JOINT", "JOINTINPARENT", "SITE")
 
 
@@ -164,6 +166,21 @@ def require_simulated(name: str, model: mujoco.MjModel) -> None:
         numbers = getattr(model, array, np.zeros(0))
         if numbers.dtype.kind == "f" and not np.isfinite(numbers).all():
             raise UserError(f"The model of the robot {name} has numbers in {array} that are not finite.")
+    for option in sorted(OPTIONS):
+        if not np.isfinite(getattr(model.opt, option)).all():
+            raise UserError(f"The model of the robot {name} has the option {option}, which is not finite.")
+    if model.opt.timestep <= 0:
+        raise UserError(
+            f"The model of the robot {name} has timestep={model.opt.timestep:g}, so that it never moves on: write a "
+            "number above 0, in s."
+        )
+    for array in RANGES:
+        low, high = getattr(model, array).T
+        for row in np.flatnonzero(low > high):
+            raise UserError(
+                f"The model of the robot {name} has a reversed range in {array} ({low[row]:g} {high[row]:g}), which "
+                "MuJoCo reads as no limit: write the lower number first."
+            )
 
 
 def _beyond(model: mujoco.MjModel) -> Iterator[str]:

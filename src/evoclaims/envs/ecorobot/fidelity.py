@@ -9,7 +9,9 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
+from collections import Counter
 from concurrent.futures import ThreadPoolExecutor
+from copy import copy
 from dataclasses import dataclass
 from functools import cache, lru_cache
 from pathlib import Path
@@ -41,6 +43,8 @@ FRAMES: Final = 240
 """Frames of a run."""
 EVERY: Final = 10
 """How often a frame is compared, and the motors change."""
+EDGE: Final = 1e-9
+"""Contacts this near to beginning begin or do not by rounding errors, m."""
 FASTEST: Final = 1e3
 """Beyond such velocities a run has diverged, m/s or rad/s."""
 
@@ -118,7 +122,7 @@ def check(scene: Scene) -> None:
     """
     # A thread of its own, since this is called while a program is traced.
     with ThreadPoolExecutor(1) as own:
-        off, made = own.submit(_differences, scene).result()
+        off, made, ours = own.submit(_differences, scene).result()
     wrong = ~(off <= TOLERANCE)  # NaN is wrong, too
     if not wrong.any():
         return
@@ -133,13 +137,56 @@ def check(scene: Scene) -> None:
     raise UserError(
         f"The robot {robot.name} is not simulated here as its file says: in {np.sum(wrong)} of {len(wrong)} random "
         f"states a frame differs from MuJoCo's own by up to {off[worst]:.2g} of 1 plus the largest velocity "
-        f"({TOLERANCE:g} is allowed), with {made.contacts[worst]} contacts. Remove from the file what MJX computes in "
-        "another way, such as contacts of meshes, or a solver that stops early (iterations, tolerance)."
+        f"({TOLERANCE:g} is allowed), with {made.contacts[worst]} contacts. {_cause(scene, made, ours, worst)}"
     )
 
 
-def _differences(scene: Scene) -> tuple[Numbers, Frames]:
-    """Return how far each frame of our step is from MuJoCo's, and MuJoCo's."""
+def _cause(scene: Scene, made: Frames, ours: Numbers, row: int) -> str:
+    """Return why a frame differs, as far as it is known, and what to do."""
+    to_minimum = copy(scene.whole)
+    to_minimum.opt.tolerance = 0.0
+    theirs, _ = _stepped(to_minimum, made, row)
+    if _off(ours[row, : len(theirs)], theirs) <= TOLERANCE:
+        return (
+            f"MuJoCo's solver stops before the minimum there (tolerance={scene.whole.opt.tolerance:g}), and a step "
+            'here does not: write <option tolerance="1e-14"/>.'
+        )
+    wider, narrower = copy(scene.whole), copy(scene.whole)
+    for model, by in ((wider, EDGE), (narrower, -EDGE)):
+        model.geom_margin += by
+        model.pair_margin += by
+    (far, met), (near, sure) = _stepped(wider, made, row), _stepped(narrower, made, row)
+    if met != sure and not _off(far, near) <= TOLERANCE:
+        one, other = (scene.whole.geom(geom).name or "without a name" for geom in min((met - sure) or (sure - met)))
+        return (
+            f"MuJoCo's own frame is decided by rounding errors there, since the geoms {one} and {other} are exactly as "
+            "far apart as where contact begins: move or resize one of them, or write contype and conaffinity with "
+            "which they do not meet."
+        )
+    return (
+        "Remove from the file what MJX computes in another way, such as contacts of meshes, or a solver that stops "
+        "early (iterations)."
+    )
+
+
+def _stepped(model: mujoco.MjModel, made: Frames, row: int) -> tuple[Numbers, Counter[tuple[int, int]]]:
+    """Return where a model goes from a frame's start, and the geoms of each contact at the start."""
+    data = mujoco.MjData(model)
+    data.qpos[:], data.qvel[:] = made.position[row], made.velocity[row]
+    data.qacc_warmstart[:], data.ctrl[:] = made.acceleration[row], made.control[row]
+    mujoco.mj_fwdPosition(model, data)
+    met = Counter((int(one), int(other)) for one, other in data.contact.geom)
+    mujoco.mj_step(model, data)
+    return np.concatenate([data.qpos, data.qvel]), met
+
+
+def _off(ours: Numbers, theirs: Numbers) -> Any:
+    """Return the largest difference of each row, as a share of 1 plus the largest number."""
+    return np.max(np.abs(ours - theirs), axis=-1) / (1.0 + np.max(np.abs(theirs), axis=-1))
+
+
+def _differences(scene: Scene) -> tuple[Numbers, Frames, Numbers]:
+    """Return how far each frame of our step is from MuJoCo's, MuJoCo's, and ours in one row each."""
     made = frames_of(scene)
     try:
         cpu = jax.local_devices(backend="cpu")[0]
@@ -156,8 +203,7 @@ def _differences(scene: Scene) -> tuple[Numbers, Frames]:
         # To compile what runs once would take five times as long as all the rest.
         ours = np.concatenate(in_numpy(frame, made.position, made.velocity, made.acceleration, made.control), axis=1)
     theirs = np.concatenate([made.next_position, made.next_velocity, made.pose], axis=1)
-    scale = 1.0 + np.max(np.abs(theirs), axis=1)
-    return np.max(np.abs(ours - theirs), axis=1) / scale, made
+    return _off(ours, theirs), made, ours
 
 
 def frames_of(scene: Scene) -> Frames:
@@ -175,17 +221,18 @@ def frames_of(scene: Scene) -> Frames:
             _beside(scene, data, random)
         data.qvel[:] = random.standard_normal(model.nv)
         for frame in range(FRAMES):
-            if frame % EVERY == 0:
+            recorded = frame % EVERY == 0
+            if recorded:
                 # Half of the runs ask for more than the motors' range.
                 data.ctrl[:] = (low + high) / 2 + (1 + run % 2) * random.uniform(-0.5, 0.5, model.nu) * (high - low)
-            mujoco.mj_kinematics(model, data)
-            pose = np.concatenate([data.xpos[1], data.xmat[1]])
-            before = [data.qpos.copy(), data.qvel.copy(), data.qacc_warmstart.copy(), data.ctrl.copy()]
+                mujoco.mj_kinematics(model, data)
+                pose = np.concatenate([data.xpos[1], data.xmat[1]])
+                before = [data.qpos.copy(), data.qvel.copy(), data.qacc_warmstart.copy(), data.ctrl.copy()]
             mujoco.mj_step(model, data)
-            if not (np.isfinite(data.qvel).all() and np.abs(data.qvel).max(initial=0.0) < FASTEST):
+            if not np.abs(data.qvel).max(initial=0.0) < FASTEST:  # NaN, too
                 break
-            if frame % EVERY == 0:
-                touching = sum(contact.efc_address >= 0 for contact in data.contact)
+            if recorded:
+                touching = np.count_nonzero(data.contact.efc_address >= 0)
                 rows.append([*before, data.qpos.copy(), data.qvel.copy(), pose, touching])
     if not rows:
         raise UserError(

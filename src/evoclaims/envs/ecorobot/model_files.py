@@ -92,7 +92,7 @@ def compiled(name: str, spec: mujoco.MjSpec) -> mujoco.MjModel:
     total, spec.compiler.settotalmass = spec.compiler.settotalmass, -1.0
     try:
         model = spec.compile()
-    except (ValueError, OSError, mujoco.FatalError) as error:
+    except (ValueError, OSError, mujoco.FatalError, UserWarning) as error:  # a warning where filters make it an error
         raise UserError(f"The model of the robot {name} cannot be compiled: {in_one_line(error)}") from error
     if total > 0:
         mujoco.mj_setTotalmass(model, total)

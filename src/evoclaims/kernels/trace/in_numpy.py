@@ -227,9 +227,9 @@ def _iota(equation: Any) -> Sequence[Lanes]:
 @_rule(*REDUCTIONS)
 def _reduce(equation: Any, x: Lanes) -> Sequence[Lanes]:
     axes = tuple(axis + 1 for axis in equation.params["axes"])
-    if not math.prod(x.shape[axis] for axis in axes):
-        return _compiled(equation, x)
     combine: Any = REDUCTIONS[equation.primitive.name]
+    if combine.identity is None and not math.prod(x.shape[axis] for axis in axes):
+        return _compiled(equation, x)
     return [combine.reduce(x, axis=axes)]
 
 
