@@ -10,7 +10,7 @@ from typing import Any, Final
 
 from evoclaims.claims.session import Session
 from evoclaims.core.canonical import content_hash
-from evoclaims.judging.changed_settings import changed_settings
+from evoclaims.judging.drift import changed_settings
 from evoclaims.paper import references
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.spec import Condition
