@@ -9,6 +9,7 @@ from typing import Any, Final
 from evoclaims.envs.gates.circuit import Circuit
 from evoclaims.methods.cma_es import CmaEs
 from evoclaims.methods.map_elites import MapElites
+from evoclaims.methods.mechanisms.observed import Observed
 from evoclaims.methods.training_loop import TrainingLoop
 from evoclaims.mutants import of_methods, of_tasks
 from evoclaims.mutants.planting import Fault, plant
@@ -51,10 +52,15 @@ def of_method(fault: type[Fault], only: type | tuple[type, ...] = object) -> Mut
 
 
 def with_method(says: str, change: Callable[[Any], Any], only: type | tuple[type, ...] = object) -> Mutant:
-    """Return the mutant that changes any method of a class, such as one of its parameters."""
-    return Mutant(
-        says, "method", lambda one: replace(one, method=change(one.method)) if isinstance(one.method, only) else None
-    )
+    """Return the mutant that changes any method of a class, or the one that it observes."""
+
+    def changed(one: Condition) -> Condition | None:
+        method: Any = one.method
+        if isinstance(method, Observed):
+            return replace(one, method=replace(method, of=change(method.of))) if isinstance(method.of, only) else None
+        return replace(one, method=change(method)) if isinstance(method, only) else None
+
+    return Mutant(says, "method", changed)
 
 
 def of_task(fault: type[Fault], only: type | tuple[type, ...] = object) -> Mutant:

@@ -1,4 +1,4 @@
-"""All verdicts as a Markdown table: a line per sentence of the paper, a column per tier or variant; controls below."""
+"""All verdicts as a Markdown table: a line per sentence, a column per tier or variant; other claims below."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from evoclaims.report.formatting import plural
 from evoclaims.report.markdown_text import literal, table
 from evoclaims.report.table_cells import NONE, in_the_papers_order
 from evoclaims.report.trial_summary import Reader
-from evoclaims.verdicts.claim_report import ClaimReport
+from evoclaims.verdicts.claim_report import CONTROL, MECHANISM, ClaimReport
 
 Versions = dict[str, str]
 _Rows = dict[tuple[str, str], dict[str, list[ClaimReport]]]
@@ -35,7 +35,7 @@ NOT_CHANGED: Final = f"{NONE}: the variant changes none of the claim's trials, o
 
 
 def overview(columns: Mapping[str, Sequence[ClaimReport]], sentences: Mapping[str, str], reader: Reader) -> str:
-    """Return a table of the paper's claims, one of the controls, and what the letters for devices and versions mean.
+    """Return tables of the paper's claims, controls and mechanisms, and what letters for devices and versions mean.
 
     Args:
         columns: reports by heading.
@@ -44,17 +44,18 @@ def overview(columns: Mapping[str, Sequence[ClaimReport]], sentences: Mapping[st
     """
     made = Environments(reader)
     papers: _Rows = {}
-    controls: _Rows = {}
+    others: dict[str, _Rows] = {CONTROL: {}, MECHANISM: {}}
     for heading, reports in columns.items():
         for report in in_the_papers_order(reports):
-            rows = controls if report.is_control else papers
+            rows = others.get(report.where, papers)
             line = rows.setdefault((report.claim, sentences[report.name]), defaultdict(list))
             line[heading].append(report)
     tables = [
         _table(*headings, columns, rows, made)
         for headings, rows in (
             (("claim", "the paper says"), papers),
-            (("control", "what the benchmark checks"), controls),
+            (("control", "what the benchmark checks"), others[CONTROL]),
+            (("mechanism", "what a part of a method or a task does"), others[MECHANISM]),
         )
         if rows
     ]
