@@ -40,24 +40,26 @@ def test_species_protect_a_niche_as_long_as_patience_lasts(trials, verdict):
 
 @claim(
     "K4",
-    says="CMA-ES approaches the optimum of a sphere at a constant rate",
+    says="CMA-ES approaches the optimum of a sphere at the rate of Hansen's equations, and leaves it a sphere",
     where="mechanism",
-    smoke="CMA-ES approaches the optimum of a sphere at a constant rate",
+    smoke="CMA-ES approaches the optimum of a sphere at the rate of Hansen's equations, and leaves it a sphere",
 )
 def test_cma_es_converges_on_a_sphere(trials, verdict):
+    """The rate and the noise of the covariance are those of his equations in NumPy, in 98 of 100 runs."""
     sphere = trials("cma_es_mechanisms", on="sphere")
-    verdict(sphere.fall("log_error").between(0.19, 0.26) & sphere.at_the_end("condition").between(1.5, 5.0))
+    verdict(sphere.fall("log_error").between(0.19, 0.255) & sphere.at_the_end("condition").between(2.0, 4.8))
 
 
 @claim(
     "K5",
-    says="CMA-ES learns the covariance of a rotated ellipsoid",
+    says="CMA-ES learns the covariance of a rotated ellipsoid, and as fast as by Hansen's equations",
     where="mechanism",
-    smoke="CMA-ES learns the covariance of a rotated ellipsoid",
+    smoke="CMA-ES learns the covariance of a rotated ellipsoid, and as fast as by Hansen's equations",
 )
 def test_cma_es_learns_an_ellipsoid(trials, verdict):
-    """Of a condition of 10,000 less than 6 is left: noise, as on a sphere."""
-    verdict(trials("cma_es_mechanisms", on="ellipsoid").at_the_end("condition").between(1.5, 6.0))
+    """Of a condition of 10,000 what is left is noise, as on a sphere."""
+    ellipsoid = trials("cma_es_mechanisms", on="ellipsoid")
+    verdict(ellipsoid.at_the_end("condition").between(2.0, 5.0) & ellipsoid.fall("log_error").between(0.14, 0.215))
 
 
 @claim(

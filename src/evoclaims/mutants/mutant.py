@@ -56,9 +56,10 @@ def with_method(says: str, change: Callable[[Any], Any], only: type | tuple[type
 
     def changed(one: Condition) -> Condition | None:
         method: Any = one.method
-        if isinstance(method, Observed):
-            return replace(one, method=replace(method, of=change(method.of))) if isinstance(method.of, only) else None
-        return replace(one, method=change(method)) if isinstance(method, only) else None
+        of = method.of if isinstance(one.method, Observed) else method
+        if not isinstance(of, only):
+            return None
+        return replace(one, method=change(of) if of is method else replace(method, of=change(of)))
 
     return Mutant(says, "method", changed)
 
