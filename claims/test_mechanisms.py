@@ -35,7 +35,7 @@ def test_structure_comes_from_the_fitter_parent(trials, verdict):
 )
 def test_species_protect_a_niche_as_long_as_patience_lasts(trials, verdict):
     """A niche whose fitness stays the same improves once, when it is new, and has a third of the population."""
-    verdict(trials("neat_mechanisms", on="two_niches").lives("niche", 0.25, 6).in_most_trials())
+    verdict(trials("neat_mechanisms", on="two_niches").reports_above("niche", 0.25).between(6, 6))
 
 
 @claim(
@@ -47,7 +47,7 @@ def test_species_protect_a_niche_as_long_as_patience_lasts(trials, verdict):
 def test_cma_es_converges_on_a_sphere(trials, verdict):
     """The rate and the noise of the covariance are those of his equations in NumPy, in 98 of 100 runs."""
     sphere = trials("cma_es_mechanisms", on="sphere")
-    verdict(sphere.fall("log_error").between(0.19, 0.255) & sphere.at_the_end("condition").between(2.0, 4.8))
+    verdict(sphere.fall("log_error").between(0.18, 0.262) & sphere.at_the_end("condition").between(1.9, 5.0))
 
 
 @claim(
@@ -59,7 +59,7 @@ def test_cma_es_converges_on_a_sphere(trials, verdict):
 def test_cma_es_learns_an_ellipsoid(trials, verdict):
     """Of a condition of 10,000 what is left is noise, as on a sphere."""
     ellipsoid = trials("cma_es_mechanisms", on="ellipsoid")
-    verdict(ellipsoid.at_the_end("condition").between(2.0, 5.0) & ellipsoid.fall("log_error").between(0.14, 0.215))
+    verdict(ellipsoid.at_the_end("condition").between(2.0, 5.0) & ellipsoid.fall("log_error").between(0.13, 0.22))
 
 
 @claim(

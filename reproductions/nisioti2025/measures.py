@@ -208,11 +208,8 @@ class PaperTrials(TrialGroup):
         """A number is exactly `value` at every report of training."""
         return self.event(f"{curve} is always {value:g}", lambda t: all(one == value for one in t.curves[curve]))
 
-    def lives(self, curve: str, share: float, generations: int) -> Event:
-        """A number is at least `share` at the first reports of training, as many as `generations`, and 0 afterwards."""
-
-        def holds(t: Any) -> bool:
-            early, late = t.curves[curve][:generations], t.curves[curve][generations:]
-            return min(early) >= share and max(late) == 0
-
-        return self.event(f"{curve} is at least {share:g} for {generations} generations, then 0", holds)
+    def reports_above(self, curve: str, value: float) -> Measure:
+        """How many reports of training have at least `value`."""
+        return self.measure(
+            f"reports with {curve} of {value:g}", lambda t: sum(one >= value for one in t.curves[curve])
+        )
