@@ -252,7 +252,6 @@ MUTANTS = {
     "drops-a-frame": of_task(DropsAFrame, only=Room),
     "selects-anybody": _with_species("lets anybody have offspring", survival=1.0),
     "one-parent": _with_species("has one parent in each species", survival=0.01),
-    "one-species": _with_species("has one species", threshold=100.0),
     "endless-patience": _with_species("never lets a species die", stagnation=1_000),
     "learns-no-covariance": _observed(LearnsNoCovariance, CmaEsMechanisms),
     "prefers-new-elites": _observed(PrefersNewElites, MapElitesMechanisms),
