@@ -1,6 +1,8 @@
-"""Mechanisms beside independent programs: Hansen's equations, and faults that each observation notices."""
+"""Mechanisms beside independent programs: Hansen's equations are within the claims' bands."""
 
 from __future__ import annotations
+
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,11 +16,13 @@ DIMENSIONS, POPULATION, GENERATIONS = 8, 16, 120
 @pytest.mark.parametrize(
     ("condition", "falls", "conditions"), [(1.0, (0.18, 0.262), (1.9, 5.0)), (10_000.0, (0.13, 0.22), (2.0, 5.0))]
 )
-def test_hansens_equations_are_within_the_bands_of_k4_and_k5(condition, falls, conditions):
+def test_hansens_equations_are_within_the_bands_of_k4_and_k5(
+    condition: float, falls: tuple[float, float], conditions: tuple[float, float]
+) -> None:
     task, found = Quadratic(condition=condition), []
     matrix = np.asarray(task.numbers, np.float64)
 
-    def error(points):
+    def error(points: Any) -> Any:
         return np.sum(((points - task.optimum) @ matrix.T) ** 2, axis=-1) / 2
 
     for seed in range(20):
