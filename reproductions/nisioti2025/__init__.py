@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from evoclaims import FIXED_10, SEQUENTIAL, Reproduction, Tier
-from reproductions.nisioti2025 import ecorobot, stepping_gates
+from reproductions.nisioti2025 import ecorobot, mechanisms, stepping_gates
 from reproductions.nisioti2025.measures import PaperTrials
 from reproductions.nisioti2025.null_agents import NULL_AGENTS
 from reproductions.nisioti2025.variants import VARIANTS
@@ -18,8 +18,14 @@ REPRODUCTION = Reproduction(
     title="When Does Neuroevolution Outcompete Reinforcement Learning in Transfer Learning Tasks?",
     folder=Path(__file__).parent,
     tiers={
-        "smoke": Tier(conditions={**stepping_gates.SMOKE, **ecorobot.SMOKE}, design=FIXED_10.for_paper(TRIALS)),
-        "full": Tier(conditions={**stepping_gates.FULL, **ecorobot.FULL}, design=SEQUENTIAL.for_paper(TRIALS)),
+        "smoke": Tier(
+            conditions={**stepping_gates.SMOKE, **ecorobot.SMOKE, **mechanisms.CONDITIONS},
+            design=FIXED_10.for_paper(TRIALS),
+        ),
+        "full": Tier(
+            conditions={**stepping_gates.FULL, **ecorobot.FULL, **mechanisms.CONDITIONS},
+            design=SEQUENTIAL.for_paper(TRIALS),
+        ),
     },
     variants=VARIANTS,
     trials=PaperTrials,

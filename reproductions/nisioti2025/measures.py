@@ -6,6 +6,8 @@ The names in quotation marks are hashed into the claims' fingerprints.
 from __future__ import annotations
 
 import itertools
+import math
+from typing import Any
 
 import numpy as np
 
@@ -185,3 +187,39 @@ class PaperTrials(TrialGroup):
     def _neurons_half_hidden(self) -> int:
         """Total neurons of a network in which half are hidden."""
         return 2 * (self.condition.task.observation_size + self.condition.task.action_size)
+
+    # Of mechanisms (reproductions/nisioti2025/mechanisms.py).
+
+    def on_average(self, curve: str) -> Measure:
+        """Mean of a number over the reports of training."""
+        return self.measure(f"{curve} on average", lambda t: math.fsum(t.curves[curve]) / len(t.curves[curve]))
+
+    def share(self, part: str, other: str) -> Measure:
+        """Share of a count in that and another one, both added up over the reports of training."""
+
+        def read(t: Any) -> float:
+            mine, others = math.fsum(t.curves[part]), math.fsum(t.curves[other])
+            return mine / (mine + others) if mine else 0.0
+
+        return self.measure(f"share of {part} against {other}", read)
+
+    def at_the_end(self, curve: str) -> Measure:
+        """A number at the last report of training."""
+        return self.measure(f"{curve} at the end", lambda t: t.curves[curve][-1])
+
+    def fall(self, curve: str) -> Measure:
+        """How much a number falls in a generation, from the first report of training to the last."""
+        return self.measure(
+            f"fall of {curve} in a generation",
+            lambda t: (t.curves[curve][0] - t.curves[curve][-1]) / (t.curves["steps"][-1] - t.curves["steps"][0]),
+        )
+
+    def always(self, curve: str, value: float) -> Event:
+        """A number is exactly `value` at every report of training."""
+        return self.event(f"{curve} is always {value:g}", lambda t: all(one == value for one in t.curves[curve]))
+
+    def reports_above(self, curve: str, value: float) -> Measure:
+        """How many reports of training have at least `value`."""
+        return self.measure(
+            f"reports with {curve} of {value:g}", lambda t: sum(one >= value for one in t.curves[curve])
+        )

@@ -9,8 +9,9 @@ import jax.numpy as jnp
 
 from evoclaims.envs import Box, DeceptiveMaze, Obstacles, Rangefinders, Ruling, SteppingStones
 from evoclaims.methods import HandBuilt, HyperNeat, Neat, Policy, Ppo, RandomPolicy
+from evoclaims.methods.mechanisms import CmaEsMechanisms, MapElitesMechanisms, NeatMechanisms, Room
 from evoclaims.methods.neat import Attribute, Mutation
-from evoclaims.mutants import Fault, Mutant, of_method, of_task, with_method, with_task
+from evoclaims.mutants import Fault, Mutant, of_method, of_task, plant, with_method, with_task
 from evoclaims.networks import Substrate
 from reproductions.nisioti2025 import ecorobot
 from reproductions.nisioti2025.waypoints import Waypoints
@@ -145,7 +146,89 @@ class UnseeingRays(Fault):
     @property
     def sensor(self) -> Rangefinders:
         """As many rays as those of the sound maze."""
-        return _Unseeing(self.sound.sensor.count)
+        return _Unseeing(self.sound.sensor.count, self.sound.sensor.reach)
+
+
+class TurnedRays(Fault):
+    """A room in which the robot's rays come from left to right."""
+
+    says: ClassVar[str] = "has rays from left to right"
+
+    @property
+    def sensor(self) -> Rangefinders:
+        """The rays in the other order."""
+        return _Turned(self.sound.sensor.count, self.sound.sensor.reach)
+
+
+@dataclass(frozen=True)
+class _Turned(Rangefinders):
+    """Rays in the other order."""
+
+    def read(self, scene: Any, pose: Any) -> Any:
+        """Return the sound readings from the last to the first."""
+        return super().read(scene, pose)[::-1]
+
+
+class DropsAFrame(Fault):
+    """A robot's task whose steps are a frame shorter than the robot says."""
+
+    says: ClassVar[str] = "drops a frame of each step"
+
+    def plain_step(self, state: Any, action: Any) -> Any:
+        """Take a step of a robot with a frame less."""
+        robot = replace(self.sound.robot, frames=self.sound.robot.frames - 1)
+        return replace(self.sound, robot=robot).with_numbers(self.sound.places).plain_step(state, action)
+
+
+class LearnsNoCovariance(Fault):
+    """CMA-ES that keeps the covariance of its first generation."""
+
+    says: ClassVar[str] = "learns no covariance"
+
+    def step(self, key: Any, task: Any, level: Any, state: Any) -> Any:
+        """Take a step, and restore the covariance."""
+        after, progress = self.sound.step(key, task, level, state)
+        return replace(after, distribution=after.distribution.replace(C=state.distribution.C)), progress
+
+
+class PrefersNewElites(Fault):
+    """MAP-Elites in whose archive any newcomer replaces an elite."""
+
+    says: ClassVar[str] = "prefers new elites"
+
+    def insert(self, task: Any, state: Any, population: Any, episodes: Any) -> Any:
+        """Insert a batch into an archive whose elites are all beaten, and restore what is left of them."""
+        fitnesses = state.archive.fitnesses
+        beaten = jnp.where(fitnesses > -jnp.inf, -1e30, -jnp.inf)
+        archive = state.archive.replace(fitnesses=beaten)
+        after = self.sound.insert(task, replace(state, archive=archive), population, episodes)
+        kept = jnp.where(after.archive.fitnesses == -1e30, fitnesses, after.archive.fitnesses)
+        return replace(after, archive=after.archive.replace(fitnesses=kept))
+
+
+def _with_species(says: str, **changes: Any) -> Mutant:
+    """Return the mutant that divides the observed NEAT otherwise into species."""
+
+    def changed(one: Any) -> Any:
+        if not isinstance(one.method, NeatMechanisms):
+            return None
+        settings = one.method.of.settings
+        species = replace(settings.species, **changes)
+        return replace(one, method=replace(one.method, of=Neat(replace(settings, species=species))))
+
+    return Mutant(says, "method", changed)
+
+
+def _observed(fault: type[Fault], kind: type) -> Mutant:
+    """Return the mutant that plants a fault in the method that a method of a class observes."""
+
+    def changed(one: Any) -> Any:
+        observer = one.method
+        return (
+            replace(one, method=replace(observer, of=plant(fault, observer.of))) if isinstance(observer, kind) else None
+        )
+
+    return Mutant(fault.says, "method", changed)
 
 
 MUTANTS = {
@@ -164,7 +247,14 @@ MUTANTS = {
         "counts stones from 1 m away", lambda task: replace(task, within=1.0), only=SteppingStones
     ),
     "no-walls": of_task(WallsUnderground, only=MAZES),
-    "unseeing-rays": of_task(UnseeingRays, only=MAZES),
+    "unseeing-rays": of_task(UnseeingRays, only=(*MAZES, Room)),
+    "turned-rays": of_task(TurnedRays, only=Room),
+    "drops-a-frame": of_task(DropsAFrame, only=Room),
+    "selects-anybody": _with_species("lets anybody have offspring", survival=1.0),
+    "one-parent": _with_species("has one parent in each species", survival=0.01),
+    "endless-patience": _with_species("never lets a species die", stagnation=1_000),
+    "learns-no-covariance": _observed(LearnsNoCovariance, CmaEsMechanisms),
+    "prefers-new-elites": _observed(PrefersNewElites, MapElitesMechanisms),
     "flat-obstacles": of_task(FlatObstacles, only=Obstacles),
     "target-from-afar": of_task(TargetFromAfar, only=DeceptiveMaze),
 }

@@ -15,6 +15,7 @@ PACKAGES = (
     "evoclaims",
     "evoclaims.methods",
     "evoclaims.methods.neat",
+    "evoclaims.methods.mechanisms",
     "evoclaims.networks",
     "evoclaims.envs",
     "evoclaims.figures",

@@ -7,8 +7,9 @@ from dataclasses import replace
 import pytest
 
 from evoclaims.judging.verdict import Outcome
+from evoclaims.report.table_cells import totals
 from evoclaims.report.tally import tally
-from evoclaims.verdicts.claim_report import CONTROL, ClaimReport, Tried
+from evoclaims.verdicts.claim_report import CONTROL, MECHANISM, ClaimReport, Tried
 
 
 def _reports(where: str, *outcomes: Outcome) -> list[ClaimReport]:
@@ -41,6 +42,12 @@ def test_every_outcome_is_counted_once_and_controls_apart(
     papers: tuple[Outcome, ...], controls: tuple[Outcome, ...], said: str
 ) -> None:
     assert tally([*_reports("§5", *papers), *_reports(CONTROL, *controls)]) == said
+
+
+def test_mechanisms_are_counted_apart_from_controls() -> None:
+    both = [*_reports(CONTROL, Outcome.SUPPORTED), *_reports(MECHANISM, Outcome.REFUTED)]
+    assert tally(both).endswith("Of 1 case of mechanisms, which test parts of methods and tasks, 1 **refuted**.")
+    assert totals(both) == "controls: 1 supported; mechanisms: 1 refuted"
 
 
 def test_support_that_no_planted_fault_changes_is_counted_apart() -> None:

@@ -12,7 +12,7 @@ from laboratory import Laboratory
 from evoclaims.judging.verdict import Outcome
 from evoclaims.report.trial_summary import Reader
 from evoclaims.report.verdict_overview import Environments, overview
-from evoclaims.verdicts.claim_report import CONTROL, ClaimReport
+from evoclaims.verdicts.claim_report import CONTROL, MECHANISM, ClaimReport
 from evoclaims.verdicts.source_trials import SourceTrials
 
 
@@ -21,9 +21,14 @@ def _report(claim: str, where: str) -> ClaimReport:
 
 
 def test_controls_are_no_sentences_of_the_paper_and_have_a_table_of_their_own(lab: Laboratory) -> None:
-    reports = [_report("C1", CONTROL), _report("G1", "§5.1")]
-    text = overview({"full": reports}, {"C1": "Nothing learns", "G1": "It solves"}, Reader(lab.archive))
-    papers, controls = text.split("\n\n")[:2]
+    reports = [_report("K1", MECHANISM), _report("C1", CONTROL), _report("G1", "§5.1")]
+    says = {"K1": "It selects", "C1": "Nothing learns", "G1": "It solves"}
+    text = overview({"full": reports}, says, Reader(lab.archive))
+    papers, controls, mechanisms = text.split("\n\n")[:3]
+    assert mechanisms.splitlines()[::2] == [
+        "| mechanism | what a part of a method or a task does | full |",
+        "| K1 | It selects | not run |",
+    ]
     assert papers.splitlines()[::2] == ["| claim | the paper says | full |", "| G1 | It solves | not run |"]
     assert controls.splitlines()[::2] == [
         "| control | what the benchmark checks | full |",

@@ -29,7 +29,8 @@ class Claim:
     Attributes:
         id: a short name, such as "G1".
         says: the paper's own words.
-        where: section and figure; "control" for a check of the benchmark itself, which is counted apart.
+        where: section and figure; "control" for a check of the benchmark itself and "mechanism" for
+            a part of a method or task, which are counted apart.
         smoke: the scaled-down statement that the smoke tier judges instead; None if it judges none.
         line: of the paper's source in which the sentence stands; None where nobody says.
         read: the name of the reading that the test judges.
@@ -86,7 +87,8 @@ def claim(
     Args:
         claim_id: a short name, such as "G1".
         says: the paper's own words.
-        where: section and figure; "control" for a check of the benchmark itself, which is counted apart.
+        where: section and figure; "control" for a check of the benchmark itself and "mechanism" for
+            a part of a method or task, which are counted apart.
         smoke: the scaled-down statement of the smoke tier; None if no small instance can show the sentence, which is
             then not judged there (see `without_smoke` for one parameter of a claim).
         expect: an accepted outcome, for every tier and parameter; a narrower one (see `expected`) overrides it.

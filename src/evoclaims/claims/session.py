@@ -29,7 +29,16 @@ from evoclaims.trials.result import TrialResult
 from evoclaims.trials.spec import TrialSpec
 from evoclaims.trials.store import Store
 from evoclaims.verdicts import history, mutation_matrix
-from evoclaims.verdicts.claim_report import CONTROL, Attainable, ClaimReport, located, named, save, succeeding
+from evoclaims.verdicts.claim_report import (
+    CONTROL,
+    MECHANISM,
+    Attainable,
+    ClaimReport,
+    located,
+    named,
+    save,
+    succeeding,
+)
 from evoclaims.verdicts.history import following, key_of
 from evoclaims.verdicts.mutation_matrix import Matrix
 from evoclaims.verdicts.readings import ReadAs, moment
@@ -192,12 +201,17 @@ class Session:
             return Verdict(Outcome.NOT_RUN, f"{of}{error}", assertion.describe(), mark)
 
     def _satisfied_by(self, test: ClaimTest, assertion: Assertion, design: Design, verdict: Verdict) -> tuple[str, ...]:
-        """Return the null agents that satisfy a claim of the paper; controls are about such agents themselves.
+        """Return the null agents that satisfy a claim of the paper; controls and mechanisms are left out.
 
         Only trials that were looked at are asked for again, so that nothing runs for it.
         """
         agents = self.reproduction.null_agents
-        if not agents or not verdict.n or test.claim.where == CONTROL or isinstance(self.fetch, AsPublished):
+        if (
+            not agents
+            or not verdict.n
+            or test.claim.where in (CONTROL, MECHANISM)
+            or isinstance(self.fetch, AsPublished)
+        ):
             return ()
         look, reads = Look(verdict.n, design.alpha), isinstance(self.fetch, StoredOnly)
         if reads and assertion.attainable(look.n, design).supported > look.alpha:

@@ -10,6 +10,7 @@ from evoclaims.core.errors import UserError
 from evoclaims.envs.gates.circuit import Circuit
 from evoclaims.methods.cma_es import CmaEs
 from evoclaims.methods.map_elites import MapElites
+from evoclaims.methods.mechanisms.observed import Observed
 from evoclaims.methods.training_loop import TrainingLoop
 from evoclaims.mutants import faults
 from evoclaims.mutants.faults import Fault, plant
@@ -54,10 +55,16 @@ def of_method(fault: type[Fault], only: type | tuple[type, ...] = object) -> Mut
 
 
 def with_method(says: str, change: Callable[[Any], Any], only: type | tuple[type, ...] = object) -> Mutant:
-    """Return the mutant that changes any method of a class, such as one of its parameters."""
-    return Mutant(
-        says, "method", lambda one: replace(one, method=change(one.method)) if isinstance(one.method, only) else None
-    )
+    """Return the mutant that changes any method of a class, or the one that it observes."""
+
+    def changed(one: Condition) -> Condition | None:
+        method: Any = one.method
+        of = method.of if isinstance(one.method, Observed) else method
+        if not isinstance(of, only):
+            return None
+        return replace(one, method=change(of) if of is method else replace(method, of=change(of)))
+
+    return Mutant(says, "method", changed)
 
 
 def of_task(fault: type[Fault], only: type | tuple[type, ...] = object) -> Mutant:

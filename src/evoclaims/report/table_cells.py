@@ -12,7 +12,7 @@ from evoclaims.judging.telescope import comparison_power
 from evoclaims.judging.verdict import Direction, Outcome
 from evoclaims.report.formatting import p_value, place_key, places
 from evoclaims.verdicts import other_code
-from evoclaims.verdicts.claim_report import ClaimReport, Tally, Tried
+from evoclaims.verdicts.claim_report import CONTROL, MECHANISM, ClaimReport, Tally, Tried
 from evoclaims.verdicts.history import ordered
 
 NONE = "–"
@@ -122,10 +122,12 @@ def counted(reports: Iterable[ClaimReport], each: str = "{count} {outcome}", bet
 
 
 def totals(reports: Sequence[ClaimReport], each: str = "{count} {outcome}", between: str = ", ") -> str:
-    """Return the same in one line, controls apart: "3 supported, 1 refuted; controls: 2 supported"."""
-    controls = counted((report for report in reports if report.is_control), each, between)
-    others = counted((report for report in reports if not report.is_control), each, between)
-    return "; ".join(filter(None, (others, controls and f"controls: {controls}"))) or "no verdicts"
+    """Return the same in one line, others apart: "3 supported, 1 refuted; controls: 2 supported; mechanisms: ..."."""
+    apart = [counted((report for report in reports if not report.is_control), each, between)]
+    for kind in (CONTROL, MECHANISM):
+        found = counted((report for report in reports if report.where == kind), each, between)
+        apart.append(found and f"{kind}s: {found}")
+    return "; ".join(filter(None, apart)) or "no verdicts"
 
 
 def faults(reports: Iterable[ClaimReport]) -> str:

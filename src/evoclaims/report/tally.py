@@ -4,27 +4,33 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Sequence
+from typing import Final
 
 from evoclaims.report import table_cells
 from evoclaims.report.formatting import plural
-from evoclaims.verdicts.claim_report import ClaimReport, Tally
+from evoclaims.verdicts.claim_report import CONTROL, MECHANISM, ClaimReport, Tally
 from evoclaims.verdicts.sentences import Sentence, chance, sentences
+
+_OTHERS: Final = {CONTROL: "the benchmark itself", MECHANISM: "parts of methods and tasks"}
+"""What cases that are no sentence of the paper test."""
 
 
 def tally(reports: Sequence[ClaimReport]) -> str:
     """Return the sentences, such as "Of 3 sentences of the paper, 2 **supported** and 1 **refuted** ...".
 
-    Sentences that another one's result decides count once; controls are counted apart.
+    Sentences that another one's result decides count once; controls and mechanisms are counted apart.
     """
-    controls = [report for report in reports if report.is_control]
+    others = {kind: [report for report in reports if report.where == kind] for kind in _OTHERS}
     papers = [report for report in reports if not report.is_control]
     lines = []
-    if papers or not controls:
+    if papers or not any(others.values()):
         lines += [by_sentence(sentences(papers)), f"By case, of {len(papers)}: {_counted(papers)}."]
         lines += by_chance(papers)
-    if controls:
-        tested = "which test the benchmark itself"
-        lines.append(f"Of {plural(len(controls), 'case')} of controls, {tested}, {_counted(controls)}.")
+    lines += [
+        f"Of {plural(len(cases), 'case')} of {kind}s, which test {_OTHERS[kind]}, {_counted(cases)}."
+        for kind, cases in others.items()
+        if cases
+    ]
     return " ".join(lines)
 
 

@@ -1,4 +1,4 @@
-"""All verdicts as Markdown tables: by sentence, as marks alone, and by the readings of each sentence."""
+"""All verdicts as Markdown tables: by sentence (others below), as marks, and by the readings of each sentence."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from evoclaims.report import table_cells
 from evoclaims.report.formatting import literal, plural, table
 from evoclaims.report.table_cells import NONE, in_the_papers_order
 from evoclaims.report.trial_summary import Reader
-from evoclaims.verdicts.claim_report import APART, ClaimReport, Tally, named
+from evoclaims.verdicts.claim_report import APART, CONTROL, MECHANISM, ClaimReport, Tally, named
 from evoclaims.verdicts.history import ordered
 from evoclaims.verdicts.readings import ReadAs
 
@@ -38,7 +38,7 @@ NOT_CHANGED: Final = f"{NONE}: the variant changes none of the claim's trials, o
 
 
 def overview(columns: Mapping[str, Sequence[ClaimReport]], sentences: Mapping[str, str], reader: Reader) -> str:
-    """Return a table of the paper's claims, one of the controls, and what the letters for devices and versions mean.
+    """Return tables of the paper's claims, controls and mechanisms, and what letters for devices and versions mean.
 
     Args:
         columns: reports by heading.
@@ -47,17 +47,18 @@ def overview(columns: Mapping[str, Sequence[ClaimReport]], sentences: Mapping[st
     """
     made = Environments(reader)
     papers: _Rows = {}
-    controls: _Rows = {}
+    others: dict[str, _Rows] = {CONTROL: {}, MECHANISM: {}}
     for heading, reports in columns.items():
         for report in in_the_papers_order(reports):
-            rows = controls if report.is_control else papers
+            rows = others.get(report.where, papers)
             line = rows.setdefault((report.claim, sentences[report.name]), defaultdict(list))
             line[heading].append(report)
     tables = [
         _table(*headings, columns, rows, made)
         for headings, rows in (
             (("claim", "the paper says"), papers),
-            (("control", "what the benchmark checks"), controls),
+            (("control", "what the benchmark checks"), others[CONTROL]),
+            (("mechanism", "what a part of a method or a task does"), others[MECHANISM]),
         )
         if rows
     ]

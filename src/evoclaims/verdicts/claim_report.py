@@ -20,6 +20,8 @@ from evoclaims.verdicts.source_trials import Several, SourceTrials, versions_of
 
 CONTROL: Final = "control"
 """What a claim says in `where` that is not the paper's, but a check of the benchmark itself."""
+MECHANISM: Final = "mechanism"
+"""What a claim says in `where` that is not the paper's, but about a part of a method or a task."""
 
 
 @dataclass(frozen=True)
@@ -154,8 +156,8 @@ class ClaimReport:
 
     @property
     def is_control(self) -> bool:
-        """Whether it checks the benchmark, and no sentence of the paper."""
-        return self.where == CONTROL
+        """Whether it is no sentence of the paper: a control of the benchmark, or about a mechanism."""
+        return self.where in (CONTROL, MECHANISM)
 
     @property
     def counted_as(self) -> Tally:
