@@ -13,6 +13,7 @@ from evoclaims.envs.gates.parity import NParity
 from evoclaims.methods.cma_es import CmaEs
 from evoclaims.methods.hand_built import HandBuilt
 from evoclaims.methods.hyperneat import CPPN_FUNCTIONS, HyperNeat
+from evoclaims.methods.hyperneat_tensorneat import HyperneatTensorneat
 from evoclaims.methods.map_elites import MapElites
 from evoclaims.methods.neat.evolution import Neat
 from evoclaims.methods.neat.settings import Attribute, Mutation, Settings, Species
@@ -20,7 +21,7 @@ from evoclaims.methods.ppo import Ppo
 from evoclaims.methods.random_policy import RandomPolicy
 from evoclaims.methods.random_search import RandomSearch
 from evoclaims.methods.seldom_decomposed_cma_es import SeldomDecomposedCmaEs
-from evoclaims.methods.tensorneat import HyperneatTensorneat, NeatTensorneat
+from evoclaims.methods.tensorneat import NeatTensorneat
 from evoclaims.networks.all_skips import AllSkips
 from evoclaims.networks.mlp import Mlp
 from reproductions.nisioti2025.waypoints import Waypoints

@@ -20,12 +20,13 @@ from evoclaims.core.errors import UserError
 from evoclaims.core.foreign import implicit_promotions
 from evoclaims.envs.gates.parity import NParity
 from evoclaims.methods.hyperneat import HyperNeat
+from evoclaims.methods.hyperneat_tensorneat import HyperneatTensorneat
 from evoclaims.methods.neat.evolution import Neat
 from evoclaims.methods.neat.homology import distance
 from evoclaims.methods.neat.population import offspring
 from evoclaims.methods.neat.settings import Attribute, Mutation, Settings, Species
 from evoclaims.methods.neat.species import SpeciesState, speciate
-from evoclaims.methods.tensorneat import Genes, HyperneatTensorneat, NeatTensorneat, library, neat, translated
+from evoclaims.methods.tensorneat import Genes, NeatTensorneat, library, neat, translated
 from evoclaims.networks.graph import GraphNetwork
 from evoclaims.trials.result_making import is_sound
 
@@ -76,7 +77,7 @@ def test_without_tensorneat_a_sentence_says_how_to_install_it(method: Any, monke
 
 def test_importing_the_adapters_does_not_import_tensorneat(tmp_path: Path) -> None:
     (tmp_path / "tensorneat.py").write_text("raise SystemExit('imported')")
-    program = f"import sys; sys.path.insert(0, {str(tmp_path)!r}); import evoclaims.methods.tensorneat"
+    program = f"import sys; sys.path.insert(0, {str(tmp_path)!r}); import evoclaims.methods.hyperneat_tensorneat"
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
 

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 from climbers import run_climbers
 
-from evoclaims.trials import devices
+from evoclaims.trials import devices, memory
 from evoclaims.trials.store import Store
 
 pytestmark = pytest.mark.oldest
@@ -21,7 +21,7 @@ def test_memory_is_given_back_at_the_end_of_a_batch(
     tmp_path: Path, cpus: list[Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     calls: list[int] = []
-    monkeypatch.setattr(devices, "_libc", lambda: SimpleNamespace(malloc_trim=calls.append))
+    monkeypatch.setattr(memory, "_libc", lambda: SimpleNamespace(malloc_trim=calls.append))
     run_climbers(Store(tmp_path), cpus)
     assert calls == [0]
     run_climbers(Store(tmp_path), cpus)  # nothing was to be run
@@ -30,28 +30,28 @@ def test_memory_is_given_back_at_the_end_of_a_batch(
 
 @pytest.mark.skipif(sys.platform != "linux", reason="glibc's allocator alone keeps what was freed")
 def test_freed_memory_goes_back_to_the_system() -> None:
-    if devices._libc() is None:
+    if memory._libc() is None:
         pytest.skip("another C library")
 
     def resident() -> int:
         return int(Path("/proc/self/statm").read_text().split()[1]) * 4096
 
-    devices.give_back()
+    memory.give_back()
     held = [bytes(10_000) for _ in range(20_000)]  # smaller than what is mapped by itself
     last = bytearray(10_000)  # keeps the heap from shrinking by itself
     full = resident()
     del held
-    devices.give_back()
+    memory.give_back()
     assert resident() < full - 100_000_000
     del last
 
 
 HEAPS = """
 import ctypes, sys, threading
-from evoclaims.trials import devices
+from evoclaims.trials import devices, memory
 
 if sys.argv[1:]:
-    devices.share_heaps()
+    memory.share_heaps()
 libc, all_there = ctypes.CDLL(None), threading.Barrier(8)
 libc.fopen.restype = ctypes.c_void_p
 
@@ -70,7 +70,7 @@ libc.fflush(None)
 
 
 def test_threads_share_two_heaps(monkeypatch: pytest.MonkeyPatch) -> None:
-    if devices._libc() is None:
+    if memory._libc() is None:
         pytest.skip("another C library")
 
     def heaps(*arguments: str) -> int:
@@ -79,6 +79,6 @@ def test_threads_share_two_heaps(monkeypatch: pytest.MonkeyPatch) -> None:
 
     assert (heaps() > 2, heaps("shared")) == (True, 2)
     calls: list[tuple[int, int]] = []
-    monkeypatch.setattr(devices, "_libc", lambda: SimpleNamespace(mallopt=lambda *which: calls.append(which)))
+    monkeypatch.setattr(memory, "_libc", lambda: SimpleNamespace(mallopt=lambda *which: calls.append(which)))
     devices.configure()  # before jax makes its threads
     assert calls == [(-8, 2)]

@@ -9,6 +9,7 @@ from evoclaims.methods.cma_es import CmaEs as CmaEs
 from evoclaims.methods.hand_built import HandBuilt as HandBuilt
 from evoclaims.methods.hyperneat import CPPN_FUNCTIONS as CPPN_FUNCTIONS
 from evoclaims.methods.hyperneat import HyperNeat as HyperNeat
+from evoclaims.methods.hyperneat_tensorneat import HyperneatTensorneat as HyperneatTensorneat
 from evoclaims.methods.map_elites import MapElites as MapElites
 from evoclaims.methods.neat.evolution import Neat as Neat
 from evoclaims.methods.ppo import LevelTest as LevelTest
@@ -16,5 +17,4 @@ from evoclaims.methods.ppo import Ppo as Ppo
 from evoclaims.methods.random_policy import RandomPolicy as RandomPolicy
 from evoclaims.methods.random_search import RandomSearch as RandomSearch
 from evoclaims.methods.seldom_decomposed_cma_es import SeldomDecomposedCmaEs as SeldomDecomposedCmaEs
-from evoclaims.methods.tensorneat import HyperneatTensorneat as HyperneatTensorneat
 from evoclaims.methods.tensorneat import NeatTensorneat as NeatTensorneat

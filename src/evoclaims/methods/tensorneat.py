@@ -23,12 +23,9 @@ from evoclaims.core.pytree import pytree, strong
 from evoclaims.envs.base import Episode, PolicyFn, Task
 from evoclaims.methods.base import Policy, Progress
 from evoclaims.methods.champion import no_episode
-from evoclaims.methods.hyperneat import PAPER as CPPN_PAPER
-from evoclaims.methods.hyperneat import check_weights
 from evoclaims.methods.neat.settings import PAPER, Settings
 from evoclaims.networks.activations import ACTIVATIONS
 from evoclaims.networks.genome import Genome
-from evoclaims.networks.substrate import Extent, layered
 
 INSTALL = 'pip install "tensorneat @ git+https://github.com/EMI-Group/tensorneat"'
 
@@ -253,6 +250,7 @@ def _without_records(state: Any, forget: Bool[Array, ""]) -> Any:
 
 
 def _count(genes: Float[Array, "population rows columns"]) -> Float[Array, " population"]:
+    """Count each genome's genes."""
     return jnp.sum(~jnp.isnan(genes[:, :, 0]), axis=1, dtype=jnp.int32).astype(jnp.float32)
 
 
@@ -277,70 +275,3 @@ def translated(genome: Genome) -> Genes:
         nodes=jnp.where(genome.has_node[:, None], rows, jnp.nan)[order],
         connections=jnp.where(genome.has_connection[:, None], linked, jnp.nan),
     )
-
-
-@dataclass(frozen=True)
-class HyperneatTensorneat(NeatTensorneat):
-    """TensorNEAT's HyperNEAT on a layered substrate.
-
-    Attributes:
-        settings: NEAT's settings for the CPPN.
-        hidden: neurons in each hidden layer.
-        extent: see `networks.substrate.layered`.
-        threshold: a connection exists where the CPPN's |q| exceeds it.
-        max_weight: weight at |q| = 1.
-    """
-
-    name: ClassVar[str] = "hyperneat_tensorneat"
-    revision: ClassVar[int] = 1
-    packages: ClassVar[tuple[str, ...]] = ("llvmlite", "tensorneat")
-
-    settings: Settings = CPPN_PAPER
-    hidden: tuple[int, ...] = (16,)
-    extent: Extent = "largest_layer"
-    threshold: float = 0.3
-    max_weight: float = 5.0
-
-    def __post_init__(self) -> None:
-        """Check the substrate and the weights."""
-        layered((1, *self.hidden, 1), self.extent)
-        check_weights(self.threshold, self.max_weight)
-
-    def _algorithm(self, task: Task) -> Any:
-        """Build TensorNEAT's algorithm for a substrate of the task's size."""
-        library()
-        from tensorneat.algorithm.hyperneat import HyperNEATFeedForward, MLPSubstrate
-
-        layers = [task.observation_size + 1, *self.hidden, task.action_size]
-        edge = float({"largest_layer": max(layers), "unit": 1}[self.extent])
-        with implicit_promotions():
-            algorithm = HyperNEATFeedForward(
-                MLPSubstrate(layers, (-edge, edge, -edge, edge)),
-                neat(self.settings, 4, 1),
-                weight_threshold=self.threshold,
-                max_weight=self.max_weight,
-                output_transform=ACTIVATIONS["tanh"],
-            )
-        # TensorNEAT's node gene does not accept the arguments that its genome passes (commit ee20490).
-        algorithm.hyper_genome.node_gene = _neuron()
-        return algorithm
-
-
-def _neuron() -> Any:
-    """Make the node gene for a substrate: hidden nodes give tanh of the sum, outputs the sum."""
-    from tensorneat.genome import BaseNode
-
-    class Neuron(BaseNode):  # type: ignore[misc]
-        def forward(
-            self,
-            state: Any,
-            attrs: Array,
-            inputs: Float[Array, " nodes"],
-            is_output_node: Bool[Array, ""],
-            valid_mask: Bool[Array, " nodes"],
-        ) -> Float[Array, ""]:
-            """Return a neuron's output; `inputs` are weighted and valid where `valid_mask` is true."""
-            z = jnp.sum(inputs, where=valid_mask)
-            return jnp.where(is_output_node, z, jnp.tanh(z))
-
-    return Neuron()
