@@ -54,7 +54,7 @@ def as_plain(value: Any) -> Any:
 
 def fields_of(value: Any) -> dict[str, Any]:
     """Return the fields of a dataclass as plain JSON values."""
-    found = ((field, getattr(value, field.name)) for field in _canonical_fields(type(value)))
+    found = ((field, getattr(value, field.name)) for field in _canonical_fields(value.__class__))
     return {
         field.name: as_plain(held)
         for field, held in found
