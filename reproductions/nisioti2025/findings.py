@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import functools
 import re
+from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from statistics import fmean
@@ -33,7 +35,17 @@ def trials(variant: str, method: str, fresh: bool = False) -> Sequence[TrialResu
         return ()
     if fresh:
         return references.committed(FRESH / variant, "full", *names)
-    return references.of_condition(REPRODUCTION.references, "full", *names, tier.condition(*names).id)
+    return _committed(method).get(tier.condition(*names).id, ())
+
+
+@functools.cache
+def _committed(method: str) -> dict[str, Sequence[TrialResult]]:
+    """Return the reference trials of a method among stones, those of variants included, by condition."""
+    found = defaultdict[str, dict[str, TrialResult]](dict)
+    for path in sorted(REPRODUCTION.references.rglob(f"full/{method}-stones.jsonl")):
+        for trial in references.load(path):
+            found[trial.condition][trial.id] = trial
+    return {condition: tuple(trials.values()) for condition, trials in found.items()}
 
 
 def cell(found: Sequence[TrialResult]) -> str:

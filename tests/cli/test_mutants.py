@@ -25,9 +25,10 @@ Sentence = Callable[[pytest.RunResult, str], None]
 
 
 def test_a_claim_notices_a_blind_task_and_no_fault_in_what_never_learns(
-    evoclaims: Evoclaims, stored: Store, monkeypatch: pytest.MonkeyPatch
+    evoclaims: Evoclaims, stored: Store, project: Project, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("COLUMNS", "80")
+    project.write(a="supported")
     status, out, err = evoclaims("mutants")
     assert (status, err) == (0, "")
     matrix = load(Path("mutants.toml"))

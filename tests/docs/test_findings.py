@@ -13,8 +13,9 @@ from reproductions.nisioti2025 import findings, findings_pictures
 def test_the_tables_of_the_findings_are_those_of_the_committed_trials() -> None:
     page = findings.PAGE.read_text(encoding="utf-8")
     assert page.count("<!-- findings: end -->") == 3
-    assert findings.filled(page) == page
-    assert findings.filled(page.replace("| 4.9 (4.8) |", "| 5.9 (4.8) |")) == page
+    changed = page.replace("| 4.9 (4.8) |", "| 5.9 (4.8) |")
+    assert changed != page
+    assert findings.filled(changed) == page
 
 
 def test_fresh_trials_are_of_the_seeds_that_the_rule_names_and_of_their_variants() -> None:

@@ -12,7 +12,9 @@ from evoclaims.judging.drift import MOST, changed_settings
 LEAVES = st.one_of(st.none(), st.booleans(), st.integers(-3, 3), st.text(max_size=3))
 SPECS = st.dictionaries(
     st.sampled_from("abc"),
-    st.recursive(LEAVES, lambda part: st.lists(part, max_size=2) | st.dictionaries(st.sampled_from("xy"), part)),
+    st.recursive(
+        LEAVES, lambda part: st.lists(part, max_size=2) | st.dictionaries(st.sampled_from("xy"), part), max_leaves=4
+    ),
 )
 
 

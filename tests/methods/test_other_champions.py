@@ -9,6 +9,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from usual_fusions import USUAL_FUSIONS
 
 from evoclaims.core.errors import UserError
 from reproductions.nisioti2025 import ecorobot
@@ -26,11 +27,11 @@ def test_neat_keeps_the_first_champion_until_an_episode_beats_it_and_evolves_as_
     kept: Any = best_ever("neat", "stones", plain)
     task = replace(plain.task, episode_steps=10)
     states = {
-        name: jax.jit(lambda key, m=m: m.init(key, task))(jax.random.key(0))
+        name: jax.jit(lambda key, m=m: m.init(key, task), compiler_options=USUAL_FUSIONS)(jax.random.key(0))
         for name, m in (("plain", plain.method), ("kept", kept.method))
     }
     steps = {
-        name: jax.jit(lambda key, state, m=m: m.step(key, task, LEVEL, state))
+        name: jax.jit(lambda key, state, m=m: m.step(key, task, LEVEL, state), compiler_options=USUAL_FUSIONS)
         for name, m in (("plain", plain.method), ("kept", kept.method))
     }
     best = -np.inf

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import hashlib
 import json
 import math
@@ -32,6 +33,8 @@ def as_plain(value: Any) -> Any:
     """
     if type(value) in _UNCHANGED:  # most values: nothing slower is asked of them
         return value
+    if type(value) is tuple:  # what `isinstance` finds below, sooner
+        return [as_plain(item) for item in value]
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
         kind = {} if is_own(type(value)) else {"class": type(value).__qualname__}
         return {**kind, **fields_of(value)}
@@ -51,17 +54,18 @@ def as_plain(value: Any) -> Any:
 
 def fields_of(value: Any) -> dict[str, Any]:
     """Return the fields of a dataclass as plain JSON values."""
+    found = ((field, getattr(value, field.name)) for field in _canonical_fields(value.__class__))
     return {
-        field.name: as_plain(getattr(value, field.name))
-        for field in dataclasses.fields(value)
-        if _is_canonical(field, getattr(value, field.name))
+        field.name: as_plain(held)
+        for field, held in found
+        if field.metadata.get("canonical") != "if set" or held != field.default
     }
 
 
-def _is_canonical(field: dataclasses.Field[Any], value: Any) -> bool:
-    """Whether a field's value is part of the canonical form."""
-    canonical = field.metadata.get("canonical", True)
-    return bool(canonical) and (canonical != "if set" or value != field.default)
+@functools.cache
+def _canonical_fields(kind: type) -> tuple[dataclasses.Field[Any], ...]:
+    """Return the fields of a dataclass that may be part of its canonical form."""
+    return tuple(field for field in dataclasses.fields(kind) if field.metadata.get("canonical", True))
 
 
 def require_whole_numbers(value: Any) -> None:

@@ -137,13 +137,18 @@ def binomial_test(k: int, n: int, p0: float, alternative: Alternative = "greater
         raise ValueError(f"No alternative {alternative!r}; known: {', '.join(get_args(Alternative))}.")
     if not 0 < p0 < 1:
         raise ValueError(f"The null's probability lies strictly between 0 and 1, unlike {p0}.")
-    from scipy.stats import binomtest  # its import takes longer than a worker, which runs trials alone, should wait
+    if n < 1:
+        raise ValueError(f"A test needs one trial at least, not {n}.")
+    if alternative == "less":  # as many failures or more
+        k, p0 = n - k, 1 - p0
+    return ExactTest(p=_at_least(k, n, p0), attainable_p=_at_least(n, n, p0))
 
-    extreme = n if alternative == "greater" else 0
-    return ExactTest(
-        p=float(binomtest(k, n, p0, alternative).pvalue),
-        attainable_p=float(binomtest(extreme, n, p0, alternative).pvalue),
-    )
+
+def _at_least(k: int, n: int, p: float) -> float:
+    """Return the probability of `k` or more successes in `n` trials."""
+    from scipy.special import betainc  # scipy.stats has this, too, and takes a second longer to import
+
+    return float(betainc(k, n - k + 1, p)) if k > 0 else 1.0
 
 
 def pairs_test(wins: float, n: int, share: float) -> float:
@@ -178,10 +183,11 @@ def clopper_pearson(k: int, n: int, alpha: float = 0.05) -> tuple[float, float]:
 
     So 10 of 10 at 0.05 gives (0.741, 1.0): the level of the whole interval is 1 - 2 alpha.
     """
-    from scipy.stats import binomtest  # as above
+    from scipy.special import betaincinv  # as above
 
-    interval = binomtest(k, n).proportion_ci(confidence_level=1 - 2 * alpha, method="exact")
-    return float(interval.low), float(interval.high)
+    low = betaincinv(k, n - k + 1, alpha) if k > 0 else 0.0
+    high = betaincinv(k + 1, n - k, 1 - alpha) if k < n else 1.0
+    return float(low), float(high)
 
 
 def holm(ps: Sequence[float]) -> tuple[float, ...]:

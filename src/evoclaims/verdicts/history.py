@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
-import json
 import tomllib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
@@ -185,7 +184,7 @@ def last_runs(reports: Iterable[ClaimReport]) -> list[ClaimReport]:
     last: dict[tuple[str, str], ClaimReport] = {}
     seen = set[str]()
     for report in reports:
-        key, content = key_of(report), json.dumps(report.to_json(), sort_keys=True)
+        key, content = key_of(report), repr(report)  # as text: NaN is not equal to itself
         if content not in seen:
             seen.add(content)
             last[key] = following(report, last.get(key))

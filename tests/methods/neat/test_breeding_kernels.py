@@ -16,6 +16,7 @@ from block_machine import run
 from genomes import CONNECTIONS, NODES, dags, made, same, stacked
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from usual_fusions import USUAL_FUSIONS
 from without_kernels import BREEDING, without_kernels
 
 from evoclaims.envs.gates.parity import NParity
@@ -27,14 +28,14 @@ from evoclaims.methods.neat.settings import Attribute, Mutation, Settings, Speci
 from evoclaims.networks.genome import Genome
 
 
-def _both_ways(function: Callable[..., Any]) -> tuple[Any, Any]:
+def _both_ways(function: Callable[..., Any]) -> tuple[Any, ...]:
     """Return a function compiled with the kernels of breeding, and one without."""
 
     def without(*arguments: Any) -> Any:
         with without_kernels(BREEDING):
             return function(*arguments)
 
-    return jax.jit(function), jax.jit(without)
+    return tuple(jax.jit(each, compiler_options=USUAL_FUSIONS) for each in (function, without))
 
 
 def _changes(happens: Any, u: Any, v: Any, genome: Genome) -> Any:
