@@ -229,8 +229,8 @@ def test_the_wall_pays_well(trials, verdict):
     ppo = trials("ppo", on="deceptive_maze_easy")
     verdict.reading(
         "a reward of 0.9 to 1",
-        ppo.reward.between(0.9, 1) & ppo.never_reaches_the_target.stays(),
+        ppo.reward.between(0.9 * ppo.whole_way, ppo.whole_way) & ppo.never_reaches_the_target.stays(),
         because="close to optimal may mean within a tenth",
         since=AUDIT,
     )
-    verdict(ppo.reward.between(0.8, 1) & ppo.never_reaches_the_target.stays())
+    verdict(ppo.reward.between(0.8 * ppo.whole_way, ppo.whole_way) & ppo.never_reaches_the_target.stays())

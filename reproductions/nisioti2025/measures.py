@@ -50,6 +50,17 @@ class PaperTrials(TrialGroup):
         """Stones that the final policy crosses in order, averaged over the examination's episodes."""
         return self.measure("stones crossed", lambda t: t.metrics["stones"])
 
+    @property
+    def half_a_stone(self) -> float:
+        """Reward of half a stone in an episode: half of its steps where each of them pays, 0.5 where one does."""
+        task: Any = self.condition.task
+        return 0.5 * (1 if getattr(task, "pays", "each") == "once" else task.episode_steps)
+
+    @property
+    def whole_way(self) -> float:
+        """Reward of a whole way to a maze's target: 1, or where it is paid in metres their number."""
+        return float(getattr(self.condition.task, "whole_way", 1))
+
     def crosses(self, stones: float) -> Event:
         """The final policy crosses exactly `stones` stones in every episode."""
         return self.event(f"crosses {stones:g} stones", lambda t: t.metrics["stones"] == stones)

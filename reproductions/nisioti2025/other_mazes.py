@@ -60,6 +60,11 @@ class EasyMazeAsCoded(DeceptiveMaze):
         super().__post_init__()
         require_at_least(1, f"{self.name}'s", examined_steps=self.examined_steps, seen_positions=self.seen_positions)
 
+    @property
+    def whole_way(self) -> float:
+        """What a way to the target pays, 8.75."""
+        return math.dist((0.0, 0.0), self.target) - self.plan.within
+
     def memory(self, pose: Pose) -> Approach:
         """Store the way that the first step is paid for, beside its own: the robot was moved from the origin."""
         return Approach(first=jnp.asarray(CREDITED, jnp.float32), done=jnp.zeros((), bool))

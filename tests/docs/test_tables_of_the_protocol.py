@@ -36,7 +36,7 @@ def _without_cost(trial: TrialResult) -> float:
 
 def _rewards(method: str, task: str, reward: Reward) -> list[float]:
     trials = committed(REPRODUCTION.references, "full", method, task)
-    assert len(trials) == 10
+    assert len(trials) in (10, 30)
     return [reward(trial) for trial in trials]
 
 
@@ -103,7 +103,7 @@ def test_rewards_of_ppo_among_obstacles_by_setting_are_those_of_its_trials(varia
     trials = committed(REPRODUCTION.references_of(variant), "full", "ppo", "obstacles")
     rewards = [_examined(trial) for trial in trials]
     passed = statistics.mean(float(trial.metrics["obstacles"]) for trial in trials)
-    assert len(trials) == 10
+    assert len(trials) in (10, 30)
     cells = [said, f"{statistics.mean(rewards):,.0f}", f"{min(rewards):,.0f}, {max(rewards):,.0f}", f"{passed:.1f}"]
     assert _line(cells) in PROTOCOL
 
@@ -164,7 +164,7 @@ def test_rewards_of_neat_with_the_published_settings_are_those_of_its_trials() -
     trials = committed(REPRODUCTION.references_of("published_neat"), "full", "neat", "stones")
     rewards = {reward: [reward(trial) for trial in trials] for reward in (_of_training, _examined)}
     earned = (f"{statistics.mean(values):,.0f} ± {statistics.stdev(values):,.0f}" for values in rewards.values())
-    assert len(trials) == 10
+    assert len(trials) in (10, 30)
     assert "{} in training and {} afterwards".format(*earned) in page
     assert f"(A12 {a12(rewards[_examined], _rewards('cma_es', 'stones', _examined)):.2f};" in page
     for method in ("cma_es", "map_elites", "hyperneat"):
@@ -191,7 +191,7 @@ def test_rewards_of_neat_with_the_published_settings_are_those_of_its_trials() -
 def test_success_by_level_is_the_mean_of_the_trials(variant: str, method: str, task: str) -> None:
     trials = committed(REPRODUCTION.references_of(variant), "full", method, task)
     levels = zip(*(trial.levels["success"] for trial in trials), strict=True)
-    assert len(trials) == 10
+    assert len(trials) in (10, 30)
     assert " ".join(f"{statistics.mean(level):.2f}" for level in levels) in " ".join(PROTOCOL.split())
 
 
@@ -213,7 +213,7 @@ def test_rewards_of_ppo_with_either_value_network_are_those_of_the_trials(headin
     for references in (REPRODUCTION.references, REPRODUCTION.references_of("published_value_network")):
         trials = committed(references, "full", method, task)
         rewards = [_examined(trial) for trial in trials]
-        assert len(trials) == 10
+        assert len(trials) in (10, 30)
         cell = f"{statistics.mean(rewards):,.{places}f} ± {statistics.stdev(rewards):,.{places}f}"
         if "stones" in task:
             cell += f" ({statistics.mean(float(trial.metrics['stones']) for trial in trials):.2f} stones)"

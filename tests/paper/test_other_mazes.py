@@ -39,6 +39,7 @@ def test_any_way_to_the_target_pays_8_75_metres() -> None:
     assert ended == [False, False, False, True]
     assert total == pytest.approx(np.hypot(4, 9) - 1.09, abs=1e-5)  # 8.76: from the origin, as the code has it
     assert bool(memory.done)
+    assert EASY.whole_way == pytest.approx(8.75, abs=0.002)
 
 
 @pytest.mark.parametrize("turned", [0.0, 0.4, -2.0])
