@@ -153,7 +153,7 @@ def test_the_same_command_writes_the_same_file_over_the_old_one(trained: Evoclai
         (("neat", "--on=parity", "--seed=-1"), "A seed is a whole number from 0 to 2147483647, not -1."),
         (
             ("neat", "--on=parity", "--seed=77"),
-            "holds no trial of neat on parity (smoke) with seed 77, and reference trials come without champions. "
+            "holds no trial of neat on parity (smoke) with seed 77, and no champion of it is committed. "
             "`evoclaims run neat --on parity --tier smoke --trials 1 --first-seed 77` runs it, in about ",
         ),
         (

@@ -196,7 +196,7 @@ CHAMPION = ("maze", "--method=random", "--seed=4")
         (("maz", "--method=random"), "There is no task for random named 'maz'. Did you mean 'maze'?"),
         (
             ("maze", "--method=random", "--seed=77"),
-            "holds no trial of random on maze (smoke) with seed 77, and reference trials come without champions. "
+            "holds no trial of random on maze (smoke) with seed 77, and no champion of it is committed. "
             "`evoclaims run random --on maze --tier smoke --trials 1 --first-seed 77` runs it, in about ",
         ),
         (("maze", "--method=random", "--seed=-1"), "A seed is a whole number from 0 to 2147483647, not -1."),

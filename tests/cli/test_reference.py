@@ -106,3 +106,16 @@ def test_trials_of_unknown_code_are_refused_unless_asked_for(evoclaims: Evoclaim
     assert "wrong-parity" not in out
     assert "Trials of wrong on parity ran code of an unknown revision" in err
     assert "wrong-parity.jsonl: 10 trials" in evoclaims("reference", "--unknown-revision")[1]
+
+
+def test_champions_are_committed_when_asked_for(evoclaims: Evoclaims, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The hand-built network of this project has none, so that the store's answers are given."""
+    monkeypatch.setattr(Store, "has_champion", lambda self, trial: trial.seed == 3)
+    monkeypatch.setattr(Store, "packed_champion", lambda self, trial: b"packed")
+    evoclaims("run", "right")
+    folder = Path("reference/smoke/champions")
+    evoclaims("reference", "--unknown-revision")
+    assert not folder.exists()
+    evoclaims("reference", "--unknown-revision", "--champions")
+    (path,) = folder.iterdir()
+    assert path.read_bytes() == b"packed"

@@ -221,6 +221,9 @@ def _keeping(add: _Add) -> None:
     reference.add_argument(
         "--unknown-revision", action="store_true", help="also trials that ran code of unknown git revision"
     )
+    reference.add_argument(
+        "--champions", action="store_true", help="also their champions, for evoclaims look and champion in a clone"
+    )
 
     add("accept", "write the current verdicts into verdicts.toml, as accepted; exit status 1 if that changed the file")
 

@@ -6,6 +6,7 @@ import argparse
 
 from evoclaims.cli.project import open_project
 from evoclaims.core.errors import UserError
+from evoclaims.core.files import write_atomically
 from evoclaims.core.packages import recorded
 from evoclaims.core.printable import printable
 from evoclaims.judging.drift import MIN_REFERENCES
@@ -72,6 +73,10 @@ def main(options: argparse.Namespace) -> int:
             continue
         references.write(path, results[:size])
         written += 1
+        for trial in results[:size] if options.champions else ():
+            if store.has_champion(trial):
+                place = references.champion_path(reproduction.references_of(options.variant), options.tier, trial)
+                write_atomically(place, store.packed_champion(trial))
         upgraded = change(recorded(results[0].provenance, condition.packages), condition.versions)
         gone = len(there) - len(committed)
         print(

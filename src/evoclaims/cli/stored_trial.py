@@ -16,6 +16,7 @@ from evoclaims.core.errors import UserError
 from evoclaims.core.keys import EVALUATION, TRAINING, trial_key
 from evoclaims.core.printable import printable
 from evoclaims.envs.ecorobot.robot_task import RobotTask
+from evoclaims.paper import references
 from evoclaims.paper.cost import Estimator, Wanted
 from evoclaims.report.live_line import duration
 from evoclaims.trials import champions, devices
@@ -40,6 +41,8 @@ class Stored:
 def load(project: Project, tier: str, method: str, task: str, seed: int) -> Stored:
     """Return a stored trial with its champion: this environment's, or else the newest of other versions.
 
+    A trial that is not stored is read from the reference trials, if its champion is committed there.
+
     Raises:
         UserError: for unknown names, a trial that is not stored (with the command that runs it and what that takes),
             and as `champions.load` does.
@@ -51,11 +54,16 @@ def load(project: Project, tier: str, method: str, task: str, seed: int) -> Stor
     spec = TrialSpec(condition, seed)
     result = store.get(spec.id, condition.versions)
     if result is None:
+        for trial in references.of_condition(reproduction.references, tier, method, task, condition.id):
+            arrays = references.champion_of(reproduction.references, tier, trial) if trial.seed == seed else None
+            if arrays is not None:
+                file = references.champion_path(reproduction.references, tier, trial)
+                return Stored(title, condition, trial, champions.unpacked(arrays, condition, trial), file)
         estimator = Estimator(store, reproduction, tier, devices.choose("auto")[0].platform)
         cost = estimator.owed({"": Wanted((method, task), condition, [seed])})[""].cost
         takes = "" if cost.basis == "budget" else f", in about {duration(cost.seconds())}"
         raise UserError(
-            f"{store.root} holds no trial of {title} with seed {seed}, and reference trials come without champions. "
+            f"{store.root} holds no trial of {title} with seed {seed}, and no champion of it is committed. "
             f"`evoclaims run {method} --on {task} --tier {tier} --trials 1 --first-seed {seed}` runs it{takes}."
         )
     return Stored(title, condition, result, champions.load(store, condition, result), store.champion_file(result))

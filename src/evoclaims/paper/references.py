@@ -1,12 +1,19 @@
-"""Committed reference trials: one JSON record per line, in reference/<tier>/<method>-<task>.jsonl of a reproduction."""
+"""Committed reference trials: one JSON record per line, in reference/<tier>/<method>-<task>.jsonl of a reproduction.
+
+Champions of some of them lie in reference/<tier>/champions, named by their digests.
+"""
 
 from __future__ import annotations
 
 import errno
+import hashlib
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import replace
 from itertools import takewhile
 from pathlib import Path
+from typing import Any
+
+from numpy.typing import NDArray
 
 from evoclaims.core.errors import UserError
 from evoclaims.core.files import read_file, write_atomically
@@ -15,6 +22,7 @@ from evoclaims.core.provenance import what_fixes_bits
 from evoclaims.judging.drift import DriftCase, check_drift
 from evoclaims.judging.drift_report import DriftReport
 from evoclaims.judging.tripwire import DigestCheck, compare_digests
+from evoclaims.trials.arrays import unpack
 from evoclaims.trials.failed import is_final
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.result_codec import RecordError, dump, parse
@@ -95,6 +103,27 @@ def write(path: Path, results: Iterable[TrialResult]) -> None:
     """Write reference trials in the order of seeds."""
     ordered = sorted(results, key=lambda result: result.seed)
     write_atomically(path, b"".join(map(dump, ordered)))
+
+
+def champion_path(folder: Path, tier: str, result: TrialResult) -> Path:
+    """Return the path of the committed champion of a reference trial, as a store packs it."""
+    return folder / tier / "champions" / f"{result.champion}.npz"
+
+
+def champion_of(folder: Path, tier: str, result: TrialResult) -> dict[str, NDArray[Any]] | None:
+    """Return the committed champion of a reference trial, arrays by name; None where none is committed.
+
+    Raises:
+        UserError: when the file is not the champion that the trial's record names.
+    """
+    path = champion_path(folder, tier, result)
+    try:
+        data = read_file(path)
+    except OSError:
+        return None
+    if hashlib.sha256(data).hexdigest() != result.champion:
+        raise UserError(f"{path} is not the champion that its trial's record names. {_MEND}")
+    return unpack(data)
 
 
 def of_one_environment(

@@ -55,9 +55,17 @@ def load(store: Store, condition: Condition, result: TrialResult) -> Any:
 
     Raises:
         DamagedFileError: when the champion's file is missing, torn or not the one that the record names.
+        UserError: as `unpacked` does.
+    """
+    return unpacked(store.champion_of(result), condition, result)
+
+
+def unpacked(arrays: Mapping[str, NDArray[Any]], condition: Condition, result: TrialResult) -> Any:
+    """Return a champion's named arrays as the tree that the condition's policies use.
+
+    Raises:
         UserError: when the trial has no champion, or one that does not fit this tree.
     """
-    arrays = store.champion_of(result)
     shapes = jax.eval_shape(lambda: _policy(condition).parameters)
     if result.status in ("timeout", "crashed") or (not arrays and jax.tree.leaves(shapes)):
         raise UserError(f"Seed {result.seed} of {condition.label} has no champion: it is {result.status}.")
