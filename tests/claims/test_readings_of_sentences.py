@@ -10,7 +10,7 @@ import pytest
 from evoclaims.claims.claim import Claim, claim
 from evoclaims.claims.collected import ClaimTest
 from evoclaims.claims.fetching import StoredOnly
-from evoclaims.claims.session import Session, Verdicts
+from evoclaims.claims.session import Session, VerdictFixture
 from evoclaims.core.errors import UserError
 from evoclaims.judging.verdict import Outcome
 from evoclaims.paper.archive import Archive
@@ -34,7 +34,9 @@ def judged(reproduction: Reproduction, store: Store, made: Callable[..., TrialRe
         store.put(trial, {})
 
     def judge(says: Claim, since: str, on: str = "small") -> ClaimReport:
-        verdict = Verdicts(lambda assertion, readings: session.settle(ClaimTest(says, "full", ""), assertion, readings))
+        verdict = VerdictFixture(
+            lambda assertion, readings: session.settle(ClaimTest(says, "full", ""), assertion, readings)
+        )
         other = session.group("better", on, "full")
         verdict.reading("solves", other.solves_every_level.in_most_trials(), because="a word", since=since)
         verdict(better.mean_success > 0.2)
@@ -86,7 +88,7 @@ def test_readings_are_of_the_papers_own_sentence(reproduction: Reproduction, sto
 def test_a_reading_that_cannot_be_one_is_a_sentence(reproduction: Reproduction, store: Store, served: Any) -> None:
     session = Session(reproduction, store, served(lambda condition, seed: 0.5))
     better = session.group("better", "small", "full")
-    verdict = Verdicts(lambda assertion, readings: assertion)
+    verdict = VerdictFixture(lambda assertion, readings: assertion)
     solves = better.solves_every_level.in_most_trials()
     for name, given, since, said in (
         ("a", True, "2026-01-02", r"The reading 'a' is True, which is not an assertion"),

@@ -13,7 +13,7 @@ from evoclaims.claims import earlier_trials
 from evoclaims.claims.claim import Claim
 from evoclaims.claims.collected import ClaimTest
 from evoclaims.claims.fetching import NotStoredError, RunMissing, StoredOnly
-from evoclaims.claims.session import Session, Verdicts
+from evoclaims.claims.session import Session, VerdictFixture
 from evoclaims.core.errors import UnknownNameError, UserError
 from evoclaims.core.packages import without_flags
 from evoclaims.core.provenance import changing_flags
@@ -167,7 +167,7 @@ def test_missing_trials_are_run_and_a_bad_store_or_device_is_found_before(tmp_pa
 
 def test_a_test_gives_exactly_one_verdict(session: Session, says: Claim) -> None:
     better, worse = _pair(session)
-    verdict = Verdicts(lambda assertion, _: session.settle(ClaimTest(says, "smoke", ""), assertion))
+    verdict = VerdictFixture(lambda assertion, _: session.settle(ClaimTest(says, "smoke", ""), assertion))
     with pytest.raises(UserError, match=r"takes an assertion about trials.*not True"):
         verdict(True)  # type: ignore[arg-type]
     with pytest.raises(UserError, match=r"takes an assertion about trials.*not 'mean success over levels' alone"):

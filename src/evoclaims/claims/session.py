@@ -45,64 +45,6 @@ from evoclaims.verdicts.readings import ReadAs, moment
 from evoclaims.verdicts.source_trials import SourceTrials, found_in
 
 
-def judged(
-    test: ClaimTest, assertion: Assertion, design: Design, verdict: Verdict, again: Mapping[str, Collection[int]]
-) -> ClaimReport:
-    """Build the report of a claim that was judged; `again` holds the seeds that were run again, by condition id."""
-    groups = [source for source in assertion.sources() if isinstance(source, TrialGroup)]
-    seeds = design.seeds(verdict.n)
-    return replace(
-        unjudged(test, verdict.outcome, verdict.reason),
-        verdict=verdict,
-        asserts=content_hash(assertion.plain()),
-        sources=tuple(_source(group, seeds, again.get(group.fingerprint, ()), assertion) for group in groups),
-        attainable=tuple(
-            Attainable(look.n, look.alpha, p.supported, p.refuted, p.smaller)
-            for look, p in attainability(assertion, design)
-        ),
-    )
-
-
-def unjudged(test: ClaimTest, outcome: Outcome, reason: str, *, has_test: bool = True) -> ClaimReport:
-    """Build the report of a claim without a verdict: its test broke or was skipped, or this tier has no test."""
-    return ClaimReport(
-        claim=test.claim.id,
-        case=test.case,
-        tier=test.tier,
-        statement=test.claim.statement(test.tier) if has_test else test.claim.says,
-        where=test.claim.where,
-        outcome=outcome,
-        reason=reason,
-        has_test=has_test,
-        line=test.claim.line,
-    )
-
-
-def expecting(report: ClaimReport, expectation: Expectation | None) -> ClaimReport:
-    """Add an accepted outcome to a report; what is accepted for the protocol is not for its variants."""
-    if expectation is None or report.variant:
-        return report
-    return replace(report, expected=expectation.outcome, because=expectation.because)
-
-
-def _source(group: TrialGroup, seeds: Sequence[int], again: Collection[int], assertion: Assertion) -> SourceTrials:
-    """Describe one condition of a report."""
-    condition = group.condition
-    trials = group.fetch(seeds) if seeds else ()
-    readings = [reading for reading in assertion.readings() if reading.source.fingerprint == group.fingerprint]
-    finished = [trial for trial in trials if trial.status == "done"]
-    return SourceTrials(
-        method=group.method,
-        task=group.task,
-        condition=group.fingerprint,
-        trials=tuple(TrialSpec(condition, seed).id for seed in seeds),
-        versions=found_in(trials, condition.packages) if seeds else {},
-        again=tuple(sorted(again)),
-        edited=condition.edited_since(trials),
-        reads=read_of(finished[0], readings) if finished else (),
-    )
-
-
 @dataclass(frozen=True)
 class Reading:
     """A reading of a claim's sentence, not yet judged; `ReadAs` has its parts after that."""
@@ -301,7 +243,7 @@ def _judged(reading: Reading, design: Design, outcome: Outcome | None = None) ->
 
 
 @dataclass
-class Verdicts:
+class VerdictFixture:
     """The `verdict` fixture: takes exactly one assertion per test, settles it, and keeps its report."""
 
     settle: Callable[[Assertion, Sequence[Reading]], object]
@@ -352,3 +294,61 @@ class Verdicts:
             raise UserError(f"The reading {name!r} needs a unique name and because=...: why the sentence means this.")
         moment(since)
         self.readings.append(Reading(name, assertion, because, since))
+
+
+def judged(
+    test: ClaimTest, assertion: Assertion, design: Design, verdict: Verdict, again: Mapping[str, Collection[int]]
+) -> ClaimReport:
+    """Build the report of a claim that was judged; `again` holds the seeds that were run again, by condition id."""
+    groups = [source for source in assertion.sources() if isinstance(source, TrialGroup)]
+    seeds = design.seeds(verdict.n)
+    return replace(
+        unjudged(test, verdict.outcome, verdict.reason),
+        verdict=verdict,
+        asserts=content_hash(assertion.plain()),
+        sources=tuple(_source(group, seeds, again.get(group.fingerprint, ()), assertion) for group in groups),
+        attainable=tuple(
+            Attainable(look.n, look.alpha, p.supported, p.refuted, p.smaller)
+            for look, p in attainability(assertion, design)
+        ),
+    )
+
+
+def unjudged(test: ClaimTest, outcome: Outcome, reason: str, *, has_test: bool = True) -> ClaimReport:
+    """Build the report of a claim without a verdict: its test broke or was skipped, or this tier has no test."""
+    return ClaimReport(
+        claim=test.claim.id,
+        case=test.case,
+        tier=test.tier,
+        statement=test.claim.statement(test.tier) if has_test else test.claim.says,
+        where=test.claim.where,
+        outcome=outcome,
+        reason=reason,
+        has_test=has_test,
+        line=test.claim.line,
+    )
+
+
+def expecting(report: ClaimReport, expectation: Expectation | None) -> ClaimReport:
+    """Add an accepted outcome to a report; what is accepted for the protocol is not for its variants."""
+    if expectation is None or report.variant:
+        return report
+    return replace(report, expected=expectation.outcome, because=expectation.because)
+
+
+def _source(group: TrialGroup, seeds: Sequence[int], again: Collection[int], assertion: Assertion) -> SourceTrials:
+    """Describe one condition of a report."""
+    condition = group.condition
+    trials = group.fetch(seeds) if seeds else ()
+    readings = [reading for reading in assertion.readings() if reading.source.fingerprint == group.fingerprint]
+    finished = [trial for trial in trials if trial.status == "done"]
+    return SourceTrials(
+        method=group.method,
+        task=group.task,
+        condition=group.fingerprint,
+        trials=tuple(TrialSpec(condition, seed).id for seed in seeds),
+        versions=found_in(trials, condition.packages) if seeds else {},
+        again=tuple(sorted(again)),
+        edited=condition.edited_since(trials),
+        reads=read_of(finished[0], readings) if finished else (),
+    )

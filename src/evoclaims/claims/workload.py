@@ -16,7 +16,7 @@ import pytest
 from evoclaims.claims.claim import gap_of
 from evoclaims.claims.collected import TIER, ClaimTest
 from evoclaims.claims.fetching import NotStoredError, RunMissing
-from evoclaims.claims.session import Session, Verdicts
+from evoclaims.claims.session import Session, VerdictFixture
 from evoclaims.judging.assertion import Assertion
 from evoclaims.paper.cost import Cost, Estimator, Wanted
 from evoclaims.paper.trial_group import TrialGroup
@@ -111,7 +111,7 @@ def _needed(session: Session, item: pytest.Item, test: ClaimTest) -> Sequence[Tr
         return found[-1]
 
     function: Callable[..., Any] = item.obj  # type: ignore[attr-defined]
-    given = {**item.callspec.params, TIER: test.tier, "trials": trials, "verdict": Verdicts(keep)}  # type: ignore[attr-defined]
+    given = {**item.callspec.params, TIER: test.tier, "trials": trials, "verdict": VerdictFixture(keep)}  # type: ignore[attr-defined]
     names = inspect.signature(function).parameters
     if gap_of(item, test.tier) or not set(names) <= set(given):
         return ()

@@ -33,7 +33,7 @@ from evoclaims.trials.stopping import end_without, interrupted_by
 
 if TYPE_CHECKING:
     from evoclaims.claims.collected import ClaimTest
-    from evoclaims.claims.session import Verdicts
+    from evoclaims.claims.session import VerdictFixture
     from evoclaims.paper.trial_group import TrialGroup
     from evoclaims.verdicts.claim_report import ClaimReport
 
@@ -242,10 +242,10 @@ def trials(request: pytest.FixtureRequest, claim_tier: str) -> Callable[..., Tri
 
 
 @pytest.fixture
-def verdict(request: pytest.FixtureRequest, claim_tier: str) -> Verdicts:
+def verdict(request: pytest.FixtureRequest, claim_tier: str) -> VerdictFixture:
     """Return `verdict(assertion)`, which judges the claim."""
     from evoclaims.claims.collected import ClaimTest
-    from evoclaims.claims.session import Verdicts
+    from evoclaims.claims.session import VerdictFixture
 
     session, test = make_session(request.config), ClaimTest.of(request.node)
     line = progress_of(request.config)
@@ -257,5 +257,5 @@ def verdict(request: pytest.FixtureRequest, claim_tier: str) -> Verdicts:
             if line is not None:
                 line.close()
 
-    verdicts = request.node.stash[VERDICTS] = Verdicts(settle)
+    verdicts = request.node.stash[VERDICTS] = VerdictFixture(settle)
     return verdicts

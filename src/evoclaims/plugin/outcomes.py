@@ -18,7 +18,7 @@ from evoclaims.plugin.options import make_session
 from evoclaims.plugin.summary import ATTRIBUTE
 
 if TYPE_CHECKING:
-    from evoclaims.claims.session import Verdicts
+    from evoclaims.claims.session import VerdictFixture
     from evoclaims.verdicts.claim_report import ClaimReport
 
 
@@ -47,7 +47,7 @@ def shortened(excinfo: pytest.ExceptionInfo[BaseException], item: pytest.Item) -
     return excinfo.getrepr(style="long" if style == "auto" else style, showlocals=showlocals, tbfilter=kept)
 
 
-VERDICTS: pytest.StashKey[Verdicts] = pytest.StashKey()
+VERDICTS: pytest.StashKey[VerdictFixture] = pytest.StashKey()
 """Under which a claim's test keeps what its fixture `verdict` has judged."""
 
 

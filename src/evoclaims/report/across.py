@@ -140,7 +140,7 @@ def timeline_chart(history: History, claim: str = "") -> VerdictChart:
     """Return a chart of accepted verdicts by date and versions; a ring is a verdict under other rules than before.
 
     Raises:
-        UserError: as `timeline.timeline` does.
+        UserError: as `verdicts.acceptance.timeline` does.
     """
     columns: dict[str, str] = {}
     rows: dict[str, dict[str, VerdictMark]] = {}

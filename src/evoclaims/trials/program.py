@@ -114,7 +114,7 @@ class Score:
     Attributes:
         final: the champion's episodes, leaves [levels].
         parameters: the champion's parameters.
-        solved_at: see `curriculum.Ascent`.
+        solved_at: see `Ascent`.
     """
 
     final: Episode

@@ -158,9 +158,9 @@ def run(
 
     A batch that takes longer than `time_limit` (seconds, on the device and compiling) ends there: its trials are stored
     as "timeout" with their curves so far, and run again only when a call allows more. With a limit the work is done on
-    another thread, since it may never return (see `allowance`).
+    another thread, since it may never return (see `stopping.Allowance`).
 
-    A batch that the device's memory does not hold goes on in two halves (see `halving`).
+    A batch that the device's memory does not hold goes on in two halves (see `batches.halved`).
 
     Of a condition whose trials exist already, there may be fewer than seeds.
 

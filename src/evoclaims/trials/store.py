@@ -62,7 +62,7 @@ class Store(StoreFiles):
         return named and self.champion_file(result).exists()
 
     def check(self) -> None:
-        """Reject an existing folder that is not a store (see `store_mark.check_store`).
+        """Reject an existing folder that is not a store (see `store_files.check_store`).
 
         Raises:
             UserError: when it is something else, cannot be read, or is of a later release.
