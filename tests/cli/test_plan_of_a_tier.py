@@ -125,7 +125,7 @@ def test_plan_tells_what_the_reference_trials_have_cost(evoclaims: Evoclaims, st
     made_here.rename("reference/smoke/wrong-parity.jsonl")
     out = evoclaims("plan")[1]
     assert re.search(r"^wrong on parity +–$", out, re.MULTILINE)
-    assert re.search(r"^total +2 h 00 min *\n +and elsewhere", out, re.MULTILINE)
+    assert re.search(r"^total +2 h 00 min *\n +\+ elsewhere", out, re.MULTILINE)
 
 
 def test_plan_takes_the_pace_of_other_tiers_where_a_condition_has_not_run(evoclaims: Evoclaims, stored: Store) -> None:

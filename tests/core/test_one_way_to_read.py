@@ -23,7 +23,7 @@ ELSEWHERE = {
     "envs/ecorobot/views/page.py": ["(ASSETS / 'viewer.html').read_text", "(ASSETS / 'viewer.js').read_text"],
     "report/html.py": ["(resources.files('evoclaims.report') / 'assets' / name).read_text"],
     # what the system says
-    "core/provenance.py": ["Path('/proc/cpuinfo').read_text"],
+    "core/provenance.py": ["Path('/proc/cpuinfo').read_text", "distribution.read_text", "distribution.read_text"],
     "cli/cluster/submissions.py": ["Path(f'/proc/{job}/cmdline').read_bytes"],
     "trials/notice.py": ["Path(f'/proc/{owner.pid}/stat').read_text", "open"],
     "trials/loop_messages.py": ["Path(f'/proc/{pid}/environ').read_bytes"],

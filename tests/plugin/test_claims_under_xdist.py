@@ -146,8 +146,9 @@ def test_each_worker_has_its_own_gpu_before_a_conftest_is_loaded(project: Any, m
     }
 
 
-def test_a_worker_that_dies_while_starting_is_one_sentence(project: Any) -> None:
+def test_a_worker_that_dies_while_starting_is_one_sentence(project: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     project.write(a="supported")
+    monkeypatch.delenv("PYTEST_XDIST_WORKER", raising=False)  # or the main process of a test in a worker would die
     (project.path / "conftest.py").write_text("import os\n\nif 'PYTEST_XDIST_WORKER' in os.environ:\n    os._exit(3)\n")
     result = project.run_apart("-n1", "--max-worker-restart=0")
     assert result.ret == pytest.ExitCode.USAGE_ERROR

@@ -76,6 +76,17 @@ PATTERNS: dict[str, Callable[[Any, float], float]] = {
 }
 
 
+CURVES: dict[str, Callable[..., float]] = {
+    r"(\w+) on average": lambda c, name: c[name].mean(),
+    r"(\w+) at the end": lambda c, name: c[name][-1],
+    r"(\w+) is always ([\d.]+)": lambda c, name, x: (c[name] == float(x)).all(),
+    r"reports with (\w+) of ([\d.]+)": lambda c, name, x: (c[name] >= float(x)).sum(),
+    r"share of (\w+) against (\w+)": lambda c, part, other: c[part].sum() / (c[part].sum() + c[other].sum()),
+    r"fall of (\w+) in a generation": lambda c, name: (c[name][0] - c[name][-1]) / np.ptp(c["steps"]),
+}
+"""Of mechanisms."""
+
+
 @dataclass(frozen=True)
 class Records:
     """Committed trials by condition and seed.
@@ -121,6 +132,11 @@ def read(name: str, trial: Any) -> float:
     for pattern, of in PATTERNS.items():
         if match := re.fullmatch(pattern, name):
             return of(trial, float(match[1]))
+    for pattern, of_curves in CURVES.items():
+        if match := re.fullmatch(pattern, name):
+            return float(
+                of_curves({curve: np.array(values) for curve, values in trial["curves"].items()}, *match.groups())
+            )
     raise LookupError(f"no reading of {name!r}: add one here")
 
 

@@ -36,7 +36,7 @@ Counts = Mapping[Names, int]
 Costs = Mapping[Names, Sequence[TrialResult]]
 """The reference trials of conditions, by method and task."""
 
-AND_ELSEWHERE: Final = "\nand elsewhere"
+AND_ELSEWHERE: Final = "\n+ elsewhere"
 """Follows a sum without conditions whose trials ran on other devices."""
 
 AND_MORE: Final = "\nand more"
