@@ -256,15 +256,16 @@ def _path(line: Line, x: _Scale, y: _Scale) -> str:
     Each point is given from the one before, in halves of a unit: curves are most of the page, and these steps repeat.
     """
     path, pen, last = [], "M", (0, 0)
-    values = line.y
-    for index, (across, up) in enumerate(zip(line.x, values, strict=True)):
-        if not math.isfinite(up):
+    # Rounded before the difference, so that no error adds up.
+    heights = [round(2 * y(up)) if math.isfinite(up) else None for up in line.y]
+    for index, (across, height) in enumerate(zip(line.x, heights, strict=True)):
+        if height is None:
             pen = "M"
             continue
-        flat = 0 < index < len(values) - 1 and values[index - 1] == up == values[index + 1]
+        flat = 0 < index < len(heights) - 1 and heights[index - 1] == height == heights[index + 1]
         if flat and pen != "M":
             continue
-        place = (round(2 * x(across)), round(2 * y(up)))  # rounded before the difference, so that no error adds up
+        place = (round(2 * x(across)), height)
         before = (0, 0) if pen == "M" else last
         path.append(f"{pen}{(place[0] - before[0]) / 2:g} {(place[1] - before[1]) / 2:g}")
         pen, last = "l" if pen == "M" else " ", place
