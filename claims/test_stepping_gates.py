@@ -292,7 +292,7 @@ def test_direct_encodings_perform_best(trials, verdict, claim_tier, direct, othe
             "PPO averaged over the levels so far",
             encoded_directly.success.above(others.success_so_far, beyond=0),
             because="the authors' evaluator of April 2025 never emptied its list of a level, and Fig. 3's bars of PPO "
-            "are such means",
+            "fit such means",
             since=AUDIT,
         )
     verdict(better & others.last_success.between(0.6, 1) if claim_tier == "smoke" else better)
