@@ -338,7 +338,8 @@ VARIANTS = {
         stones_details.easy_as_coded,
     ),
     "recurrent_24": _variant(
-        "CMA-ES among stones trains 24 neurons that feed each other five times a step and keep their state",
+        "CMA-ES among stones trains 24 neurons that feed each other five times a step and keep their state; its "
+        "covariance is decomposed once a hundredth of it is new, as with the perceptron",
         stones_details.recurrent_24,
     ),
     "submission": _variant(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -49,4 +50,12 @@ def test_another_file_than_the_records_champion_is_refused(tmp_path: Path) -> No
     assert references.champion_of(tmp_path, "smoke", trial)
     path.write_bytes(whole[:-1])
     with pytest.raises(UserError, match="is not the champion that its trial's record names"):
+        references.champion_of(tmp_path, "smoke", trial)
+    torn = replace(trial, champion=hashlib.sha256(b"torn").hexdigest())
+    references.champion_path(tmp_path, "smoke", torn).write_bytes(b"torn")
+    with pytest.raises(UserError, match="is not a readable npz file"):
+        references.champion_of(tmp_path, "smoke", torn)
+    path.unlink()
+    path.symlink_to(tmp_path / "nowhere")
+    with pytest.raises(UserError, match="cannot be read: "):
         references.champion_of(tmp_path, "smoke", trial)

@@ -106,10 +106,13 @@ class Session:
         return self.reproduction.trials(method, on, condition, self.fetch)
 
     def design(self, tier: str, *, third_look: bool = False) -> Design:
-        """Return a tier's design; with a fixed number of trials, it has one look with the whole α."""
+        """Return a tier's design; with a fixed number of trials, it has one look with the whole α.
+
+        Variants have no third look: their trials are ten, and a verdict that these leave open would count as not run.
+        """
         design = self.reproduction.tier(tier).design
         if self.trials is None:
-            return design.with_third_look() if third_look else design
+            return design.with_third_look() if third_look and not self.variant else design
         return replace(design, looks=(Look(self.trials, design.alpha),))
 
     def settle(self, test: ClaimTest, assertion: Assertion, others: Sequence[Reading] = ()) -> ClaimReport:

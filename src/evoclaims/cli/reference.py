@@ -75,7 +75,7 @@ def main(options: argparse.Namespace) -> int:
         written += 1
         for trial in results[:size] if options.champions else ():
             if store.has_champion(trial):
-                place = references.champion_path(reproduction.references_of(options.variant), options.tier, trial)
+                place = references.champion_path(reproduction.references, options.tier, trial)
                 write_atomically(place, store.packed_champion(trial))
         upgraded = change(recorded(results[0].provenance, condition.packages), condition.versions)
         gone = len(there) - len(committed)

@@ -137,8 +137,8 @@ def binomial_test(k: int, n: int, p0: float, alternative: Alternative = "greater
         raise ValueError(f"No alternative {alternative!r}; known: {', '.join(get_args(Alternative))}.")
     if not 0 < p0 < 1:
         raise ValueError(f"The null's probability lies strictly between 0 and 1, unlike {p0}.")
-    if n < 1:
-        raise ValueError(f"A test needs one trial at least, not {n}.")
+    if n < 1 or not 0 <= k <= n:
+        raise ValueError(f"A test needs one trial at least, and from none to all of them, not {k} of {n}.")
     if alternative == "less":  # as many failures or more
         k, p0 = n - k, 1 - p0
     return ExactTest(p=_at_least(k, n, p0), attainable_p=_at_least(n, n, p0))

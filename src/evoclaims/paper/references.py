@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import errno
 import hashlib
+import os
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import replace
 from itertools import takewhile
@@ -114,16 +115,21 @@ def champion_of(folder: Path, tier: str, result: TrialResult) -> dict[str, NDArr
     """Return the committed champion of a reference trial, arrays by name; None where none is committed.
 
     Raises:
-        UserError: when the file is not the champion that the trial's record names.
+        UserError: when the file cannot be read, or is not the champion that the trial's record names.
     """
     path = champion_path(folder, tier, result)
+    if not os.path.lexists(path):
+        return None
     try:
         data = read_file(path)
-    except OSError:
-        return None
+    except OSError as error:
+        raise UserError(f"The champion {path} cannot be read: {error.strerror or error}. {_MEND}") from error
     if hashlib.sha256(data).hexdigest() != result.champion:
         raise UserError(f"{path} is not the champion that its trial's record names. {_MEND}")
-    return unpack(data)
+    try:
+        return unpack(data)
+    except ValueError as error:
+        raise UserError(f"The champion {path} is {error}. {_MEND}") from error
 
 
 def of_one_environment(

@@ -2,8 +2,8 @@
 
 The instructions are the same for processors and GPUs, where a thread is one lane; only quotients and roots are made of
 others there (`gpu_instructions`, which says where these differ). Each is exactly rounded IEEE arithmetic. Which
-products are fused with a sum has been decided before (`fusing`), not by LLVM. So bits do not depend on the number of
-lanes, the machine or LLVM's version.
+products are fused with a sum has been decided before (`scalarize.fused`), not by LLVM. So bits do not depend on the
+number of lanes, the machine or LLVM's version.
 """
 
 from __future__ import annotations

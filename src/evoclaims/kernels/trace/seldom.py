@@ -14,7 +14,7 @@ from jaxtyping import Array, Bool
 def seldom(condition: Bool[Array, "*shape"]) -> Bool[Array, "*shape"]:
     """Return the condition, and tell a kernel that it is seldom True.
 
-    The kernel then has a second, shorter way to compute a loop's round (`shortcuts`), which it takes where the
+    The kernel then has a second, shorter way to compute a loop's round, which it takes where the
     condition is False for all elements that are computed together. Results have the same bits either way, but for a
     zero's sign, as long as all numbers are finite.
     """
