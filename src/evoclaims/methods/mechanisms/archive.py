@@ -24,6 +24,7 @@ class Spread(Question):
     """An answer is a place, part of them outside the area, and the fitness there."""
 
     name: ClassVar[str] = "spread"
+    packages: ClassVar[tuple[str, ...]] = MapElites.packages
     area: ClassVar[tuple[tuple[float, float], tuple[float, float]]] = ((-0.75, 0.75), (-0.25, 0.75))
 
     action_size: int = 3

@@ -26,6 +26,7 @@ class TwoNiches(Question):
     """A positive answer earns 10 and itself, so that one can always do better; any other answer earns 0."""
 
     name: ClassVar[str] = "two_niches"
+    packages: ClassVar[tuple[str, ...]] = Neat.packages
     observation_size: ClassVar[int] = 4
 
     action_size: int = 2

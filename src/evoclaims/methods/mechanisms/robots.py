@@ -66,7 +66,7 @@ class Wanderers:
 
     name: ClassVar[str] = "wanderers"
     revision: ClassVar[int] = 1
-    packages: ClassVar[tuple[str, ...]] = ()
+    packages: ClassVar[tuple[str, ...]] = ROBOT_PACKAGES
 
     robots: int = 16
 

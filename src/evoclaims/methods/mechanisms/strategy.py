@@ -48,6 +48,7 @@ class Quadratic(Question):
     """
 
     name: ClassVar[str] = "quadratic"
+    packages: ClassVar[tuple[str, ...]] = CmaEs.packages
 
     action_size: int = 8
     condition: float = 1.0
