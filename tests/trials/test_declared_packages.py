@@ -91,7 +91,10 @@ def _computing(condition: Condition) -> tuple[set[str], set[str]]:
     jax.clear_caches()  # a function traced before keeps the lines that called it then
     robot_task._start_kernel.cache_clear()
     robot_task._step_kernel.cache_clear()
-    machine_code.lanes.cache_clear()
+    # What the processor has is asked once a process, for whichever method is first; its kernels ask again.
+    machine_code.lanes()
+    if "llvmlite" in condition.packages:
+        machine_code.lanes.cache_clear()
 
     def note(frame: Any, event: str, argument: Any) -> None:
         if event == "call":
