@@ -88,6 +88,18 @@ def test_one_row_is_no_independent_trial_of_two_conditions(ours: Project, settin
     assert "read the same trials, which a rank test cannot compare" in reason
 
 
+def test_a_new_history_names_the_edited_table(ours: Project) -> None:
+    """Beside trials that the harness has run, whose specifications have other parts."""
+    ours.write(a=BETTER, b="supported")
+    ours.run(own_store=True)
+    assert cli.main(["accept", "--tier=smoke"]) == 1  # something was written
+    (ours.path / "runs.csv").write_text(_table(_numbers(0.9), _numbers(0.3)))
+    del sys.modules["our_paper"]  # which has read the old one
+    shown = ours.run(own_store=True).stdout.str()
+    assert "a (smoke): a new history begins, " in shown
+    assert "of theirs on parity, imported.sha256 " in shown
+
+
 @pytest.mark.parametrize(
     ("tier", "count", "said"),
     [

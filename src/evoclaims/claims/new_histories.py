@@ -21,6 +21,9 @@ from evoclaims.verdicts.history import AcceptedVerdict, key_of
 MOST: Final = 10_000
 """Most combinations of stored conditions that are tried for one claim."""
 
+NAMES: Final = (("method", "name"), ("task", "name"), ("imported", "file"))
+"""Where a specification has the names that an edit seldom changes together."""
+
 
 def changes(
     session: Session, reports: Sequence[ClaimReport], accepted: Mapping[tuple[str, str], AcceptedVerdict]
@@ -78,8 +81,9 @@ def _conditions(trials: Sequence[TrialResult], seeds: set[int]) -> list[list[Tri
 
 
 def _alike(old: Mapping[str, Any], new: Mapping[str, Any]) -> int:
-    """Return how many of a condition's two names, of its method and its task, are the same."""
-    return sum(old[part].get("name") == new[part].get("name") for part in ("method", "task"))
+    """Return how many names of two conditions are the same: of the method and the task, or of the imported table."""
+    names = [[(spec.get(part) or {}).get(name) for part, name in NAMES] for spec in (old, new)]
+    return sum(one == other for one, other in zip(*names, strict=True) if one is not None)
 
 
 def _settings(now: Mapping[str, Condition], before: Sequence[Sequence[TrialResult]]) -> str:
