@@ -26,7 +26,7 @@ OVER_TASKS = "it is about the tasks at their own sizes; each task's own claims h
 def test_neat_is_on_par_with_cma_es(trials, verdict, task):
     neat, cma_es = trials("neat", on=task), trials("cma_es", on=task)
     if task in ("stones", "obstacles"):
-        margin = neat.half_a_stone if task == "stones" else 500
+        margin = neat.reward_of_a_stone / 2 if task == "stones" else 500
         verdict.reading(
             "rewards within 1,000",
             neat.reward.equivalent_to(cma_es.reward, margin=2 * margin),

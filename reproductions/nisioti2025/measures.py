@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -51,10 +52,22 @@ class PaperTrials(TrialGroup):
         return self.measure("stones crossed", lambda t: t.metrics["stones"])
 
     @property
-    def half_a_stone(self) -> float:
-        """Reward of half a stone in an episode: half of its steps where each of them pays, 0.5 where one does."""
+    def reward(self) -> Measure:
+        """Episode reward of the final policy, in what the task pays for."""
+        return replace(super().reward, unit=self._paid)
+
+    @property
+    def _paid(self) -> str:
+        """What a reward counts: variants of two tasks pay once an episode, or metres."""
+        if getattr(self.condition.task, "pays", "each") == "once":
+            return "paid once an episode"
+        return "paid in metres" if self.whole_way != 1 else "paid each step"
+
+    @property
+    def reward_of_a_stone(self) -> float:
+        """Reward of a stone in an episode: its steps where each of them pays, 1 where one does."""
         task: Any = self.condition.task
-        return 0.5 * (1 if getattr(task, "pays", "each") == "once" else task.episode_steps)
+        return 1.0 if getattr(task, "pays", "each") == "once" else float(task.episode_steps)
 
     @property
     def whole_way(self) -> float:
@@ -130,12 +143,14 @@ class PaperTrials(TrialGroup):
     @property
     def reward_before_costs(self) -> Measure:
         """Episode reward of the final policy with its control cost given back."""
-        return self.measure("reward before costs", lambda t: t.metrics["last_fitness"] + t.metrics["control_cost"])
+        return self.measure(
+            "reward before costs", lambda t: t.metrics["last_fitness"] + t.metrics["control_cost"], unit=self._paid
+        )
 
     @property
     def reward_in_training(self) -> Measure:
         """Reward of the best individual of the last generation in its one episode; for methods that evolve."""
-        return self.measure("reward of training's best episode", lambda t: t.curves["fitness"][-1])
+        return self.measure("reward of training's best episode", lambda t: t.curves["fitness"][-1], unit=self._paid)
 
     @property
     def reward_gained(self) -> Measure:

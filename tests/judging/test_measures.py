@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 
 from evoclaims.core.errors import UserError
+from evoclaims.judging.design import Design
+from evoclaims.judging.kinds.greater import Greater
 from evoclaims.judging.measure import Event, Measure, Profile
 from evoclaims.judging.sample import UnreadableTrialError
 
@@ -36,6 +38,28 @@ def test_an_event_never_holds_in_a_failed_trial(source) -> None:
     ppo = source("ppo", [1.0, "diverged", 0.0, "timeout"])
     always = Event(ppo, "anything at all", lambda trial: True)
     assert always.sample(fetched(ppo, 4)).values == (1.0, 0.0, 1.0, 0.0)
+
+
+@pytest.mark.parametrize(("units", "compared"), [(("m", "km"), False), (("m", "m"), True), (("m", ""), True)])
+@pytest.mark.parametrize(
+    "compare", [lambda a, b: a > b, lambda a, b: 2 * a < b, lambda a, b: a.equivalent_to(b, margin=1)]
+)
+def test_numbers_of_two_units_are_not_compared(source, units, compared, compare) -> None:
+    """But their assertion can be written, so that a claim's other readings are judged."""
+    sides = [replace(source(name, [1.0, 2.0]).score(), unit=unit) for name, unit in zip("ab", units, strict=True)]
+    assertion = compare(*sides)
+    trials = {name: found for side in sides for name, found in fetched(side.source, 2).items()}
+    if compared:
+        assert assertion.find(trials, Design.fixed(2), 0.05).p
+    else:
+        with pytest.raises(UnreadableTrialError, match="are not compared: their numbers have different"):
+            assertion.find(trials, Design.fixed(2), 0.05)
+
+
+def test_an_assertion_built_by_hand_refuses_two_units(source) -> None:
+    a, b = (replace(source(name, [1.0]).score(), unit=name) for name in "ab")
+    with pytest.raises(UserError, match="have different units"):
+        Greater(a, b)
 
 
 def test_a_failed_trial_is_flat_and_worst_in_a_profile(source) -> None:

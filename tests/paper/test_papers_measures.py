@@ -90,3 +90,15 @@ def test_steps_to_a_success_of_1_are_those_after_which_the_papers_direct_trials_
         spent = trial.metrics["environment_steps"]
         is_solved = trial.metrics["furthest_solved"] == condition.task.levels - 1
         assert measure.of(trial) == (math.ceil(spent / every) * every if is_solved else math.inf)
+
+
+def test_no_reward_paid_once_is_compared_with_one_paid_each_step() -> None:
+    """In `submission_once` goal-conditioned PPO alone is paid each step."""
+    tier = REPRODUCTION.tier("full", "submission_once")
+    neat, ppo, goal_ppo = (
+        PaperTrials(method, "stones", tier.condition(method, "stones"), lambda *_: ())
+        for method in ("neat", "ppo", "goal_ppo")
+    )
+    assert neat.reward.unit == ppo.reward.unit == neat.reward_in_training.unit == "paid once an episode"
+    assert goal_ppo.reward.unit == "paid each step"
+    assert (neat.reward_of_a_stone, goal_ppo.reward_of_a_stone) == (1, 1_000)

@@ -6,6 +6,7 @@ A kind of assertion needs no method here: `verdict(Kind(measure, ...))` also wor
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from functools import reduce
 from numbers import Real
 from operator import and_
@@ -65,12 +66,11 @@ class Measure(NumberReading):
         if not _is_number(factor) or not 0 < factor < math.inf:
             raise UserError(f"{self.describe()!r} is multiplied by {factor!r}. Use a finite number above 0.")
         written = repr(float(factor)).removesuffix(".0")
-        return Measure(
-            self.source,
-            f"{written} × {self.name}",
-            lambda trial: product(factor, self._at_least_0(trial)),
-            self.better,
-            self.window.scaled(factor),
+        return replace(
+            self,
+            name=f"{written} × {self.name}",
+            read=lambda trial: product(factor, self._at_least_0(trial)),
+            window=self.window.scaled(factor),
         )
 
     __rmul__ = __mul__

@@ -84,11 +84,13 @@ class NumberReading(ScalarReading):
         read: reads the number from a finished trial.
         better: "higher" or "lower"; a failed trial gets the worst value, -inf or +inf.
         window: how far and how finely values are observed.
+        unit: what the number counts, such as "in metres"; empty where nothing is known. Two units are not compared.
     """
 
     read: Callable[[TrialResult], float]
     better: Better = "higher"
     window: Window = EVERYTHING
+    unit: str = ""
 
     def __post_init__(self) -> None:
         """Reject an unknown direction."""
@@ -139,6 +141,9 @@ AnyNumber = TypeVar("AnyNumber", bound=NumberReading)
 def comparable(*readings: AnyNumber) -> tuple[AnyNumber, ...]:
     """Return readings whose values can be ranked together: seen as far and as finely as all of them are.
 
+    Numbers of two units cannot: reading them makes the verdict an error. A variant may change the unit of one side, and
+    the claim's other readings are judged all the same.
+
     Raises:
         UserError: when one is better higher and another lower, or they see nothing in common.
     """
@@ -150,14 +155,22 @@ def comparable(*readings: AnyNumber) -> tuple[AnyNumber, ...]:
                 f"{other.better}. Compare measures of one direction."
             )
     window = shared([reading.window for reading in readings])
-    return tuple(reading.seen_through(window) for reading in readings)
+    seen = tuple(reading.seen_through(window) for reading in readings)
+    if len({reading.unit for reading in readings if reading.unit}) < 2:
+        return seen
+    units = " and ".join(f"{reading.describe()} ({reading.unit or 'of an unknown unit'})" for reading in readings)
+
+    def refuse(trial: TrialResult) -> float:
+        raise UnreadableTrialError(f"{units} are not compared: their numbers have different units")
+
+    return tuple(replace(reading, read=refuse, unit="") for reading in seen)
 
 
 def require_independent(*readings: NumberReading) -> None:
     """Reject measures that no rank test may compare: it assumes independent samples that are observed alike.
 
     Raises:
-        UserError: when two read the same trials, or are not observed equally far and finely.
+        UserError: when two read the same trials, have two units, or are not observed equally far and finely.
     """
     for one, other in combinations(readings, 2):
         a, b = one.source, other.source
@@ -167,11 +180,9 @@ def require_independent(*readings: NumberReading) -> None:
                 "cannot compare. Use a profile's falls() or rises() for levels, never_above_itself() for "
                 "a control."
             )
-        if one.window != other.window:
-            raise UserError(
-                f"{one.describe()!r} and {other.describe()!r} are not observed up to the same limit. "
-                "Write a < b, which handles this."
-            )
+        if one.window != other.window or (one.unit and other.unit and one.unit != other.unit):
+            differ = "are not observed up to the same limit" if one.window != other.window else "have different units"
+            raise UserError(f"{one.describe()!r} and {other.describe()!r} {differ}. Write a < b, which handles this.")
 
 
 @dataclass(frozen=True, eq=False)

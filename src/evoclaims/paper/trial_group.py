@@ -150,11 +150,16 @@ class TrialGroup:
         return isinstance(other, TrialGroup) and self.condition.shares_trials_with(other.condition)
 
     def measure(
-        self, name: str, read: Callable[[TrialResult], float] | None = None, better: Better = "higher"
+        self,
+        name: str,
+        read: Callable[[TrialResult], float] | None = None,
+        better: Better = "higher",
+        unit: str = "",
     ) -> Measure:
         """Return a measure of these trials, such as `measure("steps", lambda t: t.metrics["steps"], "lower")`.
 
-        Without `read` it is the metric of that name: `measure("steps", better="lower")`.
+        Without `read` it is the metric of that name: `measure("steps", better="lower")`. Measures of two units are
+        not compared.
 
         Raises:
             UnknownNameError: for a metric that imported trials do not have; of others it is known when they have run.
@@ -162,7 +167,7 @@ class TrialGroup:
         if read is None and self.condition.existing is not None:
             known = self.condition.existing[0].metrics
             require_known(f"metric of {self.label}", name, known)
-        return Measure(self, name, read or (lambda t: t.metrics[name]), better)
+        return Measure(self, name, read or (lambda t: t.metrics[name]), better, unit=unit)
 
     def event(self, name: str, holds: Callable[[TrialResult], bool]) -> Event:
         """Return an event, which holds in a trial or does not."""
