@@ -411,7 +411,7 @@ def test_neat_s_networks_stay_small_in_the_maze(trials, verdict, claim_tier, tas
 @pytest.mark.parametrize(
     "method",
     [
-        pytest.param("cma_es", marks=third_look),
+        "cma_es",
         pytest.param(
             "neat",
             marks=expected(

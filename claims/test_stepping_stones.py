@@ -139,7 +139,7 @@ def test_ppo_stays_at_the_first_stone(trials, verdict, claim_tier, method):
     [
         pytest.param("hyperneat", marks=third_look),
         pytest.param("cma_es", marks=expected(Outcome.REFUTED, tier="full", because=LUCKY)),
-        pytest.param("map_elites", marks=third_look),
+        "map_elites",
         "ppo",
         pytest.param("goal_ppo", marks=expected(Outcome.REFUTED, tier="full", because=LUCKY)),
     ],
@@ -169,7 +169,6 @@ def test_neat_collects_more_reward(trials, verdict, claim_tier, other):
     since=FIRST,
     smoke="MAP-Elites collects about as little reward as PPO: both more than a random policy, but far less than NEAT",
 )
-@third_look
 def test_map_elites_collects_few_stones(trials, verdict, claim_tier):
     """The words "equally bad" are read as what the paper says of PPO (S3): at most one stone. S6 judges the behaviour.
 
