@@ -23,7 +23,7 @@ def test_every_committed_verdict_is_that_of_the_independent_program(
 ) -> None:
     monkeypatch.chdir(Path(__file__).parents[2])
     project = open_project(str(tmp_path))
-    assertions = {one.test.name: one.assertion for one in project.collect([("", tier)])[0] if one.assertion}
+    assertions = {one.test.name: one.assertion for one in project.collect([("", tier)])[0] if one.assertion is not None}
     tasks = {one.id: one.task for one in project.reproduction.tier(tier).conditions.values()}
     ends = {mark: task.observation_size + task.action_size for mark, task in tasks.items()}
     guesses = {mark: constant_success(task)[-1] for mark, task in tasks.items() if isinstance(task, Circuit)}

@@ -6,6 +6,7 @@ import contextlib
 import gc
 import io
 import os
+import warnings
 from collections.abc import Collection, Generator, Iterable, Sequence
 from itertools import pairwise, product
 from pathlib import Path
@@ -87,7 +88,9 @@ def judge_all(session: Session, collected: Iterable[Collected], root: Path) -> l
         report = one.report
         if one.assertion is not None:
             try:
-                with contextlib.redirect_stdout(io.StringIO()):  # what a project's measures print
+                # What a project's measures print is not shown, and what they warn of is treated as in the test.
+                with contextlib.redirect_stdout(io.StringIO()), warnings.catch_warnings(record=True):
+                    warnings.filters = list(one.filters)
                     report = session.settle(one.test, one.assertion, one.readings)
             except KeyboardInterrupt:
                 raise

@@ -41,6 +41,7 @@ class Collected:
         assertion: what it passes to `verdict(...)`; None where it did not get there.
         readings: further readings of the sentence.
         asked: the trials that it asked for.
+        filters: what becomes of warnings in it, by the project's settings and its marks.
     """
 
     test: ClaimTest
@@ -50,6 +51,7 @@ class Collected:
     assertion: Assertion | None = None
     readings: tuple[Reading, ...] = ()
     asked: tuple[TrialGroup, ...] = ()
+    filters: tuple[Any, ...] = ()
 
     @property
     def groups(self) -> dict[Names, TrialGroup]:
@@ -86,7 +88,7 @@ class Recorder(Session):
     tests: dict[tuple[str, str], ClaimTest] = field(default_factory=dict)
     found: list[Collected] = field(default_factory=list)
     _asked: list[TrialGroup] = field(default_factory=list)
-    _asserted: list[tuple[ClaimReport, Assertion, tuple[Reading, ...]]] = field(default_factory=list)
+    _asserted: list[tuple[ClaimReport, dict[str, Any]]] = field(default_factory=list)
 
     @staticmethod
     def of(session: Session) -> Recorder:
@@ -101,16 +103,16 @@ class Recorder(Session):
     def settle(self, test: ClaimTest, assertion: Assertion, others: Sequence[Reading] = ()) -> ClaimReport:
         """Keep an assertion."""
         report = unjudged(test, Outcome.NOT_RUN, "it is not judged")
-        self._asserted[:] = [(report, assertion, tuple(others))]
+        more = {"assertion": assertion, "readings": tuple(others), "filters": tuple(warnings.filters)}
+        self._asserted[:] = [(report, more)]
         return report
 
     def complete(
         self, report: ClaimReport, expectation: Expectation | None, last: ClaimReport | None = None
     ) -> ClaimReport:
         """Note that a test has ended; what it asserts counts unless it broke after that."""
-        kept = [(assertion, others) for settled, assertion, others in self._asserted if settled is report]
-        assertion, others = kept[0] if kept else (None, ())
-        self._note(report, expectation=expectation, assertion=assertion, readings=others)
+        kept: dict[str, Any] = next((more for settled, more in self._asserted if settled is report), {})
+        self._note(report, expectation=expectation, **kept)
         return report
 
     def skipped(self, report: ClaimReport) -> ClaimReport:
