@@ -9,8 +9,7 @@ from typing import Any
 import pytest
 
 from evoclaims.claims.as_published import AsPublished
-from evoclaims.claims.claim import Claim
-from evoclaims.claims.collected import ClaimTest
+from evoclaims.claims.claim import Claim, ClaimTest
 from evoclaims.claims.session import Session
 from evoclaims.judging.assertion import Assertion
 from evoclaims.judging.verdict import Outcome

@@ -10,9 +10,8 @@ from typing import Any
 import pytest
 
 from evoclaims import Outcome, claim, expected
-from evoclaims.claims.claim import Claim, Expectation, claim_of, expectation_of, gap_of
-from evoclaims.claims.collected import ClaimTest
-from evoclaims.claims.session import expecting, unjudged
+from evoclaims.claims.claim import Claim, ClaimTest, Expectation, claim_of, expectation_of, gap_of
+from evoclaims.claims.judge import expecting, unjudged
 from evoclaims.core.errors import UserError
 from evoclaims.verdicts.claim_report import ClaimReport, save
 

@@ -8,8 +8,7 @@ from typing import Any
 
 import pytest
 
-from evoclaims.claims.claim import Claim
-from evoclaims.claims.collected import ClaimTest
+from evoclaims.claims.claim import Claim, ClaimTest
 from evoclaims.claims.session import Session
 from evoclaims.core.errors import UserError
 from evoclaims.judging.assertion import Assertion

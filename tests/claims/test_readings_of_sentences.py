@@ -7,10 +7,10 @@ from typing import Any
 
 import pytest
 
-from evoclaims.claims.claim import Claim, claim
-from evoclaims.claims.collected import ClaimTest
+from evoclaims.claims.claim import Claim, ClaimTest, claim
 from evoclaims.claims.fetching import StoredOnly
-from evoclaims.claims.session import Session, VerdictFixture
+from evoclaims.claims.recording import VerdictFixture
+from evoclaims.claims.session import Session
 from evoclaims.core.errors import UserError
 from evoclaims.judging.verdict import Outcome
 from evoclaims.paper.archive import Archive

@@ -10,10 +10,10 @@ from typing import Any
 import pytest
 
 from evoclaims.claims import earlier_trials
-from evoclaims.claims.claim import Claim
-from evoclaims.claims.collected import ClaimTest
+from evoclaims.claims.claim import Claim, ClaimTest
 from evoclaims.claims.fetching import NotStoredError, RunMissing, StoredOnly
-from evoclaims.claims.session import Session, VerdictFixture
+from evoclaims.claims.recording import VerdictFixture
+from evoclaims.claims.session import Session
 from evoclaims.core.errors import UnknownNameError, UserError
 from evoclaims.core.packages import without_flags
 from evoclaims.core.provenance import changing_flags

@@ -217,3 +217,49 @@ def test_claims_are_collected_once_for_all_that_a_command_judges(evoclaims: Evoc
         log.unlink(missing_ok=True)
         assert said in evoclaims(*command)[1]
         assert log.read_text() == "collected "
+
+
+CALLS = """
+from pathlib import Path
+
+@says("d")
+def test_d(trials, verdict, claim_tier):
+    with Path("called.log").open("a") as log:
+        log.write(f"{claim_tier} ")
+    verdict(trials("right", on="parity").measure("success", lambda trial: print("read") or READ) > 0)
+
+@says("e")
+def test_e(trials, verdict):
+    verdict(trials("wrong", on="parity").solves_every_level.in_most_trials())
+"""
+
+
+def test_a_test_is_called_once_for_all_that_judges_the_same(evoclaims: Evoclaims, project: Project) -> None:
+    """A variant that changes one of its conditions calls it again; two stores, and the paper's numbers, do not."""
+    project.write(CALLS.replace("READ", "trial.metrics['last_success']"))
+    log = Path("called.log")
+    for command, calls in (
+        (("status", "--as=json"), "smoke "),
+        (("compare", "./.evoclaims", "./.evoclaims", "--tier=smoke"), "smoke "),
+        (("audit", "--tier=smoke"), "smoke "),
+        (("report",), "smoke full smoke full "),  # with the variant, whose trials are stored
+        (("power",), "smoke "),
+        (("status", "--variant=traded"), "smoke smoke "),
+    ):
+        log.unlink(missing_ok=True)
+        _, out, _ = evoclaims(*command)
+        assert log.read_text() == calls, command
+        assert "read" not in out.split()
+
+
+def test_what_a_measure_raises_is_the_error_of_its_claim(evoclaims: Evoclaims, project: Project) -> None:
+    project.write(CALLS.replace("READ", "[][trial.seed]"))
+    status, out, _ = evoclaims("status")
+    assert (status, out.splitlines()[-1]) == (1, "claims (smoke): 1 refuted, 1 error")
+    assert "IndexError: list index out of range (claims/test_claims.py, line " in out
+    warns = "__import__('warnings').warn('odd number') or 1"
+    project.write(CALLS.replace("READ", warns))
+    assert "UserWarning: odd number (claims/test_claims.py, line " in evoclaims("status")[1]  # the project's settings
+    ignoring = "@pytest.mark.filterwarnings('ignore:odd')\n@says(\"d\")"
+    project.write(CALLS.replace("READ", warns).replace('@says("d")', ignoring))
+    assert evoclaims("status")[1].splitlines()[-1] == "claims (smoke): 1 supported, 1 refuted"

@@ -13,7 +13,7 @@ from rich.cells import cell_len
 from tiny_project import Evoclaims, Project, forget, trials_of
 
 from evoclaims import cli
-from evoclaims.cli import judging
+from evoclaims.cli.project import Project as Opened
 from evoclaims.core.errors import UserError
 from evoclaims.envs.gates.parity import NParity
 from evoclaims.report.live_line import duration
@@ -33,12 +33,14 @@ def test_the_full_plan_fits_eighty_columns_and_says_there_what_it_says_on_a_wide
 
     known: list[Any] = []
 
+    judge = Opened.judge_sessions
+
     def once(*arguments: Any) -> list[Any]:
         """Judge for the first width alone: most of a plan's time is for that."""
-        known[:] = known or judging.judge(*arguments)
+        known[:] = known or judge(*arguments)
         return known
 
-    monkeypatch.setattr("evoclaims.cli.project.judge", once)
+    monkeypatch.setattr(Opened, "judge_sessions", once)
 
     def plan(columns: int) -> str:
         monkeypatch.setenv("COLUMNS", str(columns))

@@ -117,7 +117,7 @@ def test_a_torn_line_among_the_reference_trials_is_found_before_anything_is_judg
     path = references.path_of(Path("reference"), "smoke", "right", "parity")
     path.parent.mkdir(parents=True)
     path.write_text("torn\n")
-    monkeypatch.setattr("evoclaims.cli.project.judge", None)
+    monkeypatch.setattr("evoclaims.cli.project.Project.judge_sessions", None)
     code, _, err = evoclaims(command)
     assert (code, err.count("\n")) == (2, 1)
     assert "reference/smoke/right-parity.jsonl is not a reference trial" in err

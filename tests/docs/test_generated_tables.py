@@ -6,7 +6,6 @@ import re
 import shutil
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any
 
 import pytest
 from unpacked import pieces
@@ -14,7 +13,7 @@ from unpacked import pieces
 from evoclaims import cli
 from evoclaims.claims.as_published import AsPublished
 from evoclaims.claims.session import Session
-from evoclaims.cli import project
+from evoclaims.cli.project import Project
 from evoclaims.verdicts import history
 from evoclaims.verdicts.claim_report import ClaimReport
 from reproductions.nisioti2025 import REPRODUCTION
@@ -31,16 +30,16 @@ PAGES = tuple(
 def judged_once() -> Iterator[None]:
     """All variants are judged once for both commands, which takes half of their time: both have an empty store."""
     known: dict[tuple[str, bool, str], list[ClaimReport]] = {}
-    judge = project.judge
+    judge = Project.judge_sessions
 
-    def once(config: Any, asked: Sequence[tuple[Session, str]]) -> list[list[ClaimReport]]:
+    def once(project: Project, asked: Sequence[tuple[Session, str]]) -> list[list[ClaimReport]]:
         keys = [(session.variant, isinstance(session.fetch, AsPublished), tier) for session, tier in asked]
         missing = {key: one for key, one in zip(keys, asked, strict=True) if key not in known}
-        known.update(zip(missing, judge(config, [*missing.values()]) if missing else (), strict=True))
+        known.update(zip(missing, judge(project, [*missing.values()]) if missing else (), strict=True))
         return [known[key] for key in keys]
 
     with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(project, "judge", once)
+        patched.setattr(Project, "judge_sessions", once)
         yield
 
 

@@ -66,14 +66,14 @@ def test_every_published_number_is_read_once_from_the_trials_that_it_is_about(re
     ]
     assert [one.level for one in found.values()] == [0, 1, 0, None]
     first, second, absent, reward = found.values()
-    assert (first.readings.mean, first.repetition.answer) == (pytest.approx(0.5), Answer.OUTSIDE)
-    assert (second.readings.mean, second.repetition.answer) == (pytest.approx(0.5), Answer.INSIDE)
-    assert (absent.readings.values, absent.repetition.answer, absent.repetition.reason) == (
+    assert (first.numbers.mean, first.repetition.answer) == (pytest.approx(0.5), Answer.OUTSIDE)
+    assert (second.numbers.mean, second.repetition.answer) == (pytest.approx(0.5), Answer.INSIDE)
+    assert (absent.numbers.values, absent.repetition.answer, absent.repetition.reason) == (
         (),
         Answer.UNKNOWN,
         "not run",
     )
-    assert (reward.readings.mean, reward.reported.error, reward.repetition.answer) == (9.0, 2.0, Answer.INSIDE)
+    assert (reward.numbers.mean, reward.reported.error, reward.repetition.answer) == (9.0, 2.0, Answer.INSIDE)
 
 
 def test_a_variant_has_the_numbers_that_it_changes_and_has_run(reporting: Paper) -> None:

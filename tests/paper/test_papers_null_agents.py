@@ -14,6 +14,7 @@ from evoclaims.claims.null_agents import satisfied_by
 from evoclaims.envs import SimpleAlu
 from evoclaims.judging.assertion import Assertion
 from evoclaims.judging.design import Look
+from evoclaims.judging.judge import fetch_from
 from evoclaims.paper.archive import Archive
 from evoclaims.paper.trial_group import TrialGroup
 from evoclaims.trials.store import Store
@@ -60,7 +61,7 @@ def satisfied(tmp_path_factory: pytest.TempPathFactory) -> Any:
 
     def put(asserted: Any) -> tuple[str, ...]:
         assertion: Assertion = asserted(group)
-        return satisfied_by(NULL_AGENTS, assertion, Look(10, 0.05), FULL.design, group)
+        return satisfied_by(NULL_AGENTS, assertion, Look(10, 0.05), FULL.design, fetch_from, group)
 
     return put
 

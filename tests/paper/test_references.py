@@ -13,6 +13,7 @@ from evoclaims.judging.drift import DriftCase
 from evoclaims.paper import references
 from evoclaims.paper.reproduction import Reproduction
 from evoclaims.trials.result import TrialResult
+from evoclaims.trials.result_codec import dump
 
 Made = Callable[..., TrialResult]
 
@@ -38,7 +39,7 @@ def test_what_is_written_is_read_in_the_order_of_seeds(path: Path, trials: list[
     references.write(path, trials)
     back = references.load(path)
     assert [trial.seed for trial in back] == [0, 1, 2, 3]
-    assert [trial.to_json() for trial in back] == [t.to_json() for t in sorted(trials, key=lambda t: t.seed)]
+    assert [*map(dump, back)] == [*map(dump, sorted(trials, key=lambda t: t.seed))]
     assert len(path.read_text().splitlines()) == 4
 
 

@@ -12,10 +12,10 @@ from typing import Any
 import jax
 from made_trials import trial_of
 
-from evoclaims.claims.claim import Claim
-from evoclaims.claims.collected import ClaimTest
+from evoclaims.claims.claim import Claim, ClaimTest
 from evoclaims.claims.fetching import StoredOnly
-from evoclaims.claims.session import Session, unjudged
+from evoclaims.claims.judge import unjudged
+from evoclaims.claims.session import Session
 from evoclaims.core.keys import TRAINING, trial_key
 from evoclaims.envs.gates.parity import NParity
 from evoclaims.judging.assertion import Assertion

@@ -10,8 +10,7 @@ import pytest
 from laboratory import CONDITIONS, Laboratory, record
 
 from evoclaims.claims.as_published import AsPublished
-from evoclaims.claims.claim import Claim
-from evoclaims.claims.collected import ClaimTest
+from evoclaims.claims.claim import Claim, ClaimTest
 from evoclaims.claims.session import Session
 from evoclaims.judging.assertion import Assertion
 from evoclaims.judging.kinds.omnibus import any_differ

@@ -11,8 +11,8 @@ from rich.console import Console
 from unpacked import whole
 
 from evoclaims.cli import replicate
-from evoclaims.figures.readings import Reading, Readings
 from evoclaims.figures.replication import Replication
+from evoclaims.figures.trial_numbers import TrialNumber, TrialNumbers
 from evoclaims.judging.repetition import Agreement, PublishedMean, repetition
 from evoclaims.judging.verdict import Outcome
 from evoclaims.paper.reported import Reported
@@ -23,11 +23,11 @@ from evoclaims.report.model import Page
 
 
 def _number(values: list[float], error: float | None = 20.0, variant: str = "") -> Replication:
-    readings = Readings(
-        "<neat>", "maze", "reward", tuple(Reading(seed, "", "done", x, x) for seed, x in enumerate(values))
+    numbers = TrialNumbers(
+        "<neat>", "maze", "reward", tuple(TrialNumber(seed, "", "done", x, x) for seed, x in enumerate(values))
     )
     found = repetition(PublishedMean(900.0, error, 10), values, 10)
-    return Replication("full", variant, Reported(900.0, error, "Fig. 1", 10), readings, found)
+    return Replication("full", variant, Reported(900.0, error, "Fig. 1", 10), numbers, found)
 
 
 NUMBERS = (_number([700.0, 900.0] * 5), _number([900.0] * 10, variant="rows"), _number([]))
@@ -51,7 +51,7 @@ def test_cells_say_what_is_published_what_is_ours_and_whether_it_repeats() -> No
 
 def _levels(count: int, variant: str = "") -> list[Replication]:
     first = _number([700.0, 900.0] * 5, variant=variant)
-    return [replace(first, readings=replace(first.readings, name="success"), level=level) for level in range(count)]
+    return [replace(first, numbers=replace(first.numbers, name="success"), level=level) for level in range(count)]
 
 
 @pytest.mark.parametrize(("width", "lines_each"), [(80, 1), (60, 2)])
@@ -78,7 +78,7 @@ def test_a_terminal_shows_a_block_for_each_condition_and_variant_and_breaks_only
 @pytest.mark.parametrize("name", ["speed at rest", "success at level 4", " at "])
 def test_a_measure_may_have_at_in_its_name(name: str) -> None:
     first = _number([900.0] * 10)
-    plain = replace(first, readings=replace(first.readings, name=name))
+    plain = replace(first, numbers=replace(first.numbers, name=name))
     ((heading, table),) = replicate.blocks([plain], 80)
     assert (heading, [*table.columns[1].cells], plain.measure) == (f"maze: {name}", ["<neat>"], name)
     ((heading, table),) = replicate.blocks([replace(plain, level=2)], 80)

@@ -16,6 +16,7 @@ from evoclaims.core.errors import UserError
 from evoclaims.trials.lanes import Lanes
 from evoclaims.trials.progress import RunProgress
 from evoclaims.trials.result import TrialResult
+from evoclaims.trials.result_codec import dump
 from evoclaims.trials.spec import TrialSpec
 from evoclaims.trials.store import Store
 
@@ -28,7 +29,7 @@ def test_stored_trials_are_never_run_again(
     first = run_climbers(store, cpus)
     monkeypatch.setattr("evoclaims.trials.runner.Lanes", None)
     log = Log()
-    assert [result.to_json() for result in run_climbers(store, cpus, log)] == [result.to_json() for result in first]
+    assert [*map(dump, run_climbers(store, cpus, log))] == [*map(dump, first)]
     assert (log, puts) == ([], Counter(SEEDS))
 
 

@@ -20,6 +20,7 @@ from hypothesis import strategies as st
 
 from evoclaims.core.errors import UserError
 from evoclaims.trials.result import TrialResult
+from evoclaims.trials.result_codec import dump
 from evoclaims.trials.store import DamagedFileError, Store
 
 pytestmark = pytest.mark.oldest
@@ -55,7 +56,7 @@ def test_processes_that_put_the_same_trials_at_once_leave_a_sound_store(store: S
         "print([store.put(parse(text), {'w': np.arange(1000.0)}) for text in texts])\n"
     )
     results = [make_result(seed) for seed in range(25)]
-    texts = json.dumps([json.dumps(result.to_json()) for result in results])
+    texts = json.dumps([dump(result).decode() for result in results])
     command = [sys.executable, "-c", script, str(store.root), texts]
     pipes: dict[str, Any] = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}

@@ -20,6 +20,7 @@ from evoclaims.core.errors import UserError
 from evoclaims.trials import stopping as allowances
 from evoclaims.trials.failed import DEFAULT_LIMIT, answers, is_final, seconds_of
 from evoclaims.trials.result import TrialResult
+from evoclaims.trials.result_codec import dump
 from evoclaims.trials.runner import run
 from evoclaims.trials.stopping import Allowance, OutOfTimeError
 from evoclaims.trials.store import Store
@@ -77,7 +78,7 @@ def test_what_ran_out_of_time_answers_until_more_is_allowed_and_then_goes_on_whe
     with monkeypatch.context() as patch:
         patch.setattr("evoclaims.trials.runner.Lanes", None)
         for limit in (4.0, 1.0):
-            assert [result.to_json() for result in _run(store, cpus, limit)] == [result.to_json() for result in first]
+            assert [*map(dump, _run(store, cpus, limit))] == [*map(dump, first)]
     log = Log()
     assert digests(_run(store, cpus, 40.0, log)) == digests(uninterrupted)
     assert log.phases()[0] == "resuming"

@@ -7,8 +7,6 @@ from pathlib import Path
 import pytest
 from verdicts_by_numpy import Records, judge, load
 
-from evoclaims.claims.fetching import StoredOnly
-from evoclaims.claims.power import Listening
 from evoclaims.cli.project import open_project
 from evoclaims.envs import Circuit
 from evoclaims.verdicts import history
@@ -25,8 +23,7 @@ def test_every_committed_verdict_is_that_of_the_independent_program(
 ) -> None:
     monkeypatch.chdir(Path(__file__).parents[2])
     project = open_project(str(tmp_path))
-    listening = Listening(project.reproduction, project.archive.store, StoredOnly(project.archive))
-    project.judge_sessions([(listening, tier)])
+    assertions = {one.test.name: one.assertion for one in project.collect([("", tier)])[0] if one.assertion is not None}
     tasks = {one.id: one.task for one in project.reproduction.tier(tier).conditions.values()}
     ends = {mark: task.observation_size + task.action_size for mark, task in tasks.items()}
     guesses = {mark: constant_success(task)[-1] for mark, task in tasks.items() if isinstance(task, Circuit)}
@@ -39,7 +36,7 @@ def test_every_committed_verdict_is_that_of_the_independent_program(
     found = {}
     for claim, entry in committed.items():
         looks = [*LOOKS[tier], *[THIRD] * (entry.n == THIRD[0])]
-        outcome, n, (p, *_) = judge(listening.assertions[claim].plain(), records, looks)
+        outcome, n, (p, *_) = judge(assertions[claim].plain(), records, looks)
         found[claim] = outcome
         if outcome != "inconclusive":  # what more trials could not change ends earlier
             assert n == entry.n, claim

@@ -1,7 +1,8 @@
-"""What the paper says, attached to the test that checks it."""
+"""What the paper says, attached to the test that checks it; and the tests that pytest makes of that."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Final, TypeVar
@@ -9,11 +10,19 @@ from typing import Any, Final, TypeVar
 import pytest
 
 from evoclaims.core.errors import UserError, require_known
+from evoclaims.core.printable import printable
 from evoclaims.core.tiers import TIERS
 from evoclaims.judging.verdict import Outcome
+from evoclaims.verdicts.claim_report import named
 from evoclaims.verdicts.readings import moment
 
 F = TypeVar("F", bound=Callable[..., Any])
+
+TIER: Final = "claim_tier"
+"""The parameter that makes a claim test run once per tier; the plugin makes it the last one."""
+
+_REPETITION: Final = re.compile(r"(^|-)run\d+of\d+(?=-|$)")
+"""The id of a parameter that only repeats a test, within the ids of all."""
 
 third_look: Final = pytest.mark.claim_third_look
 """Mark of a claim, or of one `pytest.param(..., marks=...)` of it: thirty trials decide what ten leave open.
@@ -184,3 +193,57 @@ def expectation_of(item: pytest.Item, tier: str) -> Expectation | None:
         if expectation.tier in (None, tier):
             found.append((distance, expectation.tier is None, expectation))
     return min(found, key=lambda one: one[:2])[2] if found else None
+
+
+def tier_id(claim: object, tier: str) -> str:
+    """Return how a test's id ends, such as "G9-smoke": in characters that pytest never escapes."""
+    named = claim.id if isinstance(claim, Claim) else ""
+    return "-".join(filter(None, (re.sub(r"[^A-Za-z0-9_.-]+", "_", named), tier)))
+
+
+@dataclass(frozen=True)
+class ClaimTest:
+    """What a test judges.
+
+    Attributes:
+        claim: the paper's sentence.
+        tier: "smoke" or "full".
+        case: the ids of its parameters other than the tier, such as "n_parity"; empty without any.
+        third_look: whether thirty trials decide what ten leave open.
+    """
+
+    claim: Claim
+    tier: str
+    case: str
+    third_look: bool = False
+
+    @staticmethod
+    def of(item: pytest.Item) -> ClaimTest:
+        """Return what a test marked as a claim judges.
+
+        Raises:
+            UserError: when it has no tier, since it cannot take parameters, or when the mark holds no claim.
+        """
+        callspec, claim = getattr(item, "callspec", None), claim_of(item)
+        if callspec is None or TIER not in callspec.params:
+            raise UserError(
+                f"{item.nodeid} is a claim that cannot run at a tier. Write it as a function, or as a method of a "
+                "class that is not a unittest.TestCase."
+            )
+        if not isinstance(claim, Claim):
+            raise UserError(f"{item.nodeid} has the mark pytest.mark.claim but no claim: use @claim(...) of evoclaims.")
+        tier: str = callspec.params[TIER]
+        case: str = callspec.id.removesuffix(tier_id(claim, tier)).removesuffix("-")
+        if item.get_closest_marker("claim_repeated"):
+            case = _REPETITION.sub("", case).removeprefix("-")
+        return ClaimTest(claim, tier, case, item.get_closest_marker("claim_third_look") is not None)
+
+    @property
+    def name(self) -> str:
+        """Id and parameters, such as "G1[n_parity]"."""
+        return named(self.claim.id, self.case)
+
+    @property
+    def key(self) -> tuple[str, str]:
+        """The key of its verdict, as `history.key_of` gives it."""
+        return self.tier, printable(self.name)

@@ -1,38 +1,22 @@
-"""Claim tests as pytest collects them: the claim, the tier, the case and the unique name of each."""
+"""The names of collected claim tests: repeated tests, names that are not unique, and names that options select."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Collection, Iterable, Sequence
-from dataclasses import dataclass
 from typing import Any, Final
 
 import pytest
 
-from evoclaims.claims.claim import Claim, claim_of
+from evoclaims.claims.claim import ClaimTest
 from evoclaims.core.errors import UnknownNameError, UserError
-from evoclaims.core.printable import printable
-from evoclaims.verdicts.claim_report import named
-
-TIER: Final = "claim_tier"
-"""The parameter that makes a claim test run once per tier; the plugin makes it the last one."""
-
-
-_REPETITION: Final = re.compile(r"(^|-)run\d+of\d+(?=-|$)")
-"""The id of a parameter that only repeats a test, within the ids of all."""
-
-
-def tier_id(claim: object, tier: str) -> str:
-    """Return how a test's id ends, such as "G9-smoke": in characters that pytest never escapes."""
-    named = claim.id if isinstance(claim, Claim) else ""
-    return "-".join(filter(None, (re.sub(r"[^A-Za-z0-9_.-]+", "_", named), tier)))
 
 
 def note_repetitions(metafunc: pytest.Metafunc) -> list[str]:
     """Return a list that fills with the parameters of a claim's test by which plugins only repeat it.
 
     Neither the test nor a fixture of it asks for such a parameter, so that it makes no other case of the claim. Its
-    ids become those of `_REPETITION`.
+    ids become those of `ClaimTest.case`.
     """
     asked, repeats, parametrize = frozenset(metafunc.fixturenames), list[str](), metafunc.parametrize
 
@@ -46,49 +30,6 @@ def note_repetitions(metafunc: pytest.Metafunc) -> list[str]:
 
     metafunc.parametrize = noting  # type: ignore[method-assign]
     return repeats
-
-
-@dataclass(frozen=True)
-class ClaimTest:
-    """What a test judges.
-
-    Attributes:
-        claim: the paper's sentence.
-        tier: "smoke" or "full".
-        case: the ids of its parameters other than the tier, such as "n_parity"; empty without any.
-        third_look: whether thirty trials decide what ten leave open.
-    """
-
-    claim: Claim
-    tier: str
-    case: str
-    third_look: bool = False
-
-    @staticmethod
-    def of(item: pytest.Item) -> ClaimTest:
-        """Return what a test marked as a claim judges.
-
-        Raises:
-            UserError: when it has no tier, since it cannot take parameters, or when the mark holds no claim.
-        """
-        callspec, claim = getattr(item, "callspec", None), claim_of(item)
-        if callspec is None or TIER not in callspec.params:
-            raise UserError(
-                f"{item.nodeid} is a claim that cannot run at a tier. Write it as a function, or as a method of a "
-                "class that is not a unittest.TestCase."
-            )
-        if not isinstance(claim, Claim):
-            raise UserError(f"{item.nodeid} has the mark pytest.mark.claim but no claim: use @claim(...) of evoclaims.")
-        tier: str = callspec.params[TIER]
-        case: str = callspec.id.removesuffix(tier_id(claim, tier)).removesuffix("-")
-        if item.get_closest_marker("claim_repeated"):
-            case = _REPETITION.sub("", case).removeprefix("-")
-        return ClaimTest(claim, tier, case, item.get_closest_marker("claim_third_look") is not None)
-
-    @property
-    def key(self) -> tuple[str, str]:
-        """The key of its verdict, as `history.key_of` gives it."""
-        return self.tier, printable(named(self.claim.id, self.case))
 
 
 def claim_tests(items: Iterable[pytest.Item]) -> dict[pytest.Item, ClaimTest]:

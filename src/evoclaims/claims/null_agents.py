@@ -15,7 +15,7 @@ from evoclaims.claims.fetching import NotStoredError
 from evoclaims.core.errors import UnknownNameError
 from evoclaims.judging.assertion import Assertion, Compound
 from evoclaims.judging.design import Design, Look
-from evoclaims.judging.judge import decide, fetch_from
+from evoclaims.judging.judge import Fetch, decide
 from evoclaims.judging.kinds.greater import Greater
 from evoclaims.judging.sample import Source
 from evoclaims.judging.verdict import Outcome
@@ -29,7 +29,12 @@ OtherTrials = Callable[[str, str], TrialGroup]
 
 
 def satisfied_by(
-    agents: Mapping[str, NullAgent], assertion: Assertion, look: Look, design: Design, others: OtherTrials | None
+    agents: Mapping[str, NullAgent],
+    assertion: Assertion,
+    look: Look,
+    design: Design,
+    trials: Fetch,
+    others: OtherTrials | None,
 ) -> tuple[str, ...]:
     """Return the names of the null agents whose trials support an assertion at one look.
 
@@ -38,10 +43,11 @@ def satisfied_by(
         assertion: what is put to them.
         look: trials per side, and the significance level.
         design: the margins and the first seed.
+        trials: gets those of sources.
         others: trials of agents that are methods; None leaves these agents out.
     """
     once = replace(design, looks=(look,))
-    return tuple(name for name, agent in agents.items() if _satisfies(agent, assertion, once, others))
+    return tuple(name for name, agent in agents.items() if _satisfies(agent, assertion, once, trials, others))
 
 
 def claimed(assertion: Assertion) -> frozenset[str]:
@@ -58,21 +64,28 @@ def claimed(assertion: Assertion) -> frozenset[str]:
     return frozenset(found)
 
 
-def _satisfies(agent: NullAgent, assertion: Assertion, design: Design, others: OtherTrials | None) -> bool:
+def _satisfies(
+    agent: NullAgent, assertion: Assertion, design: Design, trials: Fetch, others: OtherTrials | None
+) -> bool:
     if agent.method and others is None:
         return False
     every = frozenset(source.fingerprint for source in assertion.sources())
     places = {every} if agent.everywhere else {every, claimed(assertion)}
-    return any(_supported(agent, place, assertion, design, others) for place in places)
+    return any(_supported(agent, place, assertion, design, trials, others) for place in places)
 
 
 def _supported(
-    agent: NullAgent, place: Iterable[str], assertion: Assertion, design: Design, others: OtherTrials | None
+    agent: NullAgent,
+    place: Iterable[str],
+    assertion: Assertion,
+    design: Design,
+    trials: Fetch,
+    others: OtherTrials | None,
 ) -> bool:
     """Whether an assertion is supported with an agent in the place of some conditions; False where it cannot be."""
 
     def fetch(source: Source, seeds: tuple[int, ...]) -> tuple[TrialResult, ...]:
-        return _trials(agent, source, seeds, others) if source.fingerprint in place else fetch_from(source, seeds)
+        return _trials(agent, source, seeds, trials, others) if source.fingerprint in place else trials(source, seeds)
 
     try:
         ending = decide(assertion, design, fetch)
@@ -82,7 +95,7 @@ def _supported(
 
 
 def _trials(
-    agent: NullAgent, source: Source, seeds: Sequence[int], others: OtherTrials | None
+    agent: NullAgent, source: Source, seeds: Sequence[int], trials: Fetch, others: OtherTrials | None
 ) -> tuple[TrialResult, ...]:
     """Return an agent's trials in the place of a condition's.
 
@@ -93,7 +106,7 @@ def _trials(
     if not isinstance(source, TrialGroup):
         raise NotStoredError(f"{agent.says} cannot stand for {source.label}")
     if others is not None and agent.method:
-        return fetch_from(others(agent.method, source.task), tuple(seeds))
+        return trials(others(agent.method, source.task), tuple(seeds))
     numbers = agent.numbers(source.condition) if agent.numbers is not None else None
     if numbers is None:
         raise NotStoredError(f"{agent.says} cannot stand for {source.label}")

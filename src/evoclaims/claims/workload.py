@@ -2,29 +2,25 @@
 
 from __future__ import annotations
 
-import inspect
 import time
-import warnings
-from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
+from collections.abc import Hashable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Generic, TypeVar
+from typing import Generic, TypeVar
 
 import pytest
 
-from evoclaims.claims.claim import gap_of
-from evoclaims.claims.collected import TIER, ClaimTest
-from evoclaims.claims.fetching import NotStoredError, RunMissing
-from evoclaims.claims.session import Session, VerdictFixture
-from evoclaims.judging.assertion import Assertion
+from evoclaims.claims.claim import ClaimTest
+from evoclaims.claims.fetching import RunMissing
+from evoclaims.claims.recording import Collected, Recorder
+from evoclaims.claims.session import Session
 from evoclaims.paper.cost import Cost, Estimator, Wanted
 from evoclaims.paper.trial_group import TrialGroup
 from evoclaims.trials import devices
 from evoclaims.trials.devices import usable_cores
 from evoclaims.trials.notice import Running, running
-from evoclaims.trials.result import TrialResult
-from evoclaims.trials.spec import Condition, TrialSpec
+from evoclaims.trials.spec import TrialSpec
 from evoclaims.trials.store import DamagedFileError, Store
 
 
@@ -72,6 +68,7 @@ def workload(session: Session, tests: Mapping[pytest.Item, ClaimTest]) -> Worklo
     if not isinstance(session.fetch, RunMissing):
         return None
     claims, groups = dict[str, tuple[str, ...]](), dict[str, dict[str, tuple[TrialGroup, Sequence[int]]]]()
+    recorder = Recorder.of(session)
     once: dict[tuple[str, str], tuple[pytest.Item, ClaimTest]] = {}
     for item, test in tests.items():  # plugins may repeat tests
         once.setdefault(test.key, (item, test))
@@ -80,7 +77,7 @@ def workload(session: Session, tests: Mapping[pytest.Item, ClaimTest]) -> Worklo
         with suppress(Exception):  # an error of a method or a task is reported when the claim is judged
             design = session.design(test.tier, third_look=test.third_look)
             seeds, known = design.seeds(design.last.n), groups.setdefault(test.tier, {})
-            needed = {group.fingerprint: group for group in _needed(session, item, test)}
+            needed = {group.fingerprint: group for group in _needed(session, recorder.call(item, test))}
             for condition, group in needed.items():
                 _ = group.condition.environment_steps
                 if condition not in known or len(known[condition][1]) < len(seeds):
@@ -93,48 +90,14 @@ def workload(session: Session, tests: Mapping[pytest.Item, ClaimTest]) -> Worklo
     return Workload(str(session.store.root.resolve()), claims, works)
 
 
-def _needed(session: Session, item: pytest.Item, test: ClaimTest) -> Sequence[TrialGroup]:
-    """Return the trials that a claim needs: its test is called once, as far as it gets without trials.
-
-    Nothing is known of a test with fixtures of its own, which are for the run itself. What a test raises is reported
-    when it is run.
-    """
-    found: list[TrialGroup] = []
-    judged: list[Assertion] = []
-
-    def keep(assertion: Assertion, readings: object) -> Assertion:
-        judged.append(assertion)
-        return assertion
-
-    def trials(method: str, *, on: str) -> TrialGroup:
-        found.append(replace(session.group(method, on, test.tier), get=_never))
-        return found[-1]
-
-    function: Callable[..., Any] = item.obj  # type: ignore[attr-defined]
-    given = {**item.callspec.params, TIER: test.tier, "trials": trials, "verdict": VerdictFixture(keep)}  # type: ignore[attr-defined]
-    names = inspect.signature(function).parameters
-    if gap_of(item, test.tier) or not set(names) <= set(given):
-        return ()
-    try:
-        with warnings.catch_warnings(action="ignore"):
-            function(**{name: given[name] for name in names})
-    except KeyboardInterrupt:
-        raise
-    except BaseException:  # noqa: S110  (pytest's own outcomes, such as a skip, are no `Exception`)
-        pass
-    if isinstance(item.parent, pytest.Class):  # the run needs a new object of its class
-        vars(item).pop("_instance", None)
-        vars(item).pop("_obj", None)
-    if not judged:
-        return found
+def _needed(session: Session, one: Collected) -> Sequence[TrialGroup]:
+    """Return the trials that a claim needs, as far as its test gets without trials."""
+    if one.assertion is None:
+        return one.asked
     # A condition that only another reading of the sentence asks for is not run.
-    needed = {source.fingerprint for source in judged[0].sources()}
-    return () if session.leaves(test.tier, judged[0]) else [one for one in found if one.fingerprint in needed]
-
-
-def _never(condition: Condition, seeds: Sequence[int]) -> Sequence[TrialResult]:
-    """Have no trials."""
-    raise NotStoredError(f"{condition.label} is not run yet")
+    needed = {source.fingerprint for source in one.assertion.sources()}
+    leaves = session.leaves(one.test.tier, one.assertion)
+    return () if leaves else [group for group in one.asked if group.fingerprint in needed]
 
 
 def _works(

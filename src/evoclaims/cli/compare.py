@@ -11,7 +11,6 @@ from pathlib import Path
 
 from evoclaims.claims.fetching import StoredOnly
 from evoclaims.claims.session import Session
-from evoclaims.cli.judging import judge
 from evoclaims.cli.project import Project, open_project
 from evoclaims.cli.store_folder import open_store
 from evoclaims.cli.terminal import write
@@ -125,7 +124,7 @@ def _stores(project: Project, tiers: Sequence[str], old: Store, new: Store) -> t
     reproduction = project.reproduction
     rooted = [Store(store.root.absolute()) for store in (old, new)]  # found even if a claim test changes the folder
     sessions = [Session(reproduction, store, StoredOnly(Archive(store))) for store in rooted]
-    found = judge(project.config, [(session, tier) for tier in tiers for session in sessions])
+    found = project.judge_sessions([(session, tier) for tier in tiers for session in sessions])
     before, after = chain.from_iterable(found[::2]), chain.from_iterable(found[1::2])
     return comparison.store(reproduction, Archive(old), before), comparison.store(reproduction, Archive(new), after)
 

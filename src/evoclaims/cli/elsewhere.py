@@ -201,10 +201,10 @@ def _claims(options: argparse.Namespace) -> set[str]:
     """Return the ids and names of the project's claims; none where what is installed here cannot collect them."""
     try:
         project = open_project(options.storage)
-        (reports,) = project.judge_sessions([(project.as_published(options.tier), options.tier)])
+        (claims,) = project.collect([("", options.tier)])
     except UserError:
         return set()
-    return {name for report in reports for name in (report.claim, report.name)}
+    return {name for one in claims for name in (one.test.claim.id, one.test.name)}
 
 
 def released(package: str) -> list[str]:

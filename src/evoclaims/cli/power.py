@@ -8,8 +8,7 @@ import sys
 from collections.abc import Mapping, Sequence
 from typing import Final
 
-from evoclaims.claims.fetching import StoredOnly
-from evoclaims.claims.power import Asserted, ClaimPower, Listening, Pilots, asserted, only
+from evoclaims.claims.power import ClaimPower, Pilots, only, with_test
 from evoclaims.cli.processes.execution import Execution
 from evoclaims.cli.processes.job import Job
 from evoclaims.cli.processes.worker import WorkOrder
@@ -81,7 +80,8 @@ def main(options: argparse.Namespace) -> int:
     design = project.reproduction.tier(options.tier).design
     if options.draws < 1:
         raise UserError(f"--draws takes a number from 1 up, not {options.draws}.")
-    every = _claims(project, options.tier)
+    (collected,) = project.collect([("", options.tier)])
+    every = with_test(collected)
     chosen = only(every, options.only)
     pilots = Pilots(project.reproduction, options.tier, every)
     wanted = {names: group.condition for one in chosen for names, group in one.groups.items()}
@@ -102,13 +102,6 @@ def main(options: argparse.Namespace) -> int:
     if advice and troubles(powers):
         print(*advice, file=sys.stderr)
     return int(not all(one.suffices for one in powers))
-
-
-def _claims(project: Project, tier: str) -> tuple[Asserted, ...]:
-    store = project.archive.store
-    listening = Listening(project.reproduction, store, StoredOnly(project.archive))
-    (reports,) = project.judge_sessions([(listening, tier)])
-    return asserted(reports, listening.assertions)
 
 
 def _make(

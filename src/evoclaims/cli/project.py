@@ -9,9 +9,10 @@ from pathlib import Path
 from typing import Final
 
 from evoclaims.claims.as_published import AsPublished
+from evoclaims.claims.collect import collect, judge_all
 from evoclaims.claims.fetching import StoredOnly
+from evoclaims.claims.recording import Collected, Recorder, never
 from evoclaims.claims.session import Session
-from evoclaims.cli.judging import judge
 from evoclaims.cli.store_folder import open_store
 from evoclaims.core.errors import UnknownNameError
 from evoclaims.paper.archive import Archive
@@ -74,7 +75,31 @@ class Project:
 
     def judge_sessions(self, asked: Sequence[tuple[Session, str]]) -> list[list[ClaimReport]]:
         """Judge all claims of a tier in each session; raises as `judge_variants` does."""
-        return judge(self.config, asked)
+        collected = self.collect([(session.variant, tier) for session, tier in asked])
+        return [
+            judge_all(session, claims, self.config.root) for (session, _), claims in zip(asked, collected, strict=True)
+        ]
+
+    def collect(self, asked: Sequence[tuple[str, str]]) -> list[list[Collected]]:
+        """Return all claims for each variant of the protocol ("" for itself) and tier; each test is called once.
+
+        Raises:
+            UserError: when the claims cannot be collected, or not all of them are called.
+        """
+        missing = [one for one in dict.fromkeys(asked) if one not in self._collected]
+        if missing:
+            variants = list(dict.fromkeys(variant for variant, _ in missing))
+            tiers = list(dict.fromkeys(tier for _, tier in missing))
+            recorders = [Recorder(self.reproduction, self.store, never, variant=variant) for variant in variants]
+            for variant, found in zip(variants, collect(self.config, recorders, tiers), strict=True):
+                for tier in tiers:
+                    self._collected[variant, tier] = [one for one in found if one.test.tier == tier]
+        return [self._collected[one] for one in asked]
+
+    @cached_property
+    def _collected(self) -> dict[tuple[str, str], list[Collected]]:
+        """The claims by variant and tier."""
+        return {}
 
     def as_published(self, tier: str) -> Session:
         """Return a session in which the paper's own numbers stand for trials."""

@@ -59,11 +59,11 @@ def blocks(found: Sequence[Replication], width: int) -> Iterator[tuple[str, Tabl
 
 def _place(one: Replication, varied: bool) -> tuple[str, str]:
     """Return the heading that a number belongs to, with the variant if several are shown, and its name below it."""
-    readings = one.readings
+    found = one.numbers
     under = f", {one.variant or PROTOCOL}" if varied else ""
     if one.level is None:
-        return f"{readings.task}: {readings.name}{under}", readings.method
-    return f"{readings.method} on {readings.task}: {readings.name}{under}", f"level {one.level}"
+        return f"{found.task}: {found.name}{under}", found.method
+    return f"{found.method} on {found.task}: {found.name}{under}", f"level {one.level}"
 
 
 def _intervals(one: Replication) -> list[str]:

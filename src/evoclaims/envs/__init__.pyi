@@ -9,8 +9,8 @@ from evoclaims.envs.ecorobot.boxes import Box as Box
 from evoclaims.envs.ecorobot.boxes import Surface as Surface
 from evoclaims.envs.ecorobot.brax_env import BraxEnv as BraxEnv
 from evoclaims.envs.ecorobot.deceptive import DeceptiveMaze as DeceptiveMaze
+from evoclaims.envs.ecorobot.locomotion import Locomotion as Locomotion
 from evoclaims.envs.ecorobot.maze import MazePlan as MazePlan
-from evoclaims.envs.ecorobot.obstacles import Locomotion as Locomotion
 from evoclaims.envs.ecorobot.obstacles import Obstacles as Obstacles
 from evoclaims.envs.ecorobot.outing import Ruling as Ruling
 from evoclaims.envs.ecorobot.robot_task import ROBOT_PACKAGES as ROBOT_PACKAGES

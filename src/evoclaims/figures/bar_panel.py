@@ -9,8 +9,8 @@ from typing import Any, Final
 from evoclaims.core.drawing import optional
 from evoclaims.figures import brackets
 from evoclaims.figures.brackets import PairTest
-from evoclaims.figures.readings import NOT_RUN, MeasureOf, Readings
 from evoclaims.figures.sheet import FAINT, INK, SMALL, TEXT, PanelRow, lighter, measured
+from evoclaims.figures.trial_numbers import NOT_RUN, MeasureOf, TrialNumbers
 from evoclaims.paper.reported import Reported
 
 GAP: Final = 0.7
@@ -78,7 +78,7 @@ class Filled:
     """A bar with its numbers."""
 
     bar: Bar
-    readings: Readings
+    numbers: TrialNumbers
 
     @property
     def reported(self) -> Reported | None:
@@ -147,7 +147,7 @@ def lay_out(one: Measured, width: float) -> Layout:
     stars = [comparison for comparison in one.comparisons if comparison.asterisks]
     ends = [(bars[comparison.left], bars[comparison.right]) for comparison in stars]
     spans = [(min(pair), max(pair)) for pair in ends]
-    words = [1.3 * bracket * bar.readings.incomplete for bar in one.bars]  # room for "8/10" above a bar
+    words = [1.3 * bracket * bar.numbers.incomplete for bar in one.bars]  # room for "8/10" above a bar
     below = [(place, top + more) for place, top, more in zip(bars, tops, words, strict=True)]
     heights = brackets.stack(spans, below, bracket)
     top = max([high, *(height for _, height in below), *(height + bracket for height in heights)])
@@ -208,7 +208,7 @@ def legend(panels: Sequence[Measured]) -> list[Any]:
     handles = [patches.Patch(facecolor=lighter(s.colour), edgecolor=s.colour, label=s.label) for s in series]
     if any(one.shows_reported for one in panels):
         handles.append(lines.Line2D([], [], label="reported by the paper", **_DIAMOND))
-    if any(bar.readings.broken for one in panels for bar in one.bars):
+    if any(bar.numbers.broken for one in panels for bar in one.bars):
         handles.append(lines.Line2D([], [], label="trial without a value", **_CROSS))
     return handles
 
@@ -221,28 +221,28 @@ _CROSS: Final = {"marker": "x", "markersize": 4.0, "markeredgewidth": 1.0, "colo
 
 
 def _paint_bar(axis: Any, filled: Filled, middle: float, width: float) -> None:
-    readings, colour = filled.readings, filled.bar.series.colour
-    if readings.values:
+    numbers, colour = filled.numbers, filled.bar.series.colour
+    if numbers.values:
         style = {"facecolor": lighter(colour), "edgecolor": colour, "linewidth": 0.8, "zorder": 2}
-        axis.bar(middle, readings.mean, width, **style)
-    if len(readings.values) > 1:
+        axis.bar(middle, numbers.mean, width, **style)
+    if len(numbers.values) > 1:
         style = {"elinewidth": 0.8, "capsize": 1.8, "capthick": 0.8, "ecolor": INK, "zorder": 3}
-        axis.errorbar(middle, readings.mean, yerr=readings.deviation, fmt="none", **style)
-    places = [middle + 0.8 * width * share for share in _across(len(readings.each))]
-    pairs = list(zip(places, readings.each, strict=True))
-    dots = [(place, reading.value) for place, reading in pairs if reading.value is not None]
+        axis.errorbar(middle, numbers.mean, yerr=numbers.deviation, fmt="none", **style)
+    places = [middle + 0.8 * width * share for share in _across(len(numbers.each))]
+    pairs = list(zip(places, numbers.each, strict=True))
+    dots = [(place, number.value) for place, number in pairs if number.value is not None]
     if dots:
         axis.scatter(*zip(*dots, strict=True), s=5.5, c=colour, edgecolors="white", linewidths=0.3, zorder=4)
     foot = axis.get_xaxis_transform()
-    broken = [place for place, reading in pairs if reading.value is None and reading.status != NOT_RUN]
+    broken = [place for place, number in pairs if number.value is None and number.status != NOT_RUN]
     if broken:
         axis.plot(broken, [0.05] * len(broken), transform=foot, **_CROSS)
     words = {"ha": "center", "va": "bottom", "fontsize": SMALL, "color": FAINT}
     if not dots and not broken:
         axis.text(middle, 0.04, NOT_RUN, transform=foot, rotation=90, **words)
-    elif readings.incomplete:
+    elif numbers.incomplete:
         count = f"{len(dots)}/{len(pairs)}"
-        top = (middle, _ends_of_data(readings)[1])
+        top = (middle, _ends_of_data(numbers)[1])
         axis.annotate(count, top, xytext=(0, 1.5), textcoords="offset points", **words)
 
 
@@ -271,17 +271,17 @@ def _names(one: Measured) -> list[tuple[str, int, int]]:
     return names
 
 
-def _ends_of_data(readings: Readings) -> tuple[float, float]:
+def _ends_of_data(numbers: TrialNumbers) -> tuple[float, float]:
     """Return the lower and upper end of a bar, which begins at 0, with its dots and error bar."""
-    deviation = readings.deviation if len(readings.values) > 1 else 0.0
-    bar = [readings.mean - deviation, readings.mean + deviation] if readings.values else []
-    ends = [0.0, *bar, *readings.values]
+    deviation = numbers.deviation if len(numbers.values) > 1 else 0.0
+    bar = [numbers.mean - deviation, numbers.mean + deviation] if numbers.values else []
+    ends = [0.0, *bar, *numbers.values]
     return min(ends), max(ends)
 
 
 def _ends(bar: Filled, one: Measured) -> tuple[float, float]:
     """Return the lower and upper end of all that is drawn at a bar."""
-    low, high = _ends_of_data(bar.readings)
+    low, high = _ends_of_data(bar.numbers)
     if bar.reported is None or not one.panel.beside:
         return low, high
     error = bar.reported.error or 0.0

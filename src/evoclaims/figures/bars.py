@@ -11,8 +11,8 @@ from typing import Any
 from evoclaims.figures import bar_panel, brackets, sheet
 from evoclaims.figures.bar_panel import Bar, BarPanel, Filled, Measured, Series
 from evoclaims.figures.figure import Drawing, Heading, Scope
-from evoclaims.figures.readings import MeasureOf, absences, frame, read
 from evoclaims.figures.sheet import COLUMN, plain
+from evoclaims.figures.trial_numbers import MeasureOf, absences, frame, read
 from evoclaims.paper.reported import Published
 
 PanelOf = Callable[[Scope], BarPanel]
@@ -43,19 +43,19 @@ class BarChart:
         measured = [_measured(scope, panel) for panel in panels]
         with plain():
             layouts = [bar_panel.lay_out(one, self.width - sheet.LEFT - sheet.RIGHT) for one in measured]
-            caption, missing = self._caption(measured), absences(bar.readings for one in measured for bar in one.bars)
+            caption, missing = self._caption(measured), absences(bar.numbers for one in measured for bar in one.bars)
             rows = [layout.row for layout in layouts]
             legend = bar_panel.legend(measured)
             figure, axes = sheet.build(heading, self.width, rows, legend, [*missing, *caption])
             for axis, layout in zip(axes, layouts, strict=True):
                 bar_panel.paint(axis, layout)
         table = frame(row for one in measured for row in _rows(one))
-        shown = sum(len(bar.readings.values) for one in measured for bar in one.bars)
+        shown = sum(len(bar.numbers.values) for one in measured for bar in one.bars)
         return Drawing(figure, table, caption, missing, shown, f"{heading.title} ({heading.place})")
 
     def _caption(self, measured: Sequence[Measured]) -> tuple[str, ...]:
         """Say how to read the figure, and where the paper has the published numbers."""
-        shown = [one for one in measured for bar in one.bars if bar.readings.values]
+        shown = [one for one in measured for bar in one.bars if bar.numbers.values]
         sentences = [HOW] if shown else []
         if any(one.comparisons for one in measured):
             found = any(comparison.asterisks for one in measured for comparison in one.comparisons)
@@ -129,12 +129,12 @@ def _success_at(level: int, group: Any) -> Any:
 
 def _measured(scope: Scope, panel: BarPanel) -> Measured:
     """Read a panel's trials, and compare them as the paper does."""
-    readings = [read(scope, bar.series.method, bar.task, bar.measure) for bar in panel.bars]
+    numbers = [read(scope, bar.series.method, bar.task, bar.measure) for bar in panel.bars]
     families = [*_families(bar.at for bar in panel.bars)]
     if panel.across:
         families += _families(bar.series.label for bar in panel.bars)
-    comparisons = brackets.compare([one.ranks for one in readings], families)
-    return Measured(panel, tuple(map(Filled, panel.bars, readings)), comparisons)
+    comparisons = brackets.compare([one.ranks for one in numbers], families)
+    return Measured(panel, tuple(map(Filled, panel.bars, numbers)), comparisons)
 
 
 def _families(names: Iterable[str]) -> list[list[int]]:
@@ -158,10 +158,10 @@ def _rows(measured: Measured) -> list[dict[str, Any]]:
     """Return a panel's rows of the table."""
     rows: list[dict[str, Any]] = []
     for bar in measured.bars:
-        rows += bar.readings.rows(**_place(measured, bar.bar))
+        rows += bar.numbers.rows(**_place(measured, bar.bar))
         if bar.reported:
             error = math.nan if bar.reported.error is None else bar.reported.error
-            common = {**_place(measured, bar.bar), "method": bar.readings.method, "task": bar.readings.task}
+            common = {**_place(measured, bar.bar), "method": bar.numbers.method, "task": bar.numbers.task}
             rows.append({**common, "what": "reported", "value": bar.reported.value, "error": error})
     for comparison in measured.comparisons:
         left, right = measured.bars[comparison.left].bar, measured.bars[comparison.right].bar

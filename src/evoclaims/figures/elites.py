@@ -14,8 +14,8 @@ from evoclaims.envs.ecorobot.maze import Maze
 from evoclaims.envs.ecorobot.views.pictures import paint_elites, paint_ground
 from evoclaims.figures import sheet
 from evoclaims.figures.figure import Drawing, Heading, Scope
-from evoclaims.figures.readings import MeasureOf, Readings, absences, frame, read
 from evoclaims.figures.sheet import FAINT, SMALL, TEXT, plain
+from evoclaims.figures.trial_numbers import MeasureOf, TrialNumbers, absences, frame, read
 from evoclaims.trials import champions
 
 LINE: Final = 0.12
@@ -69,7 +69,7 @@ class ElitesMap:
             for one in self.grounds
         ]
         maps = [_first_map(scope, one) for one in self.grounds]
-        absent = absences(readings for listed in read_all for _, readings in listed)
+        absent = absences(numbers for listed in read_all for _, numbers in listed)
         without = [_unmapped(scope, one) for one, found in zip(self.grounds, maps, strict=True) if found is None]
         missing = (*absent, *without)
         with plain():
@@ -80,7 +80,7 @@ class ElitesMap:
                 _paint(axis, _task(scope, one), one, found, listed, wide)
         panels = zip(self.grounds, maps, read_all, strict=True)
         table = frame((row for one, found, listed in panels for row in _rows(one, found, listed)), "x", "y")
-        shown = sum(len(readings.values) for listed in read_all for _, readings in listed)
+        shown = sum(len(numbers.values) for listed in read_all for _, numbers in listed)
         return Drawing(figure, table, (HOW,), missing, shown, f"{heading.title} ({heading.place})")
 
 
@@ -110,7 +110,7 @@ def _unmapped(scope: Scope, ground: Ground) -> str:
 
 
 def _paint(
-    axis: Any, task: Maze, ground: Ground, found: Map | None, listed: list[tuple[str, Readings]], wide: float
+    axis: Any, task: Maze, ground: Ground, found: Map | None, listed: list[tuple[str, TrialNumbers]], wide: float
 ) -> None:
     """Paint one map over its maze, and below it the measures of all trials, in lines of `wide` inches."""
     paint_ground(axis, task, ())
@@ -125,16 +125,16 @@ def _paint(
         mesh = paint_elites(axis, task, found.fitnesses)
         bar = axis.figure.colorbar(mesh, cax=axis.inset_axes((1.03, 0.1, 0.03, 0.8)))
         bar.outline.set_linewidth(0.5)
-    lines = [line for name, readings in listed for line in sheet.wrap(f"{name}: {_summary(readings)}", wide, SMALL)]
+    lines = [line for name, numbers in listed for line in sheet.wrap(f"{name}: {_summary(numbers)}", wide, SMALL)]
     corner = {"xycoords": "axes fraction", "xytext": (0, -30), "textcoords": "offset points"}
     axis.annotate("\n".join(lines), (0.0, 0.0), va="top", fontsize=SMALL, **corner)
 
 
-def _summary(readings: Readings) -> str:
-    if not readings.values:
+def _summary(numbers: TrialNumbers) -> str:
+    if not numbers.values:
         return "no values"
-    spread = f" ± {_text(readings.deviation)}" if len(readings.values) > 1 else ""
-    words = f"{_text(readings.mean)}{spread} ({len(readings.values)} of {len(readings.each)} trials)"
+    spread = f" ± {_text(numbers.deviation)}" if len(numbers.values) > 1 else ""
+    words = f"{_text(numbers.mean)}{spread} ({len(numbers.values)} of {len(numbers.each)} trials)"
     return words.replace(" ", "\u00a0")  # kept on one line
 
 
@@ -143,10 +143,10 @@ def _text(value: float) -> str:
     return f"{value:,.0f}" if abs(value) >= 100 else f"{value:.2f}"
 
 
-def _rows(ground: Ground, found: Map | None, listed: list[tuple[str, Readings]]) -> Iterator[dict[str, Any]]:
+def _rows(ground: Ground, found: Map | None, listed: list[tuple[str, TrialNumbers]]) -> Iterator[dict[str, Any]]:
     """Yield a panel's rows of the table: the measures of all trials, then the elites of the map, by cell."""
-    for name, readings in listed:
-        yield from readings.rows(panel=ground.title, at=name, series=ground.method)
+    for name, numbers in listed:
+        yield from numbers.rows(panel=ground.title, at=name, series=ground.method)
     if found is not None:
         names = {"panel": ground.title, "at": "map", "series": ground.method, "method": ground.method}
         common = {**names, "task": ground.task, "what": "elite", "seed": found.seed, "trial": found.trial}

@@ -9,7 +9,7 @@ from typing import Any
 
 from evoclaims.core.errors import UnknownNameError
 from evoclaims.figures.figure import Scope
-from evoclaims.figures.readings import Readings, read
+from evoclaims.figures.trial_numbers import TrialNumbers, read
 from evoclaims.judging.measure import Profile
 from evoclaims.judging.repetition import Agreement, Answer, PublishedMean, Repetition, repetition
 from evoclaims.paper.archive import Archive
@@ -25,7 +25,7 @@ class Replication:
         tier: at which ours were made.
         variant: of the protocol; empty for the protocol itself.
         reported: the published number.
-        readings: ours, from each trial; of a profile's level, named as the profile is.
+        numbers: ours, from each trial; of a profile's level, named as the profile is.
         repetition: whether ours are what a repetition of the published trials would give.
         level: of a profile, counted from 0; None for a measure without levels.
         jointly: the same, where all numbers of the condition have to be inside together; None for a single number.
@@ -34,7 +34,7 @@ class Replication:
     tier: str
     variant: str
     reported: Reported
-    readings: Readings
+    numbers: TrialNumbers
     repetition: Repetition
     level: int | None = None
     jointly: Repetition | None = None
@@ -42,12 +42,12 @@ class Replication:
     @property
     def measure(self) -> str:
         """What is measured, such as "success at level 4"."""
-        return self.readings.name if self.level is None else f"{self.readings.name} at level {self.level}"
+        return self.numbers.name if self.level is None else f"{self.numbers.name} at level {self.level}"
 
     @property
     def name(self) -> str:
         """What is measured of which trials, such as "neat on n_parity: success at level 4"."""
-        return f"{self.readings.method} on {self.readings.task}: {self.measure}"
+        return f"{self.numbers.method} on {self.numbers.task}: {self.measure}"
 
     @property
     def agreement(self) -> Agreement:
@@ -57,7 +57,7 @@ class Replication:
     @property
     def condition(self) -> tuple[str, str, str]:
         """What a curve is one result of: method, task and measure."""
-        return self.readings.method, self.readings.task, self.readings.name
+        return self.numbers.method, self.numbers.task, self.numbers.name
 
     @property
     def holds_null(self) -> bool:
@@ -70,8 +70,8 @@ class Replication:
     def row(self) -> dict[str, Any]:
         """Return it as one row of a table for other programs."""
         common = {
-            "method": self.readings.method,
-            "task": self.readings.task,
+            "method": self.numbers.method,
+            "task": self.numbers.task,
             "measure": self.measure,
             "tier": self.tier,
             "variant": self.variant,
@@ -79,10 +79,10 @@ class Replication:
             "published.error": self.reported.error,
             "published.trials": self.reported.trials,
             "published.place": self.reported.place,
-            "ours.mean": self.readings.mean if self.readings.values else None,
-            "ours.deviation": self.readings.deviation if len(self.readings.values) > 1 else None,
-            "ours.trials": len(self.readings.values),
-            "ours.values": list(self.readings.values),
+            "ours.mean": self.numbers.mean if self.numbers.values else None,
+            "ours.deviation": self.numbers.deviation if len(self.numbers.values) > 1 else None,
+            "ours.trials": len(self.numbers.values),
+            "ours.values": list(self.numbers.values),
             "answer": self.repetition.answer,
             "agreement": self.agreement,
             "needed": self.repetition.needed,
@@ -123,11 +123,11 @@ def replications(
             names = method, task
             if scope.variant and names not in changed[scope.variant]:
                 continue
-            readings, level = _ours(scope, quantity, method, task, at)
-            if not scope.variant or readings.values:
+            numbers, level = _ours(scope, quantity, method, task, at)
+            if not scope.variant or numbers.values:
                 many = len(published.plots[task][quantity]["methods"][method]["mean"])
-                judged, jointly = (_judged(reported, readings, len(scope.seeds), among) for among in (1, many))
-                found.append(Replication(tier, scope.variant, reported, readings, judged, level, jointly))
+                judged, jointly = (_judged(reported, numbers, len(scope.seeds), among) for among in (1, many))
+                found.append(Replication(tier, scope.variant, reported, numbers, judged, level, jointly))
     return tuple(found)
 
 
@@ -184,28 +184,28 @@ def _numbers(published: Published) -> Iterator[tuple[str, str, str, int, Reporte
                         yield quantity, method, task, at, reported
 
 
-def _ours(scope: Scope, quantity: str, method: str, task: str, at: int) -> tuple[Readings, int | None]:
+def _ours(scope: Scope, quantity: str, method: str, task: str, at: int) -> tuple[TrialNumbers, int | None]:
     """Read our trials, and say of which level: None of a measure without levels.
 
-    There are no readings where the tier has no such condition, or its task no such level.
+    There are no numbers where the tier has no such condition, or its task no such level.
     """
     try:
         found = getattr(scope.group(method, task), quantity)
     except UnknownNameError:
         if (method, task) in scope.tier.conditions:
             raise
-        return Readings(method, task, quantity, ()), None
+        return TrialNumbers(method, task, quantity, ()), None
     if not isinstance(found, Profile):
         return read(scope, method, task, lambda group: getattr(group, quantity)), None
     if at >= found.size:
-        return Readings(method, task, found.name, ()), at
-    readings = read(scope, method, task, lambda group: getattr(group, quantity).at(at))
-    return replace(readings, name=found.name), at
+        return TrialNumbers(method, task, found.name, ()), at
+    numbers = read(scope, method, task, lambda group: getattr(group, quantity).at(at))
+    return replace(numbers, name=found.name), at
 
 
-def _judged(reported: Reported, readings: Readings, planned: int, among: int) -> Repetition:
-    """Put our readings to the published number."""
+def _judged(reported: Reported, numbers: TrialNumbers, planned: int, among: int) -> Repetition:
+    """Put our numbers to the published number."""
     if reported.trials is None:
         return Repetition((), Answer.UNKNOWN, "reported.toml does not say of how many trials the number is the mean")
     mean = PublishedMean(reported.value, reported.error, reported.trials, reported.scale, reported.precision)
-    return repetition(mean, readings.values, planned, readings.broken, among)
+    return repetition(mean, numbers.values, planned, numbers.broken, among)

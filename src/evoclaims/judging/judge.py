@@ -65,14 +65,28 @@ class Ending:
     doubt: str = ""
 
 
-def judge(assertion: Assertion, design: Design, *, claim: str = "", tier: str = "") -> Verdict:
+Fetch = Callable[[Source, tuple[int, ...]], tuple[TrialResult, ...]]
+"""Returns the trials of a source for some seeds, in their order."""
+
+
+def fetch_from(source: Source, seeds: tuple[int, ...]) -> tuple[TrialResult, ...]:
+    """Return a source's trials in the order of `seeds`; the source may return them in any order."""
+    by_seed = {trial.seed: trial for trial in source.fetch(seeds)}
+    if sorted(by_seed) != sorted(seeds):
+        raise ValueError(f"{source.label} returned the seeds {sorted(by_seed)} when asked for {list(seeds)}.")
+    return tuple(by_seed[seed] for seed in seeds)
+
+
+def judge(
+    assertion: Assertion, design: Design, fetch: Fetch = fetch_from, *, claim: str = "", tier: str = ""
+) -> Verdict:
     """Judge an assertion by the trials of its sources (see `decide`); `claim` and `tier` are for the fingerprint.
 
     Raises:
         Exception: whatever a source raises when it is asked for trials.
     """
     mark = fingerprint(assertion, design, claim=claim, tier=tier)
-    ending = decide(assertion, design)
+    ending = decide(assertion, design, fetch)
     if ending is None:
         return _underpowered(assertion, design, mark)
     outcome, look, finding = ending.outcome, ending.look, ending.finding
@@ -100,19 +114,7 @@ def judge(assertion: Assertion, design: Design, *, claim: str = "", tier: str = 
     )
 
 
-def fetch_from(source: Source, seeds: tuple[int, ...]) -> tuple[TrialResult, ...]:
-    """Return a source's trials in the order of `seeds`; the source may return them in any order."""
-    by_seed = {trial.seed: trial for trial in source.fetch(seeds)}
-    if sorted(by_seed) != sorted(seeds):
-        raise ValueError(f"{source.label} returned the seeds {sorted(by_seed)} when asked for {list(seeds)}.")
-    return tuple(by_seed[seed] for seed in seeds)
-
-
-def decide(
-    assertion: Assertion,
-    design: Design,
-    fetch: Callable[[Source, tuple[int, ...]], tuple[TrialResult, ...]] = fetch_from,
-) -> Ending | None:
+def decide(assertion: Assertion, design: Design, fetch: Fetch = fetch_from) -> Ending | None:
     """Follow the looks of a design to their end.
 
     Each look first checks the smallest attainable p: if neither direction can be decided, no trial is fetched. Nor is

@@ -20,7 +20,7 @@ from evoclaims.core.files import read_file
 from evoclaims.plugin.progress import progress_of
 
 if TYPE_CHECKING:
-    from evoclaims.claims.collected import ClaimTest
+    from evoclaims.claims.claim import ClaimTest
     from evoclaims.claims.session import Session
     from evoclaims.claims.workload import Workload
 

@@ -32,8 +32,8 @@ from evoclaims.trials.gpus import environment_of_worker, gpus
 from evoclaims.trials.stopping import end_without, interrupted_by
 
 if TYPE_CHECKING:
-    from evoclaims.claims.collected import ClaimTest
-    from evoclaims.claims.session import VerdictFixture
+    from evoclaims.claims.claim import ClaimTest
+    from evoclaims.claims.recording import VerdictFixture
     from evoclaims.paper.trial_group import TrialGroup
     from evoclaims.verdicts.claim_report import ClaimReport
 
@@ -132,8 +132,8 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> Generator[None, object, 
     """Run each claim once per tier; a test ends with both, after all other parameters: test_x[n_parity-G1-smoke]."""
     if metafunc.definition.get_closest_marker("claim") is None:
         return (yield)
-    from evoclaims.claims.claim import claim_of
-    from evoclaims.claims.collected import TIER, note_repetitions, tier_id
+    from evoclaims.claims.claim import TIER, claim_of, tier_id
+    from evoclaims.claims.collected import note_repetitions
 
     repeats = note_repetitions(metafunc)
     made = yield
@@ -244,8 +244,8 @@ def trials(request: pytest.FixtureRequest, claim_tier: str) -> Callable[..., Tri
 @pytest.fixture
 def verdict(request: pytest.FixtureRequest, claim_tier: str) -> VerdictFixture:
     """Return `verdict(assertion)`, which judges the claim."""
-    from evoclaims.claims.collected import ClaimTest
-    from evoclaims.claims.session import VerdictFixture
+    from evoclaims.claims.claim import ClaimTest
+    from evoclaims.claims.recording import VerdictFixture
 
     session, test = make_session(request.config), ClaimTest.of(request.node)
     line = progress_of(request.config)

@@ -20,7 +20,7 @@ from evoclaims.core.tiers import TIERS
 from evoclaims.plugin.progress import progress_of
 
 if TYPE_CHECKING:
-    from evoclaims.claims.collected import ClaimTest
+    from evoclaims.claims.claim import ClaimTest
     from evoclaims.claims.session import Session
 
 
@@ -149,20 +149,17 @@ def _check_changes(config: pytest.Config, changes: str) -> None:
         )
 
 
-SESSION: pytest.StashKey[Session] = pytest.StashKey()
-"""Where a run keeps its session; if another one is put there, it judges the claims that follow."""
-
-
 def make_session(config: pytest.Config) -> Session:
     """Return the session of a run: made once, from the project's reproduction and the options, and checked.
 
     Raises:
         UserError: when no claim can be judged with this store, device, sizes or names.
     """
+    from evoclaims.claims.session import SESSION, Session
+
     if SESSION in config.stash:
         return config.stash[SESSION]
     from evoclaims.claims.fetching import RunMissing, StoredOnly
-    from evoclaims.claims.session import Session
     from evoclaims.paper.archive import Archive
     from evoclaims.paper.config import load_config, load_reproduction
     from evoclaims.trials import devices

@@ -12,13 +12,13 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from evoclaims.core.errors import UserError, in_one_line, is_in_project
+from evoclaims.core.errors import UserError, is_in_project
 from evoclaims.core.printable import shown
 from evoclaims.plugin.options import make_session
 from evoclaims.plugin.summary import ATTRIBUTE
 
 if TYPE_CHECKING:
-    from evoclaims.claims.session import VerdictFixture
+    from evoclaims.claims.recording import VerdictFixture
     from evoclaims.verdicts.claim_report import ClaimReport
 
 
@@ -67,6 +67,8 @@ class _State:
 
 
 _state: pytest.StashKey[_State] = pytest.StashKey()
+_runs: pytest.StashKey[dict[tuple[str, str], ClaimReport]] = pytest.StashKey()
+"""The newest report of each claim, by tier and name: a plugin may run its test again."""
 
 
 @pytest.hookimpl(tryfirst=True)
@@ -82,8 +84,7 @@ def _gap(item: pytest.Item) -> str:
     """Return why a claim has no test at its tier; empty if it has one, or is no claim."""
     if item.get_closest_marker("claim_without_smoke") is None:
         return ""
-    from evoclaims.claims.claim import gap_of
-    from evoclaims.claims.collected import ClaimTest
+    from evoclaims.claims.claim import ClaimTest, gap_of
 
     return gap_of(item, ClaimTest.of(item).tier)
 
@@ -184,37 +185,36 @@ def _claim_report(
     item: pytest.Item, excinfo: pytest.ExceptionInfo[BaseException] | None, report: pytest.TestReport
 ) -> ClaimReport:
     """Return the report of a claim test: its verdict, the error that prevented one, or why it was skipped."""
-    from evoclaims.claims.claim import expectation_of
-    from evoclaims.claims.collected import ClaimTest
-    from evoclaims.claims.session import unjudged
+    from evoclaims.claims.claim import ClaimTest, expectation_of
+    from evoclaims.claims.judge import broken, unjudged
     from evoclaims.judging.verdict import Outcome
+    from evoclaims.verdicts.history import key_of
 
-    test, verdicts = ClaimTest.of(item), item.stash.get(VERDICTS, None)
+    test, verdicts, session = ClaimTest.of(item), item.stash.get(VERDICTS, None), make_session(item.config)
     if because := _gap(item):
-        return unjudged(test, Outcome.NOT_RUN, f"it has no {test.tier} test: {because}", has_test=False)
+        reason = f"it has no {test.tier} test: {because}"
+        return session.skipped(unjudged(test, Outcome.NOT_RUN, reason, has_test=False))
     if report.skipped:  # or failed as an xfail mark expects
         sentence = (
             report.longrepr[2] if isinstance(report.longrepr, tuple) else f"xfail: {getattr(report, 'wasxfail', '')}"
         )
         why = sentence.removeprefix("Skipped: ") or "no reason given"
-        return unjudged(test, Outcome.NOT_RUN, f"its test was skipped ({why})")
+        return session.skipped(unjudged(test, Outcome.NOT_RUN, f"its test was skipped ({why})"))
     if excinfo is not None and excinfo.errisinstance(pytest.skip.Exception):
-        return unjudged(test, Outcome.NOT_RUN, f"its test was skipped ({excinfo.value})")
-    if excinfo is not None:
-        claimed = unjudged(test, Outcome.ERROR, _sentence(excinfo, item.config.rootpath))
+        return session.skipped(unjudged(test, Outcome.NOT_RUN, f"its test was skipped ({excinfo.value})"))
+    if excinfo is not None and isinstance(excinfo.value, pytest.FixtureLookupError) and excinfo.value.argname:
+        lacking = f"There is no fixture named {excinfo.value.argname!r}: a claim takes trials and verdict."
+        claimed = unjudged(test, Outcome.ERROR, lacking)
+    elif excinfo is not None:
+        claimed = broken(test, excinfo.value, item.config.rootpath)
     elif verdicts is None or verdicts.report is None:
         claimed = unjudged(test, Outcome.ERROR, "the test ended without calling verdict(...), so it judged nothing")
     else:
         claimed = verdicts.report
-    return make_session(item.config).complete(claimed, expectation_of(item, test.tier))
-
-
-def _sentence(excinfo: pytest.ExceptionInfo[BaseException], root: Path) -> str:
-    """Return an exception as one line, with its place in the project `root` unless it is evoclaims' own."""
-    if isinstance(excinfo.value, pytest.FixtureLookupError) and excinfo.value.argname:
-        return f"There is no fixture named {excinfo.value.argname!r}: a claim takes trials and verdict."
-    text = str(excinfo.value).strip().splitlines()
-    return text[0] if text and excinfo.errisinstance(UserError) else in_one_line(excinfo.value, root)
+    runs = item.config.stash.setdefault(_runs, {})
+    complete = session.complete(claimed, expectation_of(item, test.tier), runs.get(key_of(claimed)))
+    runs[key_of(complete)] = complete
+    return complete
 
 
 def pytest_report_teststatus(

@@ -263,7 +263,7 @@ class Summary:
         """Return why verdicts may differ from the accepted ones, by tier and claim."""
         if self._regression is None or self._drift is None:
             return {}
-        from evoclaims.claims import new_histories
+        from evoclaims.claims.earlier_trials import new_histories
         from evoclaims.verdicts.acceptance import entry_of
         from evoclaims.verdicts.history import key_of
         from evoclaims.verdicts.regression import reason
@@ -271,7 +271,7 @@ class Summary:
         session = make_session(self._config)
         judged = {key_of(report): report for report in self.reports if report.n}
         upgraded = self._upgrade.drift if self._upgrade else None
-        return new_histories.changes(session, list(judged.values()), self._regression.accepted) | {
+        return new_histories(session, list(judged.values()), self._regression.accepted) | {
             key: reason(judged[key], old, entry_of(judged[key], session.judged_from, ""), *self._drift, upgraded)
             for key, old in self._regression.changed.items()
             if key in judged

@@ -61,11 +61,11 @@ def published(one: Replication) -> str:
 
 def ours(one: Replication) -> str:
     """Return our mean, standard deviation and number of trials, such as "0.7742 ± 0.19 (10)"."""
-    readings = one.readings
-    if not readings.values:
+    found = one.numbers
+    if not found.values:
         return NONE
-    spread = f" ± {number(float(f'{readings.deviation:.2g}'))}" if len(readings.values) > 1 else ""
-    return f"{number(readings.mean)}{spread} ({len(readings.values)})"
+    spread = f" ± {number(float(f'{found.deviation:.2g}'))}" if len(found.values) > 1 else ""
+    return f"{number(found.mean)}{spread} ({len(found.values)})"
 
 
 def answer(one: Replication) -> str:

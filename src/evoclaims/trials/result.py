@@ -9,13 +9,12 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Final, Literal
 
-from evoclaims.core.canonical import as_plain, content_hash
+from evoclaims.core.canonical import content_hash
 from evoclaims.core.errors import UserError
 
 Status = Literal["done", "diverged", "timeout", "crashed"]
 COMPLETE: tuple[str, ...] = ("done", "diverged")
 """Statuses of trials that ran to their end and have all their metrics."""
-SCHEMA = 1
 TRAINED_BY: Final = "trained_by"
 """Key of the provenance of a training loop's trial: the place of its function, "module:name"."""
 RETURNED: Final = "returned"
@@ -74,11 +73,6 @@ class TrialResult:
         """The seed, and that by which the trial is known in the table that it was imported from, if another."""
         known = self.provenance.get("seed_in_table", str(self.seed))
         return str(self.seed) if known == str(self.seed) else f"{self.seed} ({known} in the table)"
-
-    def to_json(self) -> dict[str, Any]:
-        """Return the record as plain JSON, sealed with a hash that detects torn or edited files."""
-        plain: dict[str, Any] = {"schema": SCHEMA, **as_plain(self)}
-        return {**plain, "seal": content_hash(plain)}
 
 
 def matches_digest(result: TrialResult, packed: bytes) -> bool:

@@ -16,10 +16,10 @@ from typing import Annotated, Any, Final, Literal, NoReturn, cast
 
 from msgspec import Meta, Struct, ValidationError, convert
 
-from evoclaims.core.canonical import canonical_json
+from evoclaims.core.canonical import as_plain, canonical_json, content_hash
 from evoclaims.core.errors import UserError
 from evoclaims.core.printable import printable
-from evoclaims.trials.result import COMPLETE, SCHEMA, SHARES, Status, TrialResult, is_share
+from evoclaims.trials.result import COMPLETE, SHARES, Status, TrialResult, is_share
 
 DEEPEST: Final = 64
 """Maximum nesting of objects and lists in the free JSON parts of a record."""
@@ -194,6 +194,7 @@ def _check_depth(level: list[Any]) -> None:
 _NESTING: Final = frozenset((dict, list))
 
 
+SCHEMA: Final = 1
 _HASH: Final = re.compile(r"[0-9a-f]{64}")
 _WORDS: Final = {"nan": math.nan, "inf": math.inf, "-inf": -math.inf}
 _MOST_DIGITS: Final = 19
@@ -214,8 +215,9 @@ def checked_id(text: str, of: str) -> str:
 
 
 def dump(result: TrialResult) -> bytes:
-    """Return the sealed record of `result`: one line of canonical JSON."""
-    return canonical_json(result.to_json()).encode("ascii") + b"\n"
+    """Return the record of `result` with its seal, a hash of the rest: one line of canonical JSON."""
+    plain: dict[str, Any] = {"schema": SCHEMA, **as_plain(result)}
+    return canonical_json({**plain, "seal": content_hash(plain)}).encode("ascii") + b"\n"
 
 
 def parse(data: bytes | str) -> TrialResult:

@@ -41,101 +41,10 @@ CALL_SECONDS: Final = 1.0
 AFFORDED: Final = 0.03
 """Seconds that a checkpoint may take per second between two checkpoints; slower ones are written less often."""
 
-
-class Strides:
-    """How many steps to run per device call: one at first, then as many as the last call's speed allows.
-
-    Attributes:
-        seconds: duration of the last call.
-    """
-
-    def __init__(self) -> None:
-        """Start without a measured speed."""
-        self.seconds = 0.0
-        self._per_step = math.inf
-
-    def after(self, reached: int, until: int) -> int:
-        """Return the step to run to from step `reached`, at most `until`."""
-        return min(until, reached + max(int(CALL_SECONDS / self._per_step), 1))
-
-    def seconds_for(self, steps: int) -> float | None:
-        """Return how long `steps` steps will take; None before the first call."""
-        return None if math.isinf(self._per_step) else steps * self._per_step
-
-    def took(self, steps: int, seconds: float) -> None:
-        """Measure the speed from a call of `steps` steps (at least one)."""
-        self.seconds = seconds
-        self._per_step = max(seconds, 1e-9) / steps
-
-
-class Rhythm:
-    """When the next checkpoint is due: some seconds after the last one, or later if writing is slow."""
-
-    def __init__(self, seconds: float) -> None:
-        """Begin now; `seconds` is the time between two cheap checkpoints, 0 for one after every call."""
-        self._seconds = seconds
-        self._cost = 0.0
-        self._last = time.monotonic()
-
-    @property
-    def due(self) -> bool:
-        """Whether a checkpoint is due."""
-        return time.monotonic() - self._last >= self._seconds * max(1.0, self._cost / AFFORDED)
-
-    @contextmanager
-    def saving(self) -> Iterator[None]:
-        """Time the writing of a checkpoint."""
-        began = time.monotonic()
-        yield
-        self._last = time.monotonic()
-        self._cost = self._last - began
-
-
-def warn_of_edited_bodies(condition: Condition, store: Store) -> None:
-    """Warn when the store has trials of the condition whose robot had the same file and another body."""
-    now = dict(_bodies(condition.plain))
-    if not now:
-        return
-    errors: list[DamagedFileError] = []
-    here = _without_bodies(condition.plain)
-    old = [
-        result
-        for result in store.results(errors)
-        if result.condition != condition.id
-        and _without_bodies({name: part for name, part in result.spec.items() if name != "seed"}) == here
-    ]
-    if old:
-        names = sorted({name for result in old for name, body in _bodies(result.spec) if now.get(name) != body})
-        warnings.warn(
-            f"The model of the robot {', '.join(names)} was edited: {len(old)} stored trials of {condition.label} are "
-            "of the old body and do not count, so they run again.",
-            stacklevel=2,
-        )
-
-
-def _bodies(plain: Any) -> Iterator[tuple[str, str]]:
-    """Yield names and body hashes of the custom robots in a condition's plain form."""
-    if isinstance(plain, Mapping):
-        if {"xml", "body", "name"} <= plain.keys():
-            yield plain["name"], plain["body"]
-        for part in plain.values():
-            yield from _bodies(part)
-    elif isinstance(plain, list | tuple):
-        for part in plain:
-            yield from _bodies(part)
-
-
-def _without_bodies(plain: Any) -> Any:
-    """Return a condition's plain form without its robots' body hashes."""
-    if isinstance(plain, Mapping):
-        return {name: _without_bodies(part) for name, part in plain.items() if not (name == "body" and "xml" in plain)}
-    return [_without_bodies(part) for part in plain] if isinstance(plain, list | tuple) else plain
-
-
-_log = logging.getLogger(__name__)
-
 CHECKPOINT_SECONDS: Final = 1.0
 """Minimum time between two checkpoints: what a kill can cost."""
+
+_log = logging.getLogger(__name__)
 
 
 def run(
@@ -386,3 +295,93 @@ def _progress(run: Run, batch: Batch, report: Report, strides: Strides) -> RunPr
         levels=run.condition.task.levels,
         seconds_left=strides.seconds_for(run.condition.steps - batch.steps) if batch.owed else 0.0,
     )
+
+
+class Strides:
+    """How many steps to run per device call: one at first, then as many as the last call's speed allows.
+
+    Attributes:
+        seconds: duration of the last call.
+    """
+
+    def __init__(self) -> None:
+        """Start without a measured speed."""
+        self.seconds = 0.0
+        self._per_step = math.inf
+
+    def after(self, reached: int, until: int) -> int:
+        """Return the step to run to from step `reached`, at most `until`."""
+        return min(until, reached + max(int(CALL_SECONDS / self._per_step), 1))
+
+    def seconds_for(self, steps: int) -> float | None:
+        """Return how long `steps` steps will take; None before the first call."""
+        return None if math.isinf(self._per_step) else steps * self._per_step
+
+    def took(self, steps: int, seconds: float) -> None:
+        """Measure the speed from a call of `steps` steps (at least one)."""
+        self.seconds = seconds
+        self._per_step = max(seconds, 1e-9) / steps
+
+
+class Rhythm:
+    """When the next checkpoint is due: some seconds after the last one, or later if writing is slow."""
+
+    def __init__(self, seconds: float) -> None:
+        """Begin now; `seconds` is the time between two cheap checkpoints, 0 for one after every call."""
+        self._seconds = seconds
+        self._cost = 0.0
+        self._last = time.monotonic()
+
+    @property
+    def due(self) -> bool:
+        """Whether a checkpoint is due."""
+        return time.monotonic() - self._last >= self._seconds * max(1.0, self._cost / AFFORDED)
+
+    @contextmanager
+    def saving(self) -> Iterator[None]:
+        """Time the writing of a checkpoint."""
+        began = time.monotonic()
+        yield
+        self._last = time.monotonic()
+        self._cost = self._last - began
+
+
+def warn_of_edited_bodies(condition: Condition, store: Store) -> None:
+    """Warn when the store has trials of the condition whose robot had the same file and another body."""
+    now = dict(_bodies(condition.plain))
+    if not now:
+        return
+    errors: list[DamagedFileError] = []
+    here = _without_bodies(condition.plain)
+    old = [
+        result
+        for result in store.results(errors)
+        if result.condition != condition.id
+        and _without_bodies({name: part for name, part in result.spec.items() if name != "seed"}) == here
+    ]
+    if old:
+        names = sorted({name for result in old for name, body in _bodies(result.spec) if now.get(name) != body})
+        warnings.warn(
+            f"The model of the robot {', '.join(names)} was edited: {len(old)} stored trials of {condition.label} are "
+            "of the old body and do not count, so they run again.",
+            stacklevel=2,
+        )
+
+
+def _bodies(plain: Any) -> Iterator[tuple[str, str]]:
+    """Yield names and body hashes of the custom robots in a condition's plain form."""
+    if isinstance(plain, Mapping):
+        if {"xml", "body", "name"} <= plain.keys():
+            yield plain["name"], plain["body"]
+        for part in plain.values():
+            yield from _bodies(part)
+    elif isinstance(plain, list | tuple):
+        for part in plain:
+            yield from _bodies(part)
+
+
+def _without_bodies(plain: Any) -> Any:
+    """Return a condition's plain form without its robots' body hashes."""
+    if isinstance(plain, Mapping):
+        return {name: _without_bodies(part) for name, part in plain.items() if not (name == "body" and "xml" in plain)}
+    return [_without_bodies(part) for part in plain] if isinstance(plain, list | tuple) else plain

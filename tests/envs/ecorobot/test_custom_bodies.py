@@ -14,7 +14,7 @@ from evoclaims.core.canonical import as_plain, content_hash
 from evoclaims.core.errors import UserError
 from evoclaims.envs.ecorobot import model_files
 from evoclaims.envs.ecorobot.boxes import Box
-from evoclaims.envs.ecorobot.obstacles import Locomotion
+from evoclaims.envs.ecorobot.locomotion import Locomotion
 from evoclaims.envs.ecorobot.robots import ROBOTS, Robot
 from evoclaims.envs.ecorobot.scene import Scene
 from evoclaims.methods.random_search import RandomSearch

@@ -16,7 +16,7 @@ from plain_mujoco import quickly_compiled
 from evoclaims.envs.base import Episode, TaskState
 from evoclaims.envs.ecorobot import physics, robot_task
 from evoclaims.envs.ecorobot.deceptive import DeceptiveMaze
-from evoclaims.envs.ecorobot.obstacles import Locomotion
+from evoclaims.envs.ecorobot.locomotion import Locomotion
 from evoclaims.envs.ecorobot.outing import Outing
 from evoclaims.envs.ecorobot.physics import Body
 from evoclaims.envs.ecorobot.pose import torso

@@ -11,7 +11,7 @@ import pytest
 from plain_mujoco import alone
 
 from evoclaims.envs.ecorobot import stones
-from evoclaims.envs.ecorobot.obstacles import Locomotion
+from evoclaims.envs.ecorobot.locomotion import Locomotion
 from evoclaims.envs.ecorobot.robots import ROBOTS
 from evoclaims.envs.ecorobot.scene import WORLD_GROUP, scene
 

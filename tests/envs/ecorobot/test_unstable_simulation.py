@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from evoclaims.envs.ecorobot import physics
-from evoclaims.envs.ecorobot.obstacles import Locomotion
+from evoclaims.envs.ecorobot.locomotion import Locomotion
 from evoclaims.envs.ecorobot.robots import SIMPLE_ROB
 
 TASK = Locomotion(robot=SIMPLE_ROB, episode_steps=10)

@@ -1,4 +1,4 @@
-"""Claims judged within a command: collected by one run of pytest, which ignores the settings of other runs."""
+"""All claims of a project, collected by one run of pytest that ignores the settings of other runs; then judged."""
 
 from __future__ import annotations
 
@@ -6,20 +6,20 @@ import contextlib
 import gc
 import io
 import os
-from collections.abc import Generator, Sequence
-from itertools import zip_longest
+import warnings
+from collections.abc import Collection, Generator, Iterable, Sequence
+from itertools import pairwise, product
 from pathlib import Path
 from typing import Final
 
 import pytest
 
 from evoclaims.claims.collected import claim_tests
-from evoclaims.claims.session import Session
+from evoclaims.claims.judge import broken
+from evoclaims.claims.recording import Collected, Recorder, renew
+from evoclaims.claims.session import SESSION, Session
 from evoclaims.core.errors import UserError, in_one_line
 from evoclaims.paper.config import SuiteConfig
-from evoclaims.plugin.options import SESSION
-from evoclaims.plugin.summary import ATTRIBUTE
-from evoclaims.verdicts import history
 from evoclaims.verdicts.claim_report import ClaimReport
 from evoclaims.verdicts.history import last_runs
 
@@ -40,16 +40,18 @@ MOST_NAMES: Final = 3
 """Most names of tests that an error lists."""
 
 
-def judge(config: SuiteConfig, asked: Sequence[tuple[Session, str]]) -> list[list[ClaimReport]]:
-    """Return the reports of all claims of a tier, for each session and tier asked for; the claims are collected once.
+def collect(config: SuiteConfig, recorders: Sequence[Recorder], tiers: Collection[str]) -> list[list[Collected]]:
+    """Return all claims of some tiers under the protocol of each recorder.
 
-    Options in the project's settings (addopts) and in the environment do not change which claims are judged.
+    Each test is called once, and again for a variant that changes a condition that it asks for.
+
+    Options in the project's settings (addopts) and in the environment do not change which claims are collected.
 
     Raises:
-        UserError: when the claims cannot be collected, or something keeps one from being judged.
+        UserError: when the claims cannot be collected, or something keeps one from being called.
         KeyboardInterrupt: when the run is interrupted.
     """
-    run = _Run(config, asked)
+    run = _Run(config, recorders, tiers)
     errors = io.StringIO()
     with contextlib.redirect_stderr(errors), pytest.MonkeyPatch.context() as environment:
         for name in _ENVIRONMENT:
@@ -75,32 +77,51 @@ def judge(config: SuiteConfig, asked: Sequence[tuple[Session, str]]) -> list[lis
             "@claim(...)."
         )
     run.check_complete()
-    return [last_runs(reports) for reports in run.reports]
+    return [recorder.found for recorder in recorders]
+
+
+def judge_all(session: Session, collected: Iterable[Collected], root: Path) -> list[ClaimReport]:
+    """Return the reports of collected claims from the trials of a session, of the project in `root`."""
+    last: dict[tuple[str, str], ClaimReport] = {}
+    made = []
+    for one in collected:
+        report = one.report
+        if one.assertion is not None:
+            try:
+                # What a project's measures print is not shown, and what they warn of is treated as in the test.
+                with contextlib.redirect_stdout(io.StringIO()), warnings.catch_warnings(record=True):
+                    warnings.filters = list(one.filters)
+                    report = session.settle(one.test, one.assertion, one.readings)
+            except KeyboardInterrupt:
+                raise
+            except BaseException as error:
+                report = broken(one.test, error, root)
+        if not one.skipped:
+            report = last[one.test.key] = session.complete(report, one.expectation, last.get(one.test.key))
+        made.append(report)
+    return last_runs(made)
 
 
 class _Run:
-    """A pytest plugin that takes no options from outside, judges claims in several ways, and keeps their reports."""
+    """A pytest plugin that takes no options from outside, and calls claims under several protocols."""
 
-    def __init__(self, config: SuiteConfig, asked: Sequence[tuple[Session, str]]) -> None:
+    def __init__(self, config: SuiteConfig, recorders: Sequence[Recorder], tiers: Collection[str]) -> None:
         """Start empty."""
         self.claims = config.root / config.claims
-        tiers = " or ".join({tier: None for _, tier in asked})
         # From the current folder, since pytest reads [, :: and $ in an argument as more than a path.
         claims, root = (os.path.join(os.curdir, os.path.relpath(path)) for path in (self.claims, config.root))
-        self.arguments = (claims, f"--rootdir={root}", f"-m{tiers}", *_ALONE)
-        self.reports: list[list[ClaimReport]] = [[] for _ in asked]
+        self.arguments = (claims, f"--rootdir={root}", f"-m{' or '.join(tiers)}", *_ALONE)
+        self.recorders = recorders
         self.troubles: list[str] = []
         self.interrupted = False
         self.files = self.functions = ""
         self._root = config.root
-        self._asked = asked
+        self._tiers = tiers
         self._collected: list[pytest.Item] = []
-        self._now: list[ClaimReport] = []
-        self._last: object = None
 
     def pytest_configure(self, config: pytest.Config) -> None:
         """Keep the plugin from making a session of its own."""
-        config.stash[SESSION] = self._asked[0][0]
+        config.stash[SESSION] = self.recorders[0]
         self.files = " or ".join(config.getini("python_files"))
         self.functions = " or ".join(f"{name.removesuffix('*')}*" for name in config.getini("python_functions"))
 
@@ -144,26 +165,26 @@ class _Run:
 
     @pytest.hookimpl(tryfirst=True)
     def pytest_runtestloop(self, session: pytest.Session) -> bool:
-        """Run the claims of a tier once for each session that asks for it."""
+        """Call each claim once under each protocol that changes what it asks for."""
         claims = claim_tests(session.items)
-        for (judging, tier), reports in zip(self._asked, self.reports, strict=True):
-            session.config.stash[SESSION], self._now = judging, reports
-            items = [item for item in session.items if item in claims and claims[item].tier == tier]
-            for item, following in zip_longest(items, items[1:]):
+        known: dict[pytest.Item, list[list[Collected]]] = {item: [] for item in claims}
+        for recorder in self.recorders:
+            session.config.stash[SESSION] = recorder
+            recorder.tests.update((test.key, test) for test in claims.values())
+            same = {item: _same(recorder, before) for item, before in known.items()}
+            items = [item for item in known if not same[item]]
+            following = dict(pairwise(items))
+            for item in known:
                 if self.troubles or session.shouldstop or session.shouldfail:
                     return True
-                session.config.hook.pytest_runtest_protocol(item=item, nextitem=following)
-                if isinstance(item.parent, pytest.Class):  # a test that runs again needs a new object of its class, too
-                    vars(item).pop("_instance", None)
-                    vars(item).pop("_obj", None)
+                if same[item]:
+                    recorder.found.extend(same[item])
+                    continue
+                begun = len(recorder.found)
+                session.config.hook.pytest_runtest_protocol(item=item, nextitem=following.get(item))
+                known[item].append(recorder.found[begun:])
+                renew(item)
         return True
-
-    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
-        """Keep a claim's report."""
-        plain = getattr(report, ATTRIBUTE, None)
-        if plain is not None and plain is not self._last:  # the report of a test's end has it, too
-            self._now.append(ClaimReport.from_json(plain))
-            self._last = plain
 
     @property
     def has_claims(self) -> bool:
@@ -177,10 +198,10 @@ class _Run:
             UserError: when there are such claims.
         """
         tests = {item.nodeid: test for item, test in claim_tests(self._collected).items()}
-        for (_, tier), reports in zip(self._asked, self.reports, strict=True):
-            judged = {history.key_of(report) for report in reports}
+        for recorder, tier in product(self.recorders, self._tiers):
+            called = {one.test.key for one in recorder.found}
             wanted = {name: test for name, test in tests.items() if test.tier == tier}
-            left = [name for name, test in wanted.items() if test.key not in judged]
+            left = [name for name, test in wanted.items() if test.key not in called]
             if left:
                 listed = ", ".join(left[:MOST_NAMES]) + (" and others" if len(left) > MOST_NAMES else "")
                 raise UserError(
@@ -188,6 +209,11 @@ class _Run:
                     f"judged ({listed}): a plugin, a conftest.py or pytest.exit() left them out. Mark a "
                     "claim that is not to be judged with pytest.mark.skip."
                 )
+
+
+def _same(recorder: Recorder, before: Iterable[list[Collected]]) -> list[Collected]:
+    """Return what a test asserted under another protocol, if it would assert the same under that of a recorder."""
+    return next((found for found in before if found and all(map(recorder.has_conditions_of, found))), [])
 
 
 def _sentence(error: BaseException, root: Path) -> str:

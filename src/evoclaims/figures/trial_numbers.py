@@ -26,7 +26,7 @@ COLUMNS = (*PLACE, *WHAT, "seed", "trial", "status", "value", "error")
 
 
 @dataclass(frozen=True)
-class Reading:
+class TrialNumber:
     """One trial's number.
 
     Attributes:
@@ -45,7 +45,7 @@ class Reading:
 
 
 @dataclass(frozen=True)
-class Readings:
+class TrialNumbers:
     """A measure of a condition's trials.
 
     Attributes:
@@ -57,22 +57,22 @@ class Readings:
     method: str
     task: str
     name: str
-    each: tuple[Reading, ...]
+    each: tuple[TrialNumber, ...]
 
     @property
     def values(self) -> tuple[float, ...]:
         """The numbers that can be drawn."""
-        return tuple(reading.value for reading in self.each if reading.value is not None)
+        return tuple(number.value for number in self.each if number.value is not None)
 
     @property
     def ranks(self) -> tuple[float, ...]:
         """What rank tests use."""
-        return tuple(reading.rank for reading in self.each if reading.rank is not None)
+        return tuple(number.rank for number in self.each if number.rank is not None)
 
     @property
     def broken(self) -> int:
         """How many trials ran and gave no number."""
-        return sum(reading.value is None and reading.status != NOT_RUN for reading in self.each)
+        return sum(number.value is None and number.status != NOT_RUN for number in self.each)
 
     @property
     def incomplete(self) -> bool:
@@ -101,14 +101,14 @@ class Readings:
         return [*rows, {**names, **summary}] if self.values else rows
 
 
-def read(scope: Scope, method: str, task: str, measure_of: MeasureOf) -> Readings:
+def read(scope: Scope, method: str, task: str, measure_of: MeasureOf) -> TrialNumbers:
     """Read a measure from every trial that the scope's tier looks at."""
     group = scope.group(method, task)
     measure = measure_of(group)
     trials = scope.archive.trials(group.condition, scope.seeds)
     ids = [TrialSpec(group.condition, seed).id for seed in scope.seeds]
-    each = [_reading(measure, *found) for found in zip(scope.seeds, ids, trials, strict=True)]
-    return Readings(method, task, measure.name, tuple(each))
+    each = [_number(measure, *found) for found in zip(scope.seeds, ids, trials, strict=True)]
+    return TrialNumbers(method, task, measure.name, tuple(each))
 
 
 def frame(rows: Iterable[Mapping[str, Any]], *more: str) -> Any:
@@ -118,9 +118,9 @@ def frame(rows: Iterable[Mapping[str, Any]], *more: str) -> Any:
     return pd.DataFrame(list(rows), columns=[*COLUMNS, *more]).astype(dict.fromkeys(("n", "seed", *more), "Int64"))
 
 
-def absences(readings: Iterable[Readings]) -> tuple[str, ...]:
+def absences(numbers: Iterable[TrialNumbers]) -> tuple[str, ...]:
     """Say which trials are missing and which gave no number, each condition once."""
-    kept = {(one.method, one.task): one for one in readings}
+    kept = {(one.method, one.task): one for one in numbers}
     absent = [_name(one) for one in kept.values() if all(r.status == NOT_RUN for r in one.each)]
     partial = [one for one in kept.values() if 0 < _count(one, NOT_RUN) < len(one.each)]
     sentences = [f"Not run: {', '.join(absent)}."] if absent else []
@@ -133,30 +133,30 @@ def absences(readings: Iterable[Readings]) -> tuple[str, ...]:
     return tuple(sentences)
 
 
-def _reading(measure: Measure, seed: int, trial_id: str, trial: TrialResult | None) -> Reading:
+def _number(measure: Measure, seed: int, trial_id: str, trial: TrialResult | None) -> TrialNumber:
     if trial is None:
-        return Reading(seed, trial_id, NOT_RUN, None, None)
+        return TrialNumber(seed, trial_id, NOT_RUN, None, None)
     if trial.status == "crashed":  # an accident of the machine, which says nothing about the method
-        return Reading(seed, trial_id, trial.status, None, None)
+        return TrialNumber(seed, trial_id, trial.status, None, None)
     if is_failed(trial):
-        return Reading(seed, trial_id, trial.status, None, -math.inf if measure.better == "higher" else math.inf)
+        return TrialNumber(seed, trial_id, trial.status, None, -math.inf if measure.better == "higher" else math.inf)
     try:
         value = float(measure.read(checked(trial)))
     except MissingNumberError:
-        return Reading(seed, trial_id, NOT_MEASURED, None, None)
+        return TrialNumber(seed, trial_id, NOT_MEASURED, None, None)
     except UnreadableTrialError:  # NaN
         value = math.nan
     if math.isfinite(value):
-        return Reading(seed, trial_id, trial.status, value, value)
-    return Reading(seed, trial_id, NOT_FINITE, None, None if math.isnan(value) else value)
+        return TrialNumber(seed, trial_id, trial.status, value, value)
+    return TrialNumber(seed, trial_id, NOT_FINITE, None, None if math.isnan(value) else value)
 
 
-def _count(readings: Readings, status: str) -> int:
-    return sum(reading.status == status for reading in readings.each)
+def _count(numbers: TrialNumbers, status: str) -> int:
+    return sum(number.status == status for number in numbers.each)
 
 
-def _name(readings: Readings) -> str:
-    return printable(f"{readings.method} on {readings.task}")
+def _name(numbers: TrialNumbers) -> str:
+    return printable(f"{numbers.method} on {numbers.task}")
 
 
 def _end(status: str) -> str:

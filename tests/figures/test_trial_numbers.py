@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from evoclaims.figures.readings import COLUMNS, absences, frame, read
+from evoclaims.figures.trial_numbers import COLUMNS, absences, frame, read
 
 
 def _read(paper: Any, method: str = "one", task: str = "small") -> Any:
@@ -27,8 +27,8 @@ def test_a_trial_without_a_number_has_a_status_and_no_value(paper: Any) -> None:
 
 def test_an_infinite_number_is_not_drawn_but_has_its_rank(paper: Any) -> None:
     paper.put("one", "small", [math.inf])
-    reading = read(paper.scope, "one", "small", lambda trials: trials.reward).each[0]
-    assert (reading.status, reading.value, reading.rank) == ("not finite", None, math.inf)
+    number = read(paper.scope, "one", "small", lambda trials: trials.reward).each[0]
+    assert (number.status, number.value, number.rank) == ("not finite", None, math.inf)
 
 
 def test_mean_and_deviation_are_numpys(paper: Any) -> None:

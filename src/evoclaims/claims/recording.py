@@ -1,0 +1,219 @@
+"""A claim's test called once without trials: what it asserts, and which trials it asks for."""
+
+from __future__ import annotations
+
+import inspect
+import warnings
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import pytest
+
+from evoclaims.claims.claim import TIER, ClaimTest, Expectation, gap_of
+from evoclaims.claims.fetching import NotStoredError
+from evoclaims.claims.judge import Reading, unjudged
+from evoclaims.claims.session import Session
+from evoclaims.core.errors import UserError
+from evoclaims.judging.assertion import Assertion
+from evoclaims.judging.measure import Event, Measure, Profile
+from evoclaims.judging.reading import TrialReading
+from evoclaims.judging.sample import Source
+from evoclaims.judging.verdict import Outcome
+from evoclaims.paper.reproduction import Names
+from evoclaims.paper.trial_group import TrialGroup
+from evoclaims.trials.result import TrialResult
+from evoclaims.trials.spec import Condition
+from evoclaims.verdicts.claim_report import ClaimReport
+from evoclaims.verdicts.history import key_of
+from evoclaims.verdicts.readings import moment
+
+
+@dataclass(frozen=True)
+class Collected:
+    """A claim's test, after it was called.
+
+    Attributes:
+        test: the claim, the tier and the case.
+        report: what is known without trials: why nothing is asserted, where the test broke, is skipped or missing.
+        expectation: the accepted outcome.
+        skipped: whether the test is skipped, or missing at its tier.
+        assertion: what it passes to `verdict(...)`; None where it did not get there.
+        readings: further readings of the sentence.
+        asked: the trials that it asked for.
+        filters: what becomes of warnings in it, by the project's settings and its marks.
+    """
+
+    test: ClaimTest
+    report: ClaimReport
+    expectation: Expectation | None = None
+    skipped: bool = False
+    assertion: Assertion | None = None
+    readings: tuple[Reading, ...] = ()
+    asked: tuple[TrialGroup, ...] = ()
+    filters: tuple[Any, ...] = ()
+
+    @property
+    def groups(self) -> dict[Names, TrialGroup]:
+        """The conditions that the assertion is about."""
+        sources: tuple[Source, ...] = self.assertion.sources() if self.assertion is not None else ()
+        return {(group.method, group.task): group for group in sources if isinstance(group, TrialGroup)}
+
+    @property
+    def reads(self) -> tuple[TrialReading, ...]:
+        """What the assertion reads from their trials."""
+        return self.assertion.readings() if self.assertion is not None else ()
+
+    @property
+    def expected(self) -> Outcome:
+        """The outcome that the claim should have: the accepted one, or supported."""
+        accepted = self.expectation
+        return accepted.outcome if accepted is not None and accepted.outcome.judged else Outcome.SUPPORTED
+
+
+def never(condition: Condition, seeds: Sequence[int]) -> Sequence[TrialResult]:
+    """Have no trials."""
+    raise NotStoredError(f"{condition.label} is not run yet")
+
+
+@dataclass(frozen=True)
+class Recorder(Session):
+    """A session that judges nothing, and keeps what each test asserts.
+
+    Attributes:
+        tests: what each test judges, by `ClaimTest.key`; filled in before tests are called.
+        found: what has been collected so far, in the order of the calls.
+    """
+
+    tests: dict[tuple[str, str], ClaimTest] = field(default_factory=dict)
+    found: list[Collected] = field(default_factory=list)
+    _asked: list[TrialGroup] = field(default_factory=list)
+    _asserted: list[tuple[ClaimReport, dict[str, Any]]] = field(default_factory=list)
+
+    @staticmethod
+    def of(session: Session) -> Recorder:
+        """Return a recorder for the protocol of a session."""
+        return Recorder(session.reproduction, session.store, never, session.trials, session.variant)
+
+    def group(self, method: str, on: str, tier: str) -> TrialGroup:
+        """Return trials that are never run, and note that they were asked for."""
+        self._asked.append(super().group(method, on, tier))
+        return self._asked[-1]
+
+    def settle(self, test: ClaimTest, assertion: Assertion, others: Sequence[Reading] = ()) -> ClaimReport:
+        """Keep an assertion."""
+        report = unjudged(test, Outcome.NOT_RUN, "it is not judged")
+        more = {"assertion": assertion, "readings": tuple(others), "filters": tuple(warnings.filters)}
+        self._asserted[:] = [(report, more)]
+        return report
+
+    def complete(
+        self, report: ClaimReport, expectation: Expectation | None, last: ClaimReport | None = None
+    ) -> ClaimReport:
+        """Note that a test has ended; what it asserts counts unless it broke after that."""
+        kept: dict[str, Any] = next((more for settled, more in self._asserted if settled is report), {})
+        self._note(report, expectation=expectation, **kept)
+        return report
+
+    def skipped(self, report: ClaimReport) -> ClaimReport:
+        """Note that a test was skipped."""
+        self._note(report, skipped=True)
+        return report
+
+    def _note(self, report: ClaimReport, **more: Any) -> None:
+        self.found.append(Collected(self.tests[key_of(report)], report, asked=tuple(self._asked), **more))
+        self._asked.clear()
+        self._asserted.clear()
+
+    def has_conditions_of(self, one: Collected) -> bool:
+        """Whether a test, called under this protocol, would ask for the same conditions and so assert the same."""
+        conditions = self.reproduction.tier(one.test.tier, self.variant).conditions
+        return one.assertion is not None and all(
+            (known := conditions.get((group.method, group.task))) is not None and known.id == group.fingerprint
+            for group in one.asked
+        )
+
+    def call(self, item: pytest.Item, test: ClaimTest) -> Collected:
+        """Call a test within the run of pytest that it belongs to, without the fixtures and marks of the run.
+
+        Nothing is asserted by a test with fixtures of its own, which are for the run itself. What a test raises is
+        reported when it is run.
+        """
+        verdicts = VerdictFixture(lambda assertion, others: self.settle(test, assertion, others))
+        trials = lambda method, *, on: self.group(method, on, test.tier)  # noqa: E731
+        function: Callable[..., Any] = item.obj  # type: ignore[attr-defined]
+        given = {**item.callspec.params, TIER: test.tier, "trials": trials, "verdict": verdicts}  # type: ignore[attr-defined]
+        names = inspect.signature(function).parameters
+        if not gap_of(item, test.tier) and set(names) <= set(given):
+            try:
+                with warnings.catch_warnings(action="ignore"):
+                    function(**{name: given[name] for name in names})
+            except KeyboardInterrupt:
+                raise
+            except BaseException:  # noqa: S110  (pytest's own outcomes, such as a skip, are no `Exception`)
+                pass
+            renew(item)
+        self.tests[test.key] = test
+        self.complete(verdicts.report or unjudged(test, Outcome.NOT_RUN, "it asserts nothing"), None)
+        return self.found[-1]
+
+
+def renew(item: pytest.Item) -> None:
+    """Let a test that is called again have a new object of its class."""
+    if isinstance(item.parent, pytest.Class):
+        vars(item).pop("_instance", None)
+        vars(item).pop("_obj", None)
+
+
+@dataclass
+class VerdictFixture:
+    """The `verdict` fixture: takes exactly one assertion per test, settles it, and keeps its report."""
+
+    settle: Callable[[Assertion, Sequence[Reading]], object]
+    report: Any = None
+    readings: list[Reading] = field(default_factory=list)
+
+    def __call__(self, assertion: Assertion) -> None:
+        """Judge the claim's assertion.
+
+        Raises:
+            UserError: for a second assertion, or a value that is not one.
+        """
+        if not isinstance(assertion, Assertion):
+            alone = isinstance(assertion, Measure | Event | Profile)
+            if callable(assertion):
+                name = getattr(assertion, "__name__", type(assertion).__name__)
+                raise UserError(f"verdict(...) was given the function {name} itself: call it, as in {name}().")
+            raise UserError(
+                f"verdict(...) takes an assertion about trials, such as verdict(a.mean_success > b.mean_success), "
+                f"not {f'{assertion.name!r} alone: compare it with something' if alone else repr(assertion)}."
+            )
+        if self.report is not None:
+            raise UserError("A claim has one verdict: join several assertions with & (and) or | (or).")
+        self.report = self.settle(assertion, self.readings)
+
+    def reading(self, name: str, assertion: Assertion, *, because: str, since: str) -> None:
+        """Add another reading of the claim's sentence, before `verdict(...)`: the verdict shows whether it depends.
+
+        It counts where the paper's own sentence is judged, not at a tier with a smaller statement.
+
+        Args:
+            name: a few words.
+            assertion: what the sentence says if it is read so.
+            because: why it may be read so.
+            since: when the reading was written, such as "2026-11-26" or "2026-11-26 14:30" (UTC).
+
+        Raises:
+            UserError: after the verdict, for a name that is taken, a missing text, or something else than a date or an
+                assertion.
+        """
+        if self.report is not None:
+            raise UserError(f"The reading {name!r} comes after the verdict: write verdict.reading(...) before it.")
+        if not isinstance(assertion, Assertion):
+            raise UserError(
+                f"The reading {name!r} is {assertion!r}, which is not an assertion. Write one, as for verdict(...)."
+            )
+        if not (name.strip() and because.strip()) or name in (one.name for one in self.readings):
+            raise UserError(f"The reading {name!r} needs a unique name and because=...: why the sentence means this.")
+        moment(since)
+        self.readings.append(Reading(name, assertion, because, since))
