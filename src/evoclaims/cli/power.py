@@ -81,7 +81,7 @@ def main(options: argparse.Namespace) -> int:
     design = project.reproduction.tier(options.tier).design
     if options.draws < 1:
         raise UserError(f"--draws takes a number from 1 up, not {options.draws}.")
-    every = _claims(project, options.tier)
+    every = claims_of(project, options.tier)
     chosen = only(every, options.only)
     pilots = Pilots(project.reproduction, options.tier, every)
     wanted = {names: group.condition for one in chosen for names, group in one.groups.items()}
@@ -104,7 +104,8 @@ def main(options: argparse.Namespace) -> int:
     return int(not all(one.suffices for one in powers))
 
 
-def _claims(project: Project, tier: str) -> tuple[Asserted, ...]:
+def claims_of(project: Project, tier: str) -> tuple[Asserted, ...]:
+    """Return the claims of a tier that have a test there, and what they assert; nothing is judged."""
     store = project.archive.store
     listening = Listening(project.reproduction, store, StoredOnly(project.archive))
     (reports,) = project.judge_sessions([(listening, tier)])
