@@ -1,7 +1,7 @@
 """What `evoclaims watch` finds, and how often it is wrong: nights drawn from the committed smoke trials.
 
-Nights draw seeds with replacement from the reference trials and pilots, whole trials of all conditions together. Under a
-shift, trials of a method's conditions are drawn with weights exp(shift · z), where z is the normal score of the first
+Nights draw seeds with replacement from the reference trials and pilots, whole trials of all conditions together. Under
+a shift, trials of a method's conditions are drawn with weights exp(shift · z), where z is the normal score of the first
 measure that varies: a normal measure would move by so many standard deviations, and no value is a new one.
 
     python benchmarks/watch_power.py [RUNS] [NIGHTS]
@@ -38,10 +38,10 @@ def main() -> None:
     methods = [one for one in watch.families if one.of_method and one.moves]
     for shift in (0.5, 0.8):
         for family in sorted(methods, key=lambda one: -len(one.conditions)):
-            found = [first_alarm(watch, [family], run, 8, shift) for run in range(runs)]
+            found = [first_alarm(watch, [family], run, 6, shift) for run in range(runs // 2)]
             print(
                 f"{shift:g} SD in {family.label}, {len(family.conditions)} conditions: night "
-                f"{statistics.median(found):g} in the median (9: later), {found.count(1)} of {runs} on the first",
+                f"{statistics.median(found):g} in the median (7: later), {found.count(1)} of {len(found)} on the first",
                 flush=True,
             )
 

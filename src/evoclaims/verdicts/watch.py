@@ -38,8 +38,9 @@ ALPHA: Final = 0.05
 PROCESS: Final = 1
 """Raised when evidence is computed otherwise, which begins a new series."""
 
-MOST_MOVED: Final = 3
-"""Most measures that an alarm names."""
+MOST_MOVED, SHOWN = 3, 2.5
+"""Most measures that an alarm names, and the size of a difference that is named beside the largest: its A12 - 0.5 in
+standard deviations of what chance gives."""
 
 
 @dataclass(frozen=True)
@@ -147,8 +148,7 @@ class Family:
         return [float(largest) for largest in np.max(paths, axis=0)]
 
     def _of_sum(self, nights: Sequence[Night]) -> Floats:
-        name = f"{self.label} ({len(self.conditions)})"
-        return _by_ranks(name, self.conditions[0].seeds, nights, lambda until: _scores(self.conditions, until)[0])
+        return _by_ranks(self.label, self.conditions[0].seeds, nights, lambda until: _scores(self.conditions, until)[0])
 
     def nights_to_find(self, shift: float, each: int, level: float) -> int | None:
         """Return the median number of nights to an alarm if all its measures get better by `shift` SD.
@@ -170,7 +170,6 @@ def families(conditions: Sequence[Watched]) -> tuple[Family, ...]:
         for one in conditions:
             together.setdefault((one.names[0 if of_method else 1], one.seeds), []).append(one)
         for (name, _), those in together.items():
-            alike = sum(other == name for other, _ in together)
             label = name if of_method else f"task {name}"
             if sum(other == name for other, _ in together) > 1:
                 label += f" ({', '.join(one.names[1 if of_method else 0] for one in those)})"
@@ -228,14 +227,16 @@ class Watch:
 
 def _alarm(family: Family, nights: Sequence[Night], at: int) -> list[str]:
     """Return lines on an alarm of the night at an index: when, what moved, and what changed since it began to."""
-    path = [0.5 if family.of_method else 1.0, *(night.evidence[family.label] for night in nights[: at + 1])]
-    quiet = path.index(min(path[:-1]))  # nights before the evidence began to grow
+    path = [0.0, *(night.evidence[family.label] for night in nights[: at + 1])]
+    quiet = max(index for index, found in enumerate(path) if found < 1)  # nights before the evidence grew
     packages = sorted({name for one in family.conditions for name in one.condition.packages})
     now = {name: nights[at].versions.get(name) for name in packages}
     committed = {name: version for one in family.conditions for name, version in one.versions.items()}
     moments = [("the committed trials", committed)]
     if quiet:
-        moments.insert(0, (f"night {quiet} ({nights[quiet - 1].date}), before it grew", nights[quiet - 1].versions))
+        moments.insert(
+            0, (f"night {quiet} ({nights[quiet - 1].date}), before evidence grew", nights[quiet - 1].versions)
+        )
     lines = [f"ALARM on {nights[at].date}, night {at + 1}: {family.label}: evidence {path[-1]:.3g}"]
     lines += [f"  moved: {text}" for text in _moved(family, nights[quiet:])]
     for moment, versions in moments:
@@ -255,7 +256,8 @@ def _moved(family: Family, nights: Sequence[Night]) -> list[str]:
         says = f"{one.label}: {measure} is {way}: median {median(was):.6g} -> {median(new):.6g}, A12 = {effect:.2f}"
         # Standardized by the spread of A12 where nothing moved.
         found.append((abs(effect - 0.5) / math.sqrt((1 / len(was) + 1 / len(new)) / 12), says))
-    return [says for size, says in sorted(found, key=lambda item: -item[0])[:MOST_MOVED] if size > 1]
+    found.sort(key=lambda item: -item[0])
+    return [says for size, says in found[:MOST_MOVED] if size > min(SHOWN, found[0][0] / 2)]
 
 
 def _scores(conditions: Sequence[Watched], nights: Sequence[Night]) -> tuple[Floats, float]:
