@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from msgspec import structs
 
 from evoclaims.core.errors import UserError
 from evoclaims.verdicts import watch_file
@@ -34,7 +35,7 @@ def night(watch: Watch, number: int, draw: Any, evosax: str = "1", before: tuple
     versions = {"evosax": evosax, "numpy": "2"}
     made = Night(f"2026-01-{number + 1:02}", "smoke", 1, watch.rules, seeds, "cpu", watch.level, versions, values, {})
     evidence = {one.label: one.path((*before, made))[-1] for one in watch.families}
-    return Night(**{name: getattr(made, name) for name in made.__struct_fields__} | {"evidence": evidence})
+    return structs.replace(made, evidence=evidence)
 
 
 def nights(watch: Watch, count: int, draw: Any) -> tuple[Night, ...]:
@@ -116,6 +117,7 @@ def test_an_alarm_names_measures_and_versions_and_stays() -> None:
         after = night(watch, number, lambda label: normal(rng, shift[label], 10), "1.1", series)
         series = (*series, after)
     quiet = night(watch, 5, lambda _: normal(rng, n=10), "1.1", series)
+    quiet = structs.replace(quiet, evidence={"m": 0.1})
     lines = watch.alarms((*series, quiet))["m"]
     assert lines[0].startswith("ALARM on 2026-01-0")
     assert lines[1].startswith("  moved: m on a: score is higher: median ")

@@ -8,6 +8,8 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Final
 
+from msgspec import structs
+
 from evoclaims.claims.power import Pilots
 from evoclaims.cli.power import claims_of
 from evoclaims.cli.processes.execution import Execution
@@ -131,7 +133,7 @@ def _night(watch: Watch, trials: Mapping[str, Sequence[TrialResult]], going_on: 
         evidence={},
     )
     evidence = {family.label: family.path((*going_on, night))[-1] for family in watch.families}
-    return Night(**{name: getattr(night, name) for name in night.__struct_fields__} | {"evidence": evidence})
+    return structs.replace(night, evidence=evidence)
 
 
 def _headings() -> tuple[str, ...]:
