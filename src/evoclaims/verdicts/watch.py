@@ -29,7 +29,6 @@ from evoclaims.paper import references
 from evoclaims.paper.reproduction import Names
 from evoclaims.trials.result import COMPLETE, TrialResult
 from evoclaims.trials.spec import Condition
-from evoclaims.verdicts.source_trials import change
 from evoclaims.verdicts.watch_file import Night
 
 ALPHA: Final = 0.05
@@ -226,23 +225,21 @@ class Watch:
 
 
 def _alarm(family: Family, nights: Sequence[Night], at: int) -> list[str]:
-    """Return lines on an alarm of the night at an index: when, what moved, and what changed since it began to."""
+    """Return lines on an alarm of the night at an index: when, what moved, and which versions are others."""
     path = [0.0, *(night.evidence[family.label] for night in nights[: at + 1])]
     quiet = max(index for index, found in enumerate(path) if found < 1)  # nights before the evidence grew
-    packages = sorted({name for one in family.conditions for name in one.condition.packages})
-    now = {name: nights[at].versions.get(name) for name in packages}
-    committed = {name: version for one in family.conditions for name, version in one.versions.items()}
-    moments = [("the committed trials", committed)]
-    if quiet:
-        moments.insert(
-            0, (f"night {quiet} ({nights[quiet - 1].date}), before evidence grew", nights[quiet - 1].versions)
-        )
     lines = [f"ALARM on {nights[at].date}, night {at + 1}: {family.label}: evidence {path[-1]:.3g}"]
     lines += [f"  moved: {text}" for text in _moved(family, nights[quiet:])]
-    for moment, versions in moments:
-        changed = change({name: versions.get(name) for name in packages}, now)
-        lines.append(f"  versions changed since {moment}: {changed or 'none'}")
-    return lines
+    changed = []
+    for name in sorted({name for one in family.conditions for name in one.condition.packages}):
+        versions = [night.versions.get(name) for night in nights[: at + 1]]
+        committed = next((one.versions[name] for one in family.conditions if one.versions.get(name)), None)
+        if versions[-1] != committed:
+            since = max(
+                (index for index, version in enumerate(versions, start=1) if version != versions[-1]), default=0
+            )
+            changed.append(f"{name} {committed or 'none'} -> {versions[-1] or 'none'} since night {since + 1}")
+    return [*lines, f"  versions against the committed trials: {', '.join(changed) or 'the same'}"]
 
 
 def _moved(family: Family, nights: Sequence[Night]) -> list[str]:
