@@ -11,12 +11,13 @@ from pathlib import Path
 import pytest
 
 from evoclaims.cli.arguments import parser
+from evoclaims.verdicts import watch_file
 from evoclaims.verdicts.transitions import parse_patterns
 
 ROOT = Path(__file__).parents[1]
-TEXT, WEEKLY, SITE = (
+TEXT, WEEKLY, NIGHTLY, SITE = (
     (ROOT / ".github" / "workflows" / name).read_text(encoding="utf-8")
-    for name in ("claims.yml", "releases.yml", "site.yml")
+    for name in ("claims.yml", "releases.yml", "watch.yml", "site.yml")
 )
 COMMANDS = [shlex.split(line)[1:] for line in re.findall(r"\.tox/smoke/bin/(evoclaims .*)", TEXT)]
 (ACROSS,) = (line.replace("${{ matrix.package }}", "jax") for line in re.findall(r"run: evoclaims (.*)", WEEKLY))
@@ -62,7 +63,22 @@ def test_the_text_of_an_issue_is_kept_where_something_changed_and_only_there() -
     assert kept == [("${{ failure() && hashFiles('issue.md') != '' }}", options.out)]
 
 
-@pytest.mark.parametrize("text", [TEXT, WEEKLY, SITE], ids=["claims", "releases", "site"])
+def test_every_night_new_seeds_run_and_the_nights_before_are_found_again() -> None:
+    (command,) = re.findall(r"run: evoclaims (.*)", NIGHTLY)
+    options = parser().parse_args(shlex.split(command))
+    assert (options.command, options.tier, options.form, options.out) == ("watch", "smoke", "markdown", "issue.md")
+    assert re.search(r'\n  schedule:\n    - cron: "\d+ \d+ \* \* \*"\n', NIGHTLY)
+    steps = re.findall(r"uses: actions/cache/(\w+)@v4\n +with:\n +path: (\S+)\n +key: (watch-)", NIGHTLY)
+    assert {name: path for name, path, _ in steps} == dict.fromkeys(
+        ("restore", "save"), f"reproductions/nisioti2025/{watch_file.FILE}"
+    )
+    kept = re.findall(r"if: (.*)\n +uses: actions/cache/save", NIGHTLY)
+    assert [text.startswith("${{ always() ") for text in kept] == [True]  # a night with an alarm counts, too
+    issue = re.findall(r"if: (.*)\n +uses: actions/upload-artifact@v4\n +with:\n.*\n +path: (\S+)\n", NIGHTLY)
+    assert ("${{ failure() && hashFiles('issue.md') != '' }}", options.out) in issue
+
+
+@pytest.mark.parametrize("text", [TEXT, WEEKLY, NIGHTLY, SITE], ids=["claims", "releases", "watch", "site"])
 def test_the_workflow_reads_and_changes_nothing_and_knows_no_secret(text: str) -> None:
     assert re.search(r"\npermissions:\n  contents: read\n\n", text)
     assert text.count("permissions:") == 1
@@ -71,11 +87,11 @@ def test_the_workflow_reads_and_changes_nothing_and_knows_no_secret(text: str) -
     assert "evoclaims accept" not in text
 
 
-@pytest.mark.parametrize(("text", "count"), [(TEXT, 5), (WEEKLY, 3), (SITE, 3)], ids=["claims", "releases", "site"])
+@pytest.mark.parametrize(("text", "count"), [(TEXT, 5), (WEEKLY, 3), (NIGHTLY, 6), (SITE, 3)])
 def test_every_action_is_held_to_a_major_version(text: str, count: int) -> None:
     actions = re.findall(r"uses: (\S+)", text)
     assert len(actions) == count
-    assert all(re.fullmatch(r"actions/[a-z-]+@v\d+", action) for action in actions)
+    assert all(re.fullmatch(r"actions/[a-z/-]+@v\d+", action) for action in actions)
 
 
 def test_the_site_is_built_where_it_is_kept_and_its_packages_are_pinned() -> None:

@@ -75,6 +75,10 @@ class Pilots:
         """Return a clause that says why a condition has no pilot for the claims; empty if it has one."""
         return self._unfit[names]
 
+    def reads(self, names: Names, trial: TrialResult) -> tuple[str, ...]:
+        """Return the names of what claims read of a condition's trial."""
+        return pilots.read_of(trial, self._readings[names])
+
     def write(self, names: Names, trials: Collection[TrialResult]) -> str:
         """Write trials (at least one) as the pilot of a condition, and return the file's path."""
         path = pilots.path_of(self._folder, self._tier, *names)

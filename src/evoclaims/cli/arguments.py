@@ -14,8 +14,8 @@ _TIERS = {
 }
 """Defaults of --tier, and how it is explained, where they are not those of the other commands."""
 
-_ON_DEVICES = {"plan", "run", "submit", "mutants", "power", "champion", "look", "across", "bisect"}
-IN_PROCESSES = {"run", "mutants", "power"}
+_ON_DEVICES = {"plan", "run", "submit", "mutants", "power", "champion", "look", "across", "bisect", "watch"}
+IN_PROCESSES = {"run", "mutants", "power", "watch"}
 _PROCESSES = (
     "number of processes that run trials (1: this one, on all devices); auto: one per GPU, or without GPUs as many as "
     "keep the cores busy"
@@ -243,6 +243,18 @@ def _comparing(add: _Add) -> None:
     )
 
     compare.add_argument("--out", metavar="FILE", help="with --timeline: also draw it over dates and versions, as SVG")
+
+    watch = add(
+        "watch",
+        "run new seeds and add up the evidence of all nights that trials have changed since the committed ones; writes "
+        "watch.toml, which you commit; exit status 1 on an alarm",
+    )
+    watch.add_argument("--trials", type=int, metavar="N", help="new trials per condition (default: the tier's)")
+    watch.add_argument(
+        "--restart", action="store_true", help="begin a new series of nights, such as after an alarm was looked into"
+    )
+    watch.add_argument("--as", dest="form", metavar="FORM", help="also write it: markdown, as the text of an issue")
+    watch.add_argument("--out", metavar="FILE", help="file to write (report/watch.md)")
 
     across = add(
         "across",

@@ -21,7 +21,7 @@ from evoclaims.figures.replication import replications
 from evoclaims.figures.sheet import svg
 from evoclaims.paper.archive import Archive
 from evoclaims.paper.reproduction import Reproduction
-from evoclaims.report import across, table_cells
+from evoclaims.report import across, table_cells, watch_chart
 from evoclaims.report.build import gather
 from evoclaims.report.champion import network
 from evoclaims.report.formatting import listed
@@ -31,7 +31,7 @@ from evoclaims.report.model import PaperFigure
 from evoclaims.trials import devices
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.spec import Condition
-from evoclaims.verdicts import history, mutation_matrix
+from evoclaims.verdicts import history, mutation_matrix, watch_file
 from evoclaims.verdicts.robustness import matrix
 
 
@@ -94,6 +94,7 @@ def main(options: argparse.Namespace) -> int:
         robustness=tuple(robustness),
         numbers=replications(archive, reproduction, tiers[0], ("", *reproduction.variants)),
         across=across.last({project.store.root.absolute(), project.config.root / APART["across"]}),
+        watch=watch_chart.shown(watch_file.load(reproduction.folder / watch_file.FILE)[1]),
         generated=f"Written on {datetime.now(UTC):%Y-%m-%d %H:%M} UTC by evoclaims {metadata.version('evoclaims')}.",
     )
     folder = Path(options.out or REPORT)

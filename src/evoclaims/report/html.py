@@ -127,6 +127,7 @@ _CHAPTERS: Final = (
     ("numbers", "Numbers", "Do the numbers replicate?"),
     ("faults", "Planted faults", "Which planted faults do the claims notice?"),
     ("across", "Releases", "Do other releases change a verdict?"),
+    ("watch", "Nights", "Have trials changed, night by night?"),
     ("history", "History", "Accepted verdicts by date and versions"),
     _FIGURES,
 )

@@ -16,6 +16,7 @@ from evoclaims.report.formatting import counted
 from evoclaims.report.training_curves import CurvePanel
 from evoclaims.report.trial_summary import Origin
 from evoclaims.report.verdict_chart import VerdictChart
+from evoclaims.report.watch_chart import WatchShown
 from evoclaims.verdicts.claim_report import APART, ClaimReport, Tally
 from evoclaims.verdicts.history import AcceptedVerdict
 from evoclaims.verdicts.robustness import Robustness
@@ -151,6 +152,7 @@ class Page:
         put_to_the_paper: what the claims' assertions make of the published numbers, in sentences.
         faults: which planted faults the claims notice, by tier.
         across: what `evoclaims across` has last found; None if it has not run.
+        watch: the last series of nights at each tier.
         history: accepted verdicts over dates and versions; None without any.
         generated: when, and by which version; free text.
     """
@@ -168,6 +170,7 @@ class Page:
     put_to_the_paper: tuple[str, ...] = ()
     faults: tuple[FaultGrid, ...] = ()
     across: AcrossShown | None = None
+    watch: tuple[WatchShown, ...] = ()
     history: VerdictChart | None = None
     generated: str = ""
 

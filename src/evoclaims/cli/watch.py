@@ -1,0 +1,194 @@
+"""`evoclaims watch`: new trials each night, and an alarm when all nights together show that something has changed."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Mapping, Sequence
+from datetime import UTC, datetime
+from functools import partial
+from pathlib import Path
+from typing import Final
+
+from msgspec import structs
+
+from evoclaims.claims.power import Pilots, with_test
+from evoclaims.cli.processes.execution import Execution
+from evoclaims.cli.processes.job import Job
+from evoclaims.cli.processes.worker import WorkOrder
+from evoclaims.cli.project import Project, open_project
+from evoclaims.cli.terminal import REPORT, styled, write
+from evoclaims.core.errors import UnknownNameError, UserError
+from evoclaims.judging.exact import MAX_TRIALS
+from evoclaims.paper import references
+from evoclaims.report.console import PlainSpokenConsole, plain_table
+from evoclaims.report.formatting import literal, plural
+from evoclaims.report.table_cells import NONE
+from evoclaims.trials.result import COMPLETE, TrialResult
+from evoclaims.trials.spec import TrialSpec
+from evoclaims.verdicts import watch_file
+from evoclaims.verdicts.watch import ALPHA, Family, Watch, Watched, watched
+from evoclaims.verdicts.watch_file import Night
+
+FIRST_SEED: Final = 10_000
+"""Of the first night, unless a committed trial has a later one."""
+
+FOUND: Final = (0.5, 0.8)
+"""Shifts, in standard deviations, of which the table shows after how many nights they are found."""
+
+MOST_NIGHTS: Final = 10
+
+
+def main(options: argparse.Namespace) -> int:
+    """Run a night and add it to the file; 1 when the evidence of a family has reached the level of an alarm."""
+    if options.form not in (None, "markdown"):
+        raise UnknownNameError("form", options.form, ("markdown",))
+    project = open_project(options.storage)
+    tier = project.reproduction.tier(options.tier)
+    n = options.trials if options.trials is not None else tier.design.last.n
+    if not 1 <= n <= MAX_TRIALS:
+        raise UserError(f"--trials takes 1 to {MAX_TRIALS} trials per condition, not {n}.")
+    path = project.reproduction.folder / watch_file.FILE
+    before, nights = watch_file.load(path)
+    watch, left_out = watch_of(project, options.tier)
+    going_on = () if options.restart else watch.series(nights)
+    first = watch.first_fresh_seed(max(FIRST_SEED, *tier.design.seeds(tier.design.last.n)), nights)
+    order = WorkOrder(options.storage, options.tier, options.device, first, n)
+    trials = _run(project, watch, order, options)
+    number = nights[-1].series + (not going_on) if nights else 1
+    series = (*going_on, _night(watch, trials, going_on, number))
+    watch_file.append(path, before, series[-1])
+    alarms = watch.alarms(series)
+    sentences = list(_sentences(watch, series, left_out, alarms, path))
+    console = PlainSpokenConsole(file=styled())
+    console.print_whole(plain_table(_headings(), _rows(watch, series[-1])))
+    print(*sentences, sep="\n")
+    if options.form is not None:
+        out = Path(options.out or REPORT / "watch.md")
+        write(out, _markdown(sentences, alarms).encode(), ours=options.out is None)
+        print(f"wrote {out}")
+    return int(bool(alarms))
+
+
+def watch_of(project: Project, tier: str) -> tuple[Watch, list[str]]:
+    """Return what is watched, and the conditions of claims that have too few committed trials."""
+    reproduction, (collected,) = project.reproduction, project.collect([("", tier)])
+    every = with_test(collected)
+    pilots = Pilots(reproduction, tier, every)
+    found: list[Watched] = []
+    left_out: list[str] = []
+    for names, group in sorted(pilots.groups.items()):
+        if group.existing is not None:  # an imported table has no new seeds
+            continue
+        mine = references.of_condition(reproduction.references, tier, *names, group.condition.id)
+        pilot = () if pilots.unfit(names) else pilots.trials[names]
+        one = watched(names, group.condition, mine, pilot, partial(pilots.reads, names))
+        if one is None:
+            left_out.append(" on ".join(names))
+        else:
+            found.append(one)
+    if not found:
+        raise UserError(
+            f"Nothing can be watched: no condition of the {tier} tier's claims has ten committed trials. Run the "
+            "claims, then `evoclaims reference`."
+        )
+    return Watch(tier, tuple(found)), left_out
+
+
+def _run(project: Project, watch: Watch, order: WorkOrder, options: argparse.Namespace) -> dict[str, list[TrialResult]]:
+    """Run a night's trials, and return them by label of the condition.
+
+    Raises:
+        UserError: when some have no result; the next call goes on with the same seeds.
+    """
+    running = Execution(project, order, options.host)
+    running.check()
+    wanted = {Job("", *one.names): one.condition for one in watch.conditions}
+    failed = sum(bool(ended.error) for ended in running.run(wanted, lambda text: print(f"  {text}", flush=True)))
+    again = "so this night is not added. The same command goes on with it."
+    if failed:
+        raise UserError(f"{failed} of {len(wanted)} conditions failed (above), {again}")
+    found: dict[str, list[TrialResult]] = {}
+    for one in watch.conditions:
+        stored = [project.store.get(TrialSpec(one.condition, seed).id, one.condition.versions) for seed in order.seeds]
+        found[one.label] = [trial for trial in stored if trial is not None and trial.status in COMPLETE]
+        if len(found[one.label]) < len(order.seeds):
+            bad = {trial.status for trial in stored if trial is not None} - {*COMPLETE}
+            raise UserError(f"{one.label}: trials {' and '.join(sorted(bad)) or 'are missing'}, {again}")
+    return found
+
+
+def _night(watch: Watch, trials: Mapping[str, Sequence[TrialResult]], going_on: Sequence[Night], number: int) -> Night:
+    """Return the entry of a night, after those that it goes on with."""
+    some = [trial for those in trials.values() for trial in those]
+    versions = {name: version for one in watch.conditions for name, version in one.condition.versions.items()}
+    night = Night(
+        date=datetime.now(UTC).date().isoformat(),
+        tier=watch.tier,
+        series=number,
+        rules=watch.rules,
+        seeds=tuple(sorted({trial.seed for trial in some})),
+        device=", ".join(sorted({str(trial.device.get("kind", "unknown")) for trial in some})),
+        level=watch.level,
+        versions={name: version for name, version in sorted(versions.items()) if version},
+        values={one.label: one.read(trials[one.label]) for one in watch.conditions},
+        evidence={},
+    )
+    evidence = {family.label: family.path((*going_on, night))[-1] for family in watch.families}
+    return structs.replace(night, evidence=evidence)
+
+
+def _headings() -> tuple[str, ...]:
+    return ("family", "evidence", *(f"finds {shift:g} SD in" for shift in FOUND))
+
+
+def _rows(watch: Watch, night: Night) -> list[tuple[str, ...]]:
+    """Return a row for each family that can show something, the largest evidence first."""
+    shown = [one for one in watch.families if one.of_method or one.moves]
+    shown.sort(key=lambda one: -night.evidence[one.label])
+    return [
+        (one.label, f"{night.evidence[one.label]:.2g}", *(_found_in(watch, one, shift, night) for shift in FOUND))
+        for one in shown
+    ]
+
+
+def _found_in(watch: Watch, family: Family, shift: float, night: Night) -> str:
+    """Return in how many nights a shift of all measures of a family is found, half of the time."""
+    count = family.nights_to_find(shift, len(night.seeds), watch.level)
+    if count is None:
+        return NONE
+    return plural(count, "night") if count <= MOST_NIGHTS else f"> {MOST_NIGHTS} nights"
+
+
+def _sentences(
+    watch: Watch, series: Sequence[Night], left_out: Sequence[str], alarms: Mapping[str, Sequence[str]], path: Path
+) -> list[str]:
+    """Return what a night has shown, and what to do next."""
+    last, families = series[-1], len(watch.families)
+    lines = [
+        f"Night {len(series)} of series {last.series} ({last.tier}): seeds {last.seeds[0]} to {last.seeds[-1]} of "
+        f"{plural(len(watch.conditions), 'condition')}.",
+        f"Alarm at an evidence of {watch.level:g} ({families} families / α {ALPHA:g}). If nothing has changed, a "
+        f"series of any length has an alarm with a probability of at most {ALPHA:g}.",
+    ]
+    if len(series) == 1 and last.series > 1:
+        lines.append(
+            "A new series: earlier nights do not count, on request, or since conditions, committed trials or what "
+            "claims read have changed."
+        )
+    if left_out:
+        lines.append(f"Not watched, for want of ten committed trials: {', '.join(left_out)}.")
+    lines += [line for those in alarms.values() for line in those]
+    if alarms:
+        lines.append(
+            f"Next: look into it (`evoclaims across`, `evoclaims bisect`), commit {path.name}, and begin a new series "
+            "with --restart."
+        )
+    else:
+        lines.append(f"No alarm. Next: commit {path.name}; the next night goes on with seed {last.seeds[-1] + 1}.")
+    return lines
+
+
+def _markdown(sentences: Sequence[str], alarms: Mapping[str, Sequence[str]]) -> str:
+    """Return the text of an issue."""
+    title = f"Trials have changed: {', '.join(alarms)}" if alarms else "No alarm"
+    return "\n\n".join([f"# {literal(title)}", "\n".join(f"* {literal(line)}" for line in sentences)]) + "\n"

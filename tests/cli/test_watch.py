@@ -1,0 +1,133 @@
+"""`evoclaims watch` in the tiny project: fresh seeds each night, one entry a night, an alarm, and a kill in between."""
+
+from __future__ import annotations
+
+import re
+import shutil
+from pathlib import Path
+
+import pytest
+from tiny_project import Evoclaims, aged, spoiled, trials_of
+
+from evoclaims.paper import references
+from evoclaims.trials.store import Store
+from evoclaims.verdicts import watch_file
+from evoclaims.verdicts.watch_file import load
+
+FILE = Path("watch.toml")
+COMMITTED = Path("reference/smoke/right-parity.jsonl")
+
+
+@pytest.fixture
+def watching(evoclaims: Evoclaims, stored: Store, kept: Path) -> Evoclaims:
+    """The project with committed trials of the right and the wrong network, and a store with the first night's."""
+    for method in ("right", "wrong"):
+        references.write(COMMITTED.with_name(f"{method}-parity.jsonl"), trials_of(stored, method_name(method)))
+    if (kept / "store").exists():
+        shutil.rmtree(stored.root)
+        shutil.copytree(kept / "store", stored.root)
+        shutil.copy(kept / FILE, FILE)
+    else:
+        status, out, err = evoclaims("watch")
+        assert (status, err) == (0, "")
+        assert "Night 1 of series 1 (smoke): seeds 10000 to 10009 of 2 conditions." in out
+        assert "No alarm. Next: commit watch.toml; the next night goes on with seed 10010." in out
+        shutil.copytree(stored.root, kept / "store")
+        shutil.copy(FILE, kept)
+    return evoclaims
+
+
+def method_name(method: str) -> str:
+    return {"right": "hand_built", "wrong": "hand_built_negated"}[method]
+
+
+def seeds(store: Store) -> list[int]:
+    return sorted(trial.seed for trial in trials_of(store, "hand_built"))
+
+
+def test_each_night_adds_an_entry_of_fresh_seeds(watching: Evoclaims, stored: Store) -> None:
+    before = FILE.read_bytes()
+    assert watching("watch", "--trials=3")[0] == 0
+    assert FILE.read_bytes().startswith(before)
+    first, second = load(FILE)[1]
+    assert (first.seeds, second.seeds) == (tuple(range(10_000, 10_010)), (10_010, 10_011, 10_012))
+    assert seeds(stored) == [*range(10), *range(10_000, 10_013)]
+    assert first.values["right on parity"]["mean_success"] == (1.0,) * 10
+    assert 0 < second.evidence["right"] < first.evidence["right"] < 1
+    assert {"jax", "numpy"} <= second.versions.keys()
+
+
+def test_a_kill_in_a_night_repeats_nothing_and_counts_nothing_twice(
+    watching: Evoclaims, stored: Store, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    before = FILE.read_bytes()
+    with monkeypatch.context() as patch:
+        patch.setattr(watch_file, "append", interrupt)
+        status, _, err = watching("watch")
+    assert (status, "the same command goes on from the last checkpoint" in err) == (130, True)
+    assert FILE.read_bytes() == before
+    ran = {trial.id: trial.timing for trial in stored.results([])}
+    assert len(ran) == 60
+    assert watching("watch")[0] == 0
+    assert {trial.id: trial.timing for trial in stored.results([])} == ran
+    assert seeds(stored) == [*range(10), *range(10_000, 10_020)]
+    assert [night.seeds[0] for night in load(FILE)[1]] == [10_000, 10_010]
+
+
+def interrupt(*_: object) -> None:
+    raise KeyboardInterrupt
+
+
+def test_an_alarm_ends_with_1_until_a_new_series_begins(watching: Evoclaims, stored: Store) -> None:
+    """The committed trials solved nothing, with another numpy: so the night's trials have changed."""
+    sound = COMMITTED.read_bytes()
+    references.write(COMMITTED, [aged(spoiled(trial)) for trial in references.load(COMMITTED)])
+    status, out, _ = watching("watch", "--as=markdown", "--out=issue.md")
+    assert status == 1
+    assert "A new series: earlier nights do not count" in out
+    assert "ALARM on " in out
+    assert "moved: right on parity: mean_success is higher: median 0 -> 1, A12 = 1.00" in out
+    assert re.search(r"versions against the committed trials: numpy 1\.0 -> \S+ since night 1\n", out)
+    text = Path("issue.md").read_text(encoding="utf-8")
+    assert text.startswith("# Trials have changed: ")
+    assert "mean\\_success is higher" in text
+    assert watching("watch")[0] == 1
+    COMMITTED.write_bytes(sound)
+    assert watching("watch", "--restart")[0] == 0
+    assert [night.series for night in load(FILE)[1]] == [1, 2, 2, 3]
+
+
+def test_what_cannot_be_watched_is_said_before_anything_runs(watching: Evoclaims, stored: Store) -> None:
+    before = sorted(stored.ids())
+    shutil.copy(FILE, "sound.toml")
+    FILE.write_text(FILE.read_text(encoding="utf-8").replace("1.0", "0.0", 1), encoding="utf-8")
+    assert_refused(watching, "watch.toml is not as `evoclaims watch` wrote it: night 1 does not match its seal")
+    shutil.copy("sound.toml", FILE)
+    assert_refused(watching, "--trials takes 1 to", "--trials=0")
+    assert_refused(watching, "form", "--as=csv")
+    shutil.rmtree("reference")
+    assert_refused(watching, "no condition of the smoke tier's claims has ten committed trials")
+    assert sorted(stored.ids()) == before
+
+
+def assert_refused(watching: Evoclaims, says: str, *options: str) -> None:
+    status, out, err = watching("watch", *options)
+    assert (status, out) == (2, "")
+    assert says in err
+
+
+def test_a_condition_that_fails_keeps_the_night_from_counting(
+    watching: Evoclaims, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from evoclaims.methods.hand_built import HandBuilt
+
+    before = FILE.read_bytes()
+    monkeypatch.setattr(HandBuilt, "best", fail)
+    status, _, err = watching("watch", "--trials=2")
+    assert status == 2
+    assert "conditions failed (above), so this night is not added" in err
+    assert FILE.read_bytes() == before
+
+
+def fail(*_: object) -> None:
+    raise RuntimeError("out of order")
