@@ -278,7 +278,8 @@ def _trained_with(says: str, **changes: float) -> Mutant:
     def train(self: Any, *given: Any) -> Any:
         return replace(self.sound, **changes)._train(*given)
 
-    return _observed(type("TrainsWith", (Fault,), {"says": says, "_train": train}), PpoMechanisms)
+    fault: Any = type("TrainsWith", (Fault,), {"says": says, "_train": train})
+    return _observed(fault, PpoMechanisms)
 
 
 class DrawsElsewhere(Fault):
