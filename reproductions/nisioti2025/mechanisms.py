@@ -5,11 +5,15 @@ from __future__ import annotations
 from evoclaims import Budget, Condition
 from evoclaims.methods.mechanisms import (
     CmaEsMechanisms,
+    HyperNeatMechanisms,
     MapElitesMechanisms,
     NeatMechanisms,
+    Portrait,
+    PpoMechanisms,
     Quadratic,
     Room,
     Spread,
+    Stroll,
     TwoNiches,
     Wanderers,
 )
@@ -28,6 +32,12 @@ CONDITIONS = {
     ),
     ("map_elites_mechanisms", "spread"): Condition(
         MapElitesMechanisms(), Spread(), "whole_budget", Budget(generations=10, reports=10)
+    ),
+    ("ppo_mechanisms", "stroll"): Condition(
+        PpoMechanisms(), Stroll(), "whole_budget", Budget(generations=10, reports=10)
+    ),
+    ("hyperneat_mechanisms", "portrait"): Condition(
+        HyperNeatMechanisms(), Portrait(), "whole_budget", Budget(generations=10, reports=10)
     ),
     ("wanderers", "room"): Condition(Wanderers(), Room(), "whole_budget", Budget(generations=1, reports=1)),
 }

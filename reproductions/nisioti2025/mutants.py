@@ -5,11 +5,19 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
+import jax
 import jax.numpy as jnp
 
 from evoclaims.envs import Box, DeceptiveMaze, Obstacles, Rangefinders, Ruling, SteppingStones
 from evoclaims.methods import HandBuilt, HyperNeat, Neat, Policy, Ppo, RandomPolicy
-from evoclaims.methods.mechanisms import CmaEsMechanisms, MapElitesMechanisms, NeatMechanisms, Room
+from evoclaims.methods.mechanisms import (
+    CmaEsMechanisms,
+    HyperNeatMechanisms,
+    MapElitesMechanisms,
+    NeatMechanisms,
+    PpoMechanisms,
+    Room,
+)
 from evoclaims.methods.neat import Attribute, Mutation
 from evoclaims.mutants import Fault, Mutant, of_method, of_task, plant, with_method, with_task
 from evoclaims.networks import Substrate
@@ -206,6 +214,119 @@ class PrefersNewElites(Fault):
         return replace(after, archive=after.archive.replace(fitnesses=kept))
 
 
+class WeighsAllParentsAlike(Fault):
+    """CMA-ES whose better half all has the same weight in the next mean and covariance."""
+
+    says: ClassVar[str] = "weighs all parents alike"
+
+    def _search(self, task: Any) -> Any:
+        """Return evosax's algorithm with other weights."""
+        search, params = self.sound._search(task)
+        better = params.weights > 0
+        return search, params.replace(weights=jnp.where(better, 1 / jnp.sum(better), params.weights))
+
+
+class SwapsParents(Fault):
+    """NEAT whose children have the structure of the parent that is less fit."""
+
+    says: ClassVar[str] = "takes structure from the other parent"
+
+    def parents(self, *chosen_from: Any) -> Any:
+        """Return the parents in the wrong order."""
+        chosen = self.sound.parents(*chosen_from)
+        return replace(chosen, fitter=chosen.other, other=chosen.fitter)
+
+
+class RepeatsAMinibatch(Fault):
+    """PPO that learns from the first trajectories alone."""
+
+    says: ClassVar[str] = "learns from one minibatch"
+
+    def _train(self, key: Any, task: Any, data: Any, *rest: Any) -> Any:
+        """Train on copies of the first minibatch."""
+
+        def copied(leaf: Any) -> Any:
+            return jnp.concatenate([leaf[: self.sound.batch_size]] * self.sound.minibatches)
+
+        return self.sound._train(key, task, jax.tree.map(copied, data), *rest)
+
+
+class ForgetsStatistics(Fault):
+    """PPO that whitens observations by those of its last step alone."""
+
+    says: ClassVar[str] = "forgets what it saw"
+
+    def step(self, key: Any, task: Any, level: Any, state: Any) -> Any:
+        """Take a step with fresh statistics."""
+        fresh = self.sound.init(key, task).statistics
+        return self.sound.step(key, task, level, replace(state, statistics=fresh))
+
+
+class KeepsOrder(Fault):
+    """PPO that divides trajectories into minibatches in their order."""
+
+    says: ClassVar[str] = "never shuffles"
+
+    def division(self, key: Any) -> Any:
+        """Return the trajectories in their order."""
+        return jnp.sort(self.sound.division(key).ravel()).reshape(self.sound.minibatches, -1)
+
+
+def _trained_with(says: str, **changes: float) -> Mutant:
+    """Return the mutant in which the observed PPO trains with other numbers than it has."""
+
+    def train(self: Any, *given: Any) -> Any:
+        return replace(self.sound, **changes)._train(*given)
+
+    fault: Any = type("TrainsWith", (Fault,), {"says": says, "_train": train})
+    return _observed(fault, PpoMechanisms)
+
+
+class DrawsElsewhere(Fault):
+    """HyperNEAT that asks its CPPN for each layer's neurons from right to left."""
+
+    says: ClassVar[str] = "draws weights at the wrong neurons"
+
+    def encoding(self, task: Any) -> Any:
+        """Return the encoding with each layer reversed."""
+        sound = self.sound.encoding(task)
+        return replace(sound, substrate=Substrate(tuple(layer[::-1] for layer in sound.substrate.layers)))
+
+
+class DrawsNearThreshold(Fault):
+    """HyperNEAT that draws weights beyond a threshold that is a tenth lower."""
+
+    says: ClassVar[str] = "has another threshold"
+
+    def encoding(self, task: Any) -> Any:
+        """Return the encoding with another threshold."""
+        sound = self.sound.encoding(task)
+        return replace(sound, threshold=0.9 * sound.threshold)
+
+
+class DrawsSmallWeights(Fault):
+    """HyperNEAT whose weights are a tenth smaller."""
+
+    says: ClassVar[str] = "draws smaller weights"
+
+    def encoding(self, task: Any) -> Any:
+        """Return the encoding with a smaller range."""
+        sound = self.sound.encoding(task)
+        return replace(sound, max_weight=0.9 * sound.max_weight)
+
+
+class DrawsInAPoint(Fault):
+    """HyperNEAT whose neurons all lie at one point, wherever they should."""
+
+    says: ClassVar[str] = "draws in a point"
+
+    def encoding(self, task: Any) -> Any:
+        """Return the encoding with all neurons in the middle."""
+        sound = self.sound.encoding(task)
+        layers = sound.substrate.layers
+        return replace(sound, substrate=Substrate(tuple(((0.0, 0.0),) * len(layer) for layer in layers)))
+
+
 def _with_species(says: str, **changes: Any) -> Mutant:
     """Return the mutant that divides the observed NEAT otherwise into species."""
 
@@ -253,8 +374,25 @@ MUTANTS = {
     "selects-anybody": _with_species("lets anybody have offspring", survival=1.0),
     "one-parent": _with_species("has one parent in each species", survival=0.01),
     "endless-patience": _with_species("never lets a species die", stagnation=1_000),
+    "no-elites": _with_species("keeps no elites", elites=0),
+    "little-patience": _with_species("lets a species die after three generations", stagnation=3),
+    "swaps-parents": _observed(SwapsParents, NeatMechanisms),
     "learns-no-covariance": _observed(LearnsNoCovariance, CmaEsMechanisms),
+    "weighs-parents-alike": _observed(WeighsAllParentsAlike, CmaEsMechanisms),
     "prefers-new-elites": _observed(PrefersNewElites, MapElitesMechanisms),
+    "other-discount": _trained_with("discounts by a tenth more", discounting=0.81),
+    "other-trace": _trained_with("has another λ", gae_lambda=0.72),
+    "other-learning-rate": _trained_with("has another learning rate", learning_rate=0.018),
+    "other-bounds": _trained_with("clips elsewhere", clipping=0.3),
+    "other-entropy-cost": _trained_with("has no entropy", entropy_cost=0.0),
+    "unscaled-rewards": _trained_with("scales no reward", reward_scaling=1.0),
+    "repeats-a-minibatch": _observed(RepeatsAMinibatch, PpoMechanisms),
+    "keeps-order": _observed(KeepsOrder, PpoMechanisms),
+    "forgets-statistics": _observed(ForgetsStatistics, PpoMechanisms),
+    "draws-elsewhere": _observed(DrawsElsewhere, HyperNeatMechanisms),
+    "draws-in-a-point": _observed(DrawsInAPoint, HyperNeatMechanisms),
+    "other-threshold": _observed(DrawsNearThreshold, HyperNeatMechanisms),
+    "smaller-weights": _observed(DrawsSmallWeights, HyperNeatMechanisms),
     "flat-obstacles": of_task(FlatObstacles, only=Obstacles),
     "target-from-afar": of_task(TargetFromAfar, only=DeceptiveMaze),
 }

@@ -21,7 +21,7 @@ from evoclaims.core.keys import stream, streams
 from evoclaims.core.pytree import pytree, select, strong
 from evoclaims.envs.base import Episode, Task, share
 from evoclaims.methods.base import Policy, Progress
-from evoclaims.methods.brax_blocks import losses, networks, running_statistics, specs
+from evoclaims.methods.brax_blocks import Transition, losses, networks, running_statistics, specs
 from evoclaims.methods.collect import Act, Interaction, collect
 
 
@@ -140,16 +140,12 @@ class Ppo:
 
     def step(self, key: PRNGKeyArray, task: Task, level: Int[Array, ""], state: PpoState) -> tuple[PpoState, Progress]:
         """Collect batch_size × minibatches trajectories, then train on them in updates_per_batch passes."""
-        reset_key, act_key, train_key, test_key = streams(key, "reset", "act", "train", "test")
-        interaction = state.interaction.at_level(task, reset_key, self.trained_level(level))
-        act = self._act(task, state)
-        rounds = self.batch_size * self.minibatches // self.environments
-        interaction, data = collect(task, act, act_key, interaction, rounds, self.unroll_length)
+        interaction, data = self.collected(key, task, level, state)
         statistics = state.statistics
         if self.normalize_observations:
             with implicit_promotions():
                 statistics = running_statistics.update(statistics, data.observation)
-        parameters, optimizer = self._train(train_key, task, data, statistics, state.networks, state.optimizer)
+        parameters, optimizer = self._train(key, task, data, statistics, state.networks, state.optimizer)
         after = strong(
             PpoState(
                 networks=parameters,
@@ -160,7 +156,7 @@ class Ppo:
             )
         )
         if self.level_test.every:
-            tested = self._test(test_key, task, level, after)
+            tested = self._test(stream(key, "test"), task, level, after)
         else:
             tested = Episode(fitness=jnp.mean(data.reward) * task.horizon, success=jnp.zeros(()))
         # A policy with NaN parameters can still have a finite fitness: check the parameters themselves.
@@ -171,6 +167,24 @@ class Ppo:
             healthy=jnp.all(jnp.stack(jax.tree.leaves(finite))),
             metrics={"training_reward": jnp.mean(data.reward)},
         )
+
+    def collected(
+        self, key: PRNGKeyArray, task: Task, level: Int[Array, ""], state: PpoState
+    ) -> tuple[Interaction, Transition]:
+        """Return what a step with this key collects: the episodes afterwards, and transitions as `collect` has them."""
+        reset_key, act_key = streams(key, "reset", "act")
+        interaction = state.interaction.at_level(task, reset_key, self.trained_level(level))
+        rounds = self.batch_size * self.minibatches // self.environments
+        return collect(task, self._act(task, state), act_key, interaction, rounds, self.unroll_length)
+
+    def pass_keys(self, key: PRNGKeyArray) -> PRNGKeyArray:
+        """Return the keys of the passes over what a step with this key has collected."""
+        return jax.random.split(stream(key, "train"), self.updates_per_batch)
+
+    def division(self, key: PRNGKeyArray) -> Int[Array, "minibatches batch"]:
+        """Return the trajectories of each minibatch, from a pass's key."""
+        order = jax.random.permutation(stream(key, "order"), self.batch_size * self.minibatches)
+        return order.reshape(self.minibatches, self.batch_size)
 
     def trained_level(self, level: Int[Array, ""]) -> Int[Array, ""]:
         """Return the level that a trial at `level` trains on: that one."""
@@ -238,13 +252,10 @@ class Ppo:
             return (optax.apply_updates(parameters, update), optimizer), None
 
         def one_pass(carry: tuple[Any, Any], pass_key: Array) -> tuple[tuple[Any, Any], None]:
-            order_key, loss_key = streams(pass_key, "order", "loss")
-            order = jax.random.permutation(order_key, self.batch_size * self.minibatches)
-            batches = order.reshape(self.minibatches, self.batch_size)
-            return jax.lax.scan(descend, carry, (batches, jax.random.split(loss_key, self.minibatches)))
+            loss_keys = jax.random.split(stream(pass_key, "loss"), self.minibatches)
+            return jax.lax.scan(descend, carry, (self.division(pass_key), loss_keys))
 
-        keys = jax.random.split(key, self.updates_per_batch)
-        (parameters, optimizer), _ = jax.lax.scan(one_pass, (parameters, optimizer), keys)
+        (parameters, optimizer), _ = jax.lax.scan(one_pass, (parameters, optimizer), self.pass_keys(key))
         return parameters, optimizer
 
     def _test(self, key: PRNGKeyArray, task: Task, level: Int[Array, ""], state: PpoState) -> Episode:

@@ -2,6 +2,8 @@ from evoclaims.methods.mechanisms.archive import MapElitesMechanisms as MapElite
 from evoclaims.methods.mechanisms.archive import Spread as Spread
 from evoclaims.methods.mechanisms.genomes import NeatMechanisms as NeatMechanisms
 from evoclaims.methods.mechanisms.genomes import TwoNiches as TwoNiches
+from evoclaims.methods.mechanisms.gradients import PpoMechanisms as PpoMechanisms
+from evoclaims.methods.mechanisms.gradients import Stroll as Stroll
 from evoclaims.methods.mechanisms.observed import Observed as Observed
 from evoclaims.methods.mechanisms.observed import Question as Question
 from evoclaims.methods.mechanisms.robots import Room as Room
@@ -9,3 +11,5 @@ from evoclaims.methods.mechanisms.robots import Wanderers as Wanderers
 from evoclaims.methods.mechanisms.strategy import CmaEsMechanisms as CmaEsMechanisms
 from evoclaims.methods.mechanisms.strategy import Itself as Itself
 from evoclaims.methods.mechanisms.strategy import Quadratic as Quadratic
+from evoclaims.methods.mechanisms.substrates import HyperNeatMechanisms as HyperNeatMechanisms
+from evoclaims.methods.mechanisms.substrates import Portrait as Portrait

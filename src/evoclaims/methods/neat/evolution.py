@@ -18,7 +18,14 @@ from evoclaims.kernels import take_rows
 from evoclaims.methods.base import Policy, Progress
 from evoclaims.methods.champion import no_episode
 from evoclaims.methods.neat.capacity import capacities, in_capacity
-from evoclaims.methods.neat.population import Population, first_population, forget_records, next_population
+from evoclaims.methods.neat.population import (
+    Parents,
+    Population,
+    choose_parents,
+    first_population,
+    forget_records,
+    next_population,
+)
 from evoclaims.methods.neat.settings import PAPER, Settings
 from evoclaims.networks.genome import Genome, resized
 from evoclaims.networks.graph import GraphNetwork
@@ -91,7 +98,9 @@ class GenomeMethod(ABC):
         # The newest of equals, as everywhere in NEAT.
         best = settings.population - 1 - jnp.argmax(fitness[::-1])
         champion, episode = take_rows((population.genomes, episodes), best)
-        following = next_population(reproduction_key, settings, population, fitness, network.inputs, network.outputs)
+        following = next_population(
+            reproduction_key, settings, population, fitness, network.inputs, network.outputs, self.parents
+        )
         genomes = population.genomes
         metrics = {
             "nodes": jnp.mean(genomes.node_count.astype(jnp.float32)),
@@ -104,6 +113,10 @@ class GenomeMethod(ABC):
         healthy = jnp.all(jnp.isfinite(jnp.concatenate([*genes, episode.fitness[None]])))
         progress = Progress(fitness=episode.fitness, success=episode.success, healthy=healthy, metrics=metrics)
         return Evolution(population=following, level=level, champion=champion, episode=episode), progress
+
+    def parents(self, *chosen_from: Any) -> Parents:
+        """Draw the parents of the next population; the arguments are those of `choose_parents`."""
+        return choose_parents(*chosen_from)
 
     def best(self, task: Task, state: Evolution) -> Policy:
         """Return the best genome of the last population that was evaluated, on the level it was evaluated on."""

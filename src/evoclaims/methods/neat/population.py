@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 
@@ -148,15 +149,16 @@ def next_population(
     fitness: Float[Array, " population"],
     inputs: int,
     outputs: int,
+    choose: Callable[..., Parents] = choose_parents,
 ) -> Population:
-    """Replace all genomes except elites by offspring of the best of each species.
+    """Replace all genomes except elites by offspring of the best of each species, whose parents `choose` draws.
 
     A fitness of NaN counts as -inf.
     """
     parents_key, breeding_key = streams(key, "parents", "breeding")
     fitness = jnp.where(jnp.isnan(fitness), -jnp.inf, fitness)
     species = survive(settings.species, population.species, fitness, population.generation + 1)
-    parents = choose_parents(parents_key, settings.species, species, fitness)
+    parents = choose(parents_key, settings.species, species, fitness)
     survivors = replace(population, species=species)
     breed = partial(_breed, settings, inputs, outputs)
     sizes = capacities(settings, inputs, outputs)
