@@ -11,7 +11,8 @@ import signal
 import sys
 import warnings
 from collections.abc import Iterator
-from importlib.metadata import version
+from functools import cached_property
+from importlib.metadata import EntryPoints, PackagePath, PathDistribution, distributions, version
 from pathlib import Path
 from typing import Final
 
@@ -101,7 +102,27 @@ def all_imported() -> None:
         importlib.import_module(name)
 
 
+class Installed(PathDistribution):
+    """An installed package whose entry points and files are read once for all runs of pytest in this process."""
+
+    @cached_property
+    def entry_points(self) -> EntryPoints:  # type: ignore[override]
+        return super().entry_points
+
+    @cached_property
+    def files(self) -> list[PackagePath] | None:  # type: ignore[override]
+        return super().files
+
+
+@pytest.fixture(scope="session")
+def installed() -> list[Installed]:
+    return [Installed(Path(str(package._path))) for package in distributions()]
+
+
 @pytest.fixture
-def pytester(all_imported: None, pytester: pytest.Pytester) -> pytest.Pytester:
+def pytester(
+    all_imported: None, installed: list[Installed], pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch
+) -> pytest.Pytester:
     """pytest's own, which forgets the modules that a test has imported first: their classes would be there twice."""
+    monkeypatch.setattr("importlib.metadata.distributions", lambda: installed)
     return pytester

@@ -25,9 +25,10 @@ reproduction = "tiny_paper"
 
 [tool.pytest.ini_options]
 testpaths = ["claims"]
-addopts = "--strict-markers --strict-config"
+addopts = "--strict-markers --strict-config -p no:anyio -p no:benchmark -p no:hypothesispytest -p no:jaxtyping"
 filterwarnings = ["error"]
 """
+"""Without other installed plugins, which a sixth of a run is for."""
 
 REPRODUCTION = '''
 """Hand-built networks that are right, wrong, or either by the toss of a coin."""

@@ -1,4 +1,4 @@
-"""What a batch leaves behind goes back to the system."""
+"""What compiling and a batch leave behind goes back to the system."""
 
 from __future__ import annotations
 
@@ -12,20 +12,35 @@ import pytest
 from climbers import run_climbers
 
 from evoclaims.trials import devices, memory
+from evoclaims.trials.lanes import Lanes
 from evoclaims.trials.store import Store
 
 pytestmark = pytest.mark.oldest
 
 
-def test_memory_is_given_back_at_the_end_of_a_batch(
+def test_memory_is_given_back_after_compiling_and_at_the_end_of_a_batch(
     tmp_path: Path, cpus: list[Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    calls: list[int] = []
-    monkeypatch.setattr(memory, "_libc", lambda: SimpleNamespace(malloc_trim=calls.append))
+    events: list[str] = []
+    monkeypatch.setattr(memory, "_libc", lambda: SimpleNamespace(malloc_trim=lambda _: events.append("trim")))
+    for name in ("_lowered", "_finished", "advance"):
+        monkeypatch.setattr(Lanes, name, noted(getattr(Lanes, name), name, events))
     run_climbers(Store(tmp_path), cpus)
-    assert calls == [0]
+    repeated, start = ["_lowered"] * 2 + ["trim"] + ["_finished"] * 2 + ["trim"], ["_lowered", "_finished", "trim"]
+    assert [event for event in events if event != "advance"] == [*repeated, *start, "trim"]
+    assert events[-2:] == ["advance", "trim"]
     run_climbers(Store(tmp_path), cpus)  # nothing was to be run
-    assert calls == [0]
+    assert events.count("trim") == 4
+
+
+def noted(function: Any, name: str, events: list[str]) -> Any:
+    """Return a function that notes each call."""
+
+    def called(*arguments: Any, **options: Any) -> Any:
+        events.append(name)
+        return function(*arguments, **options)
+
+    return called
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="glibc's allocator alone keeps what was freed")

@@ -15,7 +15,7 @@ from jaxtyping import Array, Bool, Float, Int, PRNGKeyArray
 from numpy.typing import NDArray
 
 from evoclaims.core.errors import UserError, require_at_least
-from evoclaims.core.foreign import implicit_promotions
+from evoclaims.core.foreign import implicit_promotions, imported_when_called
 from evoclaims.core.keys import streams
 from evoclaims.core.pytree import pytree, strong
 from evoclaims.envs.base import Episode, Task, share
@@ -23,7 +23,7 @@ from evoclaims.methods.base import Policy, Progress
 from evoclaims.methods.champion import policy_of
 from evoclaims.networks.mlp import Mlp
 
-if TYPE_CHECKING:  # where it is used it is imported: it imports scikit-learn, which takes half a second
+if TYPE_CHECKING:  # where it is used it is imported, which takes time
     from qdax.core.map_elites import MAPElites
 
 
@@ -111,14 +111,13 @@ class MapElites:
         Raises:
             UserError: for a task without an area to map.
         """
-        from qdax.core.containers.mapelites_repertoire import MapElitesRepertoire, compute_euclidean_centroids
-
+        repertoire = _repertoire()
         (x_min, x_max), (y_min, y_max) = _mapped(task).area
         size = self.network.size(task.observation_size, task.action_size)
         with implicit_promotions():
-            archive = MapElitesRepertoire.init_default(
+            archive = repertoire.MapElitesRepertoire.init_default(
                 jnp.zeros(size),
-                compute_euclidean_centroids(self.cells, [x_min, y_min], [x_max, y_max]),
+                repertoire.compute_euclidean_centroids(self.cells, [x_min, y_min], [x_max, y_max]),
                 one_extra_score={"success": jnp.zeros(())},
                 keys_extra_scores=("success",),
             )
@@ -154,15 +153,13 @@ class MapElites:
 
         An individual becomes its cell's elite when it is fitter than the old one; within a batch, the first best one.
         """
-        from qdax.core.containers.mapelites_repertoire import get_cells_indices
-
         descriptors = jnp.stack([episodes.metrics["x"], episodes.metrics["y"]], axis=-1)
         low, high = jnp.asarray(_mapped(task).area, jnp.float32).T
         inside = jnp.all((descriptors >= low[None]) & (descriptors <= high[None]), axis=1)  # NaN is not
         valid = inside & jnp.isfinite(episodes.fitness)
         fitness = jnp.where(valid, episodes.fitness, -jnp.inf)
         with implicit_promotions():
-            cell = get_cells_indices(descriptors, state.archive.centroids)
+            cell = _repertoire().get_cells_indices(descriptors, state.archive.centroids)
             fitness = jnp.where(beaten(cell, fitness), -jnp.inf, fitness)
             archive, _, _ = self._algorithm().tell(
                 population, fitness, descriptors, state.archive, None, {"success": episodes.success}
@@ -202,6 +199,7 @@ class MapElites:
 
     def _algorithm(self) -> MAPElites:
         """Build QDax's algorithm for ask and tell: it evaluates nothing itself."""
+        _repertoire()
         from qdax.core.emitters.mutation_operators import isoline_variation
         from qdax.core.emitters.standard_emitters import MixingEmitter
         from qdax.core.map_elites import MAPElites
@@ -268,6 +266,13 @@ def beaten(cell: Int[Array, " batch"], fitness: Float[Array, " batch"]) -> Bool[
     fitter = fitness[None, :] > fitness[:, None]
     earlier = (fitness[None, :] == fitness[:, None]) & (index[None, :] < index[:, None])
     return jnp.any((cell[None, :] == cell[:, None]) & (fitter | earlier), axis=1)
+
+
+def _repertoire() -> Any:
+    """Import QDax's module of archives without scikit-learn, for which it has no use here: 110 MB and a second."""
+    with imported_when_called("sklearn.cluster", "KMeans"):
+        from qdax.core.containers import mapelites_repertoire
+    return mapelites_repertoire
 
 
 def _mapped(task: Task) -> MappedTask:

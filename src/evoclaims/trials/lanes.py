@@ -20,6 +20,7 @@ from jax.sharding import SingleDeviceSharding
 
 from evoclaims.core.waiting import working_time
 from evoclaims.trials.devices import MATMUL_PRECISION, layout_on, usable_cores
+from evoclaims.trials.memory import give_back
 from evoclaims.trials.program import Program, Report, Score, TrialState, over_trials
 from evoclaims.trials.spec import Condition
 
@@ -95,6 +96,7 @@ class Lanes:
         if missing:
             began = working_time()
             self._compiled.update({(size, home): made for home, made in self._compile(size, missing).items()})
+            give_back()  # what compiling has freed, or the trials' memory comes on top of it
             self.seconds += working_time() - began
         return [self._compiled[size, home] for home in homes]
 
@@ -126,6 +128,7 @@ class Lanes:
         with self._settings():
             lowered = [self._lowered(self._program.start, home, _seeds(size)) for home in dict.fromkeys(homes)]
             starts = dict(zip(homes, self._side_by_side(self._finished, lowered), strict=False))
+        give_back()
         self.seconds += working_time() - began
         return tuple(starts[home](*share) for home, share in zip(homes, self.place((known, idle), width), strict=True))
 
@@ -208,6 +211,7 @@ class Lanes:
                     self._lowered(self._program.score, home, (state,)),
                 )
             ]
+            give_back()  # what compiling the kernels has freed
             # XLA compiles without the interpreter lock, so two programs take the time of one.
             with ThreadPoolExecutor() as pool:
                 made = list(pool.map(self._finished, lowered))
