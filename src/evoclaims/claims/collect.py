@@ -14,7 +14,7 @@ from typing import Final
 
 import pytest
 
-from evoclaims.claims.collected import claim_tests
+from evoclaims.claims.claim_names import claim_tests
 from evoclaims.claims.judge import broken
 from evoclaims.claims.recording import Collected, Recorder, renew
 from evoclaims.claims.session import SESSION, Session
