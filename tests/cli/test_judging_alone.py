@@ -242,7 +242,7 @@ def test_a_test_is_called_once_for_all_that_judges_the_same(evoclaims: Evoclaims
         (("status", "--as=json"), "smoke "),
         (("compare", "./.evoclaims", "./.evoclaims", "--tier=smoke"), "smoke "),
         (("audit", "--tier=smoke"), "smoke "),
-        (("report",), "smoke full smoke full "),  # with the variant, whose trials are stored
+        (("report",), "smoke full smoke "),  # with the variant, whose trials are stored
         (("power",), "smoke "),
         (("status", "--variant=traded"), "smoke smoke "),
     ):

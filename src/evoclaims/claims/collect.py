@@ -8,13 +8,13 @@ import io
 import os
 import warnings
 from collections.abc import Collection, Generator, Iterable, Sequence
-from itertools import pairwise, product
+from itertools import pairwise
 from pathlib import Path
 from typing import Final
 
 import pytest
 
-from evoclaims.claims.collected import claim_tests
+from evoclaims.claims.claim_names import claim_tests
 from evoclaims.claims.judge import broken
 from evoclaims.claims.recording import Collected, Recorder, renew
 from evoclaims.claims.session import SESSION, Session
@@ -40,7 +40,11 @@ MOST_NAMES: Final = 3
 """Most names of tests that an error lists."""
 
 
-def collect(config: SuiteConfig, recorders: Sequence[Recorder], tiers: Collection[str]) -> list[list[Collected]]:
+Asked = Sequence[tuple[Recorder, Collection[str]]]
+"""Under which protocols claims are collected, and at which tiers."""
+
+
+def collect(config: SuiteConfig, asked: Asked) -> list[list[Collected]]:
     """Return all claims of some tiers under the protocol of each recorder.
 
     Each test is called once, and again for a variant that changes a condition that it asks for.
@@ -51,7 +55,7 @@ def collect(config: SuiteConfig, recorders: Sequence[Recorder], tiers: Collectio
         UserError: when the claims cannot be collected, or something keeps one from being called.
         KeyboardInterrupt: when the run is interrupted.
     """
-    run = _Run(config, recorders, tiers)
+    run = _Run(config, asked)
     errors = io.StringIO()
     with contextlib.redirect_stderr(errors), pytest.MonkeyPatch.context() as environment:
         for name in _ENVIRONMENT:
@@ -77,7 +81,7 @@ def collect(config: SuiteConfig, recorders: Sequence[Recorder], tiers: Collectio
             "@claim(...)."
         )
     run.check_complete()
-    return [recorder.found for recorder in recorders]
+    return [recorder.found for recorder, _ in asked]
 
 
 def judge_all(session: Session, collected: Iterable[Collected], root: Path) -> list[ClaimReport]:
@@ -105,23 +109,23 @@ def judge_all(session: Session, collected: Iterable[Collected], root: Path) -> l
 class _Run:
     """A pytest plugin that takes no options from outside, and calls claims under several protocols."""
 
-    def __init__(self, config: SuiteConfig, recorders: Sequence[Recorder], tiers: Collection[str]) -> None:
+    def __init__(self, config: SuiteConfig, asked: Asked) -> None:
         """Start empty."""
         self.claims = config.root / config.claims
+        tiers = " or ".join({tier: None for _, tiers in asked for tier in tiers})
         # From the current folder, since pytest reads [, :: and $ in an argument as more than a path.
         claims, root = (os.path.join(os.curdir, os.path.relpath(path)) for path in (self.claims, config.root))
-        self.arguments = (claims, f"--rootdir={root}", f"-m{' or '.join(tiers)}", *_ALONE)
-        self.recorders = recorders
+        self.arguments = (claims, f"--rootdir={root}", f"-m{tiers}", *_ALONE)
         self.troubles: list[str] = []
         self.interrupted = False
         self.files = self.functions = ""
         self._root = config.root
-        self._tiers = tiers
+        self._asked = asked
         self._collected: list[pytest.Item] = []
 
     def pytest_configure(self, config: pytest.Config) -> None:
         """Keep the plugin from making a session of its own."""
-        config.stash[SESSION] = self.recorders[0]
+        config.stash[SESSION] = self._asked[0][0]
         self.files = " or ".join(config.getini("python_files"))
         self.functions = " or ".join(f"{name.removesuffix('*')}*" for name in config.getini("python_functions"))
 
@@ -168,13 +172,13 @@ class _Run:
         """Call each claim once under each protocol that changes what it asks for."""
         claims = claim_tests(session.items)
         known: dict[pytest.Item, list[list[Collected]]] = {item: [] for item in claims}
-        for recorder in self.recorders:
+        for recorder, tiers in self._asked:
             session.config.stash[SESSION] = recorder
             recorder.tests.update((test.key, test) for test in claims.values())
-            same = {item: _same(recorder, before) for item, before in known.items()}
-            items = [item for item in known if not same[item]]
+            same = {item: _same(recorder, before) for item, before in known.items() if claims[item].tier in tiers}
+            items = [item for item in same if not same[item]]
             following = dict(pairwise(items))
-            for item in known:
+            for item in same:
                 if self.troubles or session.shouldstop or session.shouldfail:
                     return True
                 if same[item]:
@@ -198,7 +202,7 @@ class _Run:
             UserError: when there are such claims.
         """
         tests = {item.nodeid: test for item, test in claim_tests(self._collected).items()}
-        for recorder, tier in product(self.recorders, self._tiers):
+        for recorder, tier in ((recorder, tier) for recorder, tiers in self._asked for tier in tiers):
             called = {one.test.key for one in recorder.found}
             wanted = {name: test for name, test in tests.items() if test.tier == tier}
             left = [name for name, test in wanted.items() if test.key not in called]

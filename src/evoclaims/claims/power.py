@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
-from evoclaims.claims.collected import selected
+from evoclaims.claims.claim_names import selected
 from evoclaims.claims.recording import Collected
 from evoclaims.judging.power import Draws, Power, power
 from evoclaims.judging.reading import TrialReading

@@ -130,7 +130,7 @@ class Recorder(Session):
         conditions = self.reproduction.tier(one.test.tier, self.variant).conditions
         return one.assertion is not None and all(
             (known := conditions.get((group.method, group.task))) is not None and known.id == group.fingerprint
-            for group in one.asked
+            for group in (*one.asked, *one.groups.values())
         )
 
     def call(self, item: pytest.Item, test: ClaimTest) -> Collected:
@@ -139,8 +139,11 @@ class Recorder(Session):
         Nothing is asserted by a test with fixtures of its own, which are for the run itself. What a test raises is
         reported when it is run.
         """
+
+        def trials(method: str, *, on: str) -> TrialGroup:
+            return self.group(method, on, test.tier)
+
         verdicts = VerdictFixture(lambda assertion, others: self.settle(test, assertion, others))
-        trials = lambda method, *, on: self.group(method, on, test.tier)  # noqa: E731
         function: Callable[..., Any] = item.obj  # type: ignore[attr-defined]
         given = {**item.callspec.params, TIER: test.tier, "trials": trials, "verdict": verdicts}  # type: ignore[attr-defined]
         names = inspect.signature(function).parameters

@@ -16,7 +16,7 @@ from pathlib import Path
 
 from packaging.version import Version
 
-from evoclaims.claims.collected import selected
+from evoclaims.claims.claim_names import selected
 from evoclaims.cli.project import open_project
 from evoclaims.cli.store_folder import open_store
 from evoclaims.cli.terminal import terminal

@@ -88,11 +88,12 @@ class Project:
         """
         missing = [one for one in dict.fromkeys(asked) if one not in self._collected]
         if missing:
-            variants = list(dict.fromkeys(variant for variant, _ in missing))
-            tiers = list(dict.fromkeys(tier for _, tier in missing))
-            recorders = [Recorder(self.reproduction, self.store, never, variant=variant) for variant in variants]
-            for variant, found in zip(variants, collect(self.config, recorders, tiers), strict=True):
-                for tier in tiers:
+            tiers = {variant: [tier for of, tier in missing if of == variant] for variant, _ in missing}
+            asking = [
+                (Recorder(self.reproduction, self.store, never, variant=variant), tiers[variant]) for variant in tiers
+            ]
+            for variant, found in zip(tiers, collect(self.config, asking), strict=True):
+                for tier in tiers[variant]:
                     self._collected[variant, tier] = [one for one in found if one.test.tier == tier]
         return [self._collected[one] for one in asked]
 

@@ -8,7 +8,7 @@ from typing import Final
 
 from rich.console import Console
 
-from evoclaims.claims.collected import selected
+from evoclaims.claims.claim_names import selected
 from evoclaims.cli.project import Project, open_project
 from evoclaims.cli.terminal import styled
 from evoclaims.core.errors import UnknownNameError, UserError

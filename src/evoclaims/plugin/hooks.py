@@ -133,7 +133,7 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> Generator[None, object, 
     if metafunc.definition.get_closest_marker("claim") is None:
         return (yield)
     from evoclaims.claims.claim import TIER, claim_of, tier_id
-    from evoclaims.claims.collected import note_repetitions
+    from evoclaims.claims.claim_names import note_repetitions
 
     repeats = note_repetitions(metafunc)
     made = yield
@@ -155,7 +155,7 @@ def pytest_collection_modifyitems(session: pytest.Session, config: pytest.Config
     tests: dict[pytest.Item, ClaimTest] = {}
     try:
         if any(item.get_closest_marker("claim") for item in items):
-            from evoclaims.claims.collected import claim_tests
+            from evoclaims.claims.claim_names import claim_tests
 
             tests = claim_tests(items)
         config.stash[KNOWN] = {test.claim.id for test in tests.values()}
@@ -189,7 +189,7 @@ def pytest_collection_finish(session: pytest.Session) -> None:
     config = session.config
     if not any(item.get_closest_marker("claim") for item in session.items) or config.option.collectonly:
         return
-    from evoclaims.claims.collected import claim_tests
+    from evoclaims.claims.claim_names import claim_tests
 
     try:
         prepare(session, make_session(config), claim_tests(session.items))

@@ -109,7 +109,7 @@ def wanted_claims(config: pytest.Config, tests: Iterable[ClaimTest], *, incomple
     option, ids = config.getoption("claims_only"), {test.claim.id for test in tests}
     if option is None:
         return ids
-    from evoclaims.claims.collected import selected
+    from evoclaims.claims.claim_names import selected
 
     return selected(option, ids | {test.key[1] for test in tests}, incomplete=incomplete)
 
