@@ -1,8 +1,8 @@
 """What `evoclaims watch` finds, and how often it is wrong: nights drawn from the committed smoke trials.
 
 Nights draw seeds with replacement from the reference trials and pilots, whole trials of all conditions together. Under
-a shift, trials of a method's conditions are drawn with weights exp(shift · z), where z is the normal score of the first
-measure that varies: a normal measure would move by so many standard deviations, and no value is a new one.
+a shift, trials of a method's conditions are drawn with weights exp(shift · z), where z is the normal score of the
+mean rank of the measures: a normal one would move by so many standard deviations, and no value is a new one.
 
     python benchmarks/watch_power.py [RUNS] [NIGHTS]
 
@@ -21,7 +21,8 @@ from scipy.stats import norm, rankdata
 
 from evoclaims.cli.project import open_project
 from evoclaims.cli.watch import watch_of
-from evoclaims.judging.e_process import uniform
+from evoclaims.judging.drift import LOWER
+from evoclaims.judging.e_process import standardized_ranks, uniform
 from evoclaims.verdicts.watch import ALPHA, Family, Watch, Watched
 from evoclaims.verdicts.watch_file import Night
 
@@ -40,10 +41,15 @@ def main() -> None:
         for family in sorted(methods, key=lambda one: -len(one.conditions)):
             found = [first_alarm(watch, [family], run, 6, shift) for run in range(runs // 2)]
             print(
-                f"{shift:g} SD in {family.label}, {len(family.conditions)} conditions: night "
+                f"{shift:g} SD in {family.label}, {_varying(family)} conditions that vary: night "
                 f"{statistics.median(found):g} in the median (7: later), {found.count(1)} of {len(found)} on the first",
                 flush=True,
             )
+
+
+def _varying(family: Family) -> int:
+    """Return how many conditions have a measure that varies."""
+    return sum(not all(map(one.constant, one.values)) for one in family.conditions)
 
 
 def first_alarm(watch: Watch, families: Sequence[Family], run: int, nights: int, shift: float = 0.0) -> int:
@@ -71,7 +77,8 @@ def redrawn(one: Watched, seeds: Sequence[int], run: int, shift: float) -> Watch
     varying = [name for name in one.values if not one.constant(name)]
     weights = np.ones(len(one.seeds))
     if shift and varying:
-        weights = np.exp(shift * norm.ppf(rankdata(one.values[varying[0]]) / (len(one.seeds) + 1)))
+        mean = sum(standardized_ranks(np.array(one.values[name])) * (-1 if name in LOWER else 1) for name in varying)
+        weights = np.exp(shift * norm.ppf(rankdata(mean) / (len(one.seeds) + 1)))
     steps = np.cumsum(weights / weights.sum())
     name = one.label if shift else "all"  # without a shift, trials of one seed belong together
     at = [int(np.searchsorted(steps, uniform(f"{run} {name}", seed))) for seed in seeds]

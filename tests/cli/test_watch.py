@@ -94,7 +94,8 @@ def test_an_alarm_ends_with_1_until_a_new_series_begins(watching: Evoclaims, sto
     assert watching("watch")[0] == 1
     COMMITTED.write_bytes(sound)
     assert watching("watch", "--restart")[0] == 0
-    assert [night.series for night in load(FILE)[1]] == [1, 2, 2, 3]
+    assert watching("watch")[0] == 0
+    assert [night.series for night in load(FILE)[1]] == [1, 2, 2, 3, 3]
 
 
 def test_what_cannot_be_watched_is_said_before_anything_runs(watching: Evoclaims, stored: Store) -> None:

@@ -105,6 +105,8 @@ def test_trials_that_diverge_rank_below_all_others() -> None:
     watch = Watch("smoke", (condition("m", "a", normal(rng)),))
     found = nights(watch, 2, lambda _: [-np.inf] * 10)
     assert "score is lower" in watch.alarms(found)["m"][1]
+    steady = Watch("smoke", (condition("m", "a", [1.0] * 60),))
+    assert "median 1 -> -inf, A12 = 0.00" in steady.alarms(nights(steady, 1, lambda _: [-np.inf] * 10))["m"][1]
 
 
 def test_an_alarm_names_measures_and_versions_and_stays() -> None:
@@ -132,7 +134,10 @@ def test_other_rules_begin_a_new_series_with_fresh_seeds() -> None:
     assert watch.series([one]) == (one,)
     other = Watch("smoke", (*watch.conditions, condition("m", "b", normal(rng))))
     assert other.series([one]) == ()
-    assert Watch("full", watch.conditions).series([one]) == ()
+    full = Watch("full", watch.conditions)
+    assert full.series([one]) == ()
+    between = structs.replace(night(full, 1, lambda _: normal(rng, n=10)), tier="full", series=2)
+    assert (watch.series([one, between]), full.series([one, between])) == ((one,), (between,))
     assert [watch.first_fresh_seed(10_000, found) for found in ([], [one])] == [10_000, 10_010]
     assert watch.first_fresh_seed(0, []) == 150
 

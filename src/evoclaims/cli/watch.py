@@ -54,7 +54,7 @@ def main(options: argparse.Namespace) -> int:
     first = watch.first_fresh_seed(max(FIRST_SEED, *tier.design.seeds(tier.design.last.n)), nights)
     order = WorkOrder(options.storage, options.tier, options.device, first, n)
     trials = _run(project, watch, order, options)
-    number = nights[-1].series + (not going_on) if nights else 1
+    number = going_on[-1].series if going_on else max((night.series for night in nights), default=0) + 1
     series = (*going_on, _night(watch, trials, going_on, number))
     watch_file.append(path, before, series[-1])
     alarms = watch.alarms(series)

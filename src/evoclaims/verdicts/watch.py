@@ -211,8 +211,8 @@ class Watch:
 
     def first_fresh_seed(self, first: int, nights: Sequence[Night]) -> int:
         """Return the first seed, from `first` up, after all those of committed trials and of nights."""
-        used = [seed for one in (*self.conditions, *nights) for seed in one.seeds]
-        return max([first, *(seed + 1 for seed in used)])
+        used = [*(one.seeds for one in self.conditions), *(night.seeds for night in nights)]
+        return max([first, *(max(seeds) + 1 for seeds in used)])
 
     def alarms(self, nights: Sequence[Night]) -> dict[str, list[str]]:
         """Return the families whose evidence has reached the level in a series, with lines on each."""
