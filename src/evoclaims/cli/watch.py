@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
+from functools import partial
 from pathlib import Path
 from typing import Final
 
@@ -80,7 +81,7 @@ def watch_of(project: Project, tier: str) -> tuple[Watch, list[str]]:
             continue
         mine = references.of_condition(reproduction.references, tier, *names, group.condition.id)
         pilot = () if pilots.unfit(names) else pilots.trials[names]
-        one = watched(names, group.condition, mine, pilot, lambda trial, names=names: pilots.reads(names, trial))
+        one = watched(names, group.condition, mine, pilot, partial(pilots.reads, names))
         if one is None:
             left_out.append(" on ".join(names))
         else:
