@@ -237,7 +237,8 @@ def _right(task: Stroll) -> Callable[[Any], Bool[Array, ""]]:
         acted = jnp.max(jnp.abs(step.action - jnp.tanh(step.extras["policy_extras"]["raw_action"]))) < 1e-5
         moved = jnp.max(jnp.abs(place + step.action - following)) < 1e-4
         paid = jnp.abs(jnp.dot(place, step.action) * (1 - 2 * step.observation[2]) - step.reward) < 1e-4
-        return acted & moved & paid & (((beyond > 0) == (step.discount == 0)) | (jnp.abs(beyond) < 1e-4))
+        ends: Array = ((beyond > 0) == (step.discount == 0)) | (jnp.abs(beyond) < 1e-4)
+        return ends & acted & moved & paid
 
     return right
 

@@ -134,7 +134,8 @@ def _asked(genome: Genome, question: Float[Array, " 4"]) -> Float[Array, ""]:
     size = nodes.key.shape[0]
     values = jnp.zeros(size).at[:inputs].set(question)
     start = values, jnp.arange(size) < inputs, jnp.zeros(())
-    return jax.lax.fori_loop(inputs, size, fire, start)[2]
+    answer: Array = jax.lax.fori_loop(inputs, size, fire, start)[2]
+    return answer
 
 
 def _answer(
