@@ -102,8 +102,10 @@ def test_the_new_project_runs_with_the_method_and_the_claim_that_are_added(
         text=True,
         check=False,
     )
-    changes = [int(words == ["evoclaims", "accept"]) for words in commands]
-    assert ran.stdout.splitlines()[-1:] == [str(changes)], ran.stdout + ran.stderr
+    ends = {"accept": 1, "watch": 2}  # a new project has no committed trials to watch
+    statuses = [ends.get(words[1], 0) for words in commands]
+    assert ran.stdout.splitlines()[-1:] == [str(statuses)], ran.stdout + ran.stderr
+    assert "has ten committed trials" in ran.stderr
     judged = {one["claim"]: one for one in json.loads((folder / "out.json").read_text())["claims"]}
     assert [judged[claim]["outcome"] for claim in ("H1", "H2")] == ["supported", "supported"]
     assert judged["H3"]["verdict"]["n"] == 10
