@@ -1,7 +1,4 @@
-"""A method on a task, with its step compiled once for all tests.
-
-With the fusions that conftest.py asks for, jax 0.10 compiles a step of MAP-Elites to a program that keeps no elite.
-"""
+"""A method on a task, with its step compiled once for all tests."""
 
 from __future__ import annotations
 
@@ -11,7 +8,6 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import numpy as np
-from usual_fusions import USUAL_FUSIONS
 
 from evoclaims.methods.base import Progress
 
@@ -19,11 +15,9 @@ from evoclaims.methods.base import Progress
 class Workbench:
     """Runs a method's pure functions; a seed stands for all the keys of a run."""
 
-    def __init__(self, method: Any, task: Any) -> None:
+    def __init__(self, method: Any, task: Any, options: Any = None) -> None:
         self.method, self.task, self.traces = method, task, 0
-        self.step: Callable[[Any, Any, Any], tuple[Any, Progress]] = jax.jit(
-            self._traced, compiler_options=USUAL_FUSIONS
-        )
+        self.step: Callable[[Any, Any, Any], tuple[Any, Progress]] = jax.jit(self._traced, compiler_options=options)
         self._init = jax.jit(lambda key: method.init(key, task))
         self._examine = jax.jit(lambda state, level: task.examine(method.best(task, state), jax.random.key(0), level))
 
