@@ -188,6 +188,36 @@ def test_an_interrupt_while_claims_are_judged_ends_the_command(evoclaims: Evocla
     assert not Path("verdicts.toml").exists()
 
 
+DURING_THE_CALL = """
+STATE = {"limit": 0.0}
+
+@says("d")
+def test_d(trials, verdict, monkeypatch):
+    monkeypatch.setitem(STATE, "limit", 2.0)
+    verdict(trials("right", on="parity").event("e", lambda t: t.metrics["mean_success"] > STATE["limit"]).stays())
+
+@says("e")
+def test_e(trials, verdict):
+    right = trials("right", on="parity")
+    assert len(right.fetch(range(10))) == 10
+    verdict(right.event("e", lambda t: pytest.skip("later")).stays())
+
+@says("f")
+def test_f(trials, verdict):
+    verdict(trials("right", on="parity").solves_every_level.in_most_trials())
+    assert verdict.report.n == 10
+"""
+
+
+def test_commands_judge_a_claim_during_its_call_as_pytest_does(project: Project, evoclaims: Evoclaims) -> None:
+    """What its fixtures have set is there, its trials can be looked at, and a part of it may skip it."""
+    project.write(DURING_THE_CALL)
+    status, out, _ = evoclaims("status")
+    assert (status, out.splitlines()[-1]) == (1, "claims (smoke): 1 supported, 1 refuted, 1 not run")
+    judged = project.json()
+    assert [one["outcome"] for one in judged["claims"]] == ["refuted", "not run", "supported"]
+
+
 IN_A_CLASS = """
 class TestThem:
     seen = ()

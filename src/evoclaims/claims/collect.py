@@ -85,12 +85,15 @@ def collect(config: SuiteConfig, asked: Asked) -> list[list[Collected]]:
 
 
 def judge_all(session: Session, collected: Iterable[Collected], root: Path) -> list[ClaimReport]:
-    """Return the reports of collected claims from the trials of a session, of the project in `root`."""
+    """Return the reports of collected claims from the trials of a session, of the project in `root`.
+
+    Claims that this session has not judged when they were called are judged now.
+    """
     last: dict[tuple[str, str], ClaimReport] = {}
     made = []
     for one in collected:
         report = one.report
-        if one.assertion is not None:
+        if one.assertion is not None and one.judge is not session:
             try:
                 # What a project's measures print is not shown, and what they warn of is treated as in the test.
                 with contextlib.redirect_stdout(io.StringIO()), warnings.catch_warnings(record=True):

@@ -35,7 +35,8 @@ class Collected:
 
     Attributes:
         test: the claim, the tier and the case.
-        report: what is known without trials: why nothing is asserted, where the test broke, is skipped or missing.
+        report: the verdict where it was judged; else why nothing is asserted: the test broke, is skipped or missing.
+        judge: the session that judged it during the call; None where nothing did.
         expectation: the accepted outcome.
         skipped: whether the test is skipped, or missing at its tier.
         assertion: what it passes to `verdict(...)`; None where it did not get there.
@@ -46,6 +47,7 @@ class Collected:
 
     test: ClaimTest
     report: ClaimReport
+    judge: Session | None = None
     expectation: Expectation | None = None
     skipped: bool = False
     assertion: Assertion | None = None
@@ -78,13 +80,18 @@ def never(condition: Condition, seeds: Sequence[int]) -> Sequence[TrialResult]:
 
 @dataclass(frozen=True)
 class Recorder(Session):
-    """A session that judges nothing, and keeps what each test asserts.
+    """A session that keeps what each test asserts.
+
+    It judges nothing by itself. With a judge, each test's assertion is judged during the call, as a run of pytest does:
+    what a measure reads besides trials may be gone when the test has ended.
 
     Attributes:
+        judge: a session that only reads trials.
         tests: what each test judges, by `ClaimTest.key`; filled in before tests are called.
         found: what has been collected so far, in the order of the calls.
     """
 
+    judge: Session | None = None
     tests: dict[tuple[str, str], ClaimTest] = field(default_factory=dict)
     found: list[Collected] = field(default_factory=list)
     _asked: list[TrialGroup] = field(default_factory=list)
@@ -92,18 +99,22 @@ class Recorder(Session):
 
     @staticmethod
     def of(session: Session) -> Recorder:
-        """Return a recorder for the protocol of a session."""
+        """Return a recorder for the protocol of a session, without a judge."""
         return Recorder(session.reproduction, session.store, never, session.trials, session.variant)
 
     def group(self, method: str, on: str, tier: str) -> TrialGroup:
-        """Return trials that are never run, and note that they were asked for."""
+        """Return trials that are not run, and note that they were asked for."""
         self._asked.append(super().group(method, on, tier))
         return self._asked[-1]
 
     def settle(self, test: ClaimTest, assertion: Assertion, others: Sequence[Reading] = ()) -> ClaimReport:
-        """Keep an assertion."""
-        report = unjudged(test, Outcome.NOT_RUN, "it is not judged")
-        more = {"assertion": assertion, "readings": tuple(others), "filters": tuple(warnings.filters)}
+        """Keep an assertion, and judge it if there is a judge."""
+        if self.judge is not None:
+            report = self.judge.settle(test, assertion, others)
+        else:
+            report = unjudged(test, Outcome.NOT_RUN, "it is not judged")
+        kept = {"assertion": assertion, "readings": tuple(others), "filters": tuple(warnings.filters)}
+        more = {**kept, "judge": self.judge}
         self._asserted[:] = [(report, more)]
         return report
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -23,6 +23,8 @@ from evoclaims.trials.store import Store
 from evoclaims.verdicts.claim_report import ClaimReport
 
 ALL_TIERS: Final = "all"
+
+NO_JUDGES: Final[Mapping[str, Session]] = {}
 
 
 @dataclass(frozen=True)
@@ -75,13 +77,18 @@ class Project:
 
     def judge_sessions(self, asked: Sequence[tuple[Session, str]]) -> list[list[ClaimReport]]:
         """Judge all claims of a tier in each session; raises as `judge_variants` does."""
-        collected = self.collect([(session.variant, tier) for session, tier in asked])
+        judges = {session.variant: session for session, _ in reversed(asked) if session.reads}
+        collected = self.collect([(session.variant, tier) for session, tier in asked], judges)
         return [
             judge_all(session, claims, self.config.root) for (session, _), claims in zip(asked, collected, strict=True)
         ]
 
-    def collect(self, asked: Sequence[tuple[str, str]]) -> list[list[Collected]]:
+    def collect(
+        self, asked: Sequence[tuple[str, str]], judges: Mapping[str, Session] = NO_JUDGES
+    ) -> list[list[Collected]]:
         """Return all claims for each variant of the protocol ("" for itself) and tier; each test is called once.
+
+        During the call the variant's session in `judges`, if any, judges what the test asserts.
 
         Raises:
             UserError: when the claims cannot be collected, or not all of them are called.
@@ -89,13 +96,14 @@ class Project:
         missing = [one for one in dict.fromkeys(asked) if one not in self._collected]
         if missing:
             tiers = {variant: [tier for of, tier in missing if of == variant] for variant, _ in missing}
-            asking = [
-                (Recorder(self.reproduction, self.store, never, variant=variant), tiers[variant]) for variant in tiers
-            ]
+            asking = [(self._recorder(variant, judges.get(variant)), tiers[variant]) for variant in tiers]
             for variant, found in zip(tiers, collect(self.config, asking), strict=True):
                 for tier in tiers[variant]:
                     self._collected[variant, tier] = [one for one in found if one.test.tier == tier]
         return [self._collected[one] for one in asked]
+
+    def _recorder(self, variant: str, judge: Session | None) -> Recorder:
+        return Recorder(self.reproduction, self.store, judge.fetch if judge else never, variant=variant, judge=judge)
 
     @cached_property
     def _collected(self) -> dict[tuple[str, str], list[Collected]]:
