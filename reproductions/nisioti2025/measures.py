@@ -155,7 +155,9 @@ class PaperTrials(TrialGroup):
     @property
     def reward_gained(self) -> Measure:
         """Reward per episode at the last report of training, less that at the first; for tasks of one level."""
-        return self.measure("reward gained", lambda t: t.curves["fitness"][-1] - t.curves["fitness"][0])
+        return self.measure(
+            "reward gained", lambda t: t.curves["fitness"][-1] - t.curves["fitness"][0], unit=self._paid
+        )
 
     @property
     def overturned(self) -> Measure:

@@ -56,6 +56,13 @@ def test_numbers_of_two_units_are_not_compared(source, units, compared, compare)
             assertion.find(trials, Design.fixed(2), 0.05)
 
 
+def test_two_units_are_not_compared_where_all_trials_have_failed(source) -> None:
+    a, b = (replace(source(name, ["diverged"] * 2).score(), unit=name) for name in "ab")
+    trials = {name: found for side in (a, b) for name, found in fetched(side.source, 2).items()}
+    with pytest.raises(UnreadableTrialError, match="different units"):
+        (a > b).find(trials, Design.fixed(2), 0.05)
+
+
 def test_an_assertion_built_by_hand_refuses_two_units(source) -> None:
     a, b = (replace(source(name, [1.0]).score(), unit=name) for name in "ab")
     with pytest.raises(UserError, match="have different units"):

@@ -85,12 +85,14 @@ class NumberReading(ScalarReading):
         better: "higher" or "lower"; a failed trial gets the worst value, -inf or +inf.
         window: how far and how finely values are observed.
         unit: what the number counts, such as "in metres"; empty where nothing is known. Two units are not compared.
+        refusal: why it is not read from any trial; empty if it is.
     """
 
     read: Callable[[TrialResult], float]
     better: Better = "higher"
     window: Window = EVERYTHING
     unit: str = ""
+    refusal: str = ""
 
     def __post_init__(self) -> None:
         """Reject an unknown direction."""
@@ -132,6 +134,8 @@ class NumberReading(ScalarReading):
 
     def of(self, trial: TrialResult) -> float:
         """Return the number of one trial, as far as it is observed; the worst value for a failed one."""
+        if self.refusal:
+            raise UnreadableTrialError(self.refusal)
         return self.window.seen(read_number(trial, self.describe(), self.read, _worst(self.better)))
 
 
@@ -159,11 +163,8 @@ def comparable(*readings: AnyNumber) -> tuple[AnyNumber, ...]:
     if len({reading.unit for reading in readings if reading.unit}) < 2:
         return seen
     units = " and ".join(f"{reading.describe()} ({reading.unit or 'of an unknown unit'})" for reading in readings)
-
-    def refuse(trial: TrialResult) -> float:
-        raise UnreadableTrialError(f"{units} are not compared: their numbers have different units")
-
-    return tuple(replace(reading, read=refuse, unit="") for reading in seen)
+    refusal = f"{units} are not compared: their numbers have different units"
+    return tuple(replace(reading, refusal=refusal, unit="") for reading in seen)
 
 
 def require_independent(*readings: NumberReading) -> None:
