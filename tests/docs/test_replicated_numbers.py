@@ -46,6 +46,6 @@ def test_the_readme_counts_contradicted_numbers() -> None:
     found = _answers(PUBLISHED)
     readme = " ".join((ROOT / "README.md").read_text(encoding="utf-8").split())
     assert (
-        f"Of {len(found)} published numbers {list(found.values()).count('contradicted')} are contradicted with the "
-        f"published scripts' settings, and {_contradicted_by_text(PUBLISHED)} with the text's."
+        f"Of {len(found)} published numbers the scripts' settings contradict {list(found.values()).count('contradicted')}, "
+        f"the text's contradict {_contradicted_by_text(PUBLISHED)}."
     ) in readme
