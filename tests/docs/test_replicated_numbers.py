@@ -44,8 +44,9 @@ def test_results_count_the_three_answers(protocol: str) -> None:
 
 def test_the_readme_counts_contradicted_numbers() -> None:
     found = _answers(PUBLISHED)
+    contradicted = list(found.values()).count("contradicted")
     readme = " ".join((ROOT / "README.md").read_text(encoding="utf-8").split())
     assert (
-        f"Of {len(found)} published numbers the scripts' settings contradict {list(found.values()).count('contradicted')}, "
+        f"Of {len(found)} published numbers the scripts' settings contradict {contradicted}, "
         f"the text's contradict {_contradicted_by_text(PUBLISHED)}."
     ) in readme
