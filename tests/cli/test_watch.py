@@ -7,7 +7,7 @@ import shutil
 from pathlib import Path
 
 import pytest
-from tiny_project import Evoclaims, aged, spoiled, trials_of
+from tiny_project import BODIES, Evoclaims, Project, aged, spoiled, trials_of
 
 from evoclaims.paper import references
 from evoclaims.trials.store import Store
@@ -108,6 +108,17 @@ def test_what_cannot_be_watched_is_said_before_anything_runs(watching: Evoclaims
     assert_refused(watching, "form", "--as=csv")
     shutil.rmtree("reference")
     assert_refused(watching, "no condition of the smoke tier's claims has ten committed trials")
+    assert sorted(stored.ids()) == before
+
+
+def test_a_broken_claim_takes_no_condition_from_the_watch(watching: Evoclaims, project: Project, stored: Store) -> None:
+    before = sorted(stored.ids())
+    project.write(a="supported", b="import gone")
+    assert_refused(
+        watching, "1 broken claim of the smoke tier would read: b (ModuleNotFoundError: No module named 'gone'"
+    )
+    project.write(a="supported", b=BODIES["refuted"] + "\n    raise OSError", c="pass")
+    assert_refused(watching, "2 broken claims of the smoke tier would read: b (OSError")
     assert sorted(stored.ids()) == before
 
 

@@ -70,9 +70,19 @@ def main(options: argparse.Namespace) -> int:
 
 
 def watch_of(project: Project, tier: str) -> tuple[Watch, list[str]]:
-    """Return what is watched, and the conditions of claims that have too few committed trials."""
+    """Return what is watched, and the conditions of claims that have too few committed trials.
+
+    Raises:
+        UserError: when a claim is broken, since nothing is known of its conditions; or when nothing can be watched.
+    """
     reproduction, (collected,) = project.reproduction, project.collect([("", tier)])
     every = with_test(collected)
+    broke = [f"{one.test.name} ({one.report.reason.removesuffix('.')})" for one in every if one.assertion is None]
+    if broke:
+        raise UserError(
+            f"Nothing is watched, since it is not known which conditions {plural(len(broke), 'broken claim')} of the "
+            f"{tier} tier would read: {', '.join(broke)}. Mend each, or mark it with pytest.mark.skip."
+        )
     pilots = Pilots(reproduction, tier, every)
     found: list[Watched] = []
     left_out: list[str] = []
