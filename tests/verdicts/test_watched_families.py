@@ -11,8 +11,9 @@ import pytest
 from msgspec import structs
 
 from evoclaims.core.errors import UserError
+from evoclaims.trials.result import TrialResult
 from evoclaims.verdicts import watch_file
-from evoclaims.verdicts.watch import ALPHA, Watch, Watched, families
+from evoclaims.verdicts.watch import ALPHA, Watch, Watched, families, watched
 from evoclaims.verdicts.watch_file import Night, append, load
 
 SEEDS = (*range(10), *range(100, 150))
@@ -107,6 +108,34 @@ def test_trials_that_diverge_rank_below_all_others() -> None:
     assert "score is lower" in watch.alarms(found)["m"][1]
     steady = Watch("smoke", (condition("m", "a", [1.0] * 60),))
     assert "median 1 -> -inf, A12 = 0.00" in steady.alarms(nights(steady, 1, lambda _: [-np.inf] * 10))["m"][1]
+
+
+def record(seed: int, status: Any = "done", versions: Any = (), **metrics: float) -> TrialResult:
+    curves = {"fitness": (metrics["score"], 1.0)} if "score" in metrics else {}
+    provenance = {"versions": dict(versions), "device": {"kind": "cpu"}}
+    return TrialResult("", "m-a", {}, seed, status, metrics, {}, curves, "", {}, provenance)
+
+
+def test_nan_is_the_worst_number_in_committed_and_new_trials_and_none_is_an_error() -> None:
+    reads = ("metrics.score", "curves.fitness")
+    committed = [record(seed, score=float(seed), environment_steps=5.0) for seed in range(10)]
+    committed[9] = record(9, score=np.nan, environment_steps=np.nan)
+    one = watched(("m", "a"), condition("m", "a", ()).condition, committed, (), lambda _: reads)
+    assert one is not None
+    assert one.values["score"] == (*range(9), -np.inf)
+    assert one.values["mean fitness while training"][9] == -np.inf
+    assert one.values["environment_steps"] == (5.0,) * 9 + (np.inf,)
+    new = [record(10, score=np.nan, environment_steps=5.0), record(11, "diverged", score=1.0, environment_steps=5.0)]
+    assert one.read(new) == {
+        "score": (-np.inf,) * 2,
+        "mean fitness while training": (-np.inf,) * 2,
+        "environment_steps": (5.0, np.inf),
+    }
+    assert one.read([record(10, score=np.inf, environment_steps=1.0)])["mean fitness while training"] == (np.inf,)
+    with pytest.raises(UserError, match="A new trial of m on a has no 'environment_steps'"):
+        one.read([record(10, score=1.0)])
+    with pytest.raises(UserError, match="A new trial of m on a has no 'mean fitness while training'"):
+        one.read([record(10, environment_steps=1.0)])
 
 
 def test_an_alarm_names_measures_and_versions_and_stays() -> None:

@@ -12,8 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evoclaims.core.canonical import content_hash
+from evoclaims.core.errors import UserError
 from evoclaims.core.packages import Versions, recorded
-from evoclaims.judging.drift import LOWER, MIN_REFERENCES, RESOLUTION, number_of
+from evoclaims.judging.drift import LOWER, MIN_REFERENCES, RESOLUTION, measured
 from evoclaims.judging.e_process import (
     Floats,
     evidence,
@@ -24,7 +25,7 @@ from evoclaims.judging.e_process import (
     uniform,
 )
 from evoclaims.judging.effect import a12, median
-from evoclaims.judging.sample import UnreadableTrialError
+from evoclaims.judging.sample import is_failed
 from evoclaims.paper import references
 from evoclaims.paper.reproduction import Names
 from evoclaims.trials.result import COMPLETE, TrialResult
@@ -34,7 +35,7 @@ from evoclaims.verdicts.watch_file import Night
 ALPHA: Final = 0.05
 """Largest probability that a series of nights, however long, has an alarm although nothing has changed."""
 
-PROCESS: Final = 1
+PROCESS: Final = 2
 """Raised when evidence is computed otherwise, which begins a new series."""
 
 MOST_MOVED, SHOWN = 3, 2.5
@@ -66,8 +67,21 @@ class Watched:
         return " on ".join(self.names)
 
     def read(self, trials: Iterable[TrialResult]) -> dict[str, tuple[float, ...]]:
-        """Return its measures of some trials; raises as `drift.number_of` does."""
-        return {name: tuple(number_of(trial, self.label, name) for trial in trials) for name in self.values}
+        """Return its measures of some trials, each the worst number where a trial has failed or has NaN.
+
+        Raises:
+            UserError: when a trial lacks one.
+        """
+        several, found = tuple(trials), {}
+        for name in self.values:
+            try:
+                found[name] = tuple(_number(trial, name) for trial in several)
+            except KeyError as error:
+                raise UserError(
+                    f"A new trial of {self.label} has no {name!r}, which the committed trials have, so this night is "
+                    "not added. Let the method or task measure it again, or write new references."
+                ) from error
+        return found
 
     def constant(self, measure: str) -> bool:
         """Whether a measure is the same in all committed trials."""
@@ -98,15 +112,26 @@ def watched(
     case = references.paired("", done, tuple(mine.values()), reads=tuple(reads(done[0])), pilot=pilot)
     mine |= {trial.seed: trial for trial in case.pilot if trial.status in COMPLETE}
     trials = [mine[seed] for seed in sorted(mine)]
-    label = " on ".join(names)
     values = {}
     for measure in case.metrics:
         try:
-            values[measure] = tuple(number_of(trial, label, measure) for trial in trials)
-        except (KeyError, UnreadableTrialError):  # a pilot has only what claims read
+            values[measure] = tuple(_number(trial, measure) for trial in trials)
+        except KeyError:  # a pilot has only what claims read
             continue
     versions = recorded(done[-1].provenance, condition.packages)
     return Watched(names, condition, tuple(sorted(mine)), values, versions) if values else None
+
+
+def _number(trial: TrialResult, measure: str) -> float:
+    """Return a measure of a committed or a new trial, which are read alike; raises a KeyError without it."""
+    worst = math.inf if measure in LOWER else -math.inf
+    if is_failed(trial):
+        return worst
+    try:
+        value = measured(trial, measure)
+    except (ValueError, OverflowError):  # a sum of both infinities
+        return worst
+    return worst if math.isnan(value) else value
 
 
 @dataclass(frozen=True)
