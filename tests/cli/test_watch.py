@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import shutil
+import sys
 from pathlib import Path
 
 import pytest
@@ -72,6 +73,27 @@ def test_a_kill_in_a_night_repeats_nothing_and_counts_nothing_twice(
     assert {trial.id: trial.timing for trial in stored.results([])} == ran
     assert seeds(stored) == [*range(10), *range(10_000, 10_020)]
     assert [night.seeds[0] for night in load(FILE)[1]] == [10_000, 10_010]
+
+
+def test_trials_of_a_killed_night_do_not_count_once_their_code_is_edited(
+    evoclaims: Evoclaims, project: Project, stored: Store, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sys, "dont_write_bytecode", True)  # two edits in one second would share it
+    project.write(a="undecided")
+    assert evoclaims("run", "coin")[0] == 0
+    references.write(COMMITTED.with_name("coin-parity.jsonl"), trials_of(stored, "coin"))
+    with monkeypatch.context() as patch:
+        patch.setattr(watch_file, "append", interrupt)
+        assert evoclaims("watch", "--trials=3")[0] == 130
+    paper = Path("tiny_paper.py")
+    paper.write_text(paper.read_text(encoding="utf-8").replace("1.0, -1.0)", "2.0, -2.0)"), encoding="utf-8")
+    sys.modules.pop("tiny_paper")
+    status, out, _ = evoclaims("watch", "--trials=2")
+    assert status == 0
+    assert "Trials up to seed 10001 ran before tiny_paper.Coin was edited: they do not count for this night." in out
+    assert "Trials up to seed 10002 ran before tiny_paper.Coin was edited" in out
+    assert "seeds 10003 to 10004" in out
+    assert [night.seeds for night in load(FILE)[1]] == [(10_003, 10_004)]
 
 
 def interrupt(*_: object) -> None:

@@ -52,6 +52,7 @@ def main(options: argparse.Namespace) -> int:
     watch, left_out = watch_of(project, options.tier)
     going_on = () if options.restart else watch.series(nights)
     first = watch.first_fresh_seed(max(FIRST_SEED, *tier.design.seeds(tier.design.last.n)), nights)
+    first = _after_older_code(project, watch, first, n)
     order = WorkOrder(options.storage, options.tier, options.device, first, n)
     trials = _run(project, watch, order, options)
     number = going_on[-1].series if going_on else max((night.series for night in nights), default=0) + 1
@@ -102,6 +103,25 @@ def watch_of(project: Project, tier: str) -> tuple[Watch, list[str]]:
             "claims, then `evoclaims reference`."
         )
     return Watch(tier, tuple(found)), left_out
+
+
+def _after_older_code(project: Project, watch: Watch, first: int, n: int) -> int:
+    """Return the first seed, from `first` up, from which a night has no trial of code that was edited since.
+
+    There are such trials after a night that was killed before its entry was written.
+    """
+    older: dict[int, tuple[str, ...]] = {}
+    for condition in (one.condition for one in watch.conditions):
+        versions = condition.versions
+        for seed in range(first, first + n):
+            stored = project.store.made_with(TrialSpec(condition, seed).id, versions)
+            if stored is not None and (edited := condition.edited_since([stored])):
+                older[seed] = (*older.get(seed, ()), *edited)
+    if not older:
+        return first
+    after, names = max(older) + 1, sorted({name for edited in older.values() for name in edited})
+    print(f"Trials up to seed {after - 1} ran before {', '.join(names)} was edited: they do not count for this night.")
+    return _after_older_code(project, watch, after, n)
 
 
 def _run(project: Project, watch: Watch, order: WorkOrder, options: argparse.Namespace) -> dict[str, list[TrialResult]]:
