@@ -114,10 +114,17 @@ def test_an_alarm_ends_with_1_until_a_new_series_begins(watching: Evoclaims, sto
     assert text.startswith("# Trials have changed: ")
     assert "mean\\_success is higher" in text
     assert watching("watch")[0] == 1
-    COMMITTED.write_bytes(sound)
+    COMMITTED.write_bytes(sound)  # which begins a series, as the edit of any claim may
+    status, out, _ = watching("watch")
+    assert status == 1
+    assert re.search(r"The alarm of series 2 \(right.*\) stays until a night is run with --restart\.\nALARM on ", out)
+    assert "moved: right on parity: mean_success is higher" in out
+    assert "No alarm" not in out
     assert watching("watch", "--restart")[0] == 0
     assert watching("watch")[0] == 0
-    assert [night.series for night in load(FILE)[1]] == [1, 2, 2, 3, 3]
+    assert [(night.series, night.restart) for night in load(FILE)[1]] == [
+        *((1, False), (2, False), (2, False), (3, False), (4, True), (4, False))
+    ]
 
 
 def test_what_cannot_be_watched_is_said_before_anything_runs(watching: Evoclaims, stored: Store) -> None:

@@ -181,6 +181,9 @@ def written(tmp_path: Path) -> Path:
         append(path, before, one)
         assert path.read_bytes().startswith(before)
         assert load(path)[1] == (*earlier, one)
+    last = structs.replace(one, alarms=('a "line"',), restart=True)
+    append(path.with_name("flagged.toml"), b"", last)
+    assert load(path.with_name("flagged.toml"))[1] == (last,)
     return path
 
 

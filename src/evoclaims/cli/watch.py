@@ -39,7 +39,7 @@ MOST_NIGHTS: Final = 10
 
 
 def main(options: argparse.Namespace) -> int:
-    """Run a night and add it to the file; 1 when the evidence of a family has reached the level of an alarm."""
+    """Run a night and add it to the file; 1 on an alarm, and while one of an earlier series stays."""
     if options.form not in (None, "markdown"):
         raise UnknownNameError("form", options.form, ("markdown",))
     project = open_project(options.storage)
@@ -57,17 +57,26 @@ def main(options: argparse.Namespace) -> int:
     trials = _run(project, watch, order, options)
     number = going_on[-1].series if going_on else max((night.series for night in nights), default=0) + 1
     series = (*going_on, _night(watch, trials, going_on, number))
-    watch_file.append(path, before, series[-1])
     alarms = watch.alarms(series)
-    sentences = list(_sentences(watch, series, left_out, alarms, path))
+    found = tuple(line for those in alarms.values() for line in those)
+    series = (*going_on, structs.replace(series[-1], alarms=found, restart=options.restart))
+    watch_file.append(path, before, series[-1])
+    stay = watch_file.standing([*(night for night in nights if night.tier == watch.tier), series[-1]])
+    sentences = _sentences(
+        watch, series, left_out, [*found, *(line for one, more in stay.items() for line in (one, *more))], path
+    )
     console = PlainSpokenConsole(file=styled())
     console.print_whole(plain_table(_headings(), _rows(watch, series[-1])))
     print(*sentences, sep="\n")
     if options.form is not None:
         out = Path(options.out or REPORT / "watch.md")
-        write(out, _markdown(sentences, alarms).encode(), ours=options.out is None)
+        write(
+            out,
+            _markdown(sentences, [*alarms, *(["an earlier alarm"] if stay else [])]).encode(),
+            ours=options.out is None,
+        )
         print(f"wrote {out}")
-    return int(bool(alarms))
+    return int(bool(alarms or stay))
 
 
 def watch_of(project: Project, tier: str) -> tuple[Watch, list[str]]:
@@ -190,7 +199,7 @@ def _found_in(watch: Watch, family: Family, shift: float, night: Night) -> str:
 
 
 def _sentences(
-    watch: Watch, series: Sequence[Night], left_out: Sequence[str], alarms: Mapping[str, Sequence[str]], path: Path
+    watch: Watch, series: Sequence[Night], left_out: Sequence[str], alarms: Sequence[str], path: Path
 ) -> list[str]:
     """Return what a night has shown, and what to do next."""
     last, families = series[-1], len(watch.families)
@@ -207,7 +216,7 @@ def _sentences(
         )
     if left_out:
         lines.append(f"Not watched, for want of ten committed trials: {', '.join(left_out)}.")
-    lines += [line for those in alarms.values() for line in those]
+    lines += alarms
     if alarms:
         lines.append(
             f"Next: look into it (`evoclaims across`, `evoclaims bisect`), commit {path.name}, and begin a new series "
@@ -218,7 +227,7 @@ def _sentences(
     return lines
 
 
-def _markdown(sentences: Sequence[str], alarms: Mapping[str, Sequence[str]]) -> str:
+def _markdown(sentences: Sequence[str], alarms: Sequence[str]) -> str:
     """Return the text of an issue."""
     title = f"Trials have changed: {', '.join(alarms)}" if alarms else "No alarm"
     return "\n\n".join([f"# {literal(title)}", "\n".join(f"* {literal(line)}" for line in sentences)]) + "\n"
