@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -13,7 +14,7 @@ from msgspec import structs
 from evoclaims.core.errors import UserError
 from evoclaims.trials.result import TrialResult
 from evoclaims.verdicts import watch_file
-from evoclaims.verdicts.watch import ALPHA, Watch, Watched, families, watched
+from evoclaims.verdicts.watch import ALPHA, Watch, Watched, _of_column, families, watched
 from evoclaims.verdicts.watch_file import Night, append, load
 
 SEEDS = (*range(10), *range(100, 150))
@@ -136,6 +137,36 @@ def test_nan_is_the_worst_number_in_committed_and_new_trials_and_none_is_an_erro
         one.read([record(10, score=1.0)])
     with pytest.raises(UserError, match="A new trial of m on a has no 'mean fitness while training'"):
         one.read([record(10, environment_steps=1.0)])
+
+
+def test_what_pilots_lack_is_watched_against_the_references_alone() -> None:
+    rng = np.random.default_rng(0)
+    made, reads = condition("m", "a", ()).condition, lambda _: ("metrics.score",)
+    references = [record(seed, score=x, environment_steps=y) for seed, (x, y) in enumerate(normal(rng, n=(10, 2)))]
+    pilot = [record(100 + seed, score=x) for seed, x in enumerate(normal(rng, n=50))]
+    one, alone = (watched(("m", "a"), made, references, those, reads) for those in (pilot, ()))
+    assert one is not None
+    assert alone is not None
+    assert {name: len(values) for name, values in one.values.items()} == {"score": 60, "environment_steps": 10}
+    assert (one.whole, alone.whole) == (("score",), ("score", "environment_steps"))
+    watch, scores = Watch("smoke", (one,)), iter(normal(rng, n=300).tolist())
+    found: tuple[Night, ...] = ()
+    for number in range(2):
+        after = night(watch, number, lambda _: [next(scores) for _ in range(10)], before=found)
+        found = (
+            *found,
+            structs.replace(after, values={"m on a": after.values["m on a"] | {"environment_steps": (9.0,) * 10}}),
+        )
+    paths = [_of_column(each, "environment_steps", found).tolist() for each in (one, alone)]
+    assert paths[0] == paths[1]
+    assert paths[0][1] > paths[0][0] > 50
+    (family,) = watch.families
+    assert family.path(found)[1] == pytest.approx(paths[0][1] / 8)
+    without = Watch("smoke", (replace(one, values={"score": one.values["score"]}),)).families[0]
+    assert family._of_sum(found).tolist() == without._of_sum(found).tolist()
+    only = watched(("m", "a"), made, references, [record(100, other=1.0)], reads)
+    assert only is not None
+    assert (only.seeds, only.whole) == (alone.seeds, alone.whole)
 
 
 def test_an_alarm_names_measures_and_versions_and_stays() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -51,7 +52,7 @@ class Watched:
         names: of method and task.
         condition: what runs.
         seeds: of the committed trials, rising.
-        values: what each measure is in them, in the order of seeds.
+        values: what each measure is in them, in the order of seeds; in the reference trials alone if pilots lack it.
         versions: of the packages that they were made with.
     """
 
@@ -83,6 +84,11 @@ class Watched:
                 ) from error
         return found
 
+    @property
+    def whole(self) -> tuple[str, ...]:
+        """The measures that all committed trials have."""
+        return tuple(name for name, values in self.values.items() if len(values) == len(self.seeds))
+
     def constant(self, measure: str) -> bool:
         """Whether a measure is the same in all committed trials."""
         values = np.asarray(self.values[measure])
@@ -110,16 +116,16 @@ def watched(
     if len(mine) < MIN_REFERENCES or not done:
         return None
     case = references.paired("", done, tuple(mine.values()), reads=tuple(reads(done[0])), pilot=pilot)
-    mine |= {trial.seed: trial for trial in case.pilot if trial.status in COMPLETE}
-    trials = [mine[seed] for seed in sorted(mine)]
-    values = {}
-    for measure in case.metrics:
-        try:
-            values[measure] = tuple(_number(trial, measure) for trial in trials)
-        except KeyError:  # a pilot has only what claims read
-            continue
+    every = mine | {trial.seed: trial for trial in case.pilot if trial.status in COMPLETE}
+    values: dict[str, tuple[float, ...]] = {}
+    for those in (every, mine):  # a pilot has only what claims read; what it lacks is watched against references
+        for measure in (name for name in case.metrics if name not in values):
+            with contextlib.suppress(KeyError):
+                values[measure] = tuple(_number(those[seed], measure) for seed in sorted(those))
+        if not values:
+            every = mine
     versions = recorded(done[-1].provenance, condition.packages)
-    return Watched(names, condition, tuple(sorted(mine)), values, versions) if values else None
+    return Watched(names, condition, tuple(sorted(every)), values, versions) if values else None
 
 
 def _number(trial: TrialResult, measure: str) -> float:
@@ -155,15 +161,15 @@ class Family:
 
     @property
     def moves(self) -> bool:
-        """Whether some measure varies."""
-        return not all(one.constant(measure) for one, measure in self.columns)
+        """Whether some measure of the sum varies."""
+        return not all(one.constant(measure) for one in self.conditions for measure in one.whole)
 
     def path(self, nights: Sequence[Night]) -> list[float]:
         """Return the evidence after each night of a series.
 
         Of a task's family, it is that of the sum over conditions. A method's takes half of its chance of a false alarm
         for the sum, and half for its measures, each of which is tested in two ways: if it varies in the committed
-        trials, by ranks, else as a constant.
+        trials, by ranks, else as a constant. A measure that pilots lack is in no sum, where all have the same trials.
         """
         if not self.of_method:
             return self._of_sum(nights).tolist() if self.moves else [1 / (at + 2) for at in range(len(nights))]
@@ -172,12 +178,14 @@ class Family:
         return [float(largest) for largest in np.max(paths, axis=0)]
 
     def _of_sum(self, nights: Sequence[Night]) -> Floats:
-        return _by_ranks(self.label, self.conditions[0].seeds, nights, lambda until: _scores(self.conditions, until)[0])
+        return _by_ranks(
+            self.label, len(self.conditions[0].seeds), nights, lambda until: _scores(self.conditions, until)[0]
+        )
 
     def nights_to_find(self, shift: float, each: int, level: float) -> int | None:
         """Return the median number of nights to an alarm if all its measures get better by `shift` SD.
 
-        None if all are constant: then one night with another value in most trials is an alarm.
+        None if all of the sum are constant: then one night with another value in most trials is an alarm.
         """
         if not self.moves:
             return None
@@ -290,8 +298,8 @@ def _scores(conditions: Sequence[Watched], nights: Sequence[Night]) -> tuple[Flo
     """
     total, gain = np.zeros(len(conditions[0].seeds) + sum(len(night.seeds) for night in nights)), 0.0
     for one in conditions:
-        ranks = np.stack([standardized_ranks(_ranks(_column(one, name, nights))) for name in one.values])
-        ranks *= np.array([-1.0 if name in LOWER else 1.0 for name in one.values])[:, None]
+        ranks = np.stack([standardized_ranks(_ranks(_column(one, name, nights))) for name in one.whole])
+        ranks *= np.array([-1.0 if name in LOWER else 1.0 for name in one.whole])[:, None]
         mean = ranks.mean(axis=0)
         if (spread := float(mean.std())) > 0:
             total += mean / spread
@@ -303,22 +311,20 @@ def _of_column(one: Watched, measure: str, nights: Sequence[Night]) -> Floats:
     """Return the evidence of one measure after each night."""
     if not one.constant(measure):
         name = f"{one.label}: {measure}"
-        return _by_ranks(name, one.seeds, nights, lambda until: _ranks(_column(one, measure, until)))
+        return _by_ranks(name, len(one.values[measure]), nights, lambda until: _ranks(_column(one, measure, until)))
     first = one.values[measure][0]
     rows = [np.asarray(night.values[one.label][measure]) for night in nights]
     odd = [(int(_differ(row, first).sum()), len(row)) for row in rows]
-    return np.array(evidence_against_constant(len(one.seeds), odd))
+    return np.array(evidence_against_constant(len(one.values[measure]), odd))
 
 
-def _by_ranks(
-    name: str, before: Sequence[int], nights: Sequence[Night], scores: Callable[[Sequence[Night]], Floats]
-) -> Floats:
+def _by_ranks(name: str, before: int, nights: Sequence[Night], scores: Callable[[Sequence[Night]], Floats]) -> Floats:
     """Return the evidence after each night, from scores of all trials up to it."""
     parts = [
         ranks_of_new(scores(nights[: at + 1]), np.array([uniform(name, seed) for seed in night.seeds]))
         for at, night in enumerate(nights)
     ]
-    return evidence(np.concatenate(parts), len(before), [len(night.seeds) for night in nights])
+    return evidence(np.concatenate(parts), before, [len(night.seeds) for night in nights])
 
 
 def _column(one: Watched, measure: str, nights: Sequence[Night]) -> list[float]:
