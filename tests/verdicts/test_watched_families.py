@@ -240,6 +240,17 @@ def test_a_file_that_was_edited_torn_or_shortened_is_refused(written: Path) -> N
             load(written)
 
 
+def test_whole_numbers_in_place_of_floats_break_no_seal(written: Path) -> None:
+    before, nights = load(written)
+    whole = structs.replace(nights[-1], level=20, values={"m": {"score": (1, 2)}}, evidence={"m": 1})
+    append(written, before, whole)
+    append(written, load(written)[0], nights[-1])
+    assert load(written)[1] == (*nights, whole, nights[-1])
+    written.write_text(written.read_text(encoding="utf-8").replace("level = 20.0", "level = 20"), encoding="utf-8")
+    append(written, load(written)[0], whole)
+    assert len(load(written)[1]) == 6
+
+
 def test_a_night_is_not_added_to_a_file_that_has_changed_meanwhile(written: Path) -> None:
     before, (one, *_) = load(written)
     written.unlink()

@@ -108,10 +108,11 @@ def _nights(plain: dict[str, Any]) -> Iterator[Night]:
     seal = ""
     for number, entry in enumerate(plain["night"], start=1):
         stored = entry.pop("seal", None)
-        seal = _seal(seal, entry)
+        night = convert(entry, Night)
+        seal = _seal(seal, night)
         if stored != seal:
             raise ValueError(f"night {number} does not match its seal, so it was edited, torn or moved")
-        yield convert(entry, Night)
+        yield night
 
 
 def append(path: Path, before: bytes, night: Night) -> None:
@@ -124,15 +125,16 @@ def append(path: Path, before: bytes, night: Night) -> None:
     now, nights = load(path)
     if now != before:
         raise UserError(f"{path} has changed during this night, which is not added. Run the same command again.")
-    entry = to_builtins(night)
+    added = convert(to_builtins(night), Night)  # a whole number may stand where a float is declared
     seal = ""
-    for one in nights:
-        seal = _seal(seal, to_builtins(one))
-    write_atomically(path, (before or HEAD.encode()) + _text({**entry, "seal": _seal(seal, entry)}).encode())
+    for one in (*nights, added):
+        seal = _seal(seal, one)
+    write_atomically(path, (before or HEAD.encode()) + _text({**to_builtins(added), "seal": seal}).encode())
 
 
-def _seal(before: str, entry: dict[str, Any]) -> str:
-    return content_hash([before, entry])
+def _seal(before: str, night: Night) -> str:
+    """Return the hash of a night and of the seal before it."""
+    return content_hash([before, to_builtins(night)])
 
 
 def _text(entry: dict[str, Any]) -> str:
