@@ -48,8 +48,8 @@ def main() -> None:
 
 
 def _varying(family: Family) -> int:
-    """Return how many conditions have a measure that varies."""
-    return sum(not all(map(one.constant, one.values)) for one in family.conditions)
+    """Return how many conditions have a measure in the sum that varies."""
+    return sum(not all(map(one.constant, one.whole)) for one in family.conditions)
 
 
 def first_alarm(watch: Watch, families: Sequence[Family], run: int, nights: int, shift: float = 0.0) -> int:

@@ -58,6 +58,17 @@ def test_each_night_adds_an_entry_of_fresh_seeds(watching: Evoclaims, stored: St
     assert {"jax", "numpy"} <= second.versions.keys()
 
 
+def test_no_night_has_seeds_of_the_design(watching: Evoclaims, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys, "dont_write_bytecode", True)  # two edits in one second would share it
+    FILE.unlink()
+    paper = Path("tiny_paper.py")
+    design = "Design(looks=Design.fixed(10).looks, first_seed=9_991)"  # up to seed 10,000
+    paper.write_text(paper.read_text(encoding="utf-8").replace("Design.fixed(10)", design, 1), encoding="utf-8")
+    sys.modules.pop("tiny_paper", None)
+    assert watching("watch", "--trials=2")[0] == 0
+    assert load(FILE)[1][0].seeds == (10_001, 10_002)
+
+
 def test_a_kill_in_a_night_repeats_nothing_and_counts_nothing_twice(
     watching: Evoclaims, stored: Store, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -87,7 +98,7 @@ def test_trials_of_a_killed_night_do_not_count_once_their_code_is_edited(
         assert evoclaims("watch", "--trials=3")[0] == 130
     paper = Path("tiny_paper.py")
     paper.write_text(paper.read_text(encoding="utf-8").replace("1.0, -1.0)", "2.0, -2.0)"), encoding="utf-8")
-    sys.modules.pop("tiny_paper")
+    sys.modules.pop("tiny_paper", None)
     status, out, _ = evoclaims("watch", "--trials=2")
     assert status == 0
     assert "Trials up to seed 10001 ran before tiny_paper.Coin was edited: they do not count for this night." in out

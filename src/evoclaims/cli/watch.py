@@ -30,7 +30,7 @@ from evoclaims.verdicts.watch import ALPHA, Family, Watch, Watched, watched
 from evoclaims.verdicts.watch_file import Night
 
 FIRST_SEED: Final = 10_000
-"""Of the first night, unless a committed trial has a later one."""
+"""Of the first night, unless a committed trial or the tier's design has it or a later one."""
 
 FOUND: Final = (0.5, 0.8)
 """Shifts, in standard deviations, of which the table shows after how many nights they are found."""
@@ -51,7 +51,8 @@ def main(options: argparse.Namespace) -> int:
     before, nights = watch_file.load(path)
     watch, left_out = watch_of(project, options.tier)
     going_on = () if options.restart else watch.series(nights)
-    first = watch.first_fresh_seed(max(FIRST_SEED, *tier.design.seeds(tier.design.last.n)), nights)
+    design = tier.design.with_third_look()
+    first = watch.first_fresh_seed(max(FIRST_SEED, design.first_seed + design.last.n), nights)
     first = _after_older_code(project, watch, first, n)
     order = WorkOrder(options.storage, options.tier, options.device, first, n)
     trials = _run(project, watch, order, options)
