@@ -48,8 +48,8 @@ def main() -> None:
 
 
 def _varying(family: Family) -> int:
-    """Return how many conditions have a measure that varies."""
-    return sum(not all(map(one.constant, one.values)) for one in family.conditions)
+    """Return how many conditions have a measure in the sum that varies."""
+    return sum(not all(map(one.constant, one.whole)) for one in family.conditions)
 
 
 def first_alarm(watch: Watch, families: Sequence[Family], run: int, nights: int, shift: float = 0.0) -> int:
@@ -74,7 +74,7 @@ def first_alarm(watch: Watch, families: Sequence[Family], run: int, nights: int,
 
 def redrawn(one: Watched, seeds: Sequence[int], run: int, shift: float) -> Watched:
     """Return a condition with other trials, drawn from the committed ones by seeds; each is drawn as a whole."""
-    varying = [name for name in one.values if not one.constant(name)]
+    varying = [name for name in one.whole if not one.constant(name)]
     weights = np.ones(len(one.seeds))
     if shift and varying:
         mean = sum(standardized_ranks(np.array(one.values[name])) * (-1 if name in LOWER else 1) for name in varying)
@@ -82,7 +82,10 @@ def redrawn(one: Watched, seeds: Sequence[int], run: int, shift: float) -> Watch
     steps = np.cumsum(weights / weights.sum())
     name = one.label if shift else "all"  # without a shift, trials of one seed belong together
     at = [int(np.searchsorted(steps, uniform(f"{run} {name}", seed))) for seed in seeds]
-    values = {name: tuple(values[place] for place in at) for name, values in one.values.items()}
+    values = {  # what pilots lack is drawn from the references again, and is as short in the committed trials
+        name: tuple(values[place % len(values)] for place in (at[: len(values)] if seeds is one.seeds else at))
+        for name, values in one.values.items()
+    }
     return dataclasses.replace(one, values=values)
 
 

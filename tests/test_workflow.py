@@ -65,8 +65,9 @@ def test_the_text_of_an_issue_is_kept_where_something_changed_and_only_there() -
 
 def test_every_night_new_seeds_run_and_the_nights_before_are_found_again() -> None:
     (command,) = re.findall(r"run: evoclaims (.*)", NIGHTLY)
-    options = parser().parse_args(shlex.split(command))
+    options = parser().parse_args(shlex.split(command.removesuffix(" $RESTART")))
     assert (options.command, options.tier, options.form, options.out) == ("watch", "smoke", "markdown", "issue.md")
+    assert not options.restart
     assert re.search(r'\n  schedule:\n    - cron: "\d+ \d+ \* \* \*"\n', NIGHTLY)
     steps = re.findall(r"uses: actions/cache/(\w+)@v4\n +with:\n +path: (\S+)\n +key: (watch-)", NIGHTLY)
     assert {name: path for name, path, _ in steps} == dict.fromkeys(
@@ -76,6 +77,15 @@ def test_every_night_new_seeds_run_and_the_nights_before_are_found_again() -> No
     assert [text.startswith("${{ always() ") for text in kept] == [True]  # a night with an alarm counts, too
     issue = re.findall(r"if: (.*)\n +uses: actions/upload-artifact@v4\n +with:\n.*\n +path: (\S+)\n", NIGHTLY)
     assert ("${{ failure() && hashFiles('issue.md') != '' }}", options.out) in issue
+
+
+def test_a_person_may_begin_a_new_series_of_nights_and_no_text_of_theirs_reaches_a_shell() -> None:
+    assert re.search(r"\n  workflow_dispatch:\n    inputs:\n      restart:\n.*\n        type: boolean\n", NIGHTLY)
+    ((yes, no),) = re.findall(r"RESTART: \$\{\{ inputs\.restart && '(.*)' \|\| '(.*)' \}\}\n", NIGHTLY)
+    (command,) = re.findall(r"run: evoclaims (.*)", NIGHTLY)
+    found = [parser().parse_args(shlex.split(command.replace("$RESTART", text))).restart for text in (yes, no)]
+    assert found == [True, False]
+    assert not [line for line in NIGHTLY.splitlines() if "${{" in line and "run:" in line]
 
 
 @pytest.mark.parametrize("text", [TEXT, WEEKLY, NIGHTLY, SITE], ids=["claims", "releases", "watch", "site"])

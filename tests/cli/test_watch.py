@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import re
 import shutil
+import sys
 from pathlib import Path
 
 import pytest
-from tiny_project import Evoclaims, aged, spoiled, trials_of
+from tiny_project import BODIES, Evoclaims, Project, aged, spoiled, trials_of
 
 from evoclaims.paper import references
 from evoclaims.trials.store import Store
@@ -57,6 +58,17 @@ def test_each_night_adds_an_entry_of_fresh_seeds(watching: Evoclaims, stored: St
     assert {"jax", "numpy"} <= second.versions.keys()
 
 
+def test_no_night_has_seeds_of_the_design(watching: Evoclaims, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys, "dont_write_bytecode", True)  # two edits in one second would share it
+    FILE.unlink()
+    paper = Path("tiny_paper.py")
+    design = "Design(looks=Design.fixed(10).looks, first_seed=9_991)"  # up to seed 10,000
+    paper.write_text(paper.read_text(encoding="utf-8").replace("Design.fixed(10)", design, 1), encoding="utf-8")
+    sys.modules.pop("tiny_paper", None)
+    assert watching("watch", "--trials=2")[0] == 0
+    assert load(FILE)[1][0].seeds == (10_001, 10_002)
+
+
 def test_a_kill_in_a_night_repeats_nothing_and_counts_nothing_twice(
     watching: Evoclaims, stored: Store, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -72,6 +84,27 @@ def test_a_kill_in_a_night_repeats_nothing_and_counts_nothing_twice(
     assert {trial.id: trial.timing for trial in stored.results([])} == ran
     assert seeds(stored) == [*range(10), *range(10_000, 10_020)]
     assert [night.seeds[0] for night in load(FILE)[1]] == [10_000, 10_010]
+
+
+def test_trials_of_a_killed_night_do_not_count_once_their_code_is_edited(
+    evoclaims: Evoclaims, project: Project, stored: Store, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sys, "dont_write_bytecode", True)  # two edits in one second would share it
+    project.write(a="undecided")
+    assert evoclaims("run", "coin")[0] == 0
+    references.write(COMMITTED.with_name("coin-parity.jsonl"), trials_of(stored, "coin"))
+    with monkeypatch.context() as patch:
+        patch.setattr(watch_file, "append", interrupt)
+        assert evoclaims("watch", "--trials=3")[0] == 130
+    paper = Path("tiny_paper.py")
+    paper.write_text(paper.read_text(encoding="utf-8").replace("1.0, -1.0)", "2.0, -2.0)"), encoding="utf-8")
+    sys.modules.pop("tiny_paper", None)
+    status, out, _ = evoclaims("watch", "--trials=2")
+    assert status == 0
+    assert "Trials up to seed 10001 ran before tiny_paper.Coin was edited: they do not count for this night." in out
+    assert "Trials up to seed 10002 ran before tiny_paper.Coin was edited" in out
+    assert "seeds 10003 to 10004" in out
+    assert [night.seeds for night in load(FILE)[1]] == [(10_003, 10_004)]
 
 
 def interrupt(*_: object) -> None:
@@ -92,10 +125,17 @@ def test_an_alarm_ends_with_1_until_a_new_series_begins(watching: Evoclaims, sto
     assert text.startswith("# Trials have changed: ")
     assert "mean\\_success is higher" in text
     assert watching("watch")[0] == 1
-    COMMITTED.write_bytes(sound)
+    COMMITTED.write_bytes(sound)  # which begins a series, as the edit of any claim may
+    status, out, _ = watching("watch")
+    assert status == 1
+    assert re.search(r"The alarm of series 2 \(right.*\) stays until a night is run with --restart\.\nALARM on ", out)
+    assert "moved: right on parity: mean_success is higher" in out
+    assert "No alarm" not in out
     assert watching("watch", "--restart")[0] == 0
     assert watching("watch")[0] == 0
-    assert [night.series for night in load(FILE)[1]] == [1, 2, 2, 3, 3]
+    assert [(night.series, night.restart) for night in load(FILE)[1]] == [
+        *((1, False), (2, False), (2, False), (3, False), (4, True), (4, False))
+    ]
 
 
 def test_what_cannot_be_watched_is_said_before_anything_runs(watching: Evoclaims, stored: Store) -> None:
@@ -108,6 +148,17 @@ def test_what_cannot_be_watched_is_said_before_anything_runs(watching: Evoclaims
     assert_refused(watching, "form", "--as=csv")
     shutil.rmtree("reference")
     assert_refused(watching, "no condition of the smoke tier's claims has ten committed trials")
+    assert sorted(stored.ids()) == before
+
+
+def test_a_broken_claim_takes_no_condition_from_the_watch(watching: Evoclaims, project: Project, stored: Store) -> None:
+    before = sorted(stored.ids())
+    project.write(a="supported", b="import gone")
+    assert_refused(
+        watching, "1 broken claim of the smoke tier would read: b (ModuleNotFoundError: No module named 'gone'"
+    )
+    project.write(a="supported", b=BODIES["refuted"] + "\n    raise OSError", c="pass")
+    assert_refused(watching, "2 broken claims of the smoke tier would read: b (OSError")
     assert sorted(stored.ids()) == before
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from laboratory import Laboratory
+from msgspec import structs
 from unpacked import whole
 
 from evoclaims.report.watch_chart import shown
@@ -21,7 +22,11 @@ def test_the_last_series_is_shown_with_its_alarms() -> None:
     full, smoke = shown(nights)
     assert (full.tier, smoke.tier) == ("full", "smoke")
     assert smoke.says.startswith("3 nights up to 2026-01-04, alarm at an evidence of 480. Largest on the last night: <")
-    assert smoke.says.endswith(f"with 20. Alarms: {HOSTILE}.")
+    assert smoke.says.endswith(
+        f"with 20. Alarms: {HOSTILE}. The alarm of series 1 ({HOSTILE}) stays until a night is run with --restart."
+    )
+    nights[1] = structs.replace(nights[1], restart=True)
+    assert shown(nights)[1].says.endswith(f"with 20. Alarms: {HOSTILE}.")
     assert full.says.endswith("Alarms: none.")
     first, *_, alarm = smoke.panel.lines
     assert [round(float(y), 3) for y in first.y] == [0, -1, 2.681, 1.301]

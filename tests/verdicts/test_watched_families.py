@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -11,8 +12,9 @@ import pytest
 from msgspec import structs
 
 from evoclaims.core.errors import UserError
+from evoclaims.trials.result import TrialResult
 from evoclaims.verdicts import watch_file
-from evoclaims.verdicts.watch import ALPHA, Watch, Watched, families
+from evoclaims.verdicts.watch import ALPHA, Watch, Watched, _of_column, families, watched
 from evoclaims.verdicts.watch_file import Night, append, load
 
 SEEDS = (*range(10), *range(100, 150))
@@ -109,6 +111,64 @@ def test_trials_that_diverge_rank_below_all_others() -> None:
     assert "median 1 -> -inf, A12 = 0.00" in steady.alarms(nights(steady, 1, lambda _: [-np.inf] * 10))["m"][1]
 
 
+def record(seed: int, status: Any = "done", versions: Any = (), **metrics: float) -> TrialResult:
+    curves = {"fitness": (metrics["score"], 1.0)} if "score" in metrics else {}
+    provenance = {"versions": dict(versions), "device": {"kind": "cpu"}}
+    return TrialResult("", "m-a", {}, seed, status, metrics, {}, curves, "", {}, provenance)
+
+
+def test_nan_is_the_worst_number_in_committed_and_new_trials_and_none_is_an_error() -> None:
+    reads = ("metrics.score", "curves.fitness")
+    committed = [record(seed, score=float(seed), environment_steps=5.0) for seed in range(10)]
+    committed[9] = record(9, score=np.nan, environment_steps=np.nan)
+    one = watched(("m", "a"), condition("m", "a", ()).condition, committed, (), lambda _: reads)
+    assert one is not None
+    assert one.values["score"] == (*range(9), -np.inf)
+    assert one.values["mean fitness while training"][9] == -np.inf
+    assert one.values["environment_steps"] == (5.0,) * 9 + (np.inf,)
+    new = [record(10, score=np.nan, environment_steps=5.0), record(11, "diverged", score=1.0, environment_steps=5.0)]
+    assert one.read(new) == {
+        "score": (-np.inf,) * 2,
+        "mean fitness while training": (-np.inf,) * 2,
+        "environment_steps": (5.0, np.inf),
+    }
+    assert one.read([record(10, score=np.inf, environment_steps=1.0)])["mean fitness while training"] == (np.inf,)
+    with pytest.raises(UserError, match="A new trial of m on a has no 'environment_steps'"):
+        one.read([record(10, score=1.0)])
+    with pytest.raises(UserError, match="A new trial of m on a has no 'mean fitness while training'"):
+        one.read([record(10, environment_steps=1.0)])
+
+
+def test_what_pilots_lack_is_watched_against_the_references_alone() -> None:
+    rng = np.random.default_rng(0)
+    made, reads = condition("m", "a", ()).condition, lambda _: ("metrics.score",)
+    references = [record(seed, score=x, environment_steps=y) for seed, (x, y) in enumerate(normal(rng, n=(10, 2)))]
+    pilot = [record(100 + seed, score=x) for seed, x in enumerate(normal(rng, n=50))]
+    one, alone = (watched(("m", "a"), made, references, those, reads) for those in (pilot, ()))
+    assert one is not None
+    assert alone is not None
+    assert {name: len(values) for name, values in one.values.items()} == {"score": 60, "environment_steps": 10}
+    assert (one.whole, alone.whole) == (("score",), ("score", "environment_steps"))
+    watch, scores = Watch("smoke", (one,)), iter(normal(rng, n=300).tolist())
+    found: tuple[Night, ...] = ()
+    for number in range(2):
+        after = night(watch, number, lambda _: [next(scores) for _ in range(10)], before=found)
+        found = (
+            *found,
+            structs.replace(after, values={"m on a": after.values["m on a"] | {"environment_steps": (9.0,) * 10}}),
+        )
+    paths = [_of_column(each, "environment_steps", found).tolist() for each in (one, alone)]
+    assert paths[0] == paths[1]
+    assert paths[0][1] > paths[0][0] > 50
+    (family,) = watch.families
+    assert family.path(found)[1] == pytest.approx(paths[0][1] / 8)
+    without = Watch("smoke", (replace(one, values={"score": one.values["score"]}),)).families[0]
+    assert family._of_sum(found).tolist() == without._of_sum(found).tolist()
+    only = watched(("m", "a"), made, references, [record(100, other=1.0)], reads)
+    assert only is not None
+    assert (only.seeds, only.whole) == (alone.seeds, alone.whole)
+
+
 def test_an_alarm_names_measures_and_versions_and_stays() -> None:
     rng = np.random.default_rng(0)
     watch = Watch("smoke", (condition("m", "a", normal(rng)), condition("m", "b", normal(rng))))
@@ -152,6 +212,9 @@ def written(tmp_path: Path) -> Path:
         append(path, before, one)
         assert path.read_bytes().startswith(before)
         assert load(path)[1] == (*earlier, one)
+    last = structs.replace(one, alarms=('a "line"',), restart=True)
+    append(path.with_name("flagged.toml"), b"", last)
+    assert load(path.with_name("flagged.toml"))[1] == (last,)
     return path
 
 
@@ -175,6 +238,17 @@ def test_a_file_that_was_edited_torn_or_shortened_is_refused(written: Path) -> N
         written.write_text(damaged, encoding="utf-8")
         with pytest.raises(UserError, match=r"watch\.toml is not as `evoclaims watch` wrote it: .*\. Restore the file"):
             load(written)
+
+
+def test_whole_numbers_in_place_of_floats_break_no_seal(written: Path) -> None:
+    before, nights = load(written)
+    whole = structs.replace(nights[-1], level=20, values={"m": {"score": (1, 2)}}, evidence={"m": 1})
+    append(written, before, whole)
+    append(written, load(written)[0], nights[-1])
+    assert load(written)[1] == (*nights, whole, nights[-1])
+    written.write_text(written.read_text(encoding="utf-8").replace("level = 20.0", "level = 20"), encoding="utf-8")
+    append(written, load(written)[0], whole)
+    assert len(load(written)[1]) == 6
 
 
 def test_a_night_is_not_added_to_a_file_that_has_changed_meanwhile(written: Path) -> None:

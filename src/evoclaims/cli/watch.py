@@ -30,7 +30,7 @@ from evoclaims.verdicts.watch import ALPHA, Family, Watch, Watched, watched
 from evoclaims.verdicts.watch_file import Night
 
 FIRST_SEED: Final = 10_000
-"""Of the first night, unless a committed trial has a later one."""
+"""Of the first night, unless a committed trial or the tier's design has it or a later one."""
 
 FOUND: Final = (0.5, 0.8)
 """Shifts, in standard deviations, of which the table shows after how many nights they are found."""
@@ -39,7 +39,7 @@ MOST_NIGHTS: Final = 10
 
 
 def main(options: argparse.Namespace) -> int:
-    """Run a night and add it to the file; 1 when the evidence of a family has reached the level of an alarm."""
+    """Run a night and add it to the file; 1 on an alarm, and while one of an earlier series stays."""
     if options.form not in (None, "markdown"):
         raise UnknownNameError("form", options.form, ("markdown",))
     project = open_project(options.storage)
@@ -51,28 +51,49 @@ def main(options: argparse.Namespace) -> int:
     before, nights = watch_file.load(path)
     watch, left_out = watch_of(project, options.tier)
     going_on = () if options.restart else watch.series(nights)
-    first = watch.first_fresh_seed(max(FIRST_SEED, *tier.design.seeds(tier.design.last.n)), nights)
+    design = tier.design.with_third_look()
+    first = watch.first_fresh_seed(max(FIRST_SEED, design.first_seed + design.last.n), nights)
+    first = _after_older_code(project, watch, first, n)
     order = WorkOrder(options.storage, options.tier, options.device, first, n)
     trials = _run(project, watch, order, options)
     number = going_on[-1].series if going_on else max((night.series for night in nights), default=0) + 1
     series = (*going_on, _night(watch, trials, going_on, number))
-    watch_file.append(path, before, series[-1])
     alarms = watch.alarms(series)
-    sentences = list(_sentences(watch, series, left_out, alarms, path))
+    found = tuple(line for those in alarms.values() for line in those)
+    series = (*going_on, structs.replace(series[-1], alarms=found, restart=options.restart))
+    watch_file.append(path, before, series[-1])
+    stay = watch_file.standing([*(night for night in nights if night.tier == watch.tier), series[-1]])
+    sentences = _sentences(
+        watch, series, left_out, [*found, *(line for one, more in stay.items() for line in (one, *more))], path
+    )
     console = PlainSpokenConsole(file=styled())
     console.print_whole(plain_table(_headings(), _rows(watch, series[-1])))
     print(*sentences, sep="\n")
     if options.form is not None:
         out = Path(options.out or REPORT / "watch.md")
-        write(out, _markdown(sentences, alarms).encode(), ours=options.out is None)
+        write(
+            out,
+            _markdown(sentences, [*alarms, *(["an earlier alarm"] if stay else [])]).encode(),
+            ours=options.out is None,
+        )
         print(f"wrote {out}")
-    return int(bool(alarms))
+    return int(bool(alarms or stay))
 
 
 def watch_of(project: Project, tier: str) -> tuple[Watch, list[str]]:
-    """Return what is watched, and the conditions of claims that have too few committed trials."""
+    """Return what is watched, and the conditions of claims that have too few committed trials.
+
+    Raises:
+        UserError: when a claim is broken, since nothing is known of its conditions; or when nothing can be watched.
+    """
     reproduction, (collected,) = project.reproduction, project.collect([("", tier)])
     every = with_test(collected)
+    broke = [f"{one.test.name} ({one.report.reason.removesuffix('.')})" for one in every if one.assertion is None]
+    if broke:
+        raise UserError(
+            f"Nothing is watched, since it is not known which conditions {plural(len(broke), 'broken claim')} of the "
+            f"{tier} tier would read: {', '.join(broke)}. Mend each, or mark it with pytest.mark.skip."
+        )
     pilots = Pilots(reproduction, tier, every)
     found: list[Watched] = []
     left_out: list[str] = []
@@ -92,6 +113,25 @@ def watch_of(project: Project, tier: str) -> tuple[Watch, list[str]]:
             "claims, then `evoclaims reference`."
         )
     return Watch(tier, tuple(found)), left_out
+
+
+def _after_older_code(project: Project, watch: Watch, first: int, n: int) -> int:
+    """Return the first seed, from `first` up, from which a night has no trial of code that was edited since.
+
+    There are such trials after a night that was killed before its entry was written.
+    """
+    older: dict[int, tuple[str, ...]] = {}
+    for condition in (one.condition for one in watch.conditions):
+        versions = condition.versions
+        for seed in range(first, first + n):
+            stored = project.store.made_with(TrialSpec(condition, seed).id, versions)
+            if stored is not None and (edited := condition.edited_since([stored])):
+                older[seed] = (*older.get(seed, ()), *edited)
+    if not older:
+        return first
+    after, names = max(older) + 1, sorted({name for edited in older.values() for name in edited})
+    print(f"Trials up to seed {after - 1} ran before {', '.join(names)} was edited: they do not count for this night.")
+    return _after_older_code(project, watch, after, n)
 
 
 def _run(project: Project, watch: Watch, order: WorkOrder, options: argparse.Namespace) -> dict[str, list[TrialResult]]:
@@ -160,7 +200,7 @@ def _found_in(watch: Watch, family: Family, shift: float, night: Night) -> str:
 
 
 def _sentences(
-    watch: Watch, series: Sequence[Night], left_out: Sequence[str], alarms: Mapping[str, Sequence[str]], path: Path
+    watch: Watch, series: Sequence[Night], left_out: Sequence[str], alarms: Sequence[str], path: Path
 ) -> list[str]:
     """Return what a night has shown, and what to do next."""
     last, families = series[-1], len(watch.families)
@@ -177,7 +217,7 @@ def _sentences(
         )
     if left_out:
         lines.append(f"Not watched, for want of ten committed trials: {', '.join(left_out)}.")
-    lines += [line for those in alarms.values() for line in those]
+    lines += alarms
     if alarms:
         lines.append(
             f"Next: look into it (`evoclaims across`, `evoclaims bisect`), commit {path.name}, and begin a new series "
@@ -188,7 +228,7 @@ def _sentences(
     return lines
 
 
-def _markdown(sentences: Sequence[str], alarms: Mapping[str, Sequence[str]]) -> str:
+def _markdown(sentences: Sequence[str], alarms: Sequence[str]) -> str:
     """Return the text of an issue."""
     title = f"Trials have changed: {', '.join(alarms)}" if alarms else "No alarm"
     return "\n\n".join([f"# {literal(title)}", "\n".join(f"* {literal(line)}" for line in sentences)]) + "\n"

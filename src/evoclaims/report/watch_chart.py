@@ -9,7 +9,7 @@ import numpy as np
 
 from evoclaims.report.formatting import plural
 from evoclaims.report.training_curves import CurvePanel, Line
-from evoclaims.verdicts.watch_file import Night
+from evoclaims.verdicts.watch_file import Night, standing
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,15 +29,16 @@ class WatchShown:
 
 def shown(nights: Sequence[Night]) -> tuple[WatchShown, ...]:
     """Return the last series of each tier."""
-    last = {night.tier: night.series for night in nights}
     return tuple(
-        _series([night for night in nights if (night.tier, night.series) == one]) for one in sorted(last.items())
+        _last_series([night for night in nights if night.tier == tier]) for tier in sorted({one.tier for one in nights})
     )
 
 
-def _series(nights: Sequence[Night]) -> WatchShown:
-    """Return a series, which has at least one night."""
-    last, x = nights[-1], np.arange(len(nights) + 1.0)
+def _last_series(every: Sequence[Night]) -> WatchShown:
+    """Return the last series of a tier, which has at least one night."""
+    last = every[-1]
+    nights = [night for night in every if night.series == last.series]
+    x = np.arange(len(nights) + 1.0)
     paths = {name: [1.0, *(night.evidence[name] for night in nights)] for name in last.evidence}
     lines = [Line(name, x, np.log10(path)) for name, path in paths.items()]
     alarm = Line(f"alarm at {last.level:g}", x, np.full(len(x), np.log10(last.level)))
@@ -47,4 +48,5 @@ def _series(nights: Sequence[Night]) -> WatchShown:
         f"{plural(len(nights), 'night')} up to {last.date}, alarm at an evidence of {last.level:g}. Largest on the "
         f"last night: {name} with {last.evidence[name]:.2g}. Alarms: {', '.join(alarms) or 'none'}."
     )
+    says = " ".join([says, *standing(every)])
     return WatchShown(last.tier, says, CurvePanel(f"log10 of evidence ({last.tier})", (*lines, alarm), None, 0))

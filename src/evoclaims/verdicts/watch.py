@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -12,8 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evoclaims.core.canonical import content_hash
+from evoclaims.core.errors import UserError
 from evoclaims.core.packages import Versions, recorded
-from evoclaims.judging.drift import LOWER, MIN_REFERENCES, RESOLUTION, number_of
+from evoclaims.judging.drift import LOWER, MIN_REFERENCES, RESOLUTION, measured
 from evoclaims.judging.e_process import (
     Floats,
     evidence,
@@ -24,7 +26,7 @@ from evoclaims.judging.e_process import (
     uniform,
 )
 from evoclaims.judging.effect import a12, median
-from evoclaims.judging.sample import UnreadableTrialError
+from evoclaims.judging.sample import is_failed
 from evoclaims.paper import references
 from evoclaims.paper.reproduction import Names
 from evoclaims.trials.result import COMPLETE, TrialResult
@@ -34,7 +36,7 @@ from evoclaims.verdicts.watch_file import Night
 ALPHA: Final = 0.05
 """Largest probability that a series of nights, however long, has an alarm although nothing has changed."""
 
-PROCESS: Final = 1
+PROCESS: Final = 2
 """Raised when evidence is computed otherwise, which begins a new series."""
 
 MOST_MOVED, SHOWN = 3, 2.5
@@ -50,7 +52,7 @@ class Watched:
         names: of method and task.
         condition: what runs.
         seeds: of the committed trials, rising.
-        values: what each measure is in them, in the order of seeds.
+        values: what each measure is in them, in the order of seeds; in the reference trials alone if pilots lack it.
         versions: of the packages that they were made with.
     """
 
@@ -66,8 +68,26 @@ class Watched:
         return " on ".join(self.names)
 
     def read(self, trials: Iterable[TrialResult]) -> dict[str, tuple[float, ...]]:
-        """Return its measures of some trials; raises as `drift.number_of` does."""
-        return {name: tuple(number_of(trial, self.label, name) for trial in trials) for name in self.values}
+        """Return its measures of some trials, each the worst number where a trial has failed or has NaN.
+
+        Raises:
+            UserError: when a trial lacks one.
+        """
+        several, found = tuple(trials), {}
+        for name in self.values:
+            try:
+                found[name] = tuple(_number(trial, name) for trial in several)
+            except KeyError as error:
+                raise UserError(
+                    f"A new trial of {self.label} has no {name!r}, which the committed trials have, so this night is "
+                    "not added. Let the method or task measure it again, or write new references."
+                ) from error
+        return found
+
+    @property
+    def whole(self) -> tuple[str, ...]:
+        """The measures that all committed trials have."""
+        return tuple(name for name, values in self.values.items() if len(values) == len(self.seeds))
 
     def constant(self, measure: str) -> bool:
         """Whether a measure is the same in all committed trials."""
@@ -96,17 +116,28 @@ def watched(
     if len(mine) < MIN_REFERENCES or not done:
         return None
     case = references.paired("", done, tuple(mine.values()), reads=tuple(reads(done[0])), pilot=pilot)
-    mine |= {trial.seed: trial for trial in case.pilot if trial.status in COMPLETE}
-    trials = [mine[seed] for seed in sorted(mine)]
-    label = " on ".join(names)
-    values = {}
-    for measure in case.metrics:
-        try:
-            values[measure] = tuple(number_of(trial, label, measure) for trial in trials)
-        except (KeyError, UnreadableTrialError):  # a pilot has only what claims read
-            continue
+    every = mine | {trial.seed: trial for trial in case.pilot if trial.status in COMPLETE}
+    values: dict[str, tuple[float, ...]] = {}
+    for those in (every, mine):  # a pilot has only what claims read; what it lacks is watched against references
+        for measure in (name for name in case.metrics if name not in values):
+            with contextlib.suppress(KeyError):
+                values[measure] = tuple(_number(those[seed], measure) for seed in sorted(those))
+        if not values:
+            every = mine
     versions = recorded(done[-1].provenance, condition.packages)
-    return Watched(names, condition, tuple(sorted(mine)), values, versions) if values else None
+    return Watched(names, condition, tuple(sorted(every)), values, versions) if values else None
+
+
+def _number(trial: TrialResult, measure: str) -> float:
+    """Return a measure of a committed or a new trial, which are read alike; raises a KeyError without it."""
+    worst = math.inf if measure in LOWER else -math.inf
+    if is_failed(trial):
+        return worst
+    try:
+        value = measured(trial, measure)
+    except (ValueError, OverflowError):  # a sum of both infinities
+        return worst
+    return worst if math.isnan(value) else value
 
 
 @dataclass(frozen=True)
@@ -130,15 +161,15 @@ class Family:
 
     @property
     def moves(self) -> bool:
-        """Whether some measure varies."""
-        return not all(one.constant(measure) for one, measure in self.columns)
+        """Whether some measure of the sum varies."""
+        return not all(one.constant(measure) for one in self.conditions for measure in one.whole)
 
     def path(self, nights: Sequence[Night]) -> list[float]:
         """Return the evidence after each night of a series.
 
         Of a task's family, it is that of the sum over conditions. A method's takes half of its chance of a false alarm
         for the sum, and half for its measures, each of which is tested in two ways: if it varies in the committed
-        trials, by ranks, else as a constant.
+        trials, by ranks, else as a constant. A measure that pilots lack is in no sum, where all have the same trials.
         """
         if not self.of_method:
             return self._of_sum(nights).tolist() if self.moves else [1 / (at + 2) for at in range(len(nights))]
@@ -147,12 +178,14 @@ class Family:
         return [float(largest) for largest in np.max(paths, axis=0)]
 
     def _of_sum(self, nights: Sequence[Night]) -> Floats:
-        return _by_ranks(self.label, self.conditions[0].seeds, nights, lambda until: _scores(self.conditions, until)[0])
+        return _by_ranks(
+            self.label, len(self.conditions[0].seeds), nights, lambda until: _scores(self.conditions, until)[0]
+        )
 
     def nights_to_find(self, shift: float, each: int, level: float) -> int | None:
         """Return the median number of nights to an alarm if all its measures get better by `shift` SD.
 
-        None if all are constant: then one night with another value in most trials is an alarm.
+        None if all of the sum are constant: then one night with another value in most trials is an alarm.
         """
         if not self.moves:
             return None
@@ -265,8 +298,8 @@ def _scores(conditions: Sequence[Watched], nights: Sequence[Night]) -> tuple[Flo
     """
     total, gain = np.zeros(len(conditions[0].seeds) + sum(len(night.seeds) for night in nights)), 0.0
     for one in conditions:
-        ranks = np.stack([standardized_ranks(_ranks(_column(one, name, nights))) for name in one.values])
-        ranks *= np.array([-1.0 if name in LOWER else 1.0 for name in one.values])[:, None]
+        ranks = np.stack([standardized_ranks(_ranks(_column(one, name, nights))) for name in one.whole])
+        ranks *= np.array([-1.0 if name in LOWER else 1.0 for name in one.whole])[:, None]
         mean = ranks.mean(axis=0)
         if (spread := float(mean.std())) > 0:
             total += mean / spread
@@ -278,22 +311,20 @@ def _of_column(one: Watched, measure: str, nights: Sequence[Night]) -> Floats:
     """Return the evidence of one measure after each night."""
     if not one.constant(measure):
         name = f"{one.label}: {measure}"
-        return _by_ranks(name, one.seeds, nights, lambda until: _ranks(_column(one, measure, until)))
+        return _by_ranks(name, len(one.values[measure]), nights, lambda until: _ranks(_column(one, measure, until)))
     first = one.values[measure][0]
     rows = [np.asarray(night.values[one.label][measure]) for night in nights]
     odd = [(int(_differ(row, first).sum()), len(row)) for row in rows]
-    return np.array(evidence_against_constant(len(one.seeds), odd))
+    return np.array(evidence_against_constant(len(one.values[measure]), odd))
 
 
-def _by_ranks(
-    name: str, before: Sequence[int], nights: Sequence[Night], scores: Callable[[Sequence[Night]], Floats]
-) -> Floats:
+def _by_ranks(name: str, before: int, nights: Sequence[Night], scores: Callable[[Sequence[Night]], Floats]) -> Floats:
     """Return the evidence after each night, from scores of all trials up to it."""
     parts = [
         ranks_of_new(scores(nights[: at + 1]), np.array([uniform(name, seed) for seed in night.seeds]))
         for at, night in enumerate(nights)
     ]
-    return evidence(np.concatenate(parts), len(before), [len(night.seeds) for night in nights])
+    return evidence(np.concatenate(parts), before, [len(night.seeds) for night in nights])
 
 
 def _column(one: Watched, measure: str, nights: Sequence[Night]) -> list[float]:

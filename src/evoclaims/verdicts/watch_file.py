@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, Final
 
@@ -29,7 +29,7 @@ schema = {SCHEMA}
 _MEND: Final = "Restore the file from version control, or remove it to begin a new watch."
 
 
-class Night(Struct, frozen=True, forbid_unknown_fields=True):
+class Night(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
     """One night.
 
     Attributes:
@@ -43,6 +43,8 @@ class Night(Struct, frozen=True, forbid_unknown_fields=True):
         versions: of the packages that the trials depend on, by name.
         values: of each measure of each condition, in the order of seeds.
         evidence: of each family after this night.
+        alarms: lines on the alarms of its series up to this night.
+        restart: whether a person began the series, which ends the alarms of earlier ones.
     """
 
     date: str
@@ -55,6 +57,28 @@ class Night(Struct, frozen=True, forbid_unknown_fields=True):
     versions: dict[str, str]
     values: dict[str, dict[str, tuple[float, ...]]]
     evidence: dict[str, float]
+    alarms: tuple[str, ...] = ()
+    restart: bool = False
+
+
+def standing(nights: Sequence[Night]) -> dict[str, tuple[str, ...]]:
+    """Return the alarms of a tier's series before the last, which stay until a person begins one: a line, and details.
+
+    Args:
+        nights: of the tier, at least one.
+    """
+    begun = max((at for at, night in enumerate(nights) if night.restart), default=0)
+    series: dict[int, list[Night]] = {}
+    for night in nights[begun:]:
+        series.setdefault(night.series, []).append(night)
+    del series[nights[-1].series]
+    found = {}
+    for number, those in series.items():
+        reached = sorted({name for night in those for name, much in night.evidence.items() if much >= night.level})
+        if reached:
+            line = f"The alarm of series {number} ({', '.join(reached)}) stays until a night is run with --restart."
+            found[line] = those[-1].alarms
+    return found
 
 
 def load(path: Path) -> tuple[bytes, tuple[Night, ...]]:
@@ -84,10 +108,11 @@ def _nights(plain: dict[str, Any]) -> Iterator[Night]:
     seal = ""
     for number, entry in enumerate(plain["night"], start=1):
         stored = entry.pop("seal", None)
-        seal = _seal(seal, entry)
+        night = convert(entry, Night)
+        seal = _seal(seal, night)
         if stored != seal:
             raise ValueError(f"night {number} does not match its seal, so it was edited, torn or moved")
-        yield convert(entry, Night)
+        yield night
 
 
 def append(path: Path, before: bytes, night: Night) -> None:
@@ -100,15 +125,16 @@ def append(path: Path, before: bytes, night: Night) -> None:
     now, nights = load(path)
     if now != before:
         raise UserError(f"{path} has changed during this night, which is not added. Run the same command again.")
-    entry = to_builtins(night)
+    added = convert(to_builtins(night), Night)  # a whole number may stand where a float is declared
     seal = ""
-    for one in nights:
-        seal = _seal(seal, to_builtins(one))
-    write_atomically(path, (before or HEAD.encode()) + _text({**entry, "seal": _seal(seal, entry)}).encode())
+    for one in (*nights, added):
+        seal = _seal(seal, one)
+    write_atomically(path, (before or HEAD.encode()) + _text({**to_builtins(added), "seal": seal}).encode())
 
 
-def _seal(before: str, entry: dict[str, Any]) -> str:
-    return content_hash([before, entry])
+def _seal(before: str, night: Night) -> str:
+    """Return the hash of a night and of the seal before it."""
+    return content_hash([before, to_builtins(night)])
 
 
 def _text(entry: dict[str, Any]) -> str:
@@ -126,7 +152,7 @@ def _lines(table: dict[str, Any]) -> list[str]:
 
 
 def _plain(value: Any) -> str:
-    """Return a text, number or list as TOML writes it."""
+    """Return a text, number, truth value or list as TOML writes it."""
     if isinstance(value, list | tuple):
         return f"[{', '.join(map(_plain, value))}]"
-    return json.dumps(value, ensure_ascii=False) if isinstance(value, str) else repr(value)
+    return json.dumps(value, ensure_ascii=False) if isinstance(value, str | bool) else repr(value)
