@@ -17,7 +17,7 @@ from evoclaims.report.markdown import markdown
 from evoclaims.report.model import Board, Page, Section
 from evoclaims.report.run_summary import run_summary
 from evoclaims.report.terminal_table import verdict_table
-from evoclaims.verdicts.claim_report import CONTROL, ClaimReport, Tally, Tried
+from evoclaims.verdicts.claim_report import CONTROL, MECHANISM, ClaimReport, Tally, Tried
 from evoclaims.verdicts.history import key_of
 from evoclaims.verdicts.mutation_matrix import Attempt, Fate, Matrix, Sensitivity, tried
 
@@ -126,7 +126,7 @@ def test_a_scoreboard_counts_insensitive_support_apart(filled: Laboratory) -> No
         Tally.NOT_RUN: 0,
     }
     assert {Tally.INSENSITIVE, Tally.SMALLER}.isdisjoint(Board("smoke", sections[:1]).counts)
-    assert board.controls == ""
+    assert board.others == ""
     shown = Page(title="A Paper", name="paper", boards=(board,))
     assert "| tier | supported | supported but insensitive | refuted |" in markdown(shown)
     assert "| smoke | 2 | 1 | 1 |" in markdown(shown)
@@ -142,12 +142,13 @@ def test_without_a_matrix_no_claim_is_called_sensitive(filled: Laboratory) -> No
         assert "sensitive" not in text.replace("insensitive", "")
 
 
-def test_a_scoreboard_counts_controls_of_the_benchmark_apart_from_the_papers_claims() -> None:
-    control = replace(REPORTS[0], claim="C1", where=CONTROL)
-    sections = tuple(Section(one, one.name, (), (one.where,)) for one in (*REPORTS, control))
+def test_a_scoreboard_counts_controls_and_mechanisms_apart_from_the_papers_claims() -> None:
+    others = [replace(REPORTS[0], claim=name, where=where) for name, where in (("C1", CONTROL), ("K1", MECHANISM))]
+    sections = tuple(Section(one, one.name, (), (one.where,)) for one in (*REPORTS, *others))
     board = Board("smoke", sections)
-    assert (len(board.papers), sum(board.counts.values()), board.controls) == (4, 4, "1 supported")
+    counted = "controls: 1 supported; mechanisms: 1 supported"
+    assert (len(board.papers), sum(board.counts.values()), board.others) == (4, 4, counted)
     shown = Page(title="A Paper", name="paper", boards=(board,))
-    assert "| smoke | 2 | 1 | 1 | 0 | 0 | 0 | 0 | 1 supported |" in markdown(shown)
-    assert "<small>4 claims; controls: 1 supported</small>" in whole(shown)
+    assert f"| smoke | 2 | 1 | 1 | 0 | 0 | 0 | 0 | {counted} |" in markdown(shown)
+    assert f"<small>4 claims; {counted}</small>" in whole(shown)
     assert 'viewBox="0 0 4 1"' in whole(shown)

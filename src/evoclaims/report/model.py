@@ -104,13 +104,13 @@ class Board:
 
     @property
     def papers(self) -> tuple[Section, ...]:
-        """The claims of the paper, without the controls of the benchmark."""
+        """The claims of the paper, without controls and mechanisms."""
         return tuple(section for section in self.sections if not section.report.is_control)
 
     @property
-    def controls(self) -> str:
-        """How the controls ended, such as "9 supported"; empty if there are none."""
-        return table_cells.counted(section.report for section in self.sections if section.report.is_control)
+    def others(self) -> str:
+        """How the other claims ended, such as "controls: 9 supported"; empty if there are none."""
+        return table_cells.others([section.report for section in self.sections])
 
     @property
     def counts(self) -> Mapping[Tally, int]:

@@ -123,11 +123,14 @@ def counted(reports: Iterable[ClaimReport], each: str = "{count} {outcome}", bet
 
 def totals(reports: Sequence[ClaimReport], each: str = "{count} {outcome}", between: str = ", ") -> str:
     """Return the same in one line, others apart: "3 supported, 1 refuted; controls: 2 supported; mechanisms: ..."."""
-    apart = [counted((report for report in reports if not report.is_control), each, between)]
-    for kind in (CONTROL, MECHANISM):
-        found = counted((report for report in reports if report.where == kind), each, between)
-        apart.append(found and f"{kind}s: {found}")
-    return "; ".join(filter(None, apart)) or "no verdicts"
+    papers = counted((report for report in reports if not report.is_control), each, between)
+    return "; ".join(filter(None, (papers, others(reports, each, between)))) or "no verdicts"
+
+
+def others(reports: Sequence[ClaimReport], each: str = "{count} {outcome}", between: str = ", ") -> str:
+    """Return the claims that are not the paper's: "controls: 2 supported; mechanisms: ..."; empty if there are none."""
+    found = {kind: [report for report in reports if report.where == kind] for kind in (CONTROL, MECHANISM)}
+    return "; ".join(f"{kind}s: {counted(those, each, between)}" for kind, those in found.items() if those)
 
 
 def faults(reports: Iterable[ClaimReport]) -> str:
