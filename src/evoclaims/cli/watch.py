@@ -26,7 +26,7 @@ from evoclaims.report.table_cells import NONE
 from evoclaims.trials.result import COMPLETE, TrialResult
 from evoclaims.trials.spec import TrialSpec
 from evoclaims.verdicts import watch_file
-from evoclaims.verdicts.watch import ALPHA, Family, Watch, Watched, watched
+from evoclaims.verdicts.watch import ALPHA, Family, Watch, Watched, kinds_of, watched
 from evoclaims.verdicts.watch_file import Night
 
 FIRST_SEED: Final = 10_000
@@ -167,7 +167,7 @@ def _night(watch: Watch, trials: Mapping[str, Sequence[TrialResult]], going_on: 
         series=number,
         rules=watch.rules,
         seeds=tuple(sorted({trial.seed for trial in some})),
-        device=", ".join(sorted({str(trial.device.get("kind", "unknown")) for trial in some})),
+        device=", ".join(kinds_of(some)),
         level=watch.level,
         versions={name: version for name, version in sorted(versions.items()) if version},
         values={one.label: one.read(trials[one.label]) for one in watch.conditions},
@@ -203,11 +203,11 @@ def _sentences(
     watch: Watch, series: Sequence[Night], left_out: Sequence[str], alarms: Sequence[str], path: Path
 ) -> list[str]:
     """Return what a night has shown, and what to do next."""
-    last, families = series[-1], len(watch.families)
+    last, families = series[-1], plural(len(watch.families), "family", "families")
     lines = [
         f"Night {len(series)} of series {last.series} ({last.tier}): seeds {last.seeds[0]} to {last.seeds[-1]} of "
         f"{plural(len(watch.conditions), 'condition')}.",
-        f"Alarm at an evidence of {watch.level:g} ({families} families / α {ALPHA:g}). If nothing has changed, a "
+        f"Alarm at an evidence of {watch.level:g} ({families} / α {ALPHA:g}). If nothing has changed, a "
         f"series of any length has an alarm with a probability of at most {ALPHA:g}.",
     ]
     if len(series) == 1 and last.series > 1:
