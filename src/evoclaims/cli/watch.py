@@ -63,21 +63,17 @@ def main(options: argparse.Namespace) -> int:
     series = (*going_on, structs.replace(series[-1], alarms=found, restart=options.restart))
     watch_file.append(path, before, series[-1])
     stay = watch_file.standing([*(night for night in nights if night.tier == watch.tier), series[-1]])
-    sentences = _sentences(
-        watch, series, left_out, [*found, *(line for one, more in stay.items() for line in (one, *more))], path
-    )
+    shown = [*found, *(line for one, more in stay.items() for line in (one, *more))]
+    sentences = _sentences(watch, series, left_out, shown, path)
     console = PlainSpokenConsole(file=styled())
     console.print_whole(plain_table(_headings(), _rows(watch, series[-1])))
     print(*sentences, sep="\n")
     if options.form is not None:
         out = Path(options.out or REPORT / "watch.md")
-        write(
-            out,
-            _markdown(sentences, [*alarms, *(["an earlier alarm"] if stay else [])]).encode(),
-            ours=options.out is None,
-        )
+        title = f"Trials have changed: {', '.join(alarms) or 'an earlier alarm stays'}" if shown else "No alarm"
+        write(out, _markdown(title, sentences).encode(), ours=options.out is None)
         print(f"wrote {out}")
-    return int(bool(alarms or stay))
+    return int(bool(shown))
 
 
 def watch_of(project: Project, tier: str) -> tuple[Watch, list[str]]:
@@ -228,7 +224,6 @@ def _sentences(
     return lines
 
 
-def _markdown(sentences: Sequence[str], alarms: Sequence[str]) -> str:
+def _markdown(title: str, sentences: Sequence[str]) -> str:
     """Return the text of an issue."""
-    title = f"Trials have changed: {', '.join(alarms)}" if alarms else "No alarm"
     return "\n\n".join([f"# {literal(title)}", "\n".join(f"* {literal(line)}" for line in sentences)]) + "\n"
