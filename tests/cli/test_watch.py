@@ -32,6 +32,7 @@ def watching(evoclaims: Evoclaims, stored: Store, kept: Path) -> Evoclaims:
         status, out, err = evoclaims("watch")
         assert (status, err) == (0, "")
         assert "Night 1 of series 1 (smoke): seeds 10000 to 10009 of 2 conditions." in out
+        assert "Alarm at an evidence of 60 (3 families / α 0.05)." in out
         assert "No alarm. Next: commit watch.toml; the next night goes on with seed 10010." in out
         shutil.copytree(stored.root, kept / "store")
         shutil.copy(FILE, kept)
@@ -103,7 +104,7 @@ def test_trials_of_a_killed_night_do_not_count_once_their_code_is_edited(
     assert status == 0
     assert "Trials up to seed 10001 ran before tiny_paper.Coin was edited: they do not count for this night." in out
     assert "Trials up to seed 10002 ran before tiny_paper.Coin was edited" in out
-    assert "seeds 10003 to 10004" in out
+    assert "seeds 10003 to 10004 of 1 condition.\nAlarm at an evidence of 20 (1 family / α 0.05)." in out
     assert [night.seeds for night in load(FILE)[1]] == [(10_003, 10_004)]
 
 

@@ -83,7 +83,7 @@ def test_evidence_is_the_mixture_of_bets_by_first_night_and_shift() -> None:
 
 def test_a_change_is_found_in_both_directions_and_after_quiet_nights() -> None:
     """Five conditions that move by 0.5 SD each move their sum by √5 times as much."""
-    level = 2 * 24 / 0.05
+    level = 2 * 25 / 0.05  # of the sum of a method, among 25 families
     for shift in (0.5 * 5**0.5, -0.5 * 5**0.5):
         assert nights_to_find(BEFORE, EACH, shift, level) <= 3
     assert nights_to_find(BEFORE, EACH, 0.8 * 5**0.5, level) <= 2

@@ -18,12 +18,17 @@ from evoclaims.verdicts.watch import ALPHA, Watch, Watched, _of_column, families
 from evoclaims.verdicts.watch_file import Night, append, load
 
 SEEDS = (*range(10), *range(100, 150))
+LEVEL = 25 / ALPHA
+"""Of an alarm in a suite of about as many families as the committed reproduction's."""
+
 TASKS = ("a", "b", "c", "d", "e")
 
 
 def condition(method: str, task: str, values: Any, measure: str = "score", seeds: tuple[int, ...] = SEEDS) -> Watched:
     made: Any = SimpleNamespace(id=f"{method}-{task}", packages=("evosax", "numpy"))
-    return Watched((method, task), made, seeds, {measure: tuple(map(float, values))}, {"evosax": "1", "numpy": "2"})
+    return Watched(
+        (method, task), made, seeds, {measure: tuple(map(float, values))}, {"evosax": "1", "numpy": "2"}, ("cpu",)
+    )
 
 
 def normal(rng: np.random.Generator, shift: float = 0.0, n: int = 60) -> Any:
@@ -57,7 +62,7 @@ def test_half_a_standard_deviation_in_five_conditions_is_found_in_three_nights()
             seeds = tuple(range(1000 + 10 * number, 1010 + 10 * number))
             values = {f"ppo on {task}": {"score": tuple(normal(rng, -0.5, 10).tolist())} for task in TASKS}
             drawn.append(Night("", "", 1, "", seeds, "", 0, {}, values, {}))
-        found.append(next((at for at, one in enumerate(family.path(drawn), start=1) if one >= 24 / ALPHA), 5))
+        found.append(next((at for at, one in enumerate(family.path(drawn), start=1) if one >= LEVEL), 5))
     assert np.median(found) <= 3
 
 
@@ -185,6 +190,8 @@ def test_an_alarm_names_measures_and_versions_and_stays() -> None:
     assert lines[1].startswith("  moved: m on a: score is higher: median ")
     assert not any("m on b" in line for line in lines)
     assert lines[2:] == ["  versions against the committed trials: evosax 1 -> 1.1 since night 3"]
+    moved = [structs.replace(one, device="cpu" if at < 1 else "gpu") for at, one in enumerate((*series, quiet))]
+    assert watch.alarms(moved)["m"] == [*lines, "  device cpu -> gpu since night 2"]
 
 
 def test_other_rules_begin_a_new_series_with_fresh_seeds() -> None:

@@ -246,8 +246,8 @@ def _comparing(add: _Add) -> None:
 
     watch = add(
         "watch",
-        "run new seeds and add up the evidence of all nights that trials have changed since the committed ones; writes "
-        "watch.toml, which you commit; exit status 1 on an alarm",
+        "run new seeds, and report whether all nights together show that results differ from the committed trials; "
+        "writes watch.toml, which you commit; exit status 1 on an alarm",
     )
     watch.add_argument("--trials", type=int, metavar="N", help="new trials per condition (default: the tier's)")
     watch.add_argument(

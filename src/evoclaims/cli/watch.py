@@ -26,7 +26,7 @@ from evoclaims.report.table_cells import NONE
 from evoclaims.trials.result import COMPLETE, TrialResult
 from evoclaims.trials.spec import TrialSpec
 from evoclaims.verdicts import watch_file
-from evoclaims.verdicts.watch import ALPHA, Family, Watch, Watched, watched
+from evoclaims.verdicts.watch import ALPHA, Family, Watch, Watched, kinds_of, watched
 from evoclaims.verdicts.watch_file import Night
 
 FIRST_SEED: Final = 10_000
@@ -63,21 +63,17 @@ def main(options: argparse.Namespace) -> int:
     series = (*going_on, structs.replace(series[-1], alarms=found, restart=options.restart))
     watch_file.append(path, before, series[-1])
     stay = watch_file.standing([*(night for night in nights if night.tier == watch.tier), series[-1]])
-    sentences = _sentences(
-        watch, series, left_out, [*found, *(line for one, more in stay.items() for line in (one, *more))], path
-    )
+    shown = [*found, *(line for one, more in stay.items() for line in (one, *more))]
+    sentences = _sentences(watch, series, left_out, shown, path)
     console = PlainSpokenConsole(file=styled())
     console.print_whole(plain_table(_headings(), _rows(watch, series[-1])))
     print(*sentences, sep="\n")
     if options.form is not None:
         out = Path(options.out or REPORT / "watch.md")
-        write(
-            out,
-            _markdown(sentences, [*alarms, *(["an earlier alarm"] if stay else [])]).encode(),
-            ours=options.out is None,
-        )
+        title = f"Trials have changed: {', '.join(alarms) or 'an earlier alarm stays'}" if shown else "No alarm"
+        write(out, _markdown(title, sentences).encode(), ours=options.out is None)
         print(f"wrote {out}")
-    return int(bool(alarms or stay))
+    return int(bool(shown))
 
 
 def watch_of(project: Project, tier: str) -> tuple[Watch, list[str]]:
@@ -167,7 +163,7 @@ def _night(watch: Watch, trials: Mapping[str, Sequence[TrialResult]], going_on: 
         series=number,
         rules=watch.rules,
         seeds=tuple(sorted({trial.seed for trial in some})),
-        device=", ".join(sorted({str(trial.device.get("kind", "unknown")) for trial in some})),
+        device=", ".join(kinds_of(some)),
         level=watch.level,
         versions={name: version for name, version in sorted(versions.items()) if version},
         values={one.label: one.read(trials[one.label]) for one in watch.conditions},
@@ -203,11 +199,11 @@ def _sentences(
     watch: Watch, series: Sequence[Night], left_out: Sequence[str], alarms: Sequence[str], path: Path
 ) -> list[str]:
     """Return what a night has shown, and what to do next."""
-    last, families = series[-1], len(watch.families)
+    last, families = series[-1], plural(len(watch.families), "family", "families")
     lines = [
         f"Night {len(series)} of series {last.series} ({last.tier}): seeds {last.seeds[0]} to {last.seeds[-1]} of "
         f"{plural(len(watch.conditions), 'condition')}.",
-        f"Alarm at an evidence of {watch.level:g} ({families} families / α {ALPHA:g}). If nothing has changed, a "
+        f"Alarm at an evidence of {watch.level:g} ({families} / α {ALPHA:g}). If nothing has changed, a "
         f"series of any length has an alarm with a probability of at most {ALPHA:g}.",
     ]
     if len(series) == 1 and last.series > 1:
@@ -228,7 +224,6 @@ def _sentences(
     return lines
 
 
-def _markdown(sentences: Sequence[str], alarms: Sequence[str]) -> str:
+def _markdown(title: str, sentences: Sequence[str]) -> str:
     """Return the text of an issue."""
-    title = f"Trials have changed: {', '.join(alarms)}" if alarms else "No alarm"
     return "\n\n".join([f"# {literal(title)}", "\n".join(f"* {literal(line)}" for line in sentences)]) + "\n"

@@ -54,6 +54,7 @@ class Watched:
         seeds: of the committed trials, rising.
         values: what each measure is in them, in the order of seeds; in the reference trials alone if pilots lack it.
         versions: of the packages that they were made with.
+        devices: kinds of those that made them, in alphabetical order.
     """
 
     names: Names
@@ -61,6 +62,7 @@ class Watched:
     seeds: tuple[int, ...]
     values: Mapping[str, tuple[float, ...]]
     versions: Versions
+    devices: tuple[str, ...]
 
     @property
     def label(self) -> str:
@@ -125,7 +127,13 @@ def watched(
         if not values:
             every = mine
     versions = recorded(done[-1].provenance, condition.packages)
-    return Watched(names, condition, tuple(sorted(every)), values, versions) if values else None
+    devices = kinds_of(every.values())
+    return Watched(names, condition, tuple(sorted(every)), values, versions, devices) if values else None
+
+
+def kinds_of(trials: Iterable[TrialResult]) -> tuple[str, ...]:
+    """Return the kinds of the devices that made some trials, in alphabetical order."""
+    return tuple(sorted({str(trial.device.get("kind", "unknown")) for trial in trials}))
 
 
 def _number(trial: TrialResult, measure: str) -> float:
@@ -185,7 +193,8 @@ class Family:
     def nights_to_find(self, shift: float, each: int, level: float) -> int | None:
         """Return the median number of nights to an alarm if all its measures get better by `shift` SD.
 
-        None if all of the sum are constant: then one night with another value in most trials is an alarm.
+        None if all of the sum are constant: then, against 60 committed trials, one night with
+        another value in six of ten new ones is an alarm.
         """
         if not self.moves:
             return None
@@ -258,21 +267,26 @@ class Watch:
 
 
 def _alarm(family: Family, nights: Sequence[Night], at: int) -> list[str]:
-    """Return lines on an alarm of the night at an index: when, what moved, and which versions are others."""
+    """Return lines on an alarm of the night at an index: when, what moved, which versions and devices are others."""
     path = [0.0, *(night.evidence[family.label] for night in nights[: at + 1])]
     quiet = max(index for index, found in enumerate(path) if found < 1)  # nights before the evidence grew
     lines = [f"ALARM on {nights[at].date}, night {at + 1}: {family.label}: evidence {path[-1]:.3g}"]
     lines += [f"  moved: {text}" for text in _moved(family, nights[quiet:])]
     changed = []
     for name in sorted({name for one in family.conditions for name in one.condition.packages}):
-        versions = [night.versions.get(name) for night in nights[: at + 1]]
         committed = next((one.versions[name] for one in family.conditions if one.versions.get(name)), None)
-        if versions[-1] != committed:
-            since = max(
-                (index for index, version in enumerate(versions, start=1) if version != versions[-1]), default=0
-            )
-            changed.append(f"{name} {committed or 'none'} -> {versions[-1] or 'none'} since night {since + 1}")
-    return [*lines, f"  versions against the committed trials: {', '.join(changed) or 'the same'}"]
+        changed += _changed(name, committed, [night.versions.get(name) for night in nights[: at + 1]])
+    lines.append(f"  versions against the committed trials: {', '.join(changed) or 'the same'}")
+    devices = ", ".join(sorted({kind for one in family.conditions for kind in one.devices}))
+    return [*lines, *_changed("  device", devices, [night.device for night in nights[: at + 1]])]
+
+
+def _changed(name: str, committed: str | None, nights: Sequence[str | None]) -> list[str]:
+    """Return what has changed by the last night, and since when; nothing if it is as it was."""
+    if nights[-1] == committed:
+        return []
+    since = max((index for index, one in enumerate(nights, start=1) if one != nights[-1]), default=0)
+    return [f"{name} {committed or 'none'} -> {nights[-1] or 'none'} since night {since + 1}"]
 
 
 def _moved(family: Family, nights: Sequence[Night]) -> list[str]:

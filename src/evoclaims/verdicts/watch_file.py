@@ -1,7 +1,8 @@
 """What `evoclaims watch` keeps: `watch.toml` beside a reproduction, to which each night adds one entry.
 
 An entry has what the night's trials measured, since the next nights rank their own trials among these. Each is sealed
-with a hash of it and of the entry before: a file that was edited, torn, or merged from two is refused.
+with a hash of it and of the entry before: a file that was edited, torn, or merged from two is refused. The hash has no
+key, so this holds against accidents, and not against someone who seals entries again.
 """
 
 from __future__ import annotations
