@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import os
 import shutil
+import sys
 from pathlib import Path
 
 import pytest
-from tiny_project import PYPROJECT, Evoclaims, Project
+from tiny_project import PYPROJECT, REPRODUCTION, Evoclaims, Project
 
 from evoclaims.trials.store import Store
 
@@ -209,11 +210,17 @@ def test_f(trials, verdict):
 """
 
 
-def test_commands_judge_a_claim_during_its_call_as_pytest_does(project: Project, evoclaims: Evoclaims) -> None:
+def test_commands_judge_a_claim_during_its_call_as_pytest_does(
+    project: Project, evoclaims: Evoclaims, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """What its fixtures have set is there, its trials can be looked at, and a part of it may skip it."""
+    monkeypatch.delitem(sys.modules, "tiny_paper", raising=False)
+    project.pytester.makepyfile(tiny_paper=REPRODUCTION.replace("conditions(2), Design", "conditions(1), Design"))
     project.write(DURING_THE_CALL)
     status, out, _ = evoclaims("status")
     assert (status, out.splitlines()[-1]) == (1, "claims (smoke): 1 supported, 1 refuted, 1 not run")
+    accepted = evoclaims("accept")[1].splitlines()  # of all tiers in one run
+    assert [f"accepted: d ({tier}): refuted, the first verdict" in accepted for tier in ("smoke", "full")] == [True] * 2
     judged = project.json()
     assert [one["outcome"] for one in judged["claims"]] == ["refuted", "not run", "supported"]
 

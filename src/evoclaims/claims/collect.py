@@ -219,7 +219,12 @@ class _Run:
 
 
 def _same(recorder: Recorder, before: Iterable[list[Collected]]) -> list[Collected]:
-    """Return what a test asserted under another protocol, if it would assert the same under that of a recorder."""
+    """Return what a test asserted under another protocol, if it would assert the same under that of a recorder.
+
+    A session of the protocol itself judges each claim during a call of its own.
+    """
+    if recorder.judge is not None and not recorder.variant:
+        return []
     return next((found for found in before if found and all(map(recorder.has_conditions_of, found))), [])
 
 

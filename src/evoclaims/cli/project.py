@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -23,8 +23,6 @@ from evoclaims.trials.store import Store
 from evoclaims.verdicts.claim_report import ClaimReport
 
 ALL_TIERS: Final = "all"
-
-NO_JUDGES: Final[Mapping[str, Session]] = {}
 
 
 @dataclass(frozen=True)
@@ -73,22 +71,30 @@ class Project:
         Raises:
             UserError: when the claims cannot be collected, or not all of them are judged.
         """
-        return self.judge_sessions([(self.session(variant), tier) for tier, variant in asked])
+        sessions = {variant: self.session(variant) for _, variant in asked}
+        return self.judge_sessions([(sessions[variant], tier) for tier, variant in asked])
 
     def judge_sessions(self, asked: Sequence[tuple[Session, str]]) -> list[list[ClaimReport]]:
-        """Judge all claims of a tier in each session; raises as `judge_variants` does."""
-        judges = {session.variant: session for session, _ in reversed(asked) if session.reads}
-        collected = self.collect([(session.variant, tier) for session, tier in asked], judges)
+        """Judge all claims of a tier in each session; raises as `judge_variants` does.
+
+        A session that reads trials judges a claim during its call; others judge what has been collected.
+        """
+        readers = {id(session): session for session, _ in asked if session.reads}
+        tiers = {key: list(dict.fromkeys(tier for one, tier in asked if id(one) == key)) for key in readers}
+        asking = [(self._recorder(one.variant, one), tiers[key]) for key, one in readers.items()]
+        found = dict(zip(readers, collect(self.config, asking) if asking else (), strict=True))
+        judged = {(key, tier): _of_tier(found[key], tier) for key in readers for tier in tiers[key]}
+        for (key, tier), claims in judged.items():
+            self._collected.setdefault((readers[key].variant, tier), claims)
         return [
-            judge_all(session, claims, self.config.root) for (session, _), claims in zip(asked, collected, strict=True)
+            judge_all(
+                session, judged.get((id(session), tier)) or self.collect([(session.variant, tier)])[0], self.config.root
+            )
+            for session, tier in asked
         ]
 
-    def collect(
-        self, asked: Sequence[tuple[str, str]], judges: Mapping[str, Session] = NO_JUDGES
-    ) -> list[list[Collected]]:
+    def collect(self, asked: Sequence[tuple[str, str]]) -> list[list[Collected]]:
         """Return all claims for each variant of the protocol ("" for itself) and tier; each test is called once.
-
-        During the call the variant's session in `judges`, if any, judges what the test asserts.
 
         Raises:
             UserError: when the claims cannot be collected, or not all of them are called.
@@ -96,14 +102,14 @@ class Project:
         missing = [one for one in dict.fromkeys(asked) if one not in self._collected]
         if missing:
             tiers = {variant: [tier for of, tier in missing if of == variant] for variant, _ in missing}
-            asking = [(self._recorder(variant, judges.get(variant)), tiers[variant]) for variant in tiers]
+            asking = [(self._recorder(variant), tiers[variant]) for variant in tiers]
             for variant, found in zip(tiers, collect(self.config, asking), strict=True):
-                for tier in tiers[variant]:
-                    self._collected[variant, tier] = [one for one in found if one.test.tier == tier]
+                self._collected.update(((variant, tier), _of_tier(found, tier)) for tier in tiers[variant])
         return [self._collected[one] for one in asked]
 
-    def _recorder(self, variant: str, judge: Session | None) -> Recorder:
-        return Recorder(self.reproduction, self.store, judge.fetch if judge else never, variant=variant, judge=judge)
+    def _recorder(self, variant: str, judge: Session | None = None) -> Recorder:
+        fetch = judge.fetch if judge else never
+        return Recorder(self.reproduction, self.store, fetch, variant=variant, judge=judge)
 
     @cached_property
     def _collected(self) -> dict[tuple[str, str], list[Collected]]:
@@ -119,6 +125,10 @@ class Project:
         fetch = StoredOnly(self.archive)
         fetch.check()
         return Session(self.reproduction, self.archive.store, fetch, variant=variant)
+
+
+def _of_tier(claims: Iterable[Collected], tier: str) -> list[Collected]:
+    return [one for one in claims if one.test.tier == tier]
 
 
 def open_project(storage: str) -> Project:

@@ -67,7 +67,8 @@ def main(options: argparse.Namespace) -> int:
     # The paper's sentence is the statement of the largest tier, so that is judged in any case.
     asked = [(tier, "") for tier in tiers if tier in (tiers[0], *shown)]
     asked += [(tier, variant) for tier in shown for variant in _tried(project, tier)]
-    sessions = [(project.session(variant), tier) for tier, variant in asked]
+    of_variant = {variant: project.session(variant) for _, variant in asked}
+    sessions = [(of_variant[variant], tier) for tier, variant in asked]
     *found, by_the_paper = project.judge_sessions([*sessions, (project.as_published(tiers[0]), tiers[0])])
     judged = dict(zip(asked, found, strict=True))
     verdicts = {tier: reports for (tier, variant), reports in judged.items() if not variant}
