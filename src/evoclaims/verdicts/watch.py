@@ -245,7 +245,7 @@ class Watch:
         return content_hash([PROCESS, ALPHA, self.tier, baselines, grouped])
 
     def series(self, nights: Sequence[Night]) -> tuple[Night, ...]:
-        """Return the nights that the next one goes on with: of the last series, if its rules are those of now."""
+        """Return the nights that the next one goes on with: of the last series, if its rules still hold."""
         mine = [night for night in nights if night.tier == self.tier]
         last = mine[-1] if mine else None
         same = last is not None and last.rules == self.rules
