@@ -21,7 +21,13 @@ OVER_TASKS = "it is about the tasks at their own sizes; each task's own claims h
     because=OVER_TASKS,
 )
 @pytest.mark.parametrize(
-    "task", ["n_parity", "simple_alu", pytest.param("stones", marks=[third_look, CMA_ES_ABOVE]), "obstacles"]
+    "task",
+    [
+        pytest.param("n_parity", marks=third_look),
+        pytest.param("simple_alu", marks=third_look),
+        pytest.param("stones", marks=[third_look, CMA_ES_ABOVE]),
+        "obstacles",
+    ],
 )
 def test_neat_is_on_par_with_cma_es(trials, verdict, task):
     neat, cma_es = trials("neat", on=task), trials("cma_es", on=task)

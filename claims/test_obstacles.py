@@ -2,7 +2,7 @@
 
 import pytest
 
-from evoclaims import Outcome, claim, expected
+from evoclaims import Outcome, claim, expected, third_look
 
 FIRST, AUDIT = "2026-11-21 10:55", "2026-11-26"
 """When claims were first committed, before their trials; and when an audit added readings, after all of them."""
@@ -225,6 +225,7 @@ def test_neat_flips_over_high_obstacles(trials, verdict):
     verdict((neat.obstacles_passed > 1) & neat.is_overturned(0.5).in_most_trials())
 
 
+@third_look
 @claim(
     "O8",
     says="[PPO] did not master the final level but progressed by flipping over",

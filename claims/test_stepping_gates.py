@@ -34,13 +34,16 @@ PAIRS = [
         "neat",
         "hyperneat",
         "simple_alu",
-        marks=without_smoke(
-            because="on two operations of the ALU NEAT is above HyperNEAT, but ten trials a side show it in only "
-            "every second run (power 0.48)"
-        ),
+        marks=[
+            without_smoke(
+                because="on two operations of the ALU NEAT is above HyperNEAT, but ten trials a side show it in only "
+                "every second run (power 0.48)"
+            ),
+            third_look,
+        ],
     ),
     pytest.param("neat", "ppo", "n_parity", marks=[NEAT_FORGETS, PPO_SOLVES_SMALL_GATES]),
-    pytest.param("neat", "ppo", "simple_alu", marks=PPO_SOLVES_SMALL_GATES),
+    pytest.param("neat", "ppo", "simple_alu", marks=[PPO_SOLVES_SMALL_GATES, third_look]),
 ]
 
 
@@ -105,6 +108,7 @@ def test_neat_solves_parity(trials, verdict):
     verdict(neat.solves_every_level.in_most_trials())
 
 
+@third_look
 @claim(
     "G3",
     says="NEAT ... stops at level 5 of the Simple ALU task",
@@ -411,7 +415,7 @@ def test_neat_s_networks_stay_small_in_the_maze(trials, verdict, claim_tier, tas
 @pytest.mark.parametrize(
     "method",
     [
-        "cma_es",
+        pytest.param("cma_es", marks=third_look),
         pytest.param(
             "neat",
             marks=expected(
