@@ -125,6 +125,11 @@ def test_methods_of_classes_are_paired_within_their_class(project: Any) -> None:
             "The smoke test test_small judges S1[coin], which its claim does not have, or marks with without_smoke.",
         ),
         (WHOLE + SMALL.replace("test_", "check_"), "the function check_small has @claim(...), and pytest takes none"),
+        (
+            WHOLE + "import functools\ntest_it = functools.update_wrapper(functools.partial(test_whole), test_whole)\n"
+            "del test_whole\n",
+            "test_it[wrong-S1-smoke] is a claim that cannot run at a tier. Write it as a function",
+        ),
         (SMALL.replace("All know a row", " "), "The smoke test of S1 lacks its says."),
         (
             SMALL.replace('says="All know a row"', "says=1"),
