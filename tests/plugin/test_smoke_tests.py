@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from typing import Any
 
@@ -56,12 +57,13 @@ def pytest_generate_tests(metafunc):
 """
 
 
-def test_each_tier_judges_the_statement_and_the_outcome_of_its_own_test(project: Any) -> None:
-    """And so they are where a plugin repeats the tests; the store has no trials of the full tier."""
+def test_each_tier_judges_the_statement_and_the_outcome_of_its_own_test(project: Any, stored: Any) -> None:
+    """And so they are where a plugin repeats the tests; `stored` has no trials of the full tier."""
     project.write(WHOLE + SMALL)
     for repeated in ("", REPEATED):
         (project.path / "conftest.py").write_text(repeated)
-        plain = project.json("-m", "smoke or full", "--claims-stored")["claims"]
+        project.run("-m", "smoke or full", "--claims-stored", "--claims-json=out.json", own_store=True)
+        plain = json.loads((project.path / "out.json").read_text())["claims"]
         assert [(one["tier"], one["case"], one["statement"], one["outcome"], one["expected"]) for one in plain] == [
             ("full", "coin", "All solve", "not run", "refuted"),
             ("full", "right", "All solve", "not run", "refuted"),
