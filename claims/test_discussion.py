@@ -91,7 +91,7 @@ def test_direct_encodings_fare_better_in_transfer_learning(trials, verdict, dire
     [
         pytest.param(
             "n_parity",
-            marks=expected(Outcome.REFUTED, tier="full", because="most trials solve every level: see G4"),
+            marks=expected(Outcome.REFUTED, because="most trials solve every level: see G4"),
         ),
         "simple_alu",
     ],

@@ -10,6 +10,7 @@ from evoclaims import Outcome, claim, expected
 
 FIRST, AUDIT = "2026-11-21 10:55", "2026-11-26"
 """When claims were first committed, before their trials; and when an audit added readings, after all of them."""
+METHODS = ["neat", "hyperneat", "cma_es", "ppo"]
 WALKS = 0.01
 """Share of the room on the path of an ant that walks (smoke); one that takes no action comes by 0.2 to 0.4% of it."""
 
@@ -26,19 +27,25 @@ NO_ROOM_FAVOURS_HYPERNEAT = (
     line=415,
     read="the first stone and no more",
     since=AUDIT,
-    smoke="The ant controlled by NEAT walks, and reaches no more than one of three stones, the simplest robot two",
 )
-@expected(Outcome.REFUTED, tier="full", because="NEAT's ants do not reach the first stone")
-def test_the_ant_stays_at_the_first_stone(trials, verdict, claim_tier):
-    ant, simple = trials("neat", on="stones_ant"), trials("neat", on="stones")
-    contrast = ant.crosses_at_most(1.5).stays() & simple.stones.between(1.25, 3) & (ant.path_coverage > WALKS)
+@expected(Outcome.REFUTED, because="NEAT's ants do not reach the first stone")
+def test_the_ant_stays_at_the_first_stone(trials, verdict):
+    ant = trials("neat", on="stones_ant")
     verdict.reading(
         "at most one stone",
         ant.crosses_at_most(1).stays(),
         because="that it gets no further; a robot that takes no action satisfies this",
         since=FIRST,
     )
-    verdict({"full": ant.stones.between(0.5, 1.5), "smoke": contrast}[claim_tier])
+    verdict(ant.stones.between(0.5, 1.5))
+
+
+@claim.smoke(
+    "M1", says="The ant controlled by NEAT walks, and reaches no more than one of three stones, the simplest robot two"
+)
+def test_the_ant_walks_no_further_than_one_stone(trials, verdict):
+    ant, simple = trials("neat", on="stones_ant"), trials("neat", on="stones")
+    verdict(ant.crosses_at_most(1.5).stays() & simple.stones.between(1.25, 3) & (ant.path_coverage > WALKS))
 
 
 @claim(
@@ -69,7 +76,6 @@ def test_the_ant_is_far_below_the_simplest_robot(trials, verdict):
 )
 @expected(
     Outcome.REFUTED,
-    tier="full",
     because="most trials stay in the local optimum, near the target; the others reach it in every episode",
 )
 def test_hyperneat_escapes_the_local_optimum(trials, verdict):
@@ -96,21 +102,25 @@ def test_hyperneat_escapes_the_local_optimum(trials, verdict):
     line=427,
     read="no episode of most trials, within 2 m",
     since=FIRST,
-    smoke="PPO remains stuck at the wall across the straight way, while MAP-Elites finds the target behind it",
 )
-def test_ppo_stays_at_the_wall(trials, verdict, claim_tier):
+def test_ppo_stays_at_the_wall(trials, verdict):
     ppo = trials("ppo", on="deceptive_maze_easy")
-    near = {"full": 2.0, "smoke": 1.0}[claim_tier]
     verdict.reading(
         "no episode of most trials",
         ppo.never_reaches_the_target.stays() & (ppo.reward > 0),
         because="where the wall is near is a number of ours",
         since=AUDIT,
     )
-    stuck = ppo.never_reaches_the_target.stays() & ppo.ends_within(near).in_most_trials()
-    if claim_tier == "smoke":
-        stuck &= trials("map_elites", on="deceptive_maze_easy").has_found_the_target.in_most_trials()
-    verdict(stuck)
+    verdict(ppo.never_reaches_the_target.stays() & ppo.ends_within(2.0).in_most_trials())
+
+
+@claim.smoke(
+    "D2", says="PPO remains stuck at the wall across the straight way, while MAP-Elites finds the target behind it"
+)
+def test_ppo_stays_at_the_wall_that_map_elites_passes(trials, verdict):
+    ppo, map_elites = trials("ppo", on="deceptive_maze_easy"), trials("map_elites", on="deceptive_maze_easy")
+    stuck = ppo.never_reaches_the_target.stays() & ppo.ends_within(1.0).in_most_trials()
+    verdict(stuck & map_elites.has_found_the_target.in_most_trials())
 
 
 @claim(
@@ -149,14 +159,9 @@ def test_the_ant_does_not_escape(trials, verdict):
     line=429,
     read="HyperNEAT never, MAP-Elites in most trials",
     since=FIRST,
-    smoke="MAP-Elites finds the target behind the wall, where HyperNEAT ends at the wall",
 )
-@expected(
-    Outcome.REFUTED,
-    tier="full",
-    because="HyperNEAT fails, but MAP-Elites, too, has found the target in few trials (see S7)",
-)
-def test_hyperneat_fails_in_the_difficult_maze(trials, verdict, claim_tier):
+@expected(Outcome.REFUTED, because="HyperNEAT fails, but MAP-Elites, too, has found the target in few trials (see S7)")
+def test_hyperneat_fails_in_the_difficult_maze(trials, verdict):
     hyperneat = trials("hyperneat", on="deceptive_maze_difficult")
     map_elites = trials("map_elites", on="deceptive_maze_difficult")
     verdict.reading(
@@ -171,10 +176,15 @@ def test_hyperneat_fails_in_the_difficult_maze(trials, verdict, claim_tier):
         because="the sentence contrasts the two",
         since=AUDIT,
     )
-    says = hyperneat.never_reaches_the_target.stays() & map_elites.has_found_the_target.in_most_trials()
-    if claim_tier == "smoke":
-        says &= hyperneat.ends_within(1.0).in_most_trials()
-    verdict(says)
+    verdict(hyperneat.never_reaches_the_target.stays() & map_elites.has_found_the_target.in_most_trials())
+
+
+@claim.smoke("D4", says="MAP-Elites finds the target behind the wall, where HyperNEAT ends at the wall")
+def test_hyperneat_ends_at_the_wall(trials, verdict):
+    hyperneat = trials("hyperneat", on="deceptive_maze_difficult")
+    map_elites = trials("map_elites", on="deceptive_maze_difficult")
+    contrast = hyperneat.never_reaches_the_target.stays() & map_elites.has_found_the_target.in_most_trials()
+    verdict(contrast & hyperneat.ends_within(1.0).in_most_trials())
 
 
 @claim(
@@ -184,28 +194,33 @@ def test_hyperneat_fails_in_the_difficult_maze(trials, verdict, claim_tier):
     line=446,
     read="the ant crosses one stone at most, the simplest robot more",
     since=AUDIT,
-    smoke="No method leads the ant past the first of three stones, though all but HyperNEAT's ants walk, and NEAT, "
+)
+@pytest.mark.parametrize("method", METHODS)
+def test_no_method_leads_the_ant_through_the_maze(trials, verdict, method):
+    ant, simple, half_cheetah = (trials(method, on=task) for task in ("stones_ant", "stones", "obstacles"))
+    verdict.reading(
+        "the ant crosses one stone at most",
+        ant.crosses_at_most(1).stays(),
+        because="without what the method does elsewhere; a robot that takes no action satisfies this",
+        since=FIRST,
+    )
+    verdict.reading(
+        "the half-cheetah does not pass all obstacles",
+        half_cheetah.passes_at_most(14).stays() & (half_cheetah.obstacles_passed > 1),
+        because="complex locomotion and transfer as well",
+        since=AUDIT,
+    )
+    verdict(ant.crosses_at_most(1).stays() & (simple.stones > ant.stones))
+
+
+@claim.smoke(
+    "X1",
+    says="No method leads the ant past the first of three stones, though all but HyperNEAT's ants walk, and NEAT, "
     "HyperNEAT and CMA-ES lead the simplest robot further, and PPO collects more reward with it than a random policy",
 )
-@pytest.mark.parametrize("method", ["neat", "hyperneat", "cma_es", "ppo"])
-def test_no_method_leads_the_ant_through_the_maze(trials, verdict, claim_tier, method):
+@pytest.mark.parametrize("method", METHODS)
+def test_no_method_leads_the_ant_past_the_first_stone(trials, verdict, method):
     ant = trials(method, on="stones_ant")
-    if claim_tier == "full":
-        verdict.reading(
-            "the ant crosses one stone at most",
-            ant.crosses_at_most(1).stays(),
-            because="without what the method does elsewhere; a robot that takes no action satisfies this",
-            since=FIRST,
-        )
-        verdict.reading(
-            "the half-cheetah does not pass all obstacles",
-            trials(method, on="obstacles").passes_at_most(14).stays()
-            & (trials(method, on="obstacles").obstacles_passed > 1),
-            because="complex locomotion and transfer as well",
-            since=AUDIT,
-        )
-        verdict(ant.crosses_at_most(1).stays() & (trials(method, on="stones").stones > ant.stones))
-        return
     simple = trials("neat" if method == "ppo" else method, on="stones")
     says = ant.crosses_at_most(1.5).stays() & (simple.stones > ant.stones)
     if method != "hyperneat":

@@ -32,7 +32,6 @@ NOBODY_RUNS_YET = (
             "ppo",
             marks=expected(
                 Outcome.INCONCLUSIVE,
-                tier="full",
                 because="NEAT's champions and PPO's policies collect about the same; in the paper's plot NEAT is above",
             ),
         ),
@@ -87,7 +86,6 @@ def test_ppo_is_second_over_obstacles(trials, verdict, other):
 )
 @expected(
     Outcome.REFUTED,
-    tier="full",
     because="PPO is upside-down for much of an episode, as the paper says; but NEAT pays the higher control cost",
 )
 def test_ppo_is_bumpy(trials, verdict):
@@ -156,7 +154,6 @@ def test_medium_obstacles_hold_back_neat_alone(trials, verdict):
 )
 @expected(
     Outcome.SMALLER,
-    tier="full",
     because="NEAT passes more obstacles, and PPO stays at the first in most trials, as the paper says; but NEAT "
     "collects less, since its control cost is higher",
 )
@@ -188,11 +185,7 @@ def test_high_obstacles_stop_ppo(trials, verdict):
     smoke=None,
     because=NOBODY_RUNS_YET,
 )
-@expected(
-    Outcome.REFUTED,
-    tier="full",
-    because="NEAT comes further in its episodes, since PPO stops on its back",
-)
+@expected(Outcome.REFUTED, because="NEAT comes further in its episodes, since PPO stops on its back")
 def test_ppo_runs_more_quickly_and_falls(trials, verdict):
     ppo, neat = trials("ppo", on="obstacles"), trials("neat", on="obstacles")
     verdict.reading(

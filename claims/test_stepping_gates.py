@@ -14,11 +14,9 @@ AUDIT = "2026-11-26"
 """When an audit added readings, after all trials had run: verdicts show these as younger than their trials."""
 
 PARITY_BY_SINES = expected(
-    Outcome.REFUTED, tier="full", because="HyperNEAT, whose CPPNs may use sines, does best of all on N-parity: see G4"
+    Outcome.REFUTED, because="HyperNEAT, whose CPPNs may use sines, does best of all on N-parity: see G4"
 )
-NEAT_FORGETS = expected(
-    Outcome.REFUTED, tier="full", because="NEAT forgets what it knew on the way up N-parity: see G2"
-)
+NEAT_FORGETS = expected(Outcome.REFUTED, because="NEAT forgets what it knew on the way up N-parity: see G2")
 SMALL_PARITY_BY_SINES = without_smoke(because="HyperNEAT, whose CPPNs may use sines, draws 3-parity as well")
 PPO_SOLVES_SMALL_GATES = without_smoke(
     because="PPO solves 3-parity and two operations of the ALU as well, and 4-parity in half of the trials; its "
@@ -116,21 +114,22 @@ def test_neat_solves_parity(trials, verdict):
     line=312,
     read="level 4 to 6 in training",
     since=SECOND,
-    smoke="NEAT gets to the second operation of Simple ALU, at which CMA-ES has more success",
 )
-def test_neat_stops_within_the_alu(trials, verdict, claim_tier):
+def test_neat_stops_within_the_alu(trials, verdict):
     neat = trials("neat", on="simple_alu")
-    if claim_tier == "smoke":
-        cma_es = trials("cma_es", on="simple_alu")
-        verdict(neat.furthest_reached.between(1, 1) & (cma_es.last_success > neat.last_success))
-    else:
-        verdict.reading(
-            "does not solve the task",
-            neat.does_not_solve_the_last_level.in_most_trials() & (neat.furthest_reached > 0),
-            because="where it stops is read off a plot; that it stops before the last level is the sentence's point",
-            since=AUDIT,
-        )
-        verdict(neat.furthest_reached.between(4, 6) & neat.does_not_solve_the_last_level.in_most_trials())
+    verdict.reading(
+        "does not solve the task",
+        neat.does_not_solve_the_last_level.in_most_trials() & (neat.furthest_reached > 0),
+        because="where it stops is read off a plot; that it stops before the last level is the sentence's point",
+        since=AUDIT,
+    )
+    verdict(neat.furthest_reached.between(4, 6) & neat.does_not_solve_the_last_level.in_most_trials())
+
+
+@claim.smoke("G3", says="NEAT gets to the second operation of Simple ALU, at which CMA-ES has more success")
+def test_neat_stops_at_the_second_operation(trials, verdict):
+    neat, cma_es = trials("neat", on="simple_alu"), trials("cma_es", on="simple_alu")
+    verdict(neat.furthest_reached.between(1, 1) & (cma_es.last_success > neat.last_success))
 
 
 @claim(
@@ -187,7 +186,6 @@ def test_hyperneat_drops_with_the_levels(trials, verdict, task):
 )
 @expected(
     Outcome.REFUTED,
-    tier="full",
     because="more than half of thirty trials solve a further level. The published code never trains on one, and then "
     "no trial does (docs/protocol.md, first_level)",
 )
@@ -249,7 +247,6 @@ def test_ppo_solves_parity_without_the_curriculum(trials, verdict):
 )
 @expected(
     Outcome.REFUTED,
-    tier="full",
     because="PPO ends near perfect success without the curriculum, and not at it: see G7. It does get more rows right",
 )
 def test_ppo_is_better_without_the_curriculum(trials, verdict):
@@ -271,14 +268,11 @@ def test_ppo_is_better_without_the_curriculum(trials, verdict):
     line=311,
     read="at every level after the first",
     since=SECOND,
-    smoke="CMA-ES has more success than HyperNEAT at the second of two operations of Simple ALU, of whose rows "
-    "HyperNEAT has learnt at least six in ten",
 )
 @pytest.mark.parametrize(("direct", "other", "task"), PAIRS)
-def test_direct_encodings_perform_best(trials, verdict, claim_tier, direct, other, task):
+def test_direct_encodings_perform_best(trials, verdict, direct, other, task):
     encoded_directly = trials(direct, on=task)
     others = trials(other, on=task)
-    better = encoded_directly.success.above(others.success, beyond=0)
     verdict.reading(
         "on average over levels",
         encoded_directly.mean_success > others.mean_success,
@@ -299,7 +293,19 @@ def test_direct_encodings_perform_best(trials, verdict, claim_tier, direct, othe
             "fit such means",
             since=AUDIT,
         )
-    verdict(better & others.last_success.between(0.6, 1) if claim_tier == "smoke" else better)
+    verdict(encoded_directly.success.above(others.success, beyond=0))
+
+
+@claim.smoke(
+    "G6",
+    says="CMA-ES has more success than HyperNEAT at the second of two operations of Simple ALU, of whose rows "
+    "HyperNEAT has learnt at least six in ten",
+)
+@pytest.mark.parametrize(("direct", "other", "task"), [("cma_es", "hyperneat", "simple_alu")])
+def test_cma_es_performs_best(trials, verdict, direct, other, task):
+    encoded_directly, others = trials(direct, on=task), trials(other, on=task)
+    better = encoded_directly.success.above(others.success, beyond=0)
+    verdict(better & others.last_success.between(0.6, 1))
 
 
 @claim(
@@ -337,7 +343,6 @@ def test_neat_degrades_slightly_without_the_curriculum(trials, verdict):
     line=405,
     read="larger than the maze's",
     since=AUDIT,
-    smoke="Most neurons of NEAT's champions are hidden on 3-parity, and on the first two operations of Simple ALU",
 )
 @pytest.mark.parametrize(
     "task",
@@ -346,23 +351,17 @@ def test_neat_degrades_slightly_without_the_curriculum(trials, verdict):
             "n_parity",
             marks=expected(
                 Outcome.SMALLER,
-                tier="full",
                 because="both fill the arrays with neurons, and the maze's champions have more connections",
             ),
         ),
         "simple_alu",
     ],
 )
-def test_neat_grows_large_networks(trials, verdict, claim_tier, task):
-    neat = trials("neat", on=task)
-    mostly_hidden = neat.champion_is_mostly_hidden.in_most_trials()
-    if claim_tier == "smoke":
-        verdict(mostly_hidden)
-        return
-    stones = trials("neat", on="stones")
+def test_neat_grows_large_networks(trials, verdict, task):
+    neat, stones = trials("neat", on=task), trials("neat", on="stones")
     verdict.reading(
         "mostly hidden neurons",
-        mostly_hidden,
+        neat.champion_is_mostly_hidden.in_most_trials(),
         because="a large network; but genomes have 97 to 100 of at most 100 neurons in every task",
         since=SECOND,
     )
@@ -375,6 +374,14 @@ def test_neat_grows_large_networks(trials, verdict, claim_tier, task):
     verdict(neat.champion_size > stones.champion_size)
 
 
+@claim.smoke(
+    "G10", says="Most neurons of NEAT's champions are hidden on 3-parity, and on the first two operations of Simple ALU"
+)
+@pytest.mark.parametrize("task", TASKS)
+def test_neat_s_networks_are_mostly_hidden(trials, verdict, task):
+    verdict(trials("neat", on=task).champion_is_mostly_hidden.in_most_trials())
+
+
 @claim(
     "G10",
     says="NEAT grows large networks for the stepping gates tasks while the networks found for this maze are "
@@ -383,23 +390,30 @@ def test_neat_grows_large_networks(trials, verdict, claim_tier, task):
     line=405,
     read="at most half hidden",
     since="2026-11-21 12:28",
-    smoke="In the room with three stones, at most half of the neurons of NEAT's champions are hidden, and they cross "
+)
+@expected(Outcome.REFUTED, because="the champions have nearly as many neurons as the arrays hold")
+@pytest.mark.parametrize("task", ["stones"])
+def test_neat_s_networks_stay_small_in_the_maze(trials, verdict, task):
+    neat = trials("neat", on=task)
+    parity, alu = (trials("neat", on=gates) for gates in TASKS)
+    verdict.reading(
+        "smaller than those for both gates",
+        (parity.champion_size > neat.champion_size) & (alu.champion_size > neat.champion_size),
+        because="the sentence compares the tasks",
+        since=AUDIT,
+    )
+    verdict(neat.champion_is_mostly_input_and_output.in_most_trials())
+
+
+@claim.smoke(
+    "G10",
+    says="In the room with three stones, at most half of the neurons of NEAT's champions are hidden, and they cross "
     "about two",
 )
-@expected(Outcome.REFUTED, tier="full", because="the champions have nearly as many neurons as the arrays hold")
 @pytest.mark.parametrize("task", ["stones"])
-def test_neat_s_networks_stay_small_in_the_maze(trials, verdict, claim_tier, task):
+def test_neat_s_small_networks_cross_two_stones(trials, verdict, task):
     neat = trials("neat", on=task)
-    small = neat.champion_is_mostly_input_and_output.in_most_trials()
-    if claim_tier == "full":
-        parity, alu = (trials("neat", on=gates) for gates in TASKS)
-        verdict.reading(
-            "smaller than those for both gates",
-            (parity.champion_size > neat.champion_size) & (alu.champion_size > neat.champion_size),
-            because="the sentence compares the tasks",
-            since=AUDIT,
-        )
-    verdict(small & neat.stones.between(1.25, 3) if claim_tier == "smoke" else small)
+    verdict(neat.champion_is_mostly_input_and_output.in_most_trials() & neat.stones.between(1.25, 3))
 
 
 @claim(
@@ -419,9 +433,7 @@ def test_neat_s_networks_stay_small_in_the_maze(trials, verdict, claim_tier, tas
         pytest.param(
             "neat",
             marks=expected(
-                Outcome.REFUTED,
-                tier="full",
-                because="NEAT ends N-parity with half of the rows, as a guess does: see G2",
+                Outcome.REFUTED, because="NEAT ends N-parity with half of the rows, as a guess does: see G2"
             ),
         ),
         "hyperneat",

@@ -18,7 +18,6 @@ EVOLVED = [
         "hyperneat",
         marks=expected(
             Outcome.REFUTED,
-            tier="full",
             because="champions of one lucky episode in training cross few stones in other episodes (docs/protocol.md)",
         ),
     ),
@@ -26,7 +25,6 @@ EVOLVED = [
         "cma_es",
         marks=expected(
             Outcome.REFUTED,
-            tier="full",
             because="its champions cross fewer stones in ten episodes other than those that made them champions",
         ),
     ),
@@ -41,7 +39,6 @@ LEARNED = [
         "goal_ppo",
         marks=expected(
             Outcome.INCONCLUSIVE,
-            tier="full",
             because="shown the next stone, PPO crosses several stones, and in some trials reaches the target in most "
             "episodes; in the published code no stone pays (docs/protocol.md)",
         ),
@@ -56,14 +53,12 @@ LEARNED = [
     line=348,
     read="four to six stones, final policy",
     since=FIRST,
-    smoke="NEAT reaches on average two out of three stepping stones",
 )
 @expected(
     Outcome.REFUTED,
-    tier="full",
     because="champions of one lucky episode in training cross few stones in ten other episodes (docs/protocol.md)",
 )
-def test_neat_reaches_five_stones(trials, verdict, claim_tier):
+def test_neat_reaches_five_stones(trials, verdict):
     neat = trials("neat", on="stones")
     verdict.reading(
         "training's best episode, in stones by its reward",
@@ -71,7 +66,12 @@ def test_neat_reaches_five_stones(trials, verdict, claim_tier):
         because="Fig. 5 may show what evolution reports; a step with five stones crossed pays about five",
         since=AUDIT,
     )
-    verdict({"full": neat.stones.between(4, 6), "smoke": neat.stones.between(1.25, 3)}[claim_tier])
+    verdict(neat.stones.between(4, 6))
+
+
+@claim.smoke("S1", says="NEAT reaches on average two out of three stepping stones")
+def test_neat_reaches_two_of_three_stones(trials, verdict):
+    verdict(trials("neat", on="stones").stones.between(1.25, 3))
 
 
 @claim(
@@ -81,21 +81,23 @@ def test_neat_reaches_five_stones(trials, verdict, claim_tier):
     line=349,
     read="two to four stones, final policy",
     since=FIRST,
-    smoke="HyperNEAT and CMA-ES reach stepping stones, unlike a random policy, but fewer than NEAT",
 )
 @pytest.mark.parametrize("method", EVOLVED)
-def test_others_reach_three_stones(trials, verdict, claim_tier, method):
+def test_others_reach_three_stones(trials, verdict, method):
     evolved = trials(method, on="stones")
-    if claim_tier == "full":
-        verdict.reading(
-            "training's best episode, in stones by its reward",
-            evolved.reward_in_training.between(2 * evolved.reward_of_a_stone, 4 * evolved.reward_of_a_stone),
-            because="Fig. 5 may show what evolution reports; a step with three stones crossed pays about three",
-            since=AUDIT,
-        )
-        verdict(evolved.stones.between(2, 4))
-        return
-    neat, random_policy = trials("neat", on="stones"), trials("random_policy", on="stones")
+    verdict.reading(
+        "training's best episode, in stones by its reward",
+        evolved.reward_in_training.between(2 * evolved.reward_of_a_stone, 4 * evolved.reward_of_a_stone),
+        because="Fig. 5 may show what evolution reports; a step with three stones crossed pays about three",
+        since=AUDIT,
+    )
+    verdict(evolved.stones.between(2, 4))
+
+
+@claim.smoke("S2", says="HyperNEAT and CMA-ES reach stepping stones, unlike a random policy, but fewer than NEAT")
+@pytest.mark.parametrize("method", ["hyperneat", "cma_es"])
+def test_others_reach_fewer_stones_than_neat(trials, verdict, method):
+    evolved, neat, random_policy = (trials(one, on="stones") for one in (method, "neat", "random_policy"))
     verdict((evolved.stones < neat.stones) & (evolved.stones > random_policy.stones))
 
 
@@ -107,21 +109,26 @@ def test_others_reach_three_stones(trials, verdict, claim_tier, method):
     line=350,
     read="the first stone and no more",
     since=AUDIT,
-    smoke="PPO reaches, unlike a random policy, the first of three stepping stones, but not the others, unlike NEAT",
 )
 @pytest.mark.parametrize("method", LEARNED)
-def test_ppo_stays_at_the_first_stone(trials, verdict, claim_tier, method):
+def test_ppo_stays_at_the_first_stone(trials, verdict, method):
     ppo = trials(method, on="stones")
-    if claim_tier == "full":
-        verdict.reading(
-            "at most one stone",
-            ppo.crosses_at_most(1).stays(),
-            because="stuck at the first stone may mean before it; a robot that takes no action satisfies this",
-            since=FIRST,
-        )
-        verdict(ppo.stones.between(0.5, 1.5))
-        return
-    neat, random_policy = trials("neat", on="stones"), trials("random_policy", on="stones")
+    verdict.reading(
+        "at most one stone",
+        ppo.crosses_at_most(1).stays(),
+        because="stuck at the first stone may mean before it; a robot that takes no action satisfies this",
+        since=FIRST,
+    )
+    verdict(ppo.stones.between(0.5, 1.5))
+
+
+@claim.smoke(
+    "S3",
+    says="PPO reaches, unlike a random policy, the first of three stepping stones, but not the others, unlike NEAT",
+)
+@pytest.mark.parametrize("method", ["ppo", "goal_ppo"])
+def test_ppo_reaches_the_first_of_three_stones(trials, verdict, method):
+    ppo, neat, random_policy = (trials(one, on="stones") for one in (method, "neat", "random_policy"))
     about_one = ppo.stones.between(0, 1.5) & (ppo.stones > random_policy.stones)
     verdict(about_one & (ppo.stones < neat.stones))
 
@@ -133,22 +140,19 @@ def test_ppo_stays_at_the_first_stone(trials, verdict, claim_tier, method):
     line=348,
     read="final policy's rewards",
     since=FIRST,
-    smoke="NEAT accrues the highest rewards in the room with three stones; the others' are above a random policy's",
 )
 @pytest.mark.parametrize(
     "other",
     [
         pytest.param("hyperneat", marks=third_look),
-        pytest.param("cma_es", marks=expected(Outcome.REFUTED, tier="full", because=LUCKY)),
+        pytest.param("cma_es", marks=expected(Outcome.REFUTED, because=LUCKY)),
         pytest.param("map_elites", marks=third_look),
         pytest.param("ppo", marks=third_look),
-        pytest.param("goal_ppo", marks=expected(Outcome.REFUTED, tier="full", because=LUCKY)),
+        pytest.param("goal_ppo", marks=expected(Outcome.REFUTED, because=LUCKY)),
     ],
 )
-def test_neat_collects_more_reward(trials, verdict, claim_tier, other):
-    neat = trials("neat", on="stones")
-    rest = trials(other, on="stones")
-    says = neat.reward > rest.reward
+def test_neat_collects_more_reward(trials, verdict, other):
+    neat, rest = trials("neat", on="stones"), trials(other, on="stones")
     if other in ("hyperneat", "cma_es", "map_elites"):
         verdict.reading(
             "rewards of training's best episodes",
@@ -156,9 +160,17 @@ def test_neat_collects_more_reward(trials, verdict, claim_tier, other):
             because="Fig. 5 may show what evolution reports",
             since=AUDIT,
         )
-    if claim_tier == "smoke":
-        says &= rest.reward > trials("random_policy", on="stones").reward
-    verdict(says)
+    verdict(neat.reward > rest.reward)
+
+
+@claim.smoke(
+    "S4",
+    says="NEAT accrues the highest rewards in the room with three stones; the others' are above a random policy's",
+)
+@pytest.mark.parametrize("other", ["hyperneat", "cma_es", "map_elites", "ppo", "goal_ppo"])
+def test_neat_collects_more_reward_among_three_stones(trials, verdict, other):
+    neat, rest, random_policy = (trials(method, on="stones") for method in ("neat", other, "random_policy"))
+    verdict((neat.reward > rest.reward) & (rest.reward > random_policy.reward))
 
 
 @third_look
@@ -169,26 +181,28 @@ def test_neat_collects_more_reward(trials, verdict, claim_tier, other):
     line=351,
     read="at most one stone, as PPO",
     since=FIRST,
-    smoke="MAP-Elites collects about as little reward as PPO: both more than a random policy, but far less than NEAT",
 )
-def test_map_elites_collects_few_stones(trials, verdict, claim_tier):
-    """The words "equally bad" are read as what the paper says of PPO (S3): at most one stone. S6 judges the behaviour.
+def test_map_elites_collects_few_stones(trials, verdict):
+    """The words "equally bad" are read as what the paper says of PPO (S3): at most one stone. Behaviour is S6."""
+    map_elites, ppo = trials("map_elites", on="stones"), trials("ppo", on="stones")
+    for within in (500, 1_000):
+        margin = within / 1_000 * map_elites.reward_of_a_stone
+        verdict.reading(
+            f"rewards within {within:,} of PPO's",
+            map_elites.reward.equivalent_to(ppo.reward, margin=margin),
+            because="equally bad as PPO, whose rewards Fig. 5 shows",
+            since=AUDIT,
+        )
+    verdict(map_elites.crosses_at_most(1).stays())
 
-    Smoke compares rewards: MAP-Elites' within 400 of PPO's, and less than NEAT's.
-    """
-    map_elites = trials("map_elites", on="stones")
-    if claim_tier == "full":
-        for within in (500, 1_000):
-            margin = within / 1_000 * map_elites.reward_of_a_stone
-            verdict.reading(
-                f"rewards within {within:,} of PPO's",
-                map_elites.reward.equivalent_to(trials("ppo", on="stones").reward, margin=margin),
-                because="equally bad as PPO, whose rewards Fig. 5 shows",
-                since=AUDIT,
-            )
-        verdict(map_elites.crosses_at_most(1).stays())
-        return
-    ppo, neat, random_policy = (trials(method, on="stones") for method in ("ppo", "neat", "random_policy"))
+
+@claim.smoke(
+    "S5",
+    says="MAP-Elites collects about as little reward as PPO: both more than a random policy, but far less than NEAT",
+)
+def test_map_elites_collects_as_little_as_ppo(trials, verdict):
+    methods = ("map_elites", "ppo", "neat", "random_policy")
+    map_elites, ppo, neat, random_policy = (trials(method, on="stones") for method in methods)
     some = (map_elites.reward > random_policy.reward) & (ppo.reward > random_policy.reward)
     verdict(map_elites.reward.equivalent_to(ppo.reward, margin=400) & some & (map_elites.reward < neat.reward))
 
@@ -201,13 +215,11 @@ def test_map_elites_collects_few_stones(trials, verdict, claim_tier):
     line=351,
     read="0.8 of the cells, more than PPO's path",
     since=FIRST,
-    smoke="The elites of MAP-Elites stand on a tenth of the room, more than PPO's way to the first stone leads through",
 )
-def test_map_elites_explores_the_maze(trials, verdict, claim_tier):
+def test_map_elites_explores_the_maze(trials, verdict):
     map_elites = trials("map_elites", on="stones")
     ppo = trials("ppo", on="stones")
     more = map_elites.archive_coverage > ppo.path_coverage
-    least = {"full": 0.8, "smoke": 0.1}[claim_tier]
     verdict.reading(
         "some elite ends at the target",
         map_elites.has_found_the_target.in_most_trials() & (map_elites.target_found > ppo.share_of_targets),
@@ -220,10 +232,17 @@ def test_map_elites_explores_the_maze(trials, verdict, claim_tier):
         because="0.8 is a number of ours for the whole maze, whose corners few policies end in",
         since=AUDIT,
     )
-    says = more & map_elites.archive_coverage.between(least, 1.0)
-    if claim_tier == "smoke":
-        says &= ppo.stones > trials("random_policy", on="stones").stones
-    verdict(says)
+    verdict(more & map_elites.archive_coverage.between(0.8, 1.0))
+
+
+@claim.smoke(
+    "S6",
+    says="The elites of MAP-Elites stand on a tenth of the room, more than PPO's way to the first stone leads through",
+)
+def test_map_elites_explores_the_room(trials, verdict):
+    map_elites, ppo, random_policy = (trials(one, on="stones") for one in ("map_elites", "ppo", "random_policy"))
+    more = map_elites.archive_coverage > ppo.path_coverage
+    verdict(more & map_elites.archive_coverage.between(0.1, 1.0) & (ppo.stones > random_policy.stones))
 
 
 @claim(
@@ -235,14 +254,9 @@ def test_map_elites_explores_the_maze(trials, verdict, claim_tier):
     line=352,
     read="finds the target, with the same coverage",
     since=FIRST,
-    smoke="Without stones MAP-Elites finds the target behind the wall; its elites, too, stand on a tenth of the room",
 )
-@expected(
-    Outcome.REFUTED,
-    tier="full",
-    because="the policies fill most cells that can be reached, but the target's in few trials",
-)
-def test_map_elites_finds_the_target_without_stones(trials, verdict, claim_tier):
+@expected(Outcome.REFUTED, because="the policies fill most cells that can be reached, but the target's in few trials")
+def test_map_elites_finds_the_target_without_stones(trials, verdict):
     plain = trials("map_elites", on="deceptive_maze_difficult")
     stones = trials("map_elites", on="stones")
     verdict.reading(
@@ -251,11 +265,18 @@ def test_map_elites_finds_the_target_without_stones(trials, verdict, claim_tier)
         because="the same coverage is what another sentence says of the figure",
         since=AUDIT,
     )
-    alike = {
-        "full": plain.archive_coverage.equivalent_to(stones.archive_coverage, margin=0.1),
-        "smoke": plain.archive_coverage.between(0.1, 1.0) & stones.archive_coverage.between(0.1, 1.0),
-    }
-    verdict(plain.has_found_the_target.in_most_trials() & alike[claim_tier])
+    alike = plain.archive_coverage.equivalent_to(stones.archive_coverage, margin=0.1)
+    verdict(plain.has_found_the_target.in_most_trials() & alike)
+
+
+@claim.smoke(
+    "S7",
+    says="Without stones MAP-Elites finds the target behind the wall; its elites, too, stand on a tenth of the room",
+)
+def test_map_elites_finds_the_target_behind_the_wall(trials, verdict):
+    plain, stones = trials("map_elites", on="deceptive_maze_difficult"), trials("map_elites", on="stones")
+    explored = plain.archive_coverage.between(0.1, 1.0) & stones.archive_coverage.between(0.1, 1.0)
+    verdict(plain.has_found_the_target.in_most_trials() & explored)
 
 
 @claim(
@@ -265,30 +286,32 @@ def test_map_elites_finds_the_target_without_stones(trials, verdict, claim_tier)
     line=403,
     read="final policy's rewards among stones",
     since=FIRST,
-    smoke="CMA-ES collects less reward than NEAT in the room with three stones, but more than a random policy",
 )
-@expected(Outcome.REFUTED, tier="full", because=LUCKY)
-def test_cma_es_is_below_neat(trials, verdict, claim_tier):
+@expected(Outcome.REFUTED, because=LUCKY)
+def test_cma_es_is_below_neat(trials, verdict):
     cma_es = trials("cma_es", on="stones")
     neat = trials("neat", on="stones")
-    says = cma_es.reward < neat.reward
     verdict.reading(
         "rewards of training's best episodes",
         cma_es.reward_in_training < neat.reward_in_training,
         because="Fig. 5 may show what evolution reports",
         since=AUDIT,
     )
-    if claim_tier == "full":
-        on_obstacles = (trials(method, on="obstacles").reward for method in ("neat", "cma_es"))
-        verdict.reading(
-            "rewards among obstacles",
-            next(on_obstacles) > next(on_obstacles),
-            because="the sentence is about transfer learning in ecorobot, which has two tasks of it",
-            since=AUDIT,
-        )
-    if claim_tier == "smoke":
-        says &= cma_es.reward > trials("random_policy", on="stones").reward
-    verdict(says)
+    verdict.reading(
+        "rewards among obstacles",
+        trials("neat", on="obstacles").reward > trials("cma_es", on="obstacles").reward,
+        because="the sentence is about transfer learning in ecorobot, which has two tasks of it",
+        since=AUDIT,
+    )
+    verdict(cma_es.reward < neat.reward)
+
+
+@claim.smoke(
+    "S8", says="CMA-ES collects less reward than NEAT in the room with three stones, but more than a random policy"
+)
+def test_cma_es_is_below_neat_among_three_stones(trials, verdict):
+    cma_es, neat, random_policy = (trials(method, on="stones") for method in ("cma_es", "neat", "random_policy"))
+    verdict((cma_es.reward < neat.reward) & (cma_es.reward > random_policy.reward))
 
 
 @claim(
@@ -301,7 +324,7 @@ def test_cma_es_is_below_neat(trials, verdict, claim_tier):
     smoke=None,
     because=A_LATER_SENTENCE,
 )
-@expected(Outcome.REFUTED, tier="full", because="no archive of ten has an elite at the target")
+@expected(Outcome.REFUTED, because="no archive of ten has an elite at the target")
 def test_map_elites_reaches_the_end_of_the_maze(trials, verdict):
     verdict(trials("map_elites", on="stones").has_found_the_target.in_most_trials())
 
@@ -316,7 +339,7 @@ def test_map_elites_reaches_the_end_of_the_maze(trials, verdict):
     smoke=None,
     because=A_LATER_SENTENCE,
 )
-@expected(Outcome.REFUTED, tier="full", because="no archive has an elite on nearly all of the cells")
+@expected(Outcome.REFUTED, because="no archive has an elite on nearly all of the cells")
 def test_map_elites_covers_both_mazes(trials, verdict):
     stones, plain = trials("map_elites", on="stones"), trials("map_elites", on="deceptive_maze_difficult")
     for least, name in ((0.8, "0.8 of the cells"), (0.5, "half of the cells")):
@@ -342,9 +365,7 @@ def test_map_elites_covers_both_mazes(trials, verdict):
 @pytest.mark.parametrize(
     "method",
     [
-        pytest.param(
-            "neat", marks=expected(Outcome.REFUTED, tier="full", because="goal-conditioned PPO collects more: see S4")
-        ),
+        pytest.param("neat", marks=expected(Outcome.REFUTED, because="goal-conditioned PPO collects more: see S4")),
         pytest.param("cma_es", marks=third_look),
     ],
 )
@@ -372,7 +393,6 @@ def test_neat_and_cma_es_perform_best(trials, verdict, method):
 )
 @expected(
     Outcome.REFUTED,
-    tier="full",
     because="an episode ends at the target, so even one that waits before the last stone collects far less",
 )
 def test_all_stones_pay_ten_thousand(trials, verdict):

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from evoclaims import Outcome, claim, expected
-from evoclaims.claims.claim import Claim, ClaimTest, Expectation, claim_of, expectation_of, gap_of
+from evoclaims.claims.claim import TIER, Claim, ClaimTest, Expectation, claim_of, expectation_of, gap_of
 from evoclaims.claims.judge import expecting, unjudged
 from evoclaims.core.errors import UserError
 from evoclaims.verdicts.claim_report import ClaimReport, save
@@ -88,12 +88,12 @@ CLAIMS = """
 
     @pytest.mark.parametrize("task", ["plain", pytest.param("marked", marks=expected("refuted", because="case"))])
     @claim("wide", **TEXTS, expect="inconclusive", because="claim")
-    def test_wide(task, claim_tier): ...
+    def test_wide(task, verdict): ...
 
     @pytest.mark.parametrize("task", ["plain", pytest.param("marked", marks=expected("refuted", because="case"))])
     @expected("inconclusive", because="claim, full", tier="full")
     @claim("fine", **TEXTS)
-    def test_fine(task, claim_tier): ...
+    def test_fine(task, verdict): ...
 
     @pytest.mark.parametrize(
         "task",
@@ -107,17 +107,17 @@ CLAIMS = """
     )
     @expected("supported", because="claim")
     @claim("tiers", **TEXTS)
-    def test_tiers(task, claim_tier): ...
+    def test_tiers(task, verdict): ...
 
     @expected("error", because="every tier")
     @expected("refuted", because="full", tier="full")
     @claim("above", **TEXTS)
-    def test_above(claim_tier): ...
+    def test_above(verdict): ...
 
     @expected("refuted", because="full", tier="full")
     @expected("error", because="every tier")
     @claim("below", **TEXTS)
-    def test_below(claim_tier): ...
+    def test_below(verdict): ...
 """
 
 CLOSEST = {
@@ -135,7 +135,7 @@ CLOSEST = {
 def test_the_closest_acceptance_holds_and_beside_it_the_one_for_the_tier_alone(pytester: pytest.Pytester) -> None:
     items, _ = pytester.inline_genitems(pytester.makepyfile(CLAIMS), "-pno:cacheprovider")
     found = {}
-    for item in (item for item in items if item.callspec.params["claim_tier"] == "full"):  # type: ignore[attr-defined]
+    for item in (item for item in items if item.callspec.params[TIER] == "full"):  # type: ignore[attr-defined]
         name = " ".join([item.originalname.removeprefix("test_"), *filter(None, [item.callspec.params.get("task")])])  # type: ignore[attr-defined]
         found[name] = tuple(getattr(expectation_of(item, tier), "because", None) for tier in ("smoke", "full"))
     assert found == CLOSEST

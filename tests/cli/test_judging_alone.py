@@ -259,11 +259,18 @@ def test_claims_are_collected_once_for_all_that_a_command_judges(evoclaims: Evoc
 CALLS = """
 from pathlib import Path
 
-@says("d")
-def test_d(trials, verdict, claim_tier):
+def judge(tier, trials, verdict):
     with Path("called.log").open("a") as log:
-        log.write(f"{claim_tier} ")
+        log.write(f"{tier} ")
     verdict(trials("right", on="parity").measure("success", lambda trial: print("read") or READ) > 0)
+
+@claim("d", says="d at full size", where="§1")
+def test_d(trials, verdict):
+    judge("full", trials, verdict)
+
+@claim.smoke("d", says="d in small")
+def test_small_d(trials, verdict):
+    judge("smoke", trials, verdict)
 
 @says("e")
 def test_e(trials, verdict):
@@ -297,6 +304,6 @@ def test_what_a_measure_raises_is_the_error_of_its_claim(evoclaims: Evoclaims, p
     warns = "__import__('warnings').warn('odd number') or 1"
     project.write(CALLS.replace("READ", warns))
     assert "UserWarning: odd number (claims/test_claims.py, line " in evoclaims("status")[1]  # the project's settings
-    ignoring = "@pytest.mark.filterwarnings('ignore:odd')\n@says(\"d\")"
-    project.write(CALLS.replace("READ", warns).replace('@says("d")', ignoring))
+    ignoring = "@pytest.mark.filterwarnings('ignore:odd')\n@claim.smoke"
+    project.write(CALLS.replace("READ", warns).replace("@claim.smoke", ignoring))
     assert evoclaims("status")[1].splitlines()[-1] == "claims (smoke): 1 supported, 1 refuted"

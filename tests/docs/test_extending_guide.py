@@ -50,6 +50,11 @@ def _write(folder: Path, names: set[str]) -> None:
         path.write_text(FILES[name], encoding="utf-8")
 
 
+def test_the_smoke_test_that_is_shown_is_one_of_the_paper() -> None:
+    (shown,) = re.findall(r"```python\n(@claim\.smoke.*?)```", GUIDE, flags=re.DOTALL)
+    assert shown in (Path(__file__).parents[2] / "claims" / "test_stepping_stones.py").read_text(encoding="utf-8")
+
+
 @pytest.mark.parametrize(
     ("names", "most"),
     [

@@ -18,7 +18,7 @@ from evoclaims.verdicts.readings import moment
 
 F = TypeVar("F", bound=Callable[..., Any])
 
-TIER: Final = "claim_tier"
+TIER: Final = "_claim_tier"
 """The parameter that makes a claim test run once per tier; the plugin makes it the last one."""
 
 _REPETITION: Final = re.compile(r"(^|-)run\d+of\d+(?=-|$)")
@@ -40,7 +40,8 @@ class Claim:
         says: the paper's own words.
         where: section and figure; "control" for a check of the benchmark itself and "mechanism" for
             a part of a method or task, which are counted apart.
-        smoke: the scaled-down statement that the smoke tier judges instead; None if it judges none.
+        smoke: the scaled-down statement that the smoke tier judges instead; None if it judges none, and empty until
+            tests are collected if a test of its own states it (see `claim.smoke`).
         line: of the paper's source in which the sentence stands; None where nobody says.
         read: the name of the reading that the test judges.
         since: when that reading was written (ISO 8601, UTC); empty where nobody says.
@@ -78,63 +79,99 @@ class Expectation:
     tier: str | None = None
 
 
-def claim(
-    claim_id: str,
-    /,
-    *,
-    says: str,
-    where: str,
-    smoke: str | None,
-    expect: Outcome | None = None,
-    because: str = "",
-    line: int | None = None,
-    read: str = "as judged",
-    since: str = "",
-) -> Callable[[F], F]:
-    """Mark a test as the check of a claim; the test runs once per tier.
+@dataclass(frozen=True)
+class Smaller:
+    """The scaled-down statement of a claim, which a test of its own judges at the smoke tier."""
 
-    Args:
-        claim_id: a short name, such as "G1".
-        says: the paper's own words.
-        where: section and figure; "control" for a check of the benchmark itself and "mechanism" for
-            a part of a method or task, which are counted apart.
-        smoke: the scaled-down statement of the smoke tier; None if no small instance can show the sentence, which is
-            then not judged there (see `without_smoke` for one parameter of a claim).
-        expect: an accepted outcome, for every tier and parameter; a narrower one (see `expected`) overrides it.
-        because: why it is accepted, or why there is no smoke test; required with `expect` and with `smoke=None`.
-        line: the line of the paper's source in which the sentence stands.
-        read: a name for the reading that the test judges; `verdict.reading(...)` adds others.
-        since: when that reading was written, such as "2026-11-26" or "2026-11-26 14:30" (UTC).
+    id: str
+    says: str
 
-    Raises:
-        UserError: when a text is missing, `since` is not a date, or `because` would have to explain two things.
-    """
-    for word, text in {"id": claim_id, "says": says, "where": where, "smoke": smoke}.items():
-        if not (isinstance(text, str) or (text is None and word == "smoke")):
+
+class _ClaimMark:
+    """The marks `@claim(...)` and `@claim.smoke(...)` of the tests that check a claim."""
+
+    def __call__(
+        self,
+        claim_id: str,
+        /,
+        *,
+        says: str,
+        where: str,
+        smoke: str | None = "",
+        expect: Outcome | None = None,
+        because: str = "",
+        line: int | None = None,
+        read: str = "as judged",
+        since: str = "",
+    ) -> Callable[[F], F]:
+        """Mark a test as the check of a claim; the test runs once per tier.
+
+        Args:
+            claim_id: a short name, such as "G1".
+            says: the paper's own words.
+            where: section and figure; "control" for a check of the benchmark itself and "mechanism" for
+                a part of a method or task, which are counted apart.
+            smoke: the scaled-down statement of the smoke tier, if the same test judges it; None if no small instance
+                can show the sentence, which is then not judged there (see `without_smoke` for one parameter of a
+                claim). Left out, a test of its own has it, right below (see `claim.smoke`).
+            expect: an accepted outcome, for all that the test judges; a narrower one (see `expected`) overrides it.
+            because: why it is accepted, or why there is no smoke test; required with `expect` and with `smoke=None`.
+            line: the line of the paper's source in which the sentence stands.
+            read: a name for the reading that the test judges; `verdict.reading(...)` adds others.
+            since: when that reading was written, such as "2026-11-26" or "2026-11-26 14:30" (UTC).
+
+        Raises:
+            UserError: when a text is missing, `since` is not a date, or `because` would have to explain two things.
+        """
+        stated = {} if smoke in (None, "") else {"smoke": smoke}
+        _check_texts("The claim", claim_id, says=says, where=where, **stated)
+        if smoke is None and expect is not None:
             raise UserError(
-                f"The claim {claim_id!r} has {text!r} as its {word}, which is not text. Write it in quotes."
+                f"The claim {claim_id} has smoke=None and expect=...: its because=... says why there is no smoke test, "
+                "so accept the outcome with @expected(...)."
             )
-        if text is not None and not text.strip():
-            raise UserError(f"The claim {claim_id or '(without id)'} lacks its {word}.")
-    if smoke is None and expect is not None:
-        raise UserError(
-            f"The claim {claim_id} has smoke=None and expect=...: its because=... says why there is no smoke test, so "
-            "accept the outcome with @expected(...)."
-        )
-    if since:
-        moment(since)
-    marks = [pytest.mark.claim(Claim(claim_id, says, where, smoke, line, read, since))]
-    if smoke is None:
-        marks.append(without_smoke(because=because))
-    if expect is not None:
-        marks.append(expected(expect, because=because))
+        if since:
+            moment(since)
+        marks = [pytest.mark.claim(Claim(claim_id, says, where, smoke, line, read, since))]
+        if smoke is None:
+            marks.append(without_smoke(because=because))
+        if expect is not None:
+            marks.append(expected(expect, because=because))
 
-    def attach(function: F) -> F:
-        for mark in marks:
-            function = mark(function)
-        return function
+        def attach(function: F) -> F:
+            for mark in marks:
+                function = mark(function)
+            return function
 
-    return attach
+        return attach
+
+    def smoke(self, claim_id: str, /, *, says: str) -> Callable[[F], F]:
+        """Mark a test as the check of a claim's scaled-down statement; it runs at the smoke tier alone.
+
+        It stands below the test of its claim, which has no `smoke=...`, and has the same parameters, except cases that
+        the claim marks as `without_smoke`.
+
+        Args:
+            claim_id: that of the claim.
+            says: the scaled-down statement.
+
+        Raises:
+            UserError: when a text is missing.
+        """
+        _check_texts("The smoke test of", claim_id, says=says)
+        return pytest.mark.claim(Smaller(claim_id, says))
+
+
+claim: Final = _ClaimMark()
+
+
+def _check_texts(what: str, claim_id: object, **texts: object) -> None:
+    """Refuse what is no text, or empty."""
+    for word, text in {"id": claim_id, **texts}.items():
+        if not isinstance(text, str):
+            raise UserError(f"{what} {claim_id!r} has {text!r} as its {word}, which is not text. Write it in quotes.")
+        if not text.strip():
+            raise UserError(f"{what} {claim_id or '(without id)'} lacks its {word}.")
 
 
 def expected(outcome: Outcome | str, *, because: str, tier: str | None = None) -> pytest.MarkDecorator:
@@ -169,10 +206,10 @@ def gap_of(item: pytest.Item, tier: str) -> str:
     return str(mark.args[0]) if mark else ""
 
 
-def claim_of(item: pytest.Item) -> Claim | None:
-    """Return the claim that a test checks, or None."""
+def claim_of(item: pytest.Item) -> Claim | Smaller | None:
+    """Return the claim that a test checks, before tests are collected what it states in small; or None."""
     mark = item.get_closest_marker("claim")
-    found: Claim | None = mark.args[0] if mark and mark.args else None
+    found: Claim | Smaller | None = mark.args[0] if mark and mark.args else None
     return found
 
 
@@ -197,7 +234,7 @@ def expectation_of(item: pytest.Item, tier: str) -> Expectation | None:
 
 def tier_id(claim: object, tier: str) -> str:
     """Return how a test's id ends, such as "G9-smoke": in characters that pytest never escapes."""
-    named = claim.id if isinstance(claim, Claim) else ""
+    named = claim.id if isinstance(claim, Claim | Smaller) else ""
     return "-".join(filter(None, (re.sub(r"[^A-Za-z0-9_.-]+", "_", named), tier)))
 
 
@@ -225,7 +262,8 @@ class ClaimTest:
             UserError: when it has no tier, since it cannot take parameters, or when the mark holds no claim.
         """
         callspec, claim = getattr(item, "callspec", None), claim_of(item)
-        if callspec is None or TIER not in callspec.params:
+        stated = not isinstance(claim, Claim) or claim.smoke != ""  # else nothing has looked for its smoke test
+        if callspec is None or TIER not in callspec.params or not stated:
             raise UserError(
                 f"{item.nodeid} is a claim that cannot run at a tier. Write it as a function, or as a method of a "
                 "class that is not a unittest.TestCase."

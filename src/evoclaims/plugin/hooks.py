@@ -9,7 +9,7 @@ import inspect
 import os
 import signal
 import unittest
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Sequence
 from typing import TYPE_CHECKING, Any
 
 import pytest
@@ -38,9 +38,15 @@ if TYPE_CHECKING:
     from evoclaims.verdicts.claim_report import ClaimReport
 
 
+_making: pytest.StashKey[bool] = pytest.StashKey()
+"""Whether pytest itself is to make the tests of a function."""
+
+
 @pytest.hookimpl(tryfirst=True)
-def pytest_pycollect_makeitem(collector: pytest.Module | pytest.Class, name: str, obj: object) -> None:
-    """Refuse a claim on a function, or in a class, that pytest does not collect under the run's settings."""
+def pytest_pycollect_makeitem(
+    collector: pytest.Module | pytest.Class, name: str, obj: object
+) -> Sequence[pytest.Item] | None:
+    """Put smoke tests in their claims' places; refuse a claim that pytest does not collect under the run's settings."""
     if inspect.isclass(obj):
         if any(map(_is_claim, vars(obj).values())) and _is_left_out(collector, name, obj):
             begun = " or ".join(collector.config.getini("python_classes"))
@@ -48,19 +54,35 @@ def pytest_pycollect_makeitem(collector: pytest.Module | pytest.Class, name: str
                 f"{collector.nodeid}: the class {name} has a function with @claim(...), and pytest takes none of this "
                 f"name for one of tests, so that its claim would never be judged: begin its name with {begun}."
             )
-        return
-    if not inspect.isfunction(obj) or collector.funcnamefilter(name):
-        return
-    if _is_claim(obj):
+        return None
+    if not _is_claim(obj):
+        return None
+    if not collector.funcnamefilter(name):
         begun = " or ".join(collector.config.getini("python_functions"))
         raise collector.CollectError(
             f"{collector.nodeid}: the function {name} has @claim(...), and pytest takes none of this name for a test, "
             f"so that its claim would never be judged: begin its name with {begun}."
         )
+    if collector.stash.get(_making, False):
+        return None
+    from evoclaims.claims.smoke_tests import tests_of
+
+    def make(name: str, obj: object) -> Sequence[pytest.Item]:
+        made = collector.ihook.pytest_pycollect_makeitem(collector=collector, name=name, obj=obj)
+        return made if isinstance(made, list) else [*filter(None, [made])]
+
+    collector.stash[_making] = True
+    try:
+        return tests_of(name, collector.obj, make)
+    except UserError as error:
+        raise collector.CollectError(f"{collector.nodeid}: {error}") from error
+    finally:
+        collector.stash[_making] = False
 
 
 def _is_claim(obj: object) -> bool:
     """Whether something in a module or a class is a function with @claim(...)."""
+    obj = obj.__func__ if isinstance(obj, staticmethod | classmethod) else obj
     return inspect.isfunction(obj) and any(mark.name == "claim" for mark in getattr(obj, "pytestmark", ()))
 
 
@@ -132,7 +154,7 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> Generator[None, object, 
     """Run each claim once per tier; a test ends with both, after all other parameters: test_x[n_parity-G1-smoke]."""
     if metafunc.definition.get_closest_marker("claim") is None:
         return (yield)
-    from evoclaims.claims.claim import TIER, claim_of, tier_id
+    from evoclaims.claims.claim import TIER, Smaller, claim_of, tier_id
     from evoclaims.claims.claim_names import note_repetitions
 
     repeats = note_repetitions(metafunc)
@@ -142,9 +164,10 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> Generator[None, object, 
             f"{metafunc.definition.nodeid} is a claim but takes neither the fixture `trials` nor `verdict`."
         )
     claim, repeated = claim_of(metafunc.definition), [pytest.mark.claim_repeated(*repeats)] if repeats else []
+    tiers = ("smoke",) if isinstance(claim, Smaller) else TIERS
     metafunc.parametrize(
         TIER,
-        [pytest.param(tier, marks=[getattr(pytest.mark, tier), *repeated], id=tier_id(claim, tier)) for tier in TIERS],
+        [pytest.param(tier, marks=[getattr(pytest.mark, tier), *repeated], id=tier_id(claim, tier)) for tier in tiers],
     )
     return made
 
@@ -220,13 +243,13 @@ def pytest_unconfigure(config: pytest.Config) -> None:
 
 
 @pytest.fixture
-def claim_tier() -> str:
+def _claim_tier() -> str:
     """The tier that a claim is judged at; parametrized for every claim."""
     raise UserError("The fixtures `trials` and `verdict` are for tests marked with @claim(...).")
 
 
 @pytest.fixture
-def trials(request: pytest.FixtureRequest, claim_tier: str) -> Callable[..., TrialGroup]:
+def trials(request: pytest.FixtureRequest, _claim_tier: str) -> Callable[..., TrialGroup]:
     """Return `trials(method, on=task)`: a condition's trials, run when a verdict needs them."""
     session = make_session(request.config)
 
@@ -236,13 +259,13 @@ def trials(request: pytest.FixtureRequest, claim_tier: str) -> Callable[..., Tri
             raise UserError(
                 f"trials({', '.join(map(repr, (method, *rest)))}) names no task. Write trials({method!r}, on={task})."
             )
-        return session.group(method, on, claim_tier)
+        return session.group(method, on, _claim_tier)
 
     return group
 
 
 @pytest.fixture
-def verdict(request: pytest.FixtureRequest, claim_tier: str) -> VerdictFixture:
+def verdict(request: pytest.FixtureRequest, _claim_tier: str) -> VerdictFixture:
     """Return `verdict(assertion)`, which judges the claim."""
     from evoclaims.claims.claim import ClaimTest
     from evoclaims.claims.recording import VerdictFixture
