@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import inspect
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, Final, TypeVar
 
@@ -107,7 +108,8 @@ def claim(
         since: when that reading was written, such as "2026-11-26" or "2026-11-26 14:30" (UTC).
 
     Raises:
-        UserError: when a text is missing, `since` is not a date, or `because` would have to explain two things.
+        UserError: when a text is missing, `since` is not a date, `because` would have to explain two things, or the
+            test replaces that of another claim.
     """
     for word, text in {"id": claim_id, "says": says, "where": where, "smoke": smoke}.items():
         if not (isinstance(text, str) or (text is None and word == "smoke")):
@@ -130,11 +132,25 @@ def claim(
         marks.append(expected(expect, because=because))
 
     def attach(function: F) -> F:
+        if (here := inspect.currentframe()) is not None and here.f_back is not None:
+            _check_name(claim_id, function, here.f_back.f_locals)
         for mark in marks:
             function = mark(function)
         return function
 
     return attach
+
+
+def _check_name(claim_id: str, function: Callable[..., Any], there: Mapping[str, object]) -> None:
+    """Refuse a test whose name another claim's has in the same file or class: only the later one would be judged."""
+    earlier = there.get(getattr(function, "__name__", ""))
+    lines = [getattr(getattr(one, "__code__", None), "co_firstlineno", None) for one in (earlier, function)]
+    replaced = [mark.args[0].id for mark in getattr(earlier, "pytestmark", ()) if mark.name == "claim"]
+    if replaced and lines[0] != lines[1]:
+        raise UserError(
+            f"The tests of the claims {replaced[0]} and {claim_id} have one name, {function.__name__}, so that the "
+            "second replaces the first, which would never be judged. Rename one of them."
+        )
 
 
 def expected(outcome: Outcome | str, *, because: str, tier: str | None = None) -> pytest.MarkDecorator:

@@ -7,10 +7,13 @@ from __future__ import annotations
 
 import inspect
 import os
+import re
 import signal
 import unittest
 from collections.abc import Callable, Generator
-from typing import TYPE_CHECKING, Any
+from fnmatch import fnmatch
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
 
 import pytest
 
@@ -36,6 +39,29 @@ if TYPE_CHECKING:
     from evoclaims.claims.recording import VerdictFixture
     from evoclaims.paper.trial_group import TrialGroup
     from evoclaims.verdicts.claim_report import ClaimReport
+
+
+CLAIM: Final = re.compile(rb"^@(evoclaims\.)?claim\(", re.MULTILINE)
+"""How a claim's test begins in a file."""
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> None:
+    """Refuse a file in a folder of tests that has claims and whose name pytest takes for none of tests."""
+    if file_path.suffix != ".py" or file_path.name == "conftest.py" or parent.session.isinitpath(file_path):
+        return
+    patterns: list[str] = parent.config.getini("python_files")
+    if any(fnmatch(file_path.name if os.sep not in one else str(file_path), one) for one in patterns):
+        return
+    try:
+        text = file_path.read_bytes() if file_path.is_file() else b""
+    except OSError:  # which pytest does not read either
+        return
+    if CLAIM.search(text):
+        raise parent.CollectError(
+            f"{file_path} has a test with @claim(...), and pytest takes no file of this name for one of tests, so that "
+            f"its claim would never be judged: let its name be one of {' or '.join(patterns)}."
+        )
 
 
 @pytest.hookimpl(tryfirst=True)
