@@ -30,7 +30,7 @@ from evoclaims.plugin.outcomes import pytest_runtest_call as pytest_runtest_call
 from evoclaims.plugin.outcomes import pytest_runtest_makereport as pytest_runtest_makereport
 from evoclaims.plugin.outcomes import pytest_runtest_setup as pytest_runtest_setup
 from evoclaims.plugin.progress import QUIET, ProgressLine, progress_of
-from evoclaims.plugin.summary import KNOWN, TROUBLE, Summary
+from evoclaims.plugin.summary import COLLECTED, KNOWN, TROUBLE, Summary
 from evoclaims.trials.gpus import environment_of_worker, gpus
 from evoclaims.trials.stopping import end_without, interrupted_by
 
@@ -187,6 +187,8 @@ def pytest_collection_modifyitems(session: pytest.Session, config: pytest.Config
 
             tests = claim_tests(items)
         config.stash[KNOWN] = {test.claim.id for test in tests.values()}
+        if _collects_all(session):
+            config.stash[COLLECTED] = {test.key for test in tests.values()}
         wanted = options.wanted_claims(config, tests.values(), incomplete=session.testsfailed > 0)
     except UserError as error:
         _refuse(config, items, error)
@@ -200,6 +202,20 @@ def pytest_collection_modifyitems(session: pytest.Session, config: pytest.Config
     if dropped:
         config.hook.pytest_deselected(items=dropped)
         items[:] = [item for item in items if item not in set(dropped)]
+
+
+def _collects_all(session: pytest.Session) -> bool:
+    """Whether a run has collected all files in the project's folder of claims."""
+    from evoclaims.paper.config import load_config
+
+    config = session.config
+    if session.testsfailed or any(config.getoption(name, None) for name in ("ignore", "ignore_glob", "lf")):
+        return False
+    try:
+        claims = (config.rootpath / load_config(config.rootpath).claims).resolve()
+    except UserError:
+        return False
+    return any(claims.is_relative_to((config.invocation_params.dir / place).resolve()) for place in config.args)
 
 
 def _refuse(config: pytest.Config, items: list[pytest.Item], error: UserError) -> None:
