@@ -41,7 +41,7 @@ def test_an_edited_method_of_the_same_revision_is_told_wherever_its_trials_count
 ) -> None:
     monkeypatch.setattr(sys, "dont_write_bytecode", True)  # two edits in one second would share it
     project.write(a="undecided")
-    told = "the code of tiny_paper.Coin was edited after trials had run, and they still count"
+    told = "the code of tiny_paper.Coin was edited or renamed after trials had run, and they still count"
     paper = Path("tiny_paper.py")
 
     def after(old: str = "", new: str = "") -> list[bool]:

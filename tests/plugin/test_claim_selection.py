@@ -190,6 +190,24 @@ def test_a_claim_that_pytest_takes_for_no_test_is_a_sentence(
     assert "a" in {report["claim"] for report in project.json()["claims"]}
 
 
+@pytest.mark.parametrize("before", ["", "    "])
+def test_a_claim_that_another_of_its_name_replaces_is_a_sentence(project: Any, sentence: Sentence, before: str) -> None:
+    two = [f"{before}@says('{name}')\n{before}def test_it(trials, verdict):\n{before}    pass\n" for name in "ab"]
+    project.write("class TestThem:\n" * bool(before) + "\n".join(two))
+    result = project.run()
+    assert result.ret == pytest.ExitCode.INTERRUPTED
+    sentence(result, "The tests of the claims a and b have one name, test_it, so that the second replaces the first")
+
+
+def test_claims_in_a_file_that_pytest_takes_for_none_of_tests_are_a_sentence(project: Any, sentence: Sentence) -> None:
+    project.write("def test_other():\n    pass\n")
+    (project.path / "claims" / "more.py").write_text("from evoclaims import claim\n\n@claim('a', ...)\n")
+    (project.path / "claims" / "helpers.py").write_text('"""No claim, which is made by @claim(...)."""\n')
+    result = project.run()
+    assert result.ret == pytest.ExitCode.INTERRUPTED
+    sentence(result, "more.py has a test with @claim(...), and pytest takes no file of this name for one of tests")
+
+
 def test_a_claim_without_a_text_is_a_sentence_at_collection(project: Any) -> None:
     project.write("@claim('a', says='x', where='', smoke='y')\ndef test_a(trials, verdict):\n    pass\n")
     result = project.run()

@@ -88,6 +88,26 @@ def test_one_row_is_no_independent_trial_of_two_conditions(ours: Project, settin
     assert "read the same trials, which a rank test cannot compare" in reason
 
 
+@pytest.mark.parametrize(
+    ("curve", "outcome"), [((1 / 3, 2 / 3, 1 / 7), "inconclusive"), ((0.25, 0.5, 2 / 3), "supported")]
+)
+def test_one_curve_under_ten_seeds_counts_once_unless_it_may_be_chance(
+    ours: Project, curve: tuple[float, ...], outcome: str
+) -> None:
+    rows = [
+        f"{algo},{seed},{step},{value if algo == 'good' else seed / 1000}\n"
+        for algo in ("good", "bad")
+        for seed in range(10)
+        for step, value in enumerate(curve)
+    ]
+    (ours.path / "runs.csv").write_text("algo,seed,at,success\n" + "".join(rows))
+    paper = (ours.path / "our_paper.py").read_text()
+    (ours.path / "our_paper.py").write_text(paper.replace('by="Ada"', 'by="Ada", step="at"'))
+    found, reason = _judged(ours)
+    assert found == outcome
+    assert reason.startswith("all 10 trials of theirs on parity are copies of one") == (outcome == "inconclusive")
+
+
 def test_a_new_history_names_the_edited_table(ours: Project) -> None:
     """Beside trials that the harness has run, whose specifications have other parts."""
     ours.write(a=BETTER, b="supported")

@@ -167,6 +167,19 @@ def test_claims_that_a_run_leaves_out_are_not_gone(accepted: Any) -> None:
     result.stdout.fnmatch_lines(["against the accepted verdicts: 1 the same"])
 
 
+def test_an_accepted_claim_that_is_gone_is_listed_by_a_run_of_all_claims(accepted: Any) -> None:
+    accepted.write(a="supported")
+    gone = "b (smoke): gone; it was inconclusive"
+    result = accepted.run()
+    assert result.ret == 0
+    result.stdout.fnmatch_lines(["against the accepted verdicts: 1 the same, 1 gone", gone])
+    assert gone in accepted.run("-k", "test_a").outlines
+    for others in ("claims/test_claims.py", "claims/test_claims.py::test_a"):  # which other files may have
+        shown = accepted.run(others).outlines
+        assert "against the accepted verdicts: 1 the same" in shown
+        assert gone not in shown
+
+
 def test_a_claim_that_is_judged_otherwise_begins_a_new_history(accepted: Any) -> None:
     accepted.write(a=ALMOST, b="undecided")
     _edit(outcome=Outcome.REFUTED)

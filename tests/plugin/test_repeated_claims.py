@@ -164,7 +164,7 @@ def test_claim_repeated_on_workers_is_counted_once(project: Any) -> None:
 
 
 def test_functions_with_the_same_claim_are_no_repetition(project: Any) -> None:
-    project.write(CLAIMS + CLAIMS.replace("test_a", "test_d"))
+    project.write(CLAIMS + CLAIMS.replace("def test_", "def test_other_"))
     (project.path / "conftest.py").write_text(PARAMETERS.replace("HOW", "trylast=True").replace("INDIRECT", "True"))
     result = project.run()
     assert result.ret == pytest.ExitCode.USAGE_ERROR

@@ -128,8 +128,8 @@ def test_a_method_edited_after_its_trials_is_said(filled: Laboratory) -> None:
     edited = replace(report, sources=(replace(one, edited=("my_paper.Own",)), *others))
     assert filled.section(report).warnings == ()
     assert filled.section(edited).warnings == (
-        "The code of my_paper.Own was edited after trials had run, and they still count: if it computes something else "
-        "now, raise its `revision`, and they run again.",
+        "The code of my_paper.Own was edited or renamed after trials had run, and they still count: if it computes "
+        "something else now, raise its `revision`, and they run again.",
     )
 
 

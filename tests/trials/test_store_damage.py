@@ -14,6 +14,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from evoclaims.trials.integrity import verify
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.result_codec import RecordError, dump, parse
 from evoclaims.trials.store import DamagedFileError, Store
@@ -125,7 +126,21 @@ def test_a_key_named_twice_is_refused(store: Store, trial: TrialResult) -> None:
     assert "not one whole JSON text" in complaint(store, trial.id)
 
 
-@pytest.mark.parametrize("schema", [0, 2, "1", True, None])
+@pytest.mark.parametrize("schema", [2, 10**6])
+def test_a_record_of_a_later_release_is_left_where_it_is(
+    store: Store, trial: TrialResult, edit_record: Edit, schema: int
+) -> None:
+    edit_record(store.record_path(trial.id), schema=schema)
+    with pytest.raises(DamagedFileError, match=rf"its schema is {schema} and .*; use that later version, or another"):
+        store.get(trial.id)
+    (problem,) = verify(store, repair=True)
+    assert (problem.path, problem.moved_to) == (store.record_path(trial.id), None)
+    assert problem.path.exists()
+    assert store.champion_path(trial.id).exists()
+    assert str(problem).endswith("(left there)")
+
+
+@pytest.mark.parametrize("schema", [0, "1", True, None])
 def test_another_schema_is_named(store: Store, trial: TrialResult, edit_record: Edit, schema: Any) -> None:
     edit_record(store.record_path(trial.id), schema=schema)
     assert f"its schema is {schema!r}" in complaint(store, trial.id)

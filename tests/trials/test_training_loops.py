@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import itertools
 import math
 import os
 import signal
@@ -13,6 +14,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 import toy_loops
 from toy_loops import Nowhere
@@ -147,6 +149,16 @@ def test_a_report_is_checked_however_soon_it_comes_after_another() -> None:
     report(0, success=0.5)
     with pytest.raises(UserError, match="A training loop reports a success of 7"):
         report(1, success=7)
+
+
+def test_steps_that_fall_are_refused() -> None:
+    """A counter that begins again in each epoch would hide what training has spent."""
+    report = Reporter(100, lambda answer: None)
+    for step in (0, 5, 5, 250):
+        report(step)
+    with pytest.raises(UserError, match="reports step 3 after step 250. Report the steps since training began"):
+        report(3)
+    assert report.last == 250
 
 
 def test_threads_of_a_loop_report_without_mixing_their_lines(store: Store, cpus: list[Any]) -> None:
@@ -312,6 +324,16 @@ def test_policies_are_told_from_each_other_by_their_actions_on_fixed_starts() ->
         assert len({hashed for hashed, _ in found}) == 3
         assert not any(graded for _, graded in found)
     assert actions_of(NParity(3), lambda bits: [0.25])[1]
+
+
+@pytest.mark.parametrize("task", [GymnasiumTask("CartPole-v1"), NParity(3)], ids=["foreign", "built in"])
+def test_a_policy_that_draws_or_remembers_is_refused(task: Any) -> None:
+    """One that acts a bit differently, as sums on other threads do, is not."""
+    random, calls = np.random.default_rng(0), itertools.count()
+    for policy in (lambda seen: int(random.integers(2)), lambda seen: next(calls) % 3 % 2):
+        with pytest.raises(UserError, match="on the same observation. It must be a function of the observation alone"):
+            actions_of(task, policy)
+    assert actions_of(NParity(3), lambda seen: [0.5 + 1e-6 * random.random()])[1]
 
 
 def test_what_training_gave_is_recorded_apart_from_the_examination(store: Store, cpus: list[Any]) -> None:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import inspect
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, Final, TypeVar
 
@@ -121,7 +122,8 @@ class _ClaimMark:
             since: when that reading was written, such as "2026-11-26" or "2026-11-26 14:30" (UTC).
 
         Raises:
-            UserError: when a text is missing, `since` is not a date, or `because` would have to explain two things.
+            UserError: when a text is missing, `since` is not a date, `because` would have to explain two things, or the
+                test replaces that of another claim.
         """
         stated = {} if smoke in (None, "") else {"smoke": smoke}
         _check_texts("The claim", claim_id, says=says, where=where, **stated)
@@ -138,12 +140,7 @@ class _ClaimMark:
         if expect is not None:
             marks.append(expected(expect, because=because))
 
-        def attach(function: F) -> F:
-            for mark in marks:
-                function = mark(function)
-            return function
-
-        return attach
+        return _attached(claim_id, marks)
 
     def smoke(self, claim_id: str, /, *, says: str) -> Callable[[F], F]:
         """Mark a test as the check of a claim's scaled-down statement; it runs at the smoke tier alone.
@@ -156,10 +153,10 @@ class _ClaimMark:
             says: the scaled-down statement.
 
         Raises:
-            UserError: when a text is missing.
+            UserError: when a text is missing, or the test replaces that of another claim.
         """
         _check_texts("The smoke test of", claim_id, says=says)
-        return pytest.mark.claim(Smaller(claim_id, says))
+        return _attached(claim_id, [pytest.mark.claim(Smaller(claim_id, says))])
 
 
 claim: Final = _ClaimMark()
@@ -172,6 +169,31 @@ def _check_texts(what: str, claim_id: object, **texts: object) -> None:
             raise UserError(f"{what} {claim_id!r} has {text!r} as its {word}, which is not text. Write it in quotes.")
         if not text.strip():
             raise UserError(f"{what} {claim_id or '(without id)'} lacks its {word}.")
+
+
+def _attached(claim_id: str, marks: list[pytest.MarkDecorator]) -> Callable[[F], F]:
+    """Return the decorator that puts marks on a claim's test."""
+
+    def attach(function: F) -> F:
+        if (here := inspect.currentframe()) is not None and here.f_back is not None:
+            _check_name(claim_id, function, here.f_back.f_locals)
+        for mark in marks:
+            function = mark(function)
+        return function
+
+    return attach
+
+
+def _check_name(claim_id: str, function: Callable[..., Any], there: Mapping[str, object]) -> None:
+    """Refuse a test whose name another claim's has in the same file or class: only the later one would be judged."""
+    earlier = there.get(getattr(function, "__name__", ""))
+    lines = [getattr(getattr(one, "__code__", None), "co_firstlineno", None) for one in (earlier, function)]
+    replaced = [mark.args[0].id for mark in getattr(earlier, "pytestmark", ()) if mark.name == "claim"]
+    if replaced and lines[0] != lines[1]:
+        raise UserError(
+            f"The tests of the claims {replaced[0]} and {claim_id} have one name, {function.__name__}, so that the "
+            "second replaces the first, which would never be judged. Rename one of them."
+        )
 
 
 def expected(outcome: Outcome | str, *, because: str, tier: str | None = None) -> pytest.MarkDecorator:

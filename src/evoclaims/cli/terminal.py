@@ -104,5 +104,5 @@ def write(path: Path, data: bytes, name: str = "file", *, ours: bool = False) ->
     if os.path.isdir(path):  # unlike `Path.is_dir`, also of what may not be looked at
         raise UserError(f"{path} is a folder; name a file in it with --out.")
     if ours and not os.path.lexists(path.parts[0]):
-        write_once(Path(path.parts[0], ".gitignore"), b"*\n", f"Name another {name} with --out.")
-    write_where_named(path, data, f"Name another {name} with --out.")
+        write_once(Path(path.parts[0], ".gitignore"), b"*\n", f"name another {name} with --out.")
+    write_where_named(path, data, f"name another {name} with --out.")

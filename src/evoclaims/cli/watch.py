@@ -126,7 +126,8 @@ def _after_older_code(project: Project, watch: Watch, first: int, n: int) -> int
     if not older:
         return first
     after, names = max(older) + 1, sorted({name for edited in older.values() for name in edited})
-    print(f"Trials up to seed {after - 1} ran before {', '.join(names)} was edited: they do not count for this night.")
+    listed = ", ".join(names)
+    print(f"Trials up to seed {after - 1} ran before {listed} was edited or renamed: they do not count for this night.")
     return _after_older_code(project, watch, after, n)
 
 

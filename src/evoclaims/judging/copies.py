@@ -7,10 +7,17 @@ import math
 from collections import Counter
 from collections.abc import Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Final
 
 from evoclaims.judging.assertion import Assertion
 from evoclaims.judging.sample import Declared, Trials
 from evoclaims.trials.result import COMPLETE, RETURNED, TRAINED_BY, TrialResult
+
+SHORT: Final = 10_000
+"""Numbers that are whole when multiplied by this may be equal by chance, as shares of few episodes are."""
+
+MOST_BY_CHANCE: Final = 3
+"""So many other numbers, all different, that two imported trials share all are no chance."""
 
 
 @dataclass(frozen=True)
@@ -73,10 +80,15 @@ def _training(trial: TrialResult) -> Hashable | None:
     engine's trial, champion and training curves count: what may be equal by chance (a success, a network of few bits)
     is not enough. Of a training loop, which keeps no champion, reported curves, the actions of its policy on fixed
     starts, and what it returned; the last may differ between copies (wall times do), so it counts only where curves
-    and actions are whole numbers, which two trainings may share.
+    and actions are whole numbers, which two trainings may share. Of an imported trial, all that its table has counts
+    where some of it is hardly shared by chance.
     """
     if trial.champion:
         return trial.champion, trial.curves_hash
+    if "imported" in trial.spec:
+        read = [*trial.metrics.values(), *itertools.chain.from_iterable(trial.curves.values())]
+        long = {number for number in read if math.isfinite(number) and not (number * SHORT).is_integer()}
+        return (repr(sorted(trial.metrics.items())), trial.curves_hash) if len(long) >= MOST_BY_CHANCE else None
     if TRAINED_BY not in trial.provenance or trial.status not in COMPLETE or not trial.digest:  # a pilot has no digest
         return None
     returned = trial.provenance.get(RETURNED)

@@ -247,7 +247,7 @@ def _all_copies(label: str, n: int) -> str:
         f"all {n} trials of {label} are copies of one: training gave the same, whatever the seed. Tests take trials "
         "for independent: does the method draw from its key or seed? One without chance, such as a control, declares "
         "deterministic = True; in_every_trial() asserts facts. A training loop whose trainings do differ reports or "
-        "returns numbers that show it"
+        "returns numbers that show it. A table has each run once"
     )
 
 

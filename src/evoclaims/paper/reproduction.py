@@ -150,7 +150,7 @@ class Reproduction:
     Tables of imported trials are looked for in `folder`.
 
     Raises:
-        UserError: when `trials` is neither, or the folder no path.
+        UserError: when `trials` is neither, the folder no path, or conditions of different classes have one id.
     """
 
     name: str
@@ -194,6 +194,8 @@ class Reproduction:
             for name, one in self.variants.items()
         }
         object.__setattr__(self, "variants", variants)
+        of_tiers = [tier.conditions for tier in tiers.values()]
+        _check_classes([*of_tiers, *(these for one in variants.values() for these in one.conditions.values())])
 
     def _found(self, conditions: Conditions) -> dict[Names, Condition]:
         """Return conditions whose tables are looked for in the reproduction's folder."""
@@ -242,3 +244,24 @@ class Reproduction:
     def references_of(self, variant: str) -> Path:
         """The folder of the reference trials that only a variant has; without a name, of the protocol's."""
         return self.references / "variants" / variant if variant else self.references
+
+
+def _check_classes(several: Iterable[Conditions]) -> None:
+    """Refuse conditions that have one id although their classes differ: one would be judged by the other's trials.
+
+    Raises:
+        UserError: naming both.
+    """
+    known: dict[str, tuple[Names, Collection[str]]] = {}
+    for names, one in ((names, one) for conditions in several for names, one in conditions.items()):
+        if isinstance(one, Imported):
+            continue
+        try:
+            first, code = known.setdefault(one.id, (names, one.code.keys()))
+        except UserError:  # it has no id: an error of the claims that ask for it
+            continue
+        if different := sorted({*code} ^ one.code.keys()):
+            raise UserError(
+                f"{' on '.join(first)} and {' on '.join(names)} would share their trials, since their classes have one "
+                f"name and revision, and equal fields: {', '.join(different)}. Write another `name` in one of them."
+            )

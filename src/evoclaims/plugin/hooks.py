@@ -7,10 +7,13 @@ from __future__ import annotations
 
 import inspect
 import os
+import re
 import signal
 import unittest
 from collections.abc import Callable, Generator, Sequence
-from typing import TYPE_CHECKING, Any
+from fnmatch import fnmatch
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
 
 import pytest
 
@@ -27,7 +30,7 @@ from evoclaims.plugin.outcomes import pytest_runtest_call as pytest_runtest_call
 from evoclaims.plugin.outcomes import pytest_runtest_makereport as pytest_runtest_makereport
 from evoclaims.plugin.outcomes import pytest_runtest_setup as pytest_runtest_setup
 from evoclaims.plugin.progress import QUIET, ProgressLine, progress_of
-from evoclaims.plugin.summary import KNOWN, TROUBLE, Summary
+from evoclaims.plugin.summary import COLLECTED, KNOWN, TROUBLE, Summary
 from evoclaims.trials.gpus import environment_of_worker, gpus
 from evoclaims.trials.stopping import end_without, interrupted_by
 
@@ -40,6 +43,29 @@ if TYPE_CHECKING:
 
 _making: pytest.StashKey[bool] = pytest.StashKey()
 """Whether pytest itself is to make the tests of a function."""
+CLAIM: Final = re.compile(rb"^@(evoclaims\.)?claim(\.smoke)?\(", re.MULTILINE)
+"""How a claim's test begins in a file."""
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> None:
+    """Refuse a file in a folder of tests that has claims and whose name pytest takes for none of tests."""
+    if file_path.suffix != ".py" or file_path.name == "conftest.py" or parent.session.isinitpath(file_path):
+        return
+    patterns: list[str] = parent.config.getini("python_files")
+    if any(fnmatch(file_path.name if os.sep not in one else str(file_path), one) for one in patterns):
+        return
+    from evoclaims.core.files import read_file
+
+    try:
+        text = read_file(file_path)
+    except OSError:  # a folder, say
+        return
+    if b"evoclaims" in text and CLAIM.search(text):
+        raise parent.CollectError(
+            f"{file_path} has a test with @claim(...), and pytest takes no file of this name for one of tests, so that "
+            f"its claim would never be judged: let its name be one of {' or '.join(patterns)}."
+        )
 
 
 @pytest.hookimpl(tryfirst=True)
@@ -182,6 +208,8 @@ def pytest_collection_modifyitems(session: pytest.Session, config: pytest.Config
 
             tests = claim_tests(items)
         config.stash[KNOWN] = {test.claim.id for test in tests.values()}
+        if _collects_all(session):
+            config.stash[COLLECTED] = {test.key for test in tests.values()}
         wanted = options.wanted_claims(config, tests.values(), incomplete=session.testsfailed > 0)
     except UserError as error:
         _refuse(config, items, error)
@@ -195,6 +223,20 @@ def pytest_collection_modifyitems(session: pytest.Session, config: pytest.Config
     if dropped:
         config.hook.pytest_deselected(items=dropped)
         items[:] = [item for item in items if item not in set(dropped)]
+
+
+def _collects_all(session: pytest.Session) -> bool:
+    """Whether a run has collected all files in the project's folder of claims."""
+    from evoclaims.paper.config import load_config
+
+    config = session.config
+    if session.testsfailed or any(config.getoption(name, None) for name in ("ignore", "ignore_glob", "lf")):
+        return False
+    try:
+        claims = (config.rootpath / load_config(config.rootpath).claims).resolve()
+    except UserError:
+        return False
+    return any(claims.is_relative_to((config.invocation_params.dir / place).resolve()) for place in config.args)
 
 
 def _refuse(config: pytest.Config, items: list[pytest.Item], error: UserError) -> None:

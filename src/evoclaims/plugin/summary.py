@@ -31,6 +31,9 @@ TROUBLE: Final = "claims_trouble"
 """Name under which an xdist worker sends its controller the reason why it runs nothing."""
 
 
+COLLECTED: Final[pytest.StashKey[set[tuple[str, str]]]] = pytest.StashKey()
+"""Tier and name of all claims of the project; only in a run that has collected all of them."""
+
 KNOWN: Final[pytest.StashKey[set[str]]] = pytest.StashKey()
 """Where a run keeps the ids of the claims that it has collected, selected or not."""
 
@@ -135,7 +138,8 @@ class Summary:
             from evoclaims.verdicts.regression import regression
 
             folder = make_session(self._config).reproduction.folder
-            self._regression = regression(folder, self.reports, self._config.getoption("claims_compare_fail"))
+            changes, collected = self._config.getoption("claims_compare_fail"), self._config.stash.get(COLLECTED, None)
+            self._regression = regression(folder, self.reports, changes, collected)
 
     def _status(self) -> pytest.ExitCode:
         unjudged = self.reports and not self._judged

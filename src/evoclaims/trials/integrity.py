@@ -34,16 +34,18 @@ class Problem:
         kind: "record", "champion" or "checkpoint" for a bad one; "leftover" for harmless remains of a kill.
         reason: a clause that says what is wrong.
         moved_to: where the repair moved the file, or None.
+        stays: whether a repair leaves it where it is, since a later release reads it.
     """
 
     path: Path
     kind: Kind
     reason: str
     moved_to: Path | None = None
+    stays: bool = False
 
     def __str__(self) -> str:
         """Return one line for the terminal."""
-        moved = f" (moved to {self.moved_to})" if self.moved_to else ""
+        moved = f" (moved to {self.moved_to})" if self.moved_to else " (left there)" * self.stays
         return printable(f"{self.kind} {self.path}: {self.reason}{moved}")
 
 
@@ -54,7 +56,7 @@ def verify(
 
     Args:
         store: the store; one that does not exist yet has no problems.
-        repair: move every listed file into `<root>/quarantine/`; nothing is ever deleted.
+        repair: move listed files, except those of a later release, into `<root>/quarantine/`; nothing is ever deleted.
         checkpoint_fault: says what is wrong with a checkpoint file, or None when it can be resumed.
 
     Returns:
@@ -71,7 +73,10 @@ def verify(
     problems = sorted(found.values(), key=lambda problem: (_ORDER[problem.kind], problem.path))
     if not repair:
         return problems
-    return [dataclasses.replace(problem, moved_to=_set_aside(store, problem.path)) for problem in problems]
+    return [
+        problem if problem.stays else dataclasses.replace(problem, moved_to=_set_aside(store, problem.path))
+        for problem in problems
+    ]
 
 
 _ORDER: Final[dict[Kind, int]] = {"record": 0, "champion": 1, "checkpoint": 2, "leftover": 3}
@@ -83,9 +88,9 @@ def _records(store: Store) -> Iterator[Problem]:
         try:
             result = store.read(path)
         except DamagedFileError as error:
-            yield Problem(path, "record", error.reason)
+            yield Problem(path, "record", error.reason, stays=error.later)
             trial_id = record_id(path)
-            if trial_id and path.parent == store.record_path(trial_id).parent:
+            if not error.later and trial_id and path.parent == store.record_path(trial_id).parent:
                 for champion in sorted({*store.champion_files(trial_id)} - _named(store, trial_id)):
                     yield Problem(champion, "champion", "its trial's record cannot be used")
             continue
@@ -103,7 +108,11 @@ def _records(store: Store) -> Iterator[Problem]:
 
 
 def _named(store: Store, trial_id: str) -> set[Path]:
-    records = store.results([], store.record_files(trial_id))
+    """Return the champions that a trial's records name; all of its own if a record is of a later release."""
+    errors: list[DamagedFileError] = []
+    records = list(store.results(errors, store.record_files(trial_id)))
+    if any(error.later for error in errors):
+        return {*store.champion_files(trial_id)}
     return {store.champion_file(result) for result in records if result.champion}
 
 

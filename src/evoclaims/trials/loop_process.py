@@ -7,6 +7,7 @@ on its standard output. When its standard input ends, its parent is gone, and it
 from __future__ import annotations
 
 import contextlib
+import copy
 import io
 import math
 import os
@@ -14,7 +15,7 @@ import signal
 import threading
 import time
 import traceback
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from numbers import Real
 from typing import Any, Final
 
@@ -61,7 +62,7 @@ class Reporter:
     """The function `report` of a trial.
 
     Attributes:
-        last: step of the last report, passed on or not; None before the first.
+        last: the largest step of a report, passed on or not; None before the first.
         finite: whether all reported numbers were.
     """
 
@@ -71,6 +72,7 @@ class Reporter:
         self._answer = answer
         self._next = 0
         self._told = -math.inf
+        self._of_thread = threading.local()
         self.last: int | None = None
         self.finite = True
 
@@ -78,11 +80,19 @@ class Reporter:
         """Tell how far training is, in the budget's unit, and numbers such as `fitness=12.5`.
 
         Raises:
-            UserError: when the step is not a count, a value is not a number, or the success is not a share.
+            UserError: when the step is not a count or falls, a value is not a number, or the success is not a share.
         """
-        self.last = step = int(step)
+        step = int(step)
         if not 0 <= step <= MOST_STEPS:
             raise UserError(f"A training function reports {step} steps. Report a number from 0 to {MOST_STEPS}.")
+        before = getattr(self._of_thread, "step", 0)
+        if step < before:  # a counter that begins again would hide what was spent
+            raise UserError(
+                f"A training function reports step {step} after step {before}. Report the steps since training began, "
+                "which never fall."
+            )
+        self._of_thread.step = step
+        self.last = max(step, self.last or 0)
         given = numbers(values)
         self.finite = self.finite and all(map(math.isfinite, given.values()))
         check_success("A training loop", given.get("success", 0.0), solves=False, advice="report such a share")
@@ -145,13 +155,19 @@ def actions_of(task: Any, policy: Callable[[Any], Any]) -> tuple[str, bool]:
     """Return the hash of a policy's actions on fixed starts, and whether some number in them is not whole.
 
     Policies with other parameters nearly always differ here, and copies of one never do, whatever their seeds.
+
+    Raises:
+        UserError: when a policy acts otherwise on the same observations again: its score would be one of many.
     """
     seen: list[Any] = []
+    observations: list[Any] = []
 
     def watched(observation: Any) -> Any:
         if len(seen) == WATCHED:
             raise _EnoughError
+        held = copy.deepcopy(observation)  # which an environment may overwrite
         action = policy(observation)
+        observations.append(held)
         seen.append(_plain_action(action))
         return action
 
@@ -167,8 +183,24 @@ def actions_of(task: Any, policy: Callable[[Any], Any]) -> tuple[str, bool]:
         pass
     except Exception as error:  # a policy may be a table without these observations
         seen.append(type(error).__name__)
+    _check_again(policy, zip(observations, seen, strict=False))
     graded = any(isinstance(x, float) and math.isfinite(x) and x % 1 != 0 for one in seen for x in one)
     return content_hash(as_plain(seen)), graded
+
+
+def _check_again(policy: Callable[[Any], Any], seen: Iterable[tuple[Any, Any]]) -> None:
+    """Check that a policy acts on observations as it did before, but for rounding."""
+    import numpy as np
+
+    for observation, before in seen:
+        again = _plain_action(policy(observation))
+        words = isinstance(before, str) or isinstance(again, str) or len(again) != len(before)
+        if again != before if words else not np.allclose(again, before, rtol=1e-3, atol=1e-5, equal_nan=True):
+            raise UserError(
+                f"A policy's action is {before} first and {again} later, on the same observation. It must be a "
+                "function of the observation alone, without randomness and memory: take the likeliest action or the "
+                "mean."
+            )
 
 
 class _EnoughError(Exception):

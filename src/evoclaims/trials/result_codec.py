@@ -127,11 +127,12 @@ class Provenance(Struct):
 
 
 class RecordError(UserError):
-    """A text is not a valid trial record; `reason` is a clause that says why."""
+    """A text is not a valid trial record; `reason` is a clause that says why, `later` if it is of a later schema."""
 
-    def __init__(self, reason: str) -> None:
+    def __init__(self, reason: str, *, later: bool = False) -> None:
         """Store `reason` for a caller that knows the file name."""
         self.reason = printable(reason)[:LONGEST_REASON]
+        self.later = later
         super().__init__(f"This is not a sound trial record: {self.reason}.")
 
 
@@ -228,8 +229,10 @@ def parse(data: bytes | str) -> TrialResult:
     """
     data = data.encode(errors="replace") if isinstance(data, str) else data
     plain = _load(data)
-    if plain.get("schema") != SCHEMA or isinstance(plain.get("schema"), bool):
-        _fail(f"its schema is {plain.get('schema')!r} and this version of evoclaims reads schema {SCHEMA}")
+    schema = plain.get("schema")
+    if schema != SCHEMA or isinstance(schema, bool):
+        reason = f"its schema is {schema!r} and this version of evoclaims reads schema {SCHEMA}"
+        raise RecordError(reason, later=isinstance(schema, int) and schema > SCHEMA)
     if plain.keys() != _FIELDS:
         _fail(f"these fields are missing or unknown: {', '.join(sorted(plain.keys() ^ _FIELDS))}")
     if not _is_sealed(data, plain):

@@ -188,9 +188,9 @@ class Condition:
         return code_of(self.method, self.task)
 
     def edited_since(self, trials: Iterable[TrialResult]) -> tuple[str, ...]:
-        """Return the classes whose code some of these trials of the condition ran otherwise than it is now."""
+        """Return the classes whose code some of these trials ran otherwise than it is now, or under another name."""
         recorded = [code for trial in trials if isinstance(code := trial.provenance.get(CODE), Mapping)]
-        return tuple(name for name, now in self.code.items() if any(code.get(name, now) != now for code in recorded))
+        return tuple(name for name, now in self.code.items() if any(code.get(name) != now for code in recorded))
 
     @property
     def programs(self) -> str:

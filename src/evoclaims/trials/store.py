@@ -35,16 +35,22 @@ Put = Literal["stored", "present", "differs"]
 
 
 class DamagedFileError(StorageError):
-    """A file of the store is torn, edited or foreign; `path` is the file and `reason` a clause that says why."""
+    """A file of the store is torn, edited or foreign; `path` is the file and `reason` a clause that says why.
 
-    def __init__(self, path: Path, reason: str) -> None:
+    One of a `later` release is whole, and only of no use here.
+    """
+
+    def __init__(self, path: Path, reason: str, *, later: bool = False) -> None:
         """Build the message, which names the file and what to do."""
-        super().__init__(
-            f"Cannot use {path}: {reason}; run `evoclaims verify{_storage_of(path)}`, which moves the file aside so "
-            "that the trial is run again."
+        todo = (
+            "use that later version, or another store"
+            if later
+            else f"run `evoclaims verify{_storage_of(path)}`, which moves the file aside so that the trial is run again"
         )
+        super().__init__(f"Cannot use {path}: {reason}; {todo}.")
         self.path = path
         self.reason = reason
+        self.later = later
 
 
 @dataclass(frozen=True)
@@ -140,7 +146,7 @@ class Store(StoreFiles):
         try:
             result = parse(data)
         except RecordError as error:
-            raise DamagedFileError(path, error.reason) from error
+            raise DamagedFileError(path, error.reason, later=error.later) from error
         if result.id != trial_id:
             raise DamagedFileError(path, f"it holds another trial, {result.id}")
         versions = _versions(result)

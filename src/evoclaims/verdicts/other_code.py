@@ -69,6 +69,6 @@ def edited(report: ClaimReport) -> list[str]:
 def summary(name: str) -> str:
     """Return a sentence about an edited method or task, without its trials."""
     return (
-        f"the code of {name} was edited after trials had run, and they still count: if it computes something else now, "
-        "raise its `revision`, and they run again"
+        f"the code of {name} was edited or renamed after trials had run, and they still count: if it computes "
+        "something else now, raise its `revision`, and they run again"
     )

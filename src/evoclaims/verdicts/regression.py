@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final
@@ -28,7 +28,7 @@ class Regression:
     """How the verdicts of a run's claims have changed.
 
     Attributes:
-        transitions: one for each claim of the run; empty if nothing has been accepted yet.
+        transitions: one for each claim of the run, and for each that is gone; empty if nothing has been accepted yet.
         matched: those that make the run fail.
         accepted: the last accepted verdict of each claim.
         chances: of each claim that lost its support to *inconclusive*, how often that happens by chance (see
@@ -53,7 +53,8 @@ class Regression:
         """
         if not self.transitions:
             return []
-        changes = [one for one in self.transitions if one.kind in (Kind.CHANGED, Kind.NEW_HISTORY)]
+        shown = (Kind.CHANGED, Kind.NEW_HISTORY, Kind.GONE)
+        changes = [one for one in self.transitions if one.kind in shown]
         return [
             f"against the accepted verdicts: {transitions.counts(self.transitions)}",
             *(
@@ -75,7 +76,12 @@ class Regression:
         return f"; by chance this happens in {chance:.1%} of draws from its pilots"
 
 
-def regression(folder: Path, reports: Sequence[ClaimReport], changes: str | None) -> Regression:
+def regression(
+    folder: Path,
+    reports: Sequence[ClaimReport],
+    changes: str | None,
+    collected: Collection[tuple[str, str]] | None = None,
+) -> Regression:
     """Compare the verdicts of a run with the accepted ones of the same claims.
 
     Args:
@@ -84,6 +90,8 @@ def regression(folder: Path, reports: Sequence[ClaimReport], changes: str | None
         changes: the changes of verdicts to fail on (see `transitions.parse_patterns`); None for none. Where there are
             some, support that is lost to *inconclusive* fails, too, unless it happens by chance in more than `SELDOM`
             of the draws from the claim's pilots.
+        collected: tier and name of all claims that there are at the run's tiers, if that is known: accepted verdicts
+            of others are about claims that are gone.
 
     Raises:
         UserError: when the accepted verdicts are damaged, or missing although the run should fail on their changes.
@@ -100,7 +108,9 @@ def regression(folder: Path, reports: Sequence[ClaimReport], changes: str | None
     if not accepted:
         return Regression((), (), {})
     now = transitions.standings(reports)
-    found = transitions.compare({key: accepted[key] for key in accepted.keys() & now.keys()}, now)
+    tiers = {tier for tier, _ in now}
+    gone = {key for key in accepted if collected is not None and key[0] in tiers and key not in collected}
+    found = transitions.compare({key: accepted[key] for key in accepted.keys() & (now.keys() | gone)}, now)
     last = {key: entries[-1] for key, entries in kept.items() if key in now}
     lost = {(one.tier, one.claim) for one in found if LOST.matches(one)}
     chances = {key_of(report): report.chance for report in reports if key_of(report) in lost}
