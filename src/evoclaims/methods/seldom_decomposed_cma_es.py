@@ -43,7 +43,10 @@ class SeldomDecomposedCmaEs(CmaEs):
         """Check the population size and the share."""
         super().__post_init__()
         if not 0.0 <= self.replaced < 1.0:
-            raise UserError(f"The share of the covariance matrix is at least 0 and below 1, not {self.replaced}.")
+            raise UserError(
+                f"SeldomDecomposedCmaEs has replaced={self.replaced}, a share of the covariance matrix. Write a "
+                "number from 0 to below 1."
+            )
 
     def _kept(self, distribution: Any) -> Any:
         """Return all of it: the next generations sample with these eigenvectors."""

@@ -73,7 +73,11 @@ class NullAgent:
     def __post_init__(self) -> None:
         """Check that it has trials of one kind."""
         if (self.numbers is None) == (not self.method):
-            raise UserError(f"The null agent {self.says!r} needs either numbers=... or method=..., and not both.")
+            raise UserError(
+                f"The null agent {self.says!r} has "
+                f"{'both numbers and a method' if self.method else 'neither numbers nor a method'}. Write either "
+                "numbers=... or method=...."
+            )
 
 
 class OtherTierError(UnknownNameError):
@@ -106,8 +110,8 @@ class Tier:
         """Reject a number of trials in the place of the design."""
         if not isinstance(self.design, Design):
             raise UserError(
-                f"A tier's design is a Design, not {self.design!r}. Write Tier(conditions, Design.fixed(10)) for "
-                "ten trials."
+                f"A tier has design={self.design!r}, which is not a Design. Write Tier(conditions, Design.fixed(10)) "
+                "for ten trials."
             )
 
     def condition(self, method: str, task: str) -> Condition:
