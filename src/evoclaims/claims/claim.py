@@ -65,7 +65,7 @@ class Claim:
 
 @dataclass(frozen=True)
 class Expectation:
-    """A verdict that has been looked into and accepted, so that it no longer fails a run.
+    """A verdict that was examined and accepted, so that it no longer fails a run.
 
     Attributes:
         outcome: the accepted outcome.
