@@ -107,7 +107,8 @@ def claim(
         since: when that reading was written, such as "2026-11-26" or "2026-11-26 14:30" (UTC).
 
     Raises:
-        UserError: when a text is missing, `since` is not a date, or `because` would have to explain two things.
+        UserError: when a text is missing, when `since` is not a date, or for `expect` together with `smoke=None`, since
+            `because` can explain only one of them.
     """
     for word, text in {"id": claim_id, "says": says, "where": where, "smoke": smoke}.items():
         if not (isinstance(text, str) or (text is None and word == "smoke")):
@@ -139,6 +140,11 @@ def claim(
 
 def expected(outcome: Outcome | str, *, because: str, tier: str | None = None) -> pytest.MarkDecorator:
     """Return a mark that accepts an outcome, for a whole claim or for one `pytest.param(..., marks=...)` of it.
+
+    Args:
+        outcome: the accepted one, such as `Outcome.REFUTED`.
+        because: what is known about why.
+        tier: the tier for which it is accepted; None for every tier.
 
     Raises:
         UserError: for an unknown outcome or tier, or without a reason.

@@ -54,7 +54,7 @@ class CmaEs:
 
     Attributes:
         population: individuals per generation (λ).
-        network: the encoding.
+        network: the policy's network, whose parameters are evolved.
     """
 
     name: ClassVar[str] = "cma_es"

@@ -70,7 +70,7 @@ class MapElites:
     counts as evaluated, but is dropped. Elites keep the fitness of the level they were evaluated on.
 
     Attributes:
-        network: the encoding: its weights and biases.
+        network: the policy's network, whose weights and biases are evolved.
         batch: individuals per iteration.
         cells: cells of the grid along x and along y.
         iso_sigma: standard deviation of the noise on every parameter.

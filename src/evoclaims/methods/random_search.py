@@ -25,7 +25,7 @@ class RandomSearch:
     Attributes:
         population: individuals drawn per step.
         std: standard deviation of every parameter; 1 is what CMA-ES starts from.
-        network: the encoding.
+        network: the policy's network, whose parameters are drawn.
     """
 
     name: ClassVar[str] = "random_search"

@@ -28,7 +28,7 @@ class SeldomDecomposedCmaEs(CmaEs):
 
     Attributes:
         population: individuals per generation (λ).
-        network: the encoding.
+        network: the policy's network, whose parameters are evolved.
         replaced: share of the matrix that generations replace, Σ (c_1 + c_μ), before it is decomposed again. With 0
             it is decomposed in every generation, as by `CmaEs`.
     """

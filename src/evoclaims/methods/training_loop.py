@@ -35,9 +35,9 @@ class TrainingLoop:
         name: of the method; the function's if empty.
         revision: raise it when the function computes something else.
         deterministic: whether its trials have no chance in them, so that they may be copies of each other.
-        overspend: by which share of its budget a trial may exceed it, for loops that cannot stop in time: with 0.5 a
-            claim is an error where one spends more than 1.5 times its budget. Claims name what is overspent by more
-            than 2% in any case. It is part of the trial's id where it is set.
+        overspend: the share by which a trial may exceed its budget, for loops that cannot stop in time. With 0.5, a
+            trial that spends more than 1.5 times its budget makes its claim an error. Claims name every trial that
+            exceeds it by more than 2%. If it is set, it is part of the trial's id.
     """
 
     function: Callable[..., Any] | str

@@ -81,7 +81,8 @@ def load_published(path: Path) -> Published:
     """Read a file of published numbers.
 
     Raises:
-        UserError: when it is missing, damaged, or a number lacks its place, or something has the place of a number.
+        UserError: when it is missing or damaged, when a number does not name its place in the paper, or when something
+            else stands where a number should.
     """
     try:
         plain = tomllib.loads(read_text(path))

@@ -56,10 +56,11 @@ class NullAgent:
 
     Attributes:
         says: what it is, in a few words.
-        numbers: returns the numbers of its trials of a condition; None where it cannot stand for one.
+        numbers: a function from a condition to the metrics, levels and curves of the agent's trials, or to None if the
+            agent cannot stand for it.
         method: a method of the same tier whose committed trials on the same task are its trials.
-        everywhere: it stands for every condition of an assertion at once, as a counter at its limit does; else also for
-            the claimed ones alone (see `claims.null_agents`).
+        everywhere: True if it only stands for all conditions of an assertion at once; False if it also stands for the
+            claimed ones alone, beside the trials of the others (see `claims.null_agents`).
 
     Raises:
         UserError: when it has both or neither.
@@ -154,7 +155,7 @@ class Reproduction:
     Tables of imported trials are looked for in `folder`.
 
     Raises:
-        UserError: when `trials` is neither, or the folder no path.
+        UserError: when `trials` is not such a class, or the folder is not a `pathlib.Path`.
     """
 
     name: str

@@ -162,7 +162,8 @@ class TrialGroup:
         not compared.
 
         Raises:
-            UnknownNameError: for a metric that imported trials do not have; of others it is known when they have run.
+            UnknownNameError: for a metric that imported trials do not have. Other trials have to run first: then a
+                missing metric makes the claim an error.
         """
         if read is None and self.condition.existing is not None:
             known = self.condition.existing[0].metrics

@@ -39,7 +39,7 @@ class Robot:
         seen_velocities: how many velocities a policy sees, from the first; None for all.
         velocity_limit: shown velocities are clipped to it.
         contacts: most contacts kept, the nearest ones.
-        touching: contacts of which seldom more touch at a time. Steps with more take longer; results are the same.
+        touching: how many contacts touch at a time in most steps. Steps with more take longer, with the same results.
         body: a hash of what it is made of, part of its trials' ids; None for the built-in robots, whose files stay.
 
     A built-in robot's file is simulated as the paper's code does: one iteration of the solver, explicit damping. Any
