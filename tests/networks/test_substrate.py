@@ -96,7 +96,7 @@ def test_an_unknown_extent_is_told_with_the_known_ones() -> None:
 
 @pytest.mark.parametrize("layers", [(), (((0.0, 0.0),),), (((0.0, 0.0),), ()), (((0.0, 0.0),), (), ((1.0, 1.0),))])
 def test_neurons_placed_by_hand_need_two_layers_and_none_empty(layers: tuple[tuple[tuple[float, float], ...]]) -> None:
-    with pytest.raises(UserError, match="one of outputs at least, and no empty layer"):
+    with pytest.raises(UserError, match="a layer of inputs and one of outputs, and no empty layer"):
         Substrate(layers)
 
 

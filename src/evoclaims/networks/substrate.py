@@ -31,8 +31,8 @@ class Substrate:
         """Check that inputs and outputs exist and every layer has neurons, each at a point."""
         if len(self.layers) < 2 or not all(self.layers):
             raise UserError(
-                f"A substrate has layers of {tuple(map(len, self.layers))} neurons. Write one of inputs and one of "
-                "outputs at least, and no empty layer."
+                f"A substrate has layers of {tuple(map(len, self.layers))} neurons. Write at least a layer of "
+                "inputs and one of outputs, and no empty layer."
             )
         for point in (point for layer in self.layers for point in layer):
             if len(point) != 2 or not all(map(math.isfinite, point)):

@@ -56,7 +56,7 @@ def test_episodes_and_their_steps_are_at_least_1(kind: Any, name: str) -> None:
     ids=str,
 )
 def test_a_box_has_a_volume(numbers: dict[str, Any]) -> None:
-    with pytest.raises(UserError, match="is not a box. Write finite numbers, half sizes above 0"):
+    with pytest.raises(UserError, match="is not valid. Write finite numbers, half sizes above 0"):
         Box(**{"centre": (0.0, 0.0), "half_size": (1.0, 1.0), **numbers})
 
 
@@ -71,7 +71,7 @@ def test_a_box_has_a_volume(numbers: dict[str, Any]) -> None:
     ids=str,
 )
 def test_a_surface_has_numbers_that_a_simulation_can_use(numbers: dict[str, Any]) -> None:
-    with pytest.raises(UserError, match="is not a surface. Write three frictions of at least 0"):
+    with pytest.raises(UserError, match="is not valid. Write three frictions of at least 0"):
         Surface(**numbers)
 
 

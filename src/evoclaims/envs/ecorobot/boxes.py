@@ -30,7 +30,7 @@ class Surface:
         numbers = [number for part in parts for number in part]
         if tuple(map(len, parts)) != (3, 2, 5) or not all(map(math.isfinite, numbers)) or min(self.friction) < 0:
             raise UserError(
-                f"{self} is not a surface. Write three frictions of at least 0, two numbers of solref and five of "
+                f"{self} is not valid. Write three frictions of at least 0, two numbers of solref and five of "
                 "solimp, all finite."
             )
 
@@ -59,7 +59,7 @@ class Box:
         numbers = (*self.centre, *self.half_size, self.angle, self.bottom, self.top)
         if not all(map(math.isfinite, numbers)) or min(self.half_size) <= 0 or self.bottom >= self.top:
             raise UserError(
-                f"{self} is not a box. Write finite numbers, half sizes above 0, and a bottom below its top."
+                f"{self} is not valid. Write finite numbers, half sizes above 0, and a bottom below its top."
             )
 
     @property
