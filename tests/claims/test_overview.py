@@ -13,7 +13,7 @@ from evoclaims.claims.workload import Watching, Work, Workload, remaining
 from evoclaims.envs.gates.parity import NParity
 from evoclaims.methods.hand_built import HandBuilt
 from evoclaims.paper.cost import Basis, Cost
-from evoclaims.trials.notice import Running, announced, shared
+from evoclaims.trials.lease import Running, announced, shared
 from evoclaims.trials.progress import RunProgress
 from evoclaims.trials.spec import Budget, Condition
 from evoclaims.trials.store import Store

@@ -104,14 +104,14 @@ def _insensitive() -> None:
 def test_a_claim_that_notices_no_fault_is_called_insensitive_wherever_it_is_shown(
     evoclaims: Evoclaims, stored: Store, project: Project
 ) -> None:
-    said = "planted faults: not tried"
+    said = "claims against planted faults: not tried"
     assert said in evoclaims("status")[1]
     assert evoclaims("mutants", "--mutant=paralysed")[0] == 0
     assert said in evoclaims("status")[1]  # only one of those that apply
     _insensitive()
     counted = "1 supported but insensitive, 1 refuted"
     _, out, _ = evoclaims("status")
-    assert f"planted faults: 1 insensitive, 1 not tried\nclaims (smoke): {counted}\n" in out
+    assert f"claims against planted faults: 1 insensitive, 1 not tried\nclaims (smoke): {counted}\n" in out
     assert out.count("✓ supported, insensitive") == 1
     assert "wrote report/claims-smoke.svg: supported but insensitive 1 / refuted 1" in evoclaims("badge")[1]
     assert f"claims (smoke): {counted}" in evoclaims("report", "--tier=smoke")[1]
@@ -121,7 +121,7 @@ def test_a_claim_that_notices_no_fault_is_called_insensitive_wherever_it_is_show
     heading, *rows = csv.reader(Path("report/verdicts.csv").read_text().splitlines())
     assert [row[heading.index("faults")] for row in rows] == ["insensitive", "not tried"]
     run = project.run("-msmoke", own_store=True)
-    run.stdout.fnmatch_lines(["planted faults: 1 insensitive, 1 not tried", f"claims: {counted}"])
+    run.stdout.fnmatch_lines(["claims against planted faults: 1 insensitive, 1 not tried", f"claims: {counted}"])
     project.write(a=BODIES["supported"].replace("in_most_trials()", "in_most_trials(p0=0.6)"), b="refuted")
     _, out, _ = evoclaims("status")
     assert "claims (smoke): 1 supported, 1 refuted" in out  # the matrix is about another claim than that of now

@@ -71,7 +71,7 @@ def test_why_a_verdict_failed_is_said_in_any_case_and_the_rest_where_it_is_asked
     for out, accepted in ((brief, False), (whole, True)):
         assert "✗ G1[wrong]: p = " in out
         assert ("[accepted: the paper errs]" in out) == accepted
-        assert ("--why says why" in out) != accepted
+        assert ("--why prints why" in out) != accepted
         assert out.splitlines()[-1] == "claims (smoke): 2 supported, 2 refuted"
 
 
@@ -130,7 +130,7 @@ def test_a_verdict_from_reference_trials_alone_is_told_as_one(
     assert evoclaims("reference")[0] == 0
     for record in stored.record_files(references.load(Path("reference/smoke/right-parity.jsonl"))[3].id):
         record.unlink(missing_ok=True)
-    told = "judged from committed reference trials, where the store has no better ones"
+    told = "judged from committed reference trials, since the store has no better ones"
     assert status()[1].splitlines()[-1] == f"{told}: 2 of 4 of these claims"
     assert status("--only", "S1")[1].splitlines()[-1] == f"{told}: all of these claims"
 
@@ -146,7 +146,7 @@ def test_a_verdict_from_reference_trials_that_go_before_older_ones_is_told_too(
     lines = status("--only", "S1")[1].splitlines()
     assert "claims (smoke): 1 supported" in lines
     assert (
-        lines[-1] == "judged from committed reference trials, where the store has no better ones: all of these claims"
+        lines[-1] == "judged from committed reference trials, since the store has no better ones: all of these claims"
     )
 
 

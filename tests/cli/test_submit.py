@@ -27,7 +27,7 @@ from evoclaims.cli.cluster.submissions import Seen, State, load_all
 from evoclaims.cli.processes.job import Job, MissingBatch
 from evoclaims.cli.submit import dealt
 from evoclaims.paper.cost import Cost
-from evoclaims.trials.notice import announced, notice_path
+from evoclaims.trials.lease import announced, lease_path
 from evoclaims.trials.store import Store
 
 pytest.importorskip("submitit", reason="jobs are NOT TESTED here: submitit is not installed (evoclaims[slurm])")
@@ -177,7 +177,7 @@ def test_of_a_job_s_batches_that_one_runs_which_a_living_process_has_announced(
     killed.wait()
     owner = f"pid={killed.pid}\nhost={socket.gethostname()}\nmode=lease\ntoken={'a' * 32}\nduration=60.0\n"
     with announced(root, second):
-        notice_path(root, first).write_text(f"filelock/2\n{owner}")
+        lease_path(root, first).write_text(f"filelock/2\n{owner}")
         lines = evoclaims("jobs")[1].splitlines()
     assert lines[0].startswith("queued ")
     assert lines[0].endswith(": process 1 runs other batches now")

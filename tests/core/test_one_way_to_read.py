@@ -25,7 +25,7 @@ ELSEWHERE = {
     # what the system says
     "core/provenance.py": ["Path('/proc/cpuinfo').read_text", "distribution.read_text", "distribution.read_text"],
     "cli/cluster/submissions.py": ["Path(f'/proc/{job}/cmdline').read_bytes"],
-    "trials/notice.py": ["Path(f'/proc/{owner.pid}/stat').read_text", "open"],
+    "trials/lease.py": ["Path(f'/proc/{owner.pid}/stat').read_text", "open"],
     "trials/loop_messages.py": ["Path(f'/proc/{pid}/environ').read_bytes"],
     "core/environments.py": ["distribution.read_text"],
     # standard streams, and nothing

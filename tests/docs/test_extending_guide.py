@@ -132,9 +132,9 @@ def test_the_robot_and_the_task_that_are_shown_are_made(tmp_path: Path, monkeypa
 @pytest.mark.parametrize(
     ("xml", "said"),
     [
-        ("my_robots:rover.xml", "there is no package 'my_robots': write PACKAGE:PATH"),
-        ("rover.xml", "there is no package 'rover.xml': write PACKAGE:PATH"),
-        (":rover.xml", "there is no package '': write PACKAGE:PATH"),
+        ("my_robots:rover.xml", "there is no package 'my_robots'. Write PACKAGE:PATH"),
+        ("rover.xml", "there is no package 'rover.xml'. Write PACKAGE:PATH"),
+        (":rover.xml", "there is no package ''. Write PACKAGE:PATH"),
         ("evoclaims:rover.xml", "there is no file "),
     ],
 )

@@ -29,5 +29,5 @@ def test_six_bits_ask_124_rows_on_the_last_of_five_levels() -> None:
 
 
 def test_a_wrong_number_of_bits_is_a_sentence() -> None:
-    with pytest.raises(UserError, match="2 to 12 bits, not 1"):
+    with pytest.raises(UserError, match="has bits=1. Write a number from 2 to 12"):
         CumulativeParity(1)

@@ -13,14 +13,14 @@ from evoclaims.envs.gates.parity import NParity
 
 @pytest.mark.parametrize("bits", [-1, 0, 1, 13])
 def test_an_impossible_number_of_bits_is_named_with_the_possible_ones(bits: int) -> None:
-    with pytest.raises(UserError, match=rf"N-parity takes 2 to 12 bits, not {bits}\."):
+    with pytest.raises(UserError, match=rf"N-parity has bits={bits}\. Write a number from 2 to 12"):
         NParity(bits)
 
 
 @pytest.mark.parametrize("levels", [-1, 0, 10])
 @pytest.mark.parametrize("operations", ["paper", "published_code"])
 def test_an_impossible_number_of_levels_is_named_with_the_possible_ones(levels: int, operations: Any) -> None:
-    with pytest.raises(UserError, match=rf"Simple ALU has 1 to 9 levels, not {levels}\."):
+    with pytest.raises(UserError, match=rf"Simple ALU has level_count={levels}\. Write a number from 1 to 9"):
         SimpleAlu(levels, operations=operations)
 
 

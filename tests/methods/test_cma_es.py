@@ -316,7 +316,7 @@ def test_an_ill_conditioned_ellipsoid_is_solved_in_as_many_generations_as_the_tu
 
 
 def test_a_population_too_small_to_recombine_is_one_sentence() -> None:
-    with pytest.raises(UserError, match="population of at least 4, not 3"):
+    with pytest.raises(UserError, match="CMA-ES has population=3. Write at least 4"):
         CmaEs(3)
 
 

@@ -67,5 +67,5 @@ def test_the_network_and_its_negation_have_different_names() -> None:
 
 
 def test_a_task_without_a_truth_table_is_one_sentence() -> None:
-    with pytest.raises(UserError, match="by hand for N-parity and Simple ALU, not for the task 'probe_copy'"):
+    with pytest.raises(UserError, match="no circuit built by hand for the task 'probe_copy'"):
         HandBuilt().best(COPY, jax.numpy.int32(0))

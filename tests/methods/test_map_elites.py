@@ -353,9 +353,9 @@ class _Blind(Plane):
 
 
 def test_a_task_that_cannot_be_mapped_is_one_sentence() -> None:
-    with pytest.raises(UserError, match="'n_parity' has no area to map; use a task with `area` and `reachable`"):
+    with pytest.raises(UserError, match="'n_parity' has no area to map. Use a task with `area` and `reachable`"):
         SMALL.init(jax.random.key(0), NParity(3))
-    with pytest.raises(UserError, match='metrics "x" and "y"; the metrics of \'plane\' are: distance.'):
+    with pytest.raises(UserError, match=r'metrics "x" and "y", which \'plane\' lacks \(it has: distance\)'):
         Workbench(SMALL, _Blind()).run(1)
 
 
@@ -364,11 +364,11 @@ def test_a_task_that_cannot_be_mapped_is_one_sentence() -> None:
     [
         ({"batch": 0}, "MAP-Elites's batch must be at least 1, not 0"),
         ({"initial": 0}, "MAP-Elites's initial must be at least 1, not 0"),
-        ({"cells": (5,)}, "The grid of MAP-Elites is (5,). It must be two numbers of cells, each at least 1."),
-        ({"cells": (5, 0)}, "The grid of MAP-Elites is (5, 0)."),
-        ({"iso_sigma": -0.1}, "iso_sigma and line_sigma are -0.1 and 0.2"),
-        ({"line_sigma": float("nan")}, "are 0.2 and nan"),
-        ({"iso_sigma": 0.0, "line_sigma": 0.0}, "not both 0"),
+        ({"cells": (5,)}, "MAP-Elites has cells=(5,). Write two numbers of at least 1."),
+        ({"cells": (5, 0)}, "MAP-Elites has cells=(5, 0)."),
+        ({"iso_sigma": -0.1}, "iso_sigma=-0.1 and line_sigma=0.2"),
+        ({"line_sigma": float("nan")}, "iso_sigma=0.2 and line_sigma=nan"),
+        ({"iso_sigma": 0.0, "line_sigma": 0.0}, "one of them above 0"),
     ],
 )
 def test_a_wrong_hyperparameter_is_one_sentence(wrong: dict[str, Any], sentence: str) -> None:

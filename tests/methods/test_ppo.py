@@ -84,10 +84,10 @@ def test_the_published_test_asks_the_stochastic_policy_and_forgives_no_error() -
         ({"batch_size": 0}, "PPO's batch_size must be at least 1"),
         ({"minibatches": -1}, "PPO's minibatches must be at least 1, not -1"),
         ({"updates_per_batch": 0}, "PPO's updates_per_batch must be at least 1"),
-        ({"environments": 3}, r"batch_size × minibatches \(4 × 1\) must be a multiple of environments \(3\)"),
-        ({"environments": 8}, "must be a multiple of environments"),
-        ({"policy_layers": (4, 0)}, "Every layer of PPO's networks has at least 1 neuron"),
-        ({"value_layers": (-1,)}, "Every layer of PPO's networks has at least 1 neuron"),
+        ({"environments": 3}, r"batch_size=4, minibatches=1 and environments=3. Write numbers"),
+        ({"environments": 8}, "is a multiple of environments"),
+        ({"policy_layers": (4, 0)}, "Write at least 1 neuron for each layer"),
+        ({"value_layers": (-1,)}, "Write at least 1 neuron for each layer"),
     ],
 )
 def test_impossible_sizes_are_one_sentence(wrong: dict[str, Any], sentence: str) -> None:
@@ -104,7 +104,7 @@ def test_an_impossible_level_test_is_one_sentence(wrong: dict[str, Any]) -> None
 def test_sampled_episodes_of_more_than_one_step_are_one_sentence() -> None:
     """On a whole table every one of them would ask the first row."""
     sampled = replace(SMALL, level_test=LevelTest(sampled_episodes=8))
-    with pytest.raises(UserError, match=r"plays one step in each, and an episode of n_parity has up to 8.*sampling="):
+    with pytest.raises(UserError, match=r"plays one step of each, but an episode of n_parity has up to 8.*sampling="):
         sampled.init(jax.random.key(0), NParity(3, sampling="exhaustive"))
     sampled.init(jax.random.key(0), NParity(3, sampling="sampled"))
     SMALL.init(jax.random.key(0), NParity(3, sampling="exhaustive"))

@@ -66,5 +66,5 @@ def test_the_standard_deviation_scales_what_is_drawn() -> None:
 
 @pytest.mark.parametrize("wrong", [{"population": 0}, {"std": 0.0}, {"std": -1.0}])
 def test_impossible_sizes_are_one_sentence(wrong: dict[str, Any]) -> None:
-    with pytest.raises(UserError, match="population of at least 1 and a standard deviation above 0"):
+    with pytest.raises(UserError, match="population of at least 1 and a std above 0"):
         RandomSearch(**wrong)

@@ -94,5 +94,5 @@ def test_a_trial_is_the_same_alone_and_in_a_batch() -> None:
 
 @pytest.mark.parametrize("share", [-0.1, 1.0, float("nan")])
 def test_a_share_that_is_none_is_refused(share: float) -> None:
-    with pytest.raises(UserError, match="at least 0 and below 1"):
+    with pytest.raises(UserError, match="Write a number from 0 to below 1"):
         SeldomDecomposedCmaEs(replaced=share)

@@ -52,7 +52,9 @@ def test_what_another_process_cannot_call_is_a_sentence() -> None:
     with pytest.raises(UserError, match=r"train does not take \(task, seed, budget\) and the settings speed: got"):
         TrainingLoop(train, {"speed": 1.0}, packages=())
     for value in ({1}, {1: 2.0}, NParity, [Mlp((4,))]):  # of dataclasses an id would have the fields, but not the class
-        with pytest.raises(UserError, match=r"so they are numbers, words, lists and tables by name; 'rate' is"):
+        with pytest.raises(
+            UserError, match=r"The setting 'rate' of a training loop is .* Write numbers, words, and lists or tables"
+        ):
             TrainingLoop(train, {"rate": value}, packages=())
     with pytest.raises(UserError, match=r"finds <function Trainer.train at .*, not <bound method"):
         TrainingLoop(Trainer().train, packages=())

@@ -195,5 +195,5 @@ def _text(traced: Any, platform: str) -> str:
 
 
 def test_a_negative_number_of_neurons_is_one_sentence() -> None:
-    with pytest.raises(UserError, match="0 or more hidden neurons, not -1"):
+    with pytest.raises(UserError, match="AllSkips has hidden=-1"):
         AllSkips(-1)

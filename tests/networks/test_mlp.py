@@ -84,11 +84,11 @@ def test_a_batch_matches_the_loop_plain_and_jitted() -> None:
 @pytest.mark.parametrize("extra", [-1, 1])
 def test_parameters_of_another_network_are_a_sentence_with_both_numbers(extra: int) -> None:
     right = Mlp((4,)).size(3, 2)
-    said = f"from 3 inputs to 2 outputs takes {right} parameters, as its `size` says, and has {right + extra}."
+    said = f"was given {right + extra} parameters. From 3 inputs to 2 outputs it takes {right}, the number"
     with pytest.raises(UserError, match=said):
         jax.jit(lambda x: Mlp((4,)).apply(jnp.zeros(right + extra), x, 2))(jnp.zeros(3))
 
 
 def test_an_empty_layer_is_one_sentence() -> None:
-    with pytest.raises(UserError, match=r"at least 1 neuron; these are \(4, 0\)"):
+    with pytest.raises(UserError, match=r"has layers=\(4, 0\)"):
         Mlp((4, 0))

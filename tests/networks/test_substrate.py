@@ -85,7 +85,7 @@ def test_a_substrate_is_told_apart_by_its_places_alone() -> None:
 
 @pytest.mark.parametrize("widths", [(), (3,), (3, 0, 1), (3, -1)])
 def test_widths_that_are_no_network_are_one_sentence(widths: tuple[int, ...]) -> None:
-    with pytest.raises(UserError, match="at least two layers of at least one neuron each, not"):
+    with pytest.raises(UserError, match="at least two layers of at least one neuron each"):
         layered(widths)
 
 
@@ -96,7 +96,7 @@ def test_an_unknown_extent_is_told_with_the_known_ones() -> None:
 
 @pytest.mark.parametrize("layers", [(), (((0.0, 0.0),),), (((0.0, 0.0),), ()), (((0.0, 0.0),), (), ((1.0, 1.0),))])
 def test_neurons_placed_by_hand_need_two_layers_and_none_empty(layers: tuple[tuple[tuple[float, float], ...]]) -> None:
-    with pytest.raises(UserError, match="at least one neuron in each layer"):
+    with pytest.raises(UserError, match="a layer of inputs and one of outputs, and no empty layer"):
         Substrate(layers)
 
 

@@ -70,8 +70,8 @@ def test_a_setting_that_is_no_text_is_a_sentence(project: Path, text: str) -> No
     [
         ('reproducton = "a_tiny_paper"\n', "has the unknown key 'reproducton'. Did you mean 'reproduction'? Known: cl"),
         (TABLE + "claim = 'x'\n", "has the unknown key 'claim'. Did you mean 'claims'?"),
-        (TABLE + "time_limit = 2\n", 'has time_limit = 2, which is no text: write it in quotes, as time_limit = "…".'),
-        (TABLE + "slurm = 3\n", "has slurm = 3, which is no table."),
+        (TABLE + "time_limit = 2\n", 'has time_limit = 2, which is not text. Write it in quotes, as time_limit = "…".'),
+        (TABLE + "slurm = 3\n", "has slurm = 3, which is not a table."),
     ],
 )
 def test_the_wrong_key_is_named_first(project: Path, text: str, said: str) -> None:
@@ -215,6 +215,6 @@ def test_a_reproduction_with_text_for_a_folder_or_a_number_for_a_design_is_refus
     with pytest.raises(UserError, match=r"folder='\.'\. Write Path\(__file__\)\.parent"):
         Reproduction("tiny", "A Tiny Paper", ".", {})  # type: ignore[arg-type]
     with pytest.raises(
-        UserError, match=r"A tier's design is a Design, not 10\. Write Tier\(conditions, Design\.fixed\(10\)\)"
+        UserError, match=r"A tier has design=10, which is not a Design\. Write Tier\(conditions, Design\.fixed\(10\)\)"
     ):
         Tier({}, 10)  # type: ignore[arg-type]

@@ -81,7 +81,7 @@ def test_what_is_not_published_is_nothing(tmp_path: Path) -> None:
     ],
 )
 def test_a_number_without_its_place_or_a_torn_plot_is_refused(tmp_path: Path, text: str, what: str) -> None:
-    with pytest.raises(UserError, match=f"these are neither: {what}"):
+    with pytest.raises(UserError, match=f"entries that are not as expected: {what}"):
         load_published(_write(tmp_path, text))
 
 

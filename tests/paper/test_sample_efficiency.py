@@ -85,7 +85,7 @@ def test_only_reports_on_the_level_count(group: Any) -> None:
     assert trials.steps_to("success", 0.9).of(trial) == 4 * COST
     assert trials.steps_to("success", 0.9, level=0).of(trial) == COST
     assert trials.steps_to("level", LAST).of(trial) == 3 * COST
-    with pytest.raises(UserError, match=f"better on small has levels 0 to {LAST}, not {LAST + 1}"):
+    with pytest.raises(UserError, match=f"better on small has no level {LAST + 1}. Use one from 0 to {LAST}"):
         trials.steps_to("success", 0.9, level=LAST + 1)
 
 
@@ -136,7 +136,7 @@ def test_a_misspelt_curve_says_which_there_are(group: Any) -> None:
     trials = group([0.0] * 4)
     with pytest.raises(UnreadableTrialError, match="Did you mean 'success'"):
         trials.steps_to("sucess", 0.9).of(trials.fetch([0])[0])
-    with pytest.raises(UserError, match="a finite value, not nan"):
+    with pytest.raises(UserError, match="a value that is not finite"):
         trials.steps_to("success", math.nan)
     with pytest.raises(UserError, match="between 0 and 1, and never reaches 90"):
         trials.steps_to("success", 90)

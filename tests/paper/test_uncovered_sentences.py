@@ -22,5 +22,5 @@ def test_sentences_are_read_in_the_papers_order(tmp_path: Path) -> None:
 @pytest.mark.parametrize("text", ["[[sentence", "[[sentence]]\nline = 3\n", ONE.format('"x"'), "sentence = 3\n"])
 def test_a_file_that_holds_something_else_is_a_sentence(tmp_path: Path, text: str) -> None:
     (tmp_path / FILE).write_text(text)
-    with pytest.raises(UserError, match=r"Cannot read .*sentences.toml: .* has line \(a number\), says and because"):
+    with pytest.raises(UserError, match=r"Cannot read .*sentences.toml: .* with line \(a number\), says and because"):
         uncovered(tmp_path)

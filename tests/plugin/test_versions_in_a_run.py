@@ -115,12 +115,12 @@ def test_whatever_is_there_is_judged_and_the_table_says_that_its_versions_are_mi
     monkeypatch.setenv("GITHUB_STEP_SUMMARY", str(project.path / "page.md"))
     result = project.run(option, own_store=True)
     lines = _lines(result)
-    assert f"† versions are mixed: numpy 1.0 and {HERE}: a (smoke)" in lines
+    assert f"† trials of mixed versions: numpy 1.0 and {HERE}: a (smoke)" in lines
     assert any("inconclusive†" in line for line in lines)
     assert not [line for line in lines if "compiling" in line or line.startswith("versions changed")]
     page = (project.path / "page.md").read_text()
     assert "inconclusive†" in page
-    assert "† versions are mixed" in page
+    assert "† trials of mixed versions" in page
 
 
 def test_trials_of_one_other_environment_are_told_with_what_is_installed(
@@ -133,7 +133,7 @@ def test_trials_of_one_other_environment_are_told_with_what_is_installed(
     capsys.readouterr()
     main(["status"])
     out = " ".join(capsys.readouterr().out.split())
-    assert f"not made with the installed versions: numpy 1.0 (here {HERE}): a (smoke)" in out
+    assert f"trials from other versions than the installed ones: numpy 1.0 (installed: {HERE}): a (smoke)" in out
     assert "†" not in out
     assert "1 refuted" in out
 

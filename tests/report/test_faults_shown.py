@@ -39,12 +39,12 @@ def test_support_that_no_fault_could_change_is_counted_apart() -> None:
     ]
     assert table_cells.totals(REPORTS) == "2 supported, 1 supported but insensitive, 1 refuted"
     assert message_of(REPORTS) == "supported 2 / supported but insensitive 1 / refuted 1"
-    assert table_cells.faults(REPORTS) == "planted faults: 1 sensitive, 2 insensitive, 1 not tried"
+    assert table_cells.faults(REPORTS) == "claims against planted faults: 1 sensitive, 2 insensitive, 1 not tried"
     assert (colour_of(REPORTS[:1]), colour_of(REPORTS[:2])) == (GREEN, BLUE)
 
 
 def test_what_was_not_tried_is_called_so() -> None:
-    assert table_cells.faults([report("G1")]) == "planted faults: not tried"
+    assert table_cells.faults([report("G1")]) == "claims against planted faults: not tried"
     assert table_cells.faults([report("G1", "not run", verdict=None)]) == ""
     assert table_cells.verdict(report("G1")) == "✓ supported"
     assert "not tried" in run_summary([report("G1")])
@@ -64,7 +64,7 @@ def test_markdown_for_continuous_integration_says_so() -> None:
     text = run_summary(REPORTS)
     assert "**2 supported, 1 supported but insensitive, 1 refuted**" in text
     assert "✗ refuted, insensitive" in text
-    assert "* planted faults: 1 sensitive, 2 insensitive, 1 not tried" in text
+    assert "* claims against planted faults: 1 sensitive, 2 insensitive, 1 not tried" in text
 
 
 def row(of: ClaimReport, *fates: Fate, untried: tuple[str, ...] = ()) -> Sensitivity:

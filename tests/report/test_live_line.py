@@ -19,7 +19,7 @@ from evoclaims.report.live_line import (
     describe_all,
     duration,
 )
-from evoclaims.trials.notice import Running
+from evoclaims.trials.lease import Running
 from evoclaims.trials.progress import RunProgress
 
 WAITING = RunProgress("ppo on n_parity", "compiling", trials=3)

@@ -42,7 +42,7 @@ def test_totals_and_notes_stand_above_and_below() -> None:
 def test_an_accepted_verdict_says_why_it_is_accepted() -> None:
     (row,) = _rows(run_summary([report("G1", "refuted", expected="refuted", because="known")]))
     assert row[2] == r"✗ refuted\*"
-    assert row[5] == "for a reason; looked into and accepted: known"
+    assert row[5] == "for a reason; examined and accepted: known"
 
 
 def test_rows_come_in_the_order_in_which_people_count() -> None:

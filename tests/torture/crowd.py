@@ -14,7 +14,7 @@ from guard import Guard
 from tally import Tally
 from tortured_project import REPORTS, TRIALS, methods
 
-from evoclaims.trials.notice import FRESH_SECONDS
+from evoclaims.trials.lease import FRESH_SECONDS
 
 LIFE = 20.0
 """Seconds after which a process is killed on average, its start included."""

@@ -284,14 +284,17 @@ BITS = np.ones((4, 2), np.float32)
 @pytest.mark.parametrize(
     ("table", "what"),
     [
-        ((BITS.astype(np.int64), YES, YES, (4,)), "table's inputs have shape (4, 2) and type int64"),
-        ((BITS[0], YES[:2], YES[:2], (1,)), "table's inputs have shape (2,) and type float32"),
-        ((BITS, YES[:3], YES[:3], (3,)), "table's targets have shape (3, 1) and type bool"),
-        ((BITS, YES.astype(np.float32), YES, (4,)), "table's targets have shape (4, 1) and type float32"),
-        ((BITS, YES, np.ones((4, 2), bool), (4,)), "table's active outputs have shape (4, 2), and its targets (4, 1)"),
-        ((BITS, YES, YES, (2, 5)), "table's levels ask for (2, 5) rows, which must increase up to all 4"),
-        ((BITS, YES, YES, (3, 2)), "table's levels ask for (3, 2) rows, which must increase up to all 4"),
-        ((BITS, YES, YES, ()), "table's levels ask for () rows, which must increase up to all 4"),
+        ((BITS.astype(np.int64), YES, YES, (4,)), "table has inputs of shape (4, 2) and type int64"),
+        ((BITS[0], YES[:2], YES[:2], (1,)), "table has inputs of shape (2,) and type float32"),
+        ((BITS, YES[:3], YES[:3], (3,)), "table has targets of shape (3, 1) and type bool"),
+        ((BITS, YES.astype(np.float32), YES, (4,)), "table has targets of shape (4, 1) and type float32"),
+        (
+            (BITS, YES, np.ones((4, 2), bool), (4,)),
+            "table has active outputs of shape (4, 2) and targets of shape (4, 1)",
+        ),
+        ((BITS, YES, YES, (2, 5)), "table has rows_at_level=(2, 5): write numbers above 0 that increase up to 4"),
+        ((BITS, YES, YES, (3, 2)), "table has rows_at_level=(3, 2): write numbers above 0 that increase up to 4"),
+        ((BITS, YES, YES, ()), "table has rows_at_level=(): write numbers above 0 that increase up to 4"),
     ],
 )
 def test_a_truth_table_whose_parts_do_not_belong_together_is_refused(table: Any, what: str) -> None:
@@ -345,8 +348,8 @@ def test_a_task_whose_reset_does_not_read_the_level_is_refused_if_it_has_several
 @pytest.mark.parametrize(
     ("parts", "sentence"),
     [
-        ((BITS, YES, np.array([[True], [False], [True], [True]]), (2, 4)), "a row that asks nothing"),
-        ((BITS, YES, YES, (2, 3)), "which must increase up to all 4"),
+        ((BITS, YES, np.array([[True], [False], [True], [True]]), (2, 4)), "a row without an active output"),
+        ((BITS, YES, YES, (2, 3)), "that increase up to 4"),
     ],
 )
 def test_a_table_with_rows_that_ask_nothing_or_are_never_asked_is_refused(parts: Any, sentence: str) -> None:

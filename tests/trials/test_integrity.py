@@ -14,7 +14,7 @@ import pytest
 from evoclaims.core.errors import UserError
 from evoclaims.trials import integrity
 from evoclaims.trials.integrity import Problem, verify
-from evoclaims.trials.notice import announced, notice_path
+from evoclaims.trials.lease import announced, lease_path
 from evoclaims.trials.result import TrialResult, digest
 from evoclaims.trials.store import Store
 
@@ -201,7 +201,7 @@ def test_the_notice_of_a_process_that_is_gone_is_a_leftover_and_that_of_a_live_o
     store: Store, trial: TrialResult
 ) -> None:
     with announced(store.root, trial.condition):
-        path = notice_path(store.root, trial.condition)
+        path = lease_path(store.root, trial.condition)
         assert verify(store, repair=True) == []
         age(path)
         assert [problem.path for problem in verify(store, repair=False)] == [path]

@@ -19,7 +19,7 @@ from evoclaims.paper.config import load_config
 from evoclaims.paper.reported import load_published
 from evoclaims.trials import checkpoint
 from evoclaims.trials.integrity import verify
-from evoclaims.trials.notice import progress_path, shared
+from evoclaims.trials.lease import progress_path, shared
 from evoclaims.trials.progress import RunProgress, ignore
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.store import DamagedFileError, Store

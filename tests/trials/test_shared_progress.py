@@ -12,9 +12,9 @@ import pytest
 from climbers import CLIMBING, run_climbers
 from msgspec import json
 
-from evoclaims.trials import notice as bulletins
+from evoclaims.trials import lease as bulletins
 from evoclaims.trials.integrity import verify
-from evoclaims.trials.notice import Running, announced, notice_path, progress_path, running, shared, sweep
+from evoclaims.trials.lease import Running, announced, lease_path, progress_path, running, shared, sweep
 from evoclaims.trials.progress import RunProgress, ignore
 from evoclaims.trials.store import Store
 
@@ -44,16 +44,16 @@ def test_a_run_tells_others_its_progress_until_it_ends(store: Store, cpus: Seque
 
 def test_who_waits_for_another_process_tells_nothing_in_its_place(store: Store, cpus: Sequence[Any]) -> None:
     store.check_writable()
-    notice = notice_path(store.root, CLIMBING.id)
-    notice.parent.mkdir()
+    lease = lease_path(store.root, CLIMBING.id)
+    lease.parent.mkdir()
     other = f"filelock/2\npid=1\nhost=elsewhere\nmode=lease\ntoken={'a' * 32}\nduration=60.0\n"
-    notice.write_text(other)
+    lease.write_text(other)
     waited = []
 
     def watch(progress: RunProgress) -> None:
         if progress.phase.startswith("waiting"):
             waited.append(progress_path(store.root, CLIMBING.id).exists())
-            notice.unlink(missing_ok=True)
+            lease.unlink(missing_ok=True)
 
     run_climbers(store, cpus, watch)
     assert waited

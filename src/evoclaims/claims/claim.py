@@ -67,7 +67,7 @@ class Claim:
 
 @dataclass(frozen=True)
 class Expectation:
-    """A verdict that has been looked into and accepted, so that it no longer fails a run.
+    """A verdict that was examined and accepted, so that it no longer fails a run.
 
     Attributes:
         outcome: the accepted outcome.
@@ -198,6 +198,11 @@ def _check_name(claim_id: str, function: Callable[..., Any], there: Mapping[str,
 
 def expected(outcome: Outcome | str, *, because: str, tier: str | None = None) -> pytest.MarkDecorator:
     """Return a mark that accepts an outcome, for a whole claim or for one `pytest.param(..., marks=...)` of it.
+
+    Args:
+        outcome: the accepted one, such as `Outcome.REFUTED`.
+        because: what is known about why.
+        tier: the tier for which it is accepted; None for every tier.
 
     Raises:
         UserError: for an unknown outcome or tier, or without a reason.

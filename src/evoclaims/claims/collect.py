@@ -15,8 +15,8 @@ from typing import Final
 import pytest
 
 from evoclaims.claims.claim_names import claim_tests
+from evoclaims.claims.collected import Collected, Recorder, renew
 from evoclaims.claims.judge import broken
-from evoclaims.claims.recording import Collected, Recorder, renew
 from evoclaims.claims.session import SESSION, Session
 from evoclaims.core.errors import UserError, in_one_line
 from evoclaims.paper.config import SuiteConfig

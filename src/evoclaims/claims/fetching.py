@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from evoclaims.core.errors import UserError
 from evoclaims.paper.archive import Archive
 from evoclaims.trials import devices
-from evoclaims.trials.notice import sweep
+from evoclaims.trials.lease import sweep
 from evoclaims.trials.progress import Watcher
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.runner import run

@@ -6,7 +6,7 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
 from evoclaims.claims.claim_names import selected
-from evoclaims.claims.recording import Collected
+from evoclaims.claims.collected import Collected
 from evoclaims.judging.power import Draws, Power, power
 from evoclaims.judging.reading import TrialReading
 from evoclaims.judging.verdict import Outcome

@@ -12,14 +12,14 @@ from typing import Generic, TypeVar
 import pytest
 
 from evoclaims.claims.claim import ClaimTest
+from evoclaims.claims.collected import Collected, Recorder
 from evoclaims.claims.fetching import RunMissing
-from evoclaims.claims.recording import Collected, Recorder
 from evoclaims.claims.session import Session
 from evoclaims.paper.cost import Cost, Estimator, Wanted
 from evoclaims.paper.trial_group import TrialGroup
 from evoclaims.trials import devices
 from evoclaims.trials.devices import usable_cores
-from evoclaims.trials.notice import Running, running
+from evoclaims.trials.lease import Running, running
 from evoclaims.trials.spec import TrialSpec
 from evoclaims.trials.store import DamagedFileError, Store
 

@@ -251,7 +251,7 @@ def _comparing(add: _Add) -> None:
     )
     watch.add_argument("--trials", type=int, metavar="N", help="new trials per condition (default: the tier's)")
     watch.add_argument(
-        "--restart", action="store_true", help="begin a new series of nights, such as after an alarm was looked into"
+        "--restart", action="store_true", help="begin a new series of nights, such as after an alarm was examined"
     )
     watch.add_argument("--as", dest="form", metavar="FORM", help="also write it: markdown, as the text of an issue")
     watch.add_argument("--out", metavar="FILE", help="file to write (report/watch.md)")

@@ -24,7 +24,7 @@ from evoclaims.cli.project import Project, open_project
 from evoclaims.core.errors import UserError
 from evoclaims.core.files import open_file
 from evoclaims.trials.batches import StoredTrials
-from evoclaims.trials.notice import is_announced
+from evoclaims.trials.lease import is_announced
 
 TAIL: Final = 20_000
 """Bytes at the end of a log in which a reason is looked for."""

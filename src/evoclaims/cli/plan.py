@@ -121,8 +121,8 @@ def main(options: argparse.Namespace) -> int:
     _print_spent(console, tier, {names: costs[names] for names in used})
     ends = ", ".join(f"{end.symbol} {end}" for end in (Outcome.SUPPORTED, Outcome.REFUTED, Outcome.SMALLER))
     console.print(
-        f"\nClaims: the smallest p that the design allows (n trials a side, α {tier.design.alpha:g}), and how each "
-        f"look can end them: {ends}, or neither (no)"
+        f"\nClaims, with n trials a side and α {tier.design.alpha:g} over all looks: the smallest p for and against "
+        f"them that the design allows, and the outcomes that each look can reach: {ends}, or none (no)"
     )
     if variant:
         console.print(f"The time of a claim is that of the conditions that {variant} changes.")

@@ -10,8 +10,8 @@ from typing import Final
 
 from evoclaims.claims.as_published import AsPublished
 from evoclaims.claims.collect import collect, judge_all
+from evoclaims.claims.collected import Collected, Recorder, never
 from evoclaims.claims.fetching import StoredOnly
-from evoclaims.claims.recording import Collected, Recorder, never
 from evoclaims.claims.session import Session
 from evoclaims.cli.store_folder import open_store
 from evoclaims.core.errors import UnknownNameError

@@ -78,7 +78,7 @@ def _where_from(reports: Sequence[ClaimReport], project: Project) -> str:
     if not lacking:
         return ""
     some = "all" if len(lacking) == len(judged) else f"{len(lacking)} of {len(judged)}"
-    return f"judged from committed reference trials, where the store has no better ones: {some} of these claims"
+    return f"judged from committed reference trials, since the store has no better ones: {some} of these claims"
 
 
 def _changes(
@@ -103,7 +103,7 @@ def _print(reports: Sequence[ClaimReport], tier: str, why: bool) -> None:
     for part in (
         terminal_table.verdict_table(reports, width, console.is_terminal, console.encoding),
         terminal_table.explanations(explained, width, console.is_terminal),
-        "--why says why verdicts are accepted, inconclusive or not run" if unexplained and not why else "",
+        "--why prints why verdicts are accepted, inconclusive or not run" if unexplained and not why else "",
         table_cells.faults(reports),
         f"claims ({tier}): {table_cells.totals(reports)}",
     ):

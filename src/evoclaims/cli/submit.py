@@ -34,7 +34,7 @@ from evoclaims.report.formatting import plural
 from evoclaims.report.live_line import duration
 from evoclaims.trials.devices import usable_cores
 from evoclaims.trials.gpus import gpus
-from evoclaims.trials.notice import announced
+from evoclaims.trials.lease import announced
 from evoclaims.trials.spec import Condition
 
 ONE_AT_A_TIME: Final = content_hash("evoclaims submit")

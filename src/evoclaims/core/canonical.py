@@ -81,7 +81,10 @@ def require_whole_numbers(value: Any) -> None:
         items = given if isinstance(given, tuple) else (given,)
         declared = field.type if isinstance(field.type, str) else formatannotation(field.type)
         if WHOLE.fullmatch(declared) and any(isinstance(item, float) for item in items):
-            raise UserError(f"{field.name} of {type(value).__name__} takes whole numbers: {declared}, not {given!r}.")
+            raise UserError(
+                f"{type(value).__name__} has {field.name}={given!r}. Write whole numbers without a decimal point "
+                f"({declared})."
+            )
         for item in items:
             require_whole_numbers(item)
 

@@ -327,7 +327,10 @@ def _pins(recipe: Recipe) -> str:
     try:
         pins = read_text(recipe.constraints)
     except (OSError, UnicodeError) as error:
-        raise UserError(f"Cannot read the constraints {recipe.constraints}: {error}.") from error
+        raise UserError(
+            f"Cannot read the constraints {recipe.constraints}: {error}. Name a text file with one requirement on "
+            "each line."
+        ) from error
     return without(pins, recipe.package)
 
 

@@ -22,15 +22,21 @@ def reference(value: Any) -> str:
     module, name = getattr(value, "__module__", None), getattr(value, "__qualname__", None)
     if not module or not name or module == "__main__" or "<" in name:
         raise UserError(
-            f"{name or value!r} cannot be imported by another process; define it under its own name in a module, not "
+            f"{name or value!r} cannot be imported by another process. Define it under its own name in a module, not "
             "inside a function or in a script."
         )
     try:
         found = resolve(named := f"{module}:{name}")
     except (ImportError, AttributeError) as error:  # a class that was made while the program ran
-        raise UserError(f"{named} cannot be imported by another process: {error}.") from error
+        raise UserError(
+            f"{named} cannot be imported by another process: {error}. Define it in a module, outside functions and "
+            "classes."
+        ) from error
     if found != value:  # a method of one object, or a function that a decorator has replaced
-        raise UserError(f"Another process that imports {named} finds {found!r} there, not {value!r}.")
+        raise UserError(
+            f"Another process that imports {named} finds {found!r} there, not {value!r}. Give each its own name in "
+            "the module."
+        )
     return named
 
 
@@ -61,7 +67,7 @@ def to_plain(value: Any) -> Any:
     if dataclasses.is_dataclass(value):
         fields = {field.name: getattr(value, field.name) for field in dataclasses.fields(value) if field.init}
         return {"class": reference(type(value)), "fields": {name: to_plain(item) for name, item in fields.items()}}
-    raise UserError(f"A {type(value).__name__} cannot be passed to another process; use a frozen dataclass.")
+    raise UserError(f"A {type(value).__name__} cannot be passed to another process. Use a frozen dataclass.")
 
 
 def from_plain(plain: Any) -> Any:

@@ -25,7 +25,13 @@ UNDER: Final = 0.03
 
 @dataclass(frozen=True)
 class Series:
-    """A method, as figures show it."""
+    """A method, as figures show it.
+
+    Attributes:
+        method: its name in conditions.
+        label: its name in figures.
+        colour: of its bars, as matplotlib takes it.
+    """
 
     method: str
     label: str

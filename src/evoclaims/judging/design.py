@@ -89,7 +89,7 @@ class Design:
         return tuple(range(self.first_seed, self.first_seed + n))
 
     def for_paper(self, trials: int) -> Design:
-        """Return the design for a paper that compares so many trials a side: its margin (Simonsohn 2015).
+        """Return the design with the margin for a paper that compares `trials` trials per side (Simonsohn 2015).
 
         Raises:
             UserError: for fewer than 4 or more than the exact tests' number of trials.

@@ -44,7 +44,7 @@ def no_episode() -> Episode:
 
 
 def first_champion(parameters: Float[Array, " parameters"]) -> Champion:
-    """Return a champion that any evaluated individual beats."""
+    """Return a champion with these parameters, shape [parameters], that any evaluated individual beats."""
     return Champion(parameters=parameters, episode=no_episode())
 
 
@@ -59,6 +59,14 @@ def evaluate_with_champion(
     """Evaluate a population and its champion together, and return the best as the new champion.
 
     The old champion is evaluated again, because the level may have changed. A tie goes to the newcomer.
+
+    Args:
+        network: the network that all of them parametrize.
+        task: the task.
+        key: from which all episodes draw.
+        level: of the task, counted from 0, shape [].
+        population: one row of parameters for each individual, shape [n, parameters].
+        champion: the best so far.
 
     Returns:
         The population's episodes (leaves [n]), the new champion, and whether all fitnesses and parameters are finite.

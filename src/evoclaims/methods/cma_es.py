@@ -54,7 +54,7 @@ class CmaEs:
 
     Attributes:
         population: individuals per generation (λ).
-        network: the encoding.
+        network: the policy's network, whose parameters are evolved.
     """
 
     name: ClassVar[str] = "cma_es"
@@ -67,7 +67,7 @@ class CmaEs:
     def __post_init__(self) -> None:
         """Check the population size: the better half recombines, with weights by rank."""
         if self.population < 4:
-            raise UserError(f"CMA-ES needs a population of at least 4, not {self.population}.")
+            raise UserError(f"CMA-ES has population={self.population}. Write at least 4.")
 
     def init(self, key: PRNGKeyArray, task: Task) -> CmaEsState:
         """Start from N(0, 1), evosax's default; the key is not used."""

@@ -149,4 +149,4 @@ def circuit_for(task: Task) -> ThresholdCircuit:
     if isinstance(task, SimpleAlu):
         names = (_MULTIPLEXERS[task.multiplexer], *_LISTS[task.operations][1:])
         return alu_circuit(names[: task.level_count])
-    raise UserError(f"Circuits are built by hand for N-parity and Simple ALU, not for the task {task.name!r}.")
+    raise UserError(f"There is no circuit built by hand for the task {task.name!r}. Use N-parity or Simple ALU.")

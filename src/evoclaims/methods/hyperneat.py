@@ -100,8 +100,8 @@ class HyperNeat(GenomeMethod):
         ends = len(substrate.layers[0]), len(substrate.layers[-1])
         if ends != (inputs, outputs):
             raise UserError(
-                f"{task.name} needs a substrate with {inputs} inputs (one of them the bias) and {outputs} outputs; "
-                f"this one has {ends[0]} and {ends[1]}."
+                f"The substrate has {ends[0]} inputs and {ends[1]} outputs, but {task.name} needs {inputs} (one of "
+                f"them the bias) and {outputs}. Write a substrate of this size, or leave it out."
             )
         return SubstrateNetwork(substrate, self.network(task), self.threshold, self.max_weight)
 
@@ -110,6 +110,6 @@ def check_weights(threshold: float, max_weight: float) -> None:
     """Raise a `UserError` for numbers by which no weight can be drawn."""
     if not 0 <= threshold < 1 or not 0 < max_weight < math.inf:
         raise UserError(
-            "HyperNEAT's threshold lies in [0, 1) and its largest weight is finite and above 0: not "
-            f"{threshold} and {max_weight}."
+            f"HyperNEAT has threshold={threshold} and max_weight={max_weight}. Write a threshold from 0 to below 1, "
+            "and a finite largest weight above 0."
         )

@@ -70,7 +70,7 @@ class MapElites:
     counts as evaluated, but is dropped. Elites keep the fitness of the level they were evaluated on.
 
     Attributes:
-        network: the encoding: its weights and biases.
+        network: the policy's network, whose weights and biases are evolved.
         batch: individuals per iteration.
         cells: cells of the grid along x and along y.
         iso_sigma: standard deviation of the noise on every parameter.
@@ -92,17 +92,15 @@ class MapElites:
     def __post_init__(self) -> None:
         """Check the sizes and standard deviations."""
         if not isinstance(self.network, Mlp):
-            raise UserError(f"MAP-Elites evolves perceptrons: its network is an Mlp, not {self.network!r}.")
+            raise UserError(f"MAP-Elites has network={self.network!r}. Write an Mlp, such as Mlp((8,)).")
         require_at_least(1, "MAP-Elites's", batch=self.batch, initial=self.initial)
         if len(self.cells) != 2 or min(self.cells) < 1:
-            raise UserError(
-                f"The grid of MAP-Elites is {self.cells}. It must be two numbers of cells, each at least 1."
-            )
+            raise UserError(f"MAP-Elites has cells={self.cells}. Write two numbers of at least 1.")
         spreads = (self.iso_sigma, self.line_sigma)
         if not all(math.isfinite(sigma) and sigma >= 0 for sigma in spreads) or sum(spreads) == 0:
             raise UserError(
-                "MAP-Elites varies elites by finite standard deviations of at least 0, not both 0; iso_sigma and "
-                f"line_sigma are {self.iso_sigma} and {self.line_sigma}."
+                f"MAP-Elites has iso_sigma={self.iso_sigma} and line_sigma={self.line_sigma}. Write finite standard "
+                "deviations of at least 0, one of them above 0."
             )
 
     def init(self, key: PRNGKeyArray, task: Task) -> MapElitesState:
@@ -219,7 +217,8 @@ class MapElites:
         if not {"x", "y"} <= set(episodes.metrics):
             known = ", ".join(sorted(episodes.metrics)) or "none"
             raise UserError(
-                f'MAP-Elites maps episodes by their metrics "x" and "y"; the metrics of {task.name!r} are: {known}.'
+                f'MAP-Elites maps episodes by their metrics "x" and "y", which {task.name!r} lacks (it has: '
+                f"{known}). Add them to its episodes."
             )
         return episodes
 
@@ -278,7 +277,7 @@ def _repertoire() -> Any:
 def _mapped(task: Task) -> MappedTask:
     if not isinstance(task, MappedTask):
         raise UserError(
-            f"MAP-Elites maps where episodes end, and the task {task.name!r} has no area to map; use a task with "
+            f"MAP-Elites maps where episodes end, and the task {task.name!r} has no area to map. Use a task with "
             "`area` and `reachable`, such as a maze."
         )
     return task

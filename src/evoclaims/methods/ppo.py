@@ -100,13 +100,14 @@ class Ppo:
         require_at_least(1, "PPO's", **{name: getattr(self, name) for name in sizes})
         if any(width < 1 for width in (*self.policy_layers, *self.value_layers)):
             raise UserError(
-                "Every layer of PPO's networks has at least 1 neuron; these are "
-                f"{self.policy_layers} and {self.value_layers}."
+                f"PPO has policy_layers={self.policy_layers} and value_layers={self.value_layers}. Write at least 1 "
+                "neuron for each layer."
             )
         if self.batch_size * self.minibatches % self.environments:
             raise UserError(
-                f"PPO's batch_size × minibatches ({self.batch_size} × {self.minibatches}) must be a multiple of "
-                f"environments ({self.environments})."
+                f"PPO has batch_size={self.batch_size}, minibatches={self.minibatches} and "
+                f"environments={self.environments}. Write numbers for which batch_size × minibatches is a multiple "
+                "of environments."
             )
 
     def init(self, key: PRNGKeyArray, task: Task) -> PpoState:
@@ -117,10 +118,10 @@ class Ppo:
         """
         if self.level_test.sampled_episodes and task.horizon > 1:
             raise UserError(
-                "PPO's level test by sampled episodes plays one step in each, and an episode of "
-                f"{task.name} has up to {task.horizon}, so the first step would decide alone. Let the "
-                "task draw one row per episode (sampling='sampled'), or test the deterministic policy on "
-                "the whole table (sampled_episodes=0)."
+                f"PPO's level test by sampled episodes plays one step of each, but an episode of {task.name} has up "
+                f"to {task.horizon} steps, so the first one would decide alone. Let the task draw one row per "
+                "episode (sampling='sampled'), or test the deterministic policy on the whole table "
+                "(sampled_episodes=0)."
             )
         policy_key, value_key, reset_key = streams(key, "policy", "value", "reset")
         net = self._networks(task)

@@ -21,7 +21,7 @@ class RandomPolicy:
     """Draw one network's parameters from N(0, 1) and keep them.
 
     Attributes:
-        network: the encoding.
+        network: the policy's network, whose parameters are drawn.
     """
 
     name: ClassVar[str] = "random_policy"

@@ -25,7 +25,7 @@ class RandomSearch:
     Attributes:
         population: individuals drawn per step.
         std: standard deviation of every parameter; 1 is what CMA-ES starts from.
-        network: the encoding.
+        network: the policy's network, whose parameters are drawn.
     """
 
     name: ClassVar[str] = "random_search"
@@ -40,8 +40,8 @@ class RandomSearch:
         """Check the size and the spread."""
         if self.population < 1 or self.std <= 0:
             raise UserError(
-                "Random search needs a population of at least 1 and a standard deviation above 0, not "
-                f"{self.population} and {self.std}."
+                f"Random search has population={self.population} and std={self.std}. Write a population of at least "
+                "1 and a std above 0."
             )
 
     def init(self, key: PRNGKeyArray, task: Task) -> Champion:

@@ -28,7 +28,7 @@ class SeldomDecomposedCmaEs(CmaEs):
 
     Attributes:
         population: individuals per generation (λ).
-        network: the encoding.
+        network: the policy's network, whose parameters are evolved.
         replaced: share of the matrix that generations replace, Σ (c_1 + c_μ), before it is decomposed again. With 0
             it is decomposed in every generation, as by `CmaEs`.
     """
@@ -43,7 +43,10 @@ class SeldomDecomposedCmaEs(CmaEs):
         """Check the population size and the share."""
         super().__post_init__()
         if not 0.0 <= self.replaced < 1.0:
-            raise UserError(f"The share of the covariance matrix is at least 0 and below 1, not {self.replaced}.")
+            raise UserError(
+                f"SeldomDecomposedCmaEs has replaced={self.replaced}, a share of the covariance matrix. Write a "
+                "number from 0 to below 1."
+            )
 
     def _kept(self, distribution: Any) -> Any:
         """Return all of it: the next generations sample with these eigenvectors."""

@@ -35,9 +35,9 @@ class TrainingLoop:
         name: of the method; the function's if empty.
         revision: raise it when the function computes something else.
         deterministic: whether its trials have no chance in them, so that they may be copies of each other.
-        overspend: by which share of its budget a trial may exceed it, for loops that cannot stop in time: with 0.5 a
-            claim is an error where one spends more than 1.5 times its budget. Claims name what is overspent by more
-            than 2% in any case. It is part of the trial's id where it is set.
+        overspend: the share by which a trial may exceed its budget, for loops that cannot stop in time. With 0.5, a
+            trial that spends more than 1.5 times its budget makes its claim an error. Claims name every trial that
+            exceeds it by more than 2%. If it is set, it is part of the trial's id.
     """
 
     function: Callable[..., Any] | str
@@ -60,9 +60,9 @@ class TrainingLoop:
         for name, value in self.settings.items():
             if not _is_plain(value):
                 raise UserError(
-                    "Settings of a training loop are part of its trials' ids, so they are numbers, "
-                    f"words, lists and tables by name; {name!r} is {value!r}. Let the training function "
-                    "make it."
+                    f"The setting {name!r} of a training loop is {value!r}, which cannot be part of its trials' ids. "
+                    "Write numbers, words, and lists or tables of these, and let the training function make the "
+                    "rest."
                 )
         if callable(self.function):
             place = reference(self.function)
@@ -83,8 +83,8 @@ class TrainingLoop:
     def init(self, *_: Any, **__: Any) -> NoReturn:
         """Raise a `UserError`: the function trains, not steps that the engine compiles."""
         raise UserError(
-            f"{self.name!r} is a training loop. Its policies are examined where they are trained and are not kept, so "
-            "it has no champion."
+            f"{self.name!r} is a training loop. Its policies are examined where they are trained and are not kept, "
+            "so it has no champion. Use a method with init, step, best and cost here."
         )
 
     step = best = init
@@ -116,5 +116,6 @@ def check_arguments(function: Callable[..., Any], settings: Mapping[str, Any]) -
     except TypeError as error:
         raise UserError(
             f"The training function {function.__qualname__} does not take (task, seed, budget) and the settings "
-            f"{', '.join(settings) or 'none'}: {error}."
+            f"{', '.join(settings) or 'none'}: {error}. Give it these parameters, or leave out the settings that it "
+            "does not take."
         ) from error

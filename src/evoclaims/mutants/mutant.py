@@ -27,7 +27,7 @@ class Mutant:
 
     Attributes:
         says: what is wrong, such as "minimizes".
-        part: what has the fault.
+        part: "method" or "task", whichever has the fault.
         change: returns a condition with the fault, or None where it cannot be planted.
     """
 

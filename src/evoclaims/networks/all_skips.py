@@ -32,7 +32,7 @@ class AllSkips:
     def __post_init__(self) -> None:
         """Check the size."""
         if self.hidden < 0:
-            raise UserError(f"A network has 0 or more hidden neurons, not {self.hidden}.")
+            raise UserError(f"AllSkips has hidden={self.hidden}. Write 0 or more neurons.")
 
     def size(self, inputs: int, outputs: int) -> int:
         """Return the number of parameters."""

@@ -30,7 +30,7 @@ class Mlp:
     def __post_init__(self) -> None:
         """Check the widths."""
         if any(width < 1 for width in self.layers):
-            raise UserError(f"Every hidden layer of a perceptron has at least 1 neuron; these are {self.layers}.")
+            raise UserError(f"A perceptron has layers={self.layers}. Write at least 1 neuron for each hidden layer.")
 
     def size(self, inputs: int, outputs: int) -> int:
         """Return the number of parameters."""
@@ -49,8 +49,9 @@ class Mlp:
         inputs = observation.shape[-1]
         if parameters.shape != (self.size(inputs, outputs),):
             raise UserError(
-                f"A perceptron with layers={self.layers}, skip={self.skip} from {inputs} inputs to {outputs} outputs "
-                f"takes {self.size(inputs, outputs)} parameters, as its `size` says, and has {parameters.size}."
+                f"A perceptron with layers={self.layers}, skip={self.skip} was given {parameters.size} parameters. "
+                f"From {inputs} inputs to {outputs} outputs it takes {self.size(inputs, outputs)}, the number that "
+                "its `size` returns."
             )
         signal, start = observation, 0
         widths = (*self.layers, outputs)

@@ -30,10 +30,13 @@ class Substrate:
     def __post_init__(self) -> None:
         """Check that inputs and outputs exist and every layer has neurons, each at a point."""
         if len(self.layers) < 2 or not all(self.layers):
-            raise UserError("A substrate has a layer of inputs, one of outputs, and at least one neuron in each layer.")
+            raise UserError(
+                f"A substrate has layers of {tuple(map(len, self.layers))} neurons. Write at least a layer of "
+                "inputs and one of outputs, and no empty layer."
+            )
         for point in (point for layer in self.layers for point in layer):
             if len(point) != 2 or not all(map(math.isfinite, point)):
-                raise UserError(f"A neuron of a substrate is at {point}. It must be at two finite coordinates.")
+                raise UserError(f"A neuron of a substrate is at {point}. Write two finite coordinates.")
 
     @property
     def shapes(self) -> list[tuple[int, int]]:
@@ -63,7 +66,9 @@ def layered(widths: Sequence[int], extent: Extent = "largest_layer") -> Substrat
     """
     require_known("extent of a substrate", extent, get_args(Extent))
     if len(widths) < 2 or min(widths) < 1:
-        raise UserError(f"A substrate has at least two layers of at least one neuron each, not {tuple(widths)}.")
+        raise UserError(
+            f"A substrate has layers of {tuple(widths)} neurons. Write at least two layers of at least one neuron each."
+        )
     size = float(max(widths)) if extent == "largest_layer" else 1.0
     heights = _spread(len(widths), size)
     return Substrate(

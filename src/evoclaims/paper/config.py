@@ -119,8 +119,8 @@ def _trouble(table: Mapping[str, object], slurm: object) -> str:
         if key not in keys:
             return f"[tool.evoclaims] has the unknown key {key!r}.{guess(key, (*keys, 'slurm'))} "
         if not isinstance(value, str):
-            return f'[tool.evoclaims] has {key} = {value!r}, which is no text: write it in quotes, as {key} = "…". '
-    return "" if isinstance(slurm, dict) else f"[tool.evoclaims] has slurm = {slurm!r}, which is no table. "
+            return f'[tool.evoclaims] has {key} = {value!r}, which is not text. Write it in quotes, as {key} = "…". '
+    return "" if isinstance(slurm, dict) else f"[tool.evoclaims] has slurm = {slurm!r}, which is not a table. "
 
 
 def make_importable(root: Path) -> None:
@@ -141,7 +141,10 @@ def load_reproduction(config: SuiteConfig) -> Reproduction:
     module = import_module(config.reproduction, config.root, "[tool.evoclaims]")
     found = getattr(module, "REPRODUCTION", None)
     if not isinstance(found, Reproduction):
-        raise UserError(f"The module {config.reproduction!r} has no REPRODUCTION = Reproduction(...).")
+        raise UserError(
+            f"The module {config.reproduction!r} has no REPRODUCTION = Reproduction(...). Add it, or name another "
+            "module in [tool.evoclaims]."
+        )
     return found
 
 
@@ -152,5 +155,5 @@ def _tool_tables(path: Path) -> dict[str, object]:
     except FileNotFoundError:
         return {}
     except (OSError, ValueError, RecursionError) as error:
-        raise UserError(f"Cannot read {path}: {error}.") from error
+        raise UserError(f"Cannot read {path}: {error}. Correct the file.") from error
     return tool if isinstance(tool, dict) else {}

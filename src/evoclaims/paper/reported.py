@@ -81,17 +81,19 @@ def load_published(path: Path) -> Published:
     """Read a file of published numbers.
 
     Raises:
-        UserError: when it is missing, damaged, or a number lacks its place, or something has the place of a number.
+        UserError: when it is missing or damaged, when a number does not name its place in the paper, or when something
+            else stands where a number should.
     """
     try:
         plain = tomllib.loads(read_text(path))
     except (OSError, ValueError, RecursionError) as error:
-        raise UserError(f"Cannot read the published numbers in {path}: {error}.") from error
+        raise UserError(f"Cannot read the published numbers in {path}: {error}. Correct the file.") from error
     if wrong := [*_wrong_plots(plain.get("plots", {})), *_wrong_tables(plain.get("tables", {})), *_wrong_rest(plain)]:
         raise UserError(
-            f"{path} holds [plots.TASK.QUANTITY] with a place and methods (each with a list mean, and an error of the "
-            "same length where known; scale = [lowest, highest], precision and null), [tables.NAME] with a place and "
-            f"values, and trials = how many each mean is of, at least 2; these are neither: {', '.join(wrong)}."
+            f"{path} has entries that are not as expected: {', '.join(wrong)}. Write [plots.TASK.QUANTITY] with a "
+            "place and methods (each with a list mean, and an error of the same length where known; scale = "
+            "[lowest, highest], precision and null), [tables.NAME] with a place and values, and trials, the number "
+            "of trials behind each mean, at least 2."
         )
     return Published(plain.get("plots", {}), plain.get("tables", {}), plain.get("trials"))
 
@@ -175,6 +177,6 @@ def uncovered(folder: Path) -> tuple[Uncovered, ...]:
         found = convert(tomllib.loads(read_file(path).decode()), _File).sentence
     except (OSError, ValueError, ValidationError) as error:
         raise UserError(
-            f"Cannot read {path}: {error}. Each [[sentence]] has line (a number), says and because."
+            f"Cannot read {path}: {error}. Write each [[sentence]] with line (a number), says and because."
         ) from error
     return tuple(sorted(found, key=lambda one: one.line))

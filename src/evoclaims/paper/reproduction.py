@@ -56,10 +56,11 @@ class NullAgent:
 
     Attributes:
         says: what it is, in a few words.
-        numbers: returns the numbers of its trials of a condition; None where it cannot stand for one.
+        numbers: a function from a condition to the metrics, levels and curves of the agent's trials, or to None if the
+            agent cannot stand for it.
         method: a method of the same tier whose committed trials on the same task are its trials.
-        everywhere: it stands for every condition of an assertion at once, as a counter at its limit does; else also for
-            the claimed ones alone (see `claims.null_agents`).
+        everywhere: True if it only stands for all conditions of an assertion at once; False if it also stands for the
+            claimed ones alone, beside the trials of the others (see `claims.null_agents`).
 
     Raises:
         UserError: when it has both or neither.
@@ -73,7 +74,11 @@ class NullAgent:
     def __post_init__(self) -> None:
         """Check that it has trials of one kind."""
         if (self.numbers is None) == (not self.method):
-            raise UserError(f"The null agent {self.says!r} needs either numbers=... or method=..., and not both.")
+            raise UserError(
+                f"The null agent {self.says!r} has "
+                f"{'both numbers and a method' if self.method else 'neither numbers nor a method'}. Write either "
+                "numbers=... or method=...."
+            )
 
 
 class OtherTierError(UnknownNameError):
@@ -106,8 +111,8 @@ class Tier:
         """Reject a number of trials in the place of the design."""
         if not isinstance(self.design, Design):
             raise UserError(
-                f"A tier's design is a Design, not {self.design!r}. Write Tier(conditions, Design.fixed(10)) for "
-                "ten trials."
+                f"A tier has design={self.design!r}, which is not a Design. Write Tier(conditions, Design.fixed(10)) "
+                "for ten trials."
             )
 
     def condition(self, method: str, task: str) -> Condition:
@@ -150,7 +155,8 @@ class Reproduction:
     Tables of imported trials are looked for in `folder`.
 
     Raises:
-        UserError: when `trials` is neither, the folder no path, or conditions of different classes have one id.
+        UserError: when `trials` is not such a class, the folder is not a `pathlib.Path`, or conditions of different
+            classes have one id.
     """
 
     name: str

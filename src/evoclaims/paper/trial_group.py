@@ -38,13 +38,13 @@ def steps_to(source: Source, condition: Condition, curve: str, value: float, lev
     levels = condition.task.levels
     wanted = levels - 1 if level is None else level
     if not math.isfinite(value):
-        raise UserError(f"{source.label}: steps_to takes a finite value, not {value}.")
+        raise UserError(f"{source.label}: steps_to({value}) asks for a value that is not finite. Write a number.")
     if curve == "success" and not 0.0 <= value <= 1.0:
         raise UserError(
             f"{source.label}: a success is between 0 and 1, and never reaches {value:g}. Use a value in this range."
         )
     if not 0 <= wanted < levels:
-        raise UserError(f"{source.label} has levels 0 to {levels - 1}, not {wanted}.")
+        raise UserError(f"{source.label} has no level {wanted}. Use one from 0 to {levels - 1}.")
     cost, budget = condition.cost, float(condition.environment_steps)
     chunk = condition.budget.chunk(cost)
     imported = condition.existing is not None
@@ -162,7 +162,8 @@ class TrialGroup:
         not compared.
 
         Raises:
-            UnknownNameError: for a metric that imported trials do not have; of others it is known when they have run.
+            UnknownNameError: for a metric that imported trials do not have. Other trials have to run first: then a
+                missing metric makes the claim an error.
         """
         if read is None and self.condition.existing is not None:
             known = self.condition.existing[0].metrics
@@ -248,8 +249,6 @@ class TrialGroup:
             raise UserError(
                 f"{self.label} has {self.condition.task.levels} levels, counted from 0: an event at level {level} "
                 f"would always hold, or never. Use a level from {first} to {last}."
-                if first <= last
-                else f"{self.label} has a single level, which is 0, and so none beyond it."
             )
 
     def last_success_is(self, value: float) -> Event:

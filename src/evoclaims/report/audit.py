@@ -65,13 +65,13 @@ def _kinds(ours: Sequence[ClaimReport], papers: Sequence[ClaimReport], agents: i
         [names for report, names in satisfied if report.is_vacuous],
     )
     yield (
-        "satisfied by a null agent, and not supported or changed by planted faults",
+        "satisfied by a null agent, but not vacuous (not supported, or a planted fault changes the verdict)",
         [f"{names} ({report.outcome})" for report, names in satisfied if not report.is_vacuous],
     )
     yield (
         "verdicts that depend on the reading",
         [
-            f"{report.name} ({report.outcome}): {by_reading(report.readings)}"
+            f"{report.name} ({report.outcome}): {by_reading(report.readings).removeprefix('depends on the reading: ')}"
             for report in ours
             if report.depends_on_the_reading
         ],
@@ -79,17 +79,17 @@ def _kinds(ours: Sequence[ClaimReport], papers: Sequence[ClaimReport], agents: i
     yield (
         "judged by a reading that is younger than its trials",
         [
-            f"{report.name} ({report.outcome}): since {report.readings[0].since}, trials {_date(report)}"
+            f"{report.name} ({report.outcome}): written {report.readings[0].since}, first trial {_date(report)}"
             for report in ours
             if report.readings and report.readings[0].late
         ],
     )
     yield (
-        "sentences that the result of another one decides",
-        [f"{one.claim}: {', '.join(dict.fromkeys(one.same_as))}" for one in sentences(ours) if one.same_as],
+        "sentences with the same result as another one",
+        [f"{one.claim}: as {', '.join(dict.fromkeys(one.same_as))}" for one in sentences(ours) if one.same_as],
     )
     yield (
-        "assertions that the paper's own numbers do not pass",
+        "assertions that the paper's own numbers do not support",
         [
             f"{report.name}: {report.outcome}"
             for report in papers

@@ -37,7 +37,7 @@ def _scoreboard(page: Page) -> str:
     boards = [board for board in page.boards if board.sections]
     tallies = [tally for tally in Tally if any(tally in board.counts for board in boards)]
     return table(
-        ("tier", *map(str, tallies), "looked into and accepted", "others"),
+        ("tier", *map(str, tallies), "examined and accepted", "others"),
         (
             (literal(b.tier), *(str(b.counts.get(tally, 0)) for tally in tallies), str(b.accepted), b.others or NONE)
             for b in boards

@@ -120,7 +120,7 @@ class Board:
 
     @property
     def accepted(self) -> int:
-        """How many verdicts other than supported were looked into and accepted."""
+        """How many verdicts other than supported were examined and accepted."""
         reports = [section.report for section in self.sections]
         return sum(report.as_expected and report.outcome is not Outcome.SUPPORTED for report in reports)
 

@@ -26,7 +26,7 @@ def run_summary(reports: Sequence[ClaimReport], notes: Sequence[str] = ()) -> st
 
 
 def _cells(report: ClaimReport) -> tuple[str, ...]:
-    because = f"; looked into and accepted: {report.because}" if report.as_expected and report.because else ""
+    because = f"; examined and accepted: {report.because}" if report.as_expected and report.because else ""
     return (
         f"{report.name} ({report.tier})",
         f"{report.statement} ({report.where})",

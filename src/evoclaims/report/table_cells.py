@@ -139,5 +139,5 @@ def faults(reports: Iterable[ClaimReport]) -> str:
     if not found:
         return ""
     if set(found) == {Tried.NOT_TRIED}:
-        return "planted faults: not tried"
-    return "planted faults: " + ", ".join(f"{found[one]} {one}" for one in Tried if found[one])
+        return "claims against planted faults: not tried"
+    return "claims against planted faults: " + ", ".join(f"{found[one]} {one}" for one in Tried if found[one])

@@ -61,14 +61,14 @@ def by_chance(papers: Sequence[ClaimReport]) -> list[str]:
     if not found.tested:
         return []
     ended = Counter(report.outcome.value for report in papers)
-    survive = "; ".join(
-        f"at {rate:g} it keeps {kept[0]} of {ended['supported']} supported and {kept[1]} of {ended['refuted']} refuted"
+    survive = "; one of ".join(
+        f"{rate:g} leaves {kept[0]} of {ended['supported']} supported and {kept[1]} of {ended['refuted']} refuted"
         for rate, kept in found.kept.items()
     )
     return [
         f"Chance alone would support at most {found.expected:.1f} of {found.tested} tested cases if every claim were "
-        f"false, and refute at most as many if every claim were true. By Benjamini and Hochberg's rate of false "
-        f"discoveries, {survive}."
+        f"false, and refute at most as many if every claim were true. By Benjamini and Hochberg's "
+        f"procedure, a false discovery rate of {survive}."
     ]
 
 

@@ -69,13 +69,13 @@ def verdict_table(reports: Sequence[ClaimReport], width: int, colour: bool, enco
     folders = sorted({os.path.relpath(Path(report.evidence).parent) for report in reports if report.evidence})
     captions = [f"evidence: {printable(folder)}/<claim>.json" for folder in folders]
     if any(report.as_expected for report in reports):
-        captions.append("* looked into and accepted")
+        captions.append("* examined and accepted (expect= in the claim)")
     if any(report.tried is Tried.INSENSITIVE for report in reports):
         captions.append("insensitive: no fault planted in the claim's methods changes its verdict, so it is no support")
     if any(report.is_vacuous for report in reports):
         captions.append("vacuous: a null agent, which has learnt nothing, is supported as well, so it is no support")
     if any(report.depends_on_the_reading for report in reports):
-        captions.append("by reading: another reading of the sentence ends otherwise (evoclaims audit)")
+        captions.append("by reading: another reading of the sentence gives another verdict (evoclaims audit)")
     captions += other_code.lines(reports)
     below = _rendered("\n".join(captions), width, colour).splitlines() if captions else []
     return "\n".join([*(_rendered(line, width, colour).rstrip() for line in lines), *map(str.rstrip, below)])

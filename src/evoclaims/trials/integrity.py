@@ -138,12 +138,12 @@ def _checkpoints(store: Store, fault: Callable[[Path], str | None]) -> Iterator[
 
 
 def _leftovers(store: Store) -> Iterator[Problem]:
-    """Find files that a kill left half-written, and notices of processes that no longer run."""
+    """Find files that a kill left half-written, and leases of processes that no longer run."""
     for path in sorted(store.root.rglob(".*.tmp")):
         if _quarantine(store) not in path.parents and _settled(path):
             yield Problem(path, "leftover", "its writer was stopped before the file was whole")
     for path in sorted((store.root / "running").glob("*")):
-        beside = (path, path.with_suffix(".lock"))  # a running process refreshes its notice
+        beside = (path, path.with_suffix(".lock"))  # a running process refreshes its lease
         if not path.name.startswith(".") and all(_settled(one) for one in beside if one.exists()):
             yield Problem(path, "leftover", "the process that it announces is no longer at work")
 

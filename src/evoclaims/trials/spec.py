@@ -28,6 +28,9 @@ class Budget:
         environment_steps: interactions with the task, for reinforcement learning; rounded up to whole steps of
             the method.
         reports: points on the training curve.
+
+    Raises:
+        UserError: unless exactly one of the two lengths is given, and all numbers are whole and at least 1.
     """
 
     generations: int | None = None
@@ -188,7 +191,7 @@ class Condition:
         return code_of(self.method, self.task)
 
     def edited_since(self, trials: Iterable[TrialResult]) -> tuple[str, ...]:
-        """Return the classes whose code some of these trials ran otherwise than it is now, or under another name."""
+        """Return the project's classes whose code some of these trials ran otherwise, or under another name."""
         recorded = [code for trial in trials if isinstance(code := trial.provenance.get(CODE), Mapping)]
         return tuple(name for name, now in self.code.items() if any(code.get(name) != now for code in recorded))
 

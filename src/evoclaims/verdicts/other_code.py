@@ -43,14 +43,14 @@ def lines(reports: Sequence[ClaimReport]) -> list[str]:
             elsewhere.append(f"{report.name} ({report.tier})")
         for name, those in other.items():
             foreign[name] += those
-    lines = [f"{MARK} versions are mixed: {what}: {listed(names)}" for what, names in mixed.items()]
+    lines = [f"{MARK} trials of mixed versions: {what}: {listed(names)}" for what, names in mixed.items()]
     if elsewhere:
         here = installed(tuple(foreign))
         packages = (
-            f"{name} {in_words(different(those))} (here {here[name] or 'none'})"
+            f"{name} {in_words(different(those))} (installed: {here[name] or 'none'})"
             for name, those in sorted(foreign.items())
         )
-        lines.append(f"not made with the installed versions: {', '.join(packages)}: {listed(elsewhere)}")
+        lines.append(f"trials from other versions than the installed ones: {', '.join(packages)}: {listed(elsewhere)}")
     lines += [f"{summary(name)}: {listed(names)}" for name, names in sorted(edits.items())]
     return [printable(line) for line in lines]
 

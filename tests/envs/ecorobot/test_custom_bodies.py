@@ -99,7 +99,7 @@ def test_a_built_in_robot_s_file_that_was_edited_is_refused(monkeypatch: pytest.
     xml = ROBOTS["simple_rob"].xml
     monkeypatch.setitem(model_files.BUILT_IN, xml, "0" * 64)
     with pytest.raises(
-        UserError, match=r"The model of the robot simple_rob, .*, is not the one that the paper's trials"
+        UserError, match=r"The model of the robot simple_rob, .*, is not the file with which the paper's trials"
     ):
         model_files.read("simple_rob", xml)
 

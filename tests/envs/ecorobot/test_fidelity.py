@@ -47,7 +47,7 @@ def test_a_step_that_differs_by_a_millionth_is_refused(tmp_path: Path, monkeypat
         return replace(body, velocity=body.velocity * (1 + 1e-6))
 
     monkeypatch.setattr(physics, "_frame", faulty)
-    with pytest.raises(UserError, match="rover is not simulated here as its file says: in .* random states a frame"):
+    with pytest.raises(UserError, match="rover is not simulated as its file says. In .* random states a frame"):
         check(scene)
 
 

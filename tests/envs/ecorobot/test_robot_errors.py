@@ -56,7 +56,7 @@ def test_episodes_and_their_steps_are_at_least_1(kind: Any, name: str) -> None:
     ids=str,
 )
 def test_a_box_has_a_volume(numbers: dict[str, Any]) -> None:
-    with pytest.raises(UserError, match="A box has finite numbers, half-sizes above 0"):
+    with pytest.raises(UserError, match="is not valid. Write finite numbers, half sizes above 0"):
         Box(**{"centre": (0.0, 0.0), "half_size": (1.0, 1.0), **numbers})
 
 
@@ -71,14 +71,14 @@ def test_a_box_has_a_volume(numbers: dict[str, Any]) -> None:
     ids=str,
 )
 def test_a_surface_has_numbers_that_a_simulation_can_use(numbers: dict[str, Any]) -> None:
-    with pytest.raises(UserError, match="A surface has 3 frictions of at least 0"):
+    with pytest.raises(UserError, match="is not valid. Write three frictions of at least 0"):
         Surface(**numbers)
 
 
 @pytest.mark.parametrize("sensor", [Rangefinders, PieSlices])
 @pytest.mark.parametrize("numbers", [{"count": 0}, {"reach": 0.0}, {"reach": math.inf}, {"reach": math.nan}])
 def test_a_sensor_has_rays_and_a_reach(sensor: Any, numbers: dict[str, Any]) -> None:
-    with pytest.raises(UserError, match="at least 1 ray and a finite reach above 0 m"):
+    with pytest.raises(UserError, match="at least 1 ray, and a finite reach above 0"):
         sensor(**numbers)
 
 
@@ -140,5 +140,5 @@ def test_a_robot_with_what_is_not_simulated_says_so(
 
 
 def test_a_robot_whose_floor_would_count_as_a_box_says_so(of_text: Callable[[str], Robot]) -> None:
-    with pytest.raises(UserError, match="has a geom of the world in group 1, which is that of a task's boxes"):
+    with pytest.raises(UserError, match="has a geom of the world in group 1, which is the group of a task's boxes"):
         _ = Scene(of_text(ROB.replace('group="0"', 'group="1"'))).model

@@ -79,16 +79,18 @@ def test_an_environment_whose_episodes_may_never_end_is_refused_before_training(
 
 
 def test_an_unknown_environment_or_setting_is_a_sentence() -> None:
-    with pytest.raises(UserError, match=r"Gymnasium makes no 'CartPole-v9' with {}"):
+    with pytest.raises(UserError, match=r"Gymnasium cannot make 'CartPole-v9' with {}"):
         GymnasiumTask("CartPole-v9").make()
-    with pytest.raises(UserError, match="Gymnasium makes no 'CartPole-v1' with {'wheels': 4}"):
+    with pytest.raises(UserError, match="Gymnasium cannot make 'CartPole-v1' with {'wheels': 4}"):
         GymnasiumTask("CartPole-v1", {"wheels": 4}).make()
 
 
 def test_a_method_that_is_compiled_says_what_to_do_instead(store_of: Store) -> None:
     search = RandomSearch(population=2, network=Mlp((2,)))
     condition = Condition(search, CART, "direct", Budget(generations=1))
-    with pytest.raises(UserError, match="which runs on the host: train on it by a TrainingLoop, or take"):
+    with pytest.raises(
+        UserError, match="which runs on the host and not in compiled programs. Train on it with a TrainingLoop"
+    ):
         run(condition, [0], store_of, jax.devices("cpu"))
 
 
@@ -111,5 +113,5 @@ def test_a_task_of_ours_is_an_environment_that_gymnasium_accepts() -> None:
 
 @pytest.mark.parametrize("level", [-1, 2])
 def test_a_task_as_an_environment_of_gymnasium_has_the_levels_that_it_has(level: int) -> None:
-    with pytest.raises(UserError, match=f"n_parity has levels 0 to 1, not {level}"):
+    with pytest.raises(UserError, match=f"n_parity has no level {level}. Use one from 0 to 1"):
         GymnasiumEnv(NParity(3), level=level)

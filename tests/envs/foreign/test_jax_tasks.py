@@ -190,7 +190,7 @@ def test_wrong_names_and_what_map_elites_needs_are_sentences() -> None:
 
 @pytest.mark.parametrize("places", [(0,), (0, 1, 2), (-1, 0), (0.5, 1)])
 def test_a_descriptors_places_are_two_positions(places: Any) -> None:
-    with pytest.raises(UserError, match=r"places are \(.*\)\. They must be two positions in the observation"):
+    with pytest.raises(UserError, match=r"has places=\(.*\)\. Write two positions in the observation"):
         Descriptor(places=places, area=((0, 1), (0, 1)))
 
 
@@ -202,5 +202,7 @@ def test_a_descriptors_area_has_room(area: Any) -> None:
 
 def test_a_place_beyond_the_observation_is_not_read_as_its_last_number() -> None:
     beyond = Descriptor(places=(0, 2), area=((-5, 5), (-5, 5)))  # an observation of fast has two numbers
-    with pytest.raises(UserError, match=r"reads the places \(0, 2\) of its observation, which has 2 numbers"):
+    with pytest.raises(
+        UserError, match=r"reads the places \(0, 2\) of its observation, which has 2 numbers. Write places from 0 to 1"
+    ):
         traced_progress(METHODS["map_elites"], BraxTask("fast", episode_steps=12, descriptor=beyond))

@@ -165,5 +165,5 @@ def test_the_default_is_the_papers() -> None:
 
 def test_a_task_that_does_not_fit_is_one_sentence() -> None:
     small = Neat(Settings(population=20, nodes=6, connections=24, species=Species(most=4)))
-    with pytest.raises(UserError, match="starts with 7 nodes and 6 connections; at most 6 and 24"):
+    with pytest.raises(UserError, match="starts with 7 nodes and 6 connections, but nodes=6 and connections=24"):
         small.init(jax.random.key(0), NParity(6))

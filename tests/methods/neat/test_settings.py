@@ -54,7 +54,7 @@ def test_impossible_attributes_are_refused(wrong: dict[str, Any]) -> None:
 )
 @pytest.mark.parametrize("value", [-0.1, 1.1])
 def test_what_is_no_probability_is_refused_by_its_name(name: str, value: float) -> None:
-    with pytest.raises(UserError, match=f"{name} is .* It must be between 0 and 1"):
+    with pytest.raises(UserError, match=f"{name}={value}. Write a number from 0 to 1"):
         Mutation(**{name: value})
 
 

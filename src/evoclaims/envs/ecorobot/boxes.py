@@ -30,8 +30,8 @@ class Surface:
         numbers = [number for part in parts for number in part]
         if tuple(map(len, parts)) != (3, 2, 5) or not all(map(math.isfinite, numbers)) or min(self.friction) < 0:
             raise UserError(
-                "A surface has 3 frictions of at least 0, and 2 numbers of solref and 5 of solimp, all finite, unlike "
-                f"{self}."
+                f"{self} is not valid. Write three frictions of at least 0, two numbers of solref and five of "
+                "solimp, all finite."
             )
 
 
@@ -59,7 +59,7 @@ class Box:
         numbers = (*self.centre, *self.half_size, self.angle, self.bottom, self.top)
         if not all(map(math.isfinite, numbers)) or min(self.half_size) <= 0 or self.bottom >= self.top:
             raise UserError(
-                f"A box has finite numbers, half-sizes above 0 and its bottom below its top, unlike {self}."
+                f"{self} is not valid. Write finite numbers, half sizes above 0, and a bottom below its top."
             )
 
     @property

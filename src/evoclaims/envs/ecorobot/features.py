@@ -151,35 +151,40 @@ def require_simulated(name: str, model: mujoco.MjModel) -> None:
     """
     if beyond := sorted(set(_beyond(model))):
         raise UserError(
-            f"The model of the robot {name} has {', '.join(beyond)}, which is not simulated here: a step knows "
-            "joints with limits, springs and damping, motors without a state of their own, and contacts with pyramidal "
-            "friction cones, and integrates as MuJoCo's Euler or RK4 does."
+            f"The model of the robot {name} has {', '.join(beyond)}, which is not simulated here. Remove it from the "
+            "file. A step simulates joints with limits, springs and damping, motors without a state, and contacts "
+            "with pyramidal friction cones, by MuJoCo's Euler or RK4 integrator."
         )
     if model.nbody < 2 or not model.body_jntnum[1]:
         body = model.body(1).name or "without a name" if model.nbody > 1 else ""
         has = f"its first body ({body}) has no joint" if body else "it has no body"
         raise UserError(
-            f"The model of the robot {name} has no torso: {has}. The first body in <worldbody> is the torso, and its "
-            "joints move the robot through the world."
+            f"The model of the robot {name} has no torso: {has}. Begin <worldbody> with a body that has joints: it "
+            "is the torso, and its joints move the robot through the world."
         )
     for array in sorted(SIMULATED):
         numbers = getattr(model, array, np.zeros(0))
         if numbers.dtype.kind == "f" and not np.isfinite(numbers).all():
-            raise UserError(f"The model of the robot {name} has numbers in {array} that are not finite.")
+            raise UserError(
+                f"The model of the robot {name} has numbers in {array} that are not finite. Write finite ones."
+            )
     for option in sorted(OPTIONS):
         if not np.isfinite(getattr(model.opt, option)).all():
-            raise UserError(f"The model of the robot {name} has the option {option}, which is not finite.")
+            raise UserError(
+                f"The model of the robot {name} has {option}={getattr(model.opt, option)}, which is not finite. "
+                "Write finite numbers."
+            )
     if model.opt.timestep <= 0:
         raise UserError(
-            f"The model of the robot {name} has timestep={model.opt.timestep:g}, so that it never moves on: write a "
-            "number above 0, in s."
+            f"The model of the robot {name} has timestep={model.opt.timestep:g}, so its time would not go on. Write "
+            "a number above 0, in s."
         )
     for array in RANGES:
         low, high = getattr(model, array).T
         for row in np.flatnonzero(low > high):
             raise UserError(
                 f"The model of the robot {name} has a reversed range in {array} ({low[row]:g} {high[row]:g}), which "
-                "MuJoCo reads as no limit: write the lower number first."
+                "MuJoCo reads as no limit. Write the lower number first."
             )
 
 

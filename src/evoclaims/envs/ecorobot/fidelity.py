@@ -131,13 +131,14 @@ def check(scene: Scene) -> None:
     crowded = wrong & (made.contacts > robot.contacts)
     if crowded.any() and not (wrong & ~crowded).any():
         raise UserError(
-            f"The robot {robot.name} touches at {made.contacts[crowded].max()} points at a time, and contacts="
-            f"{robot.contacts} of them are simulated: write Robot(…, contacts={made.contacts.max()}) or more."
+            f"The robot {robot.name} touches at {made.contacts[crowded].max()} points at a time, but only "
+            f"contacts={robot.contacts} of them are simulated. Write Robot(…, contacts={made.contacts.max()}) or "
+            "more."
         )
     raise UserError(
-        f"The robot {robot.name} is not simulated here as its file says: in {np.sum(wrong)} of {len(wrong)} random "
-        f"states a frame differs from MuJoCo's own by up to {off[worst]:.2g} of 1 plus the largest velocity "
-        f"({TOLERANCE:g} is allowed), with {made.contacts[worst]} contacts. {_cause(scene, made, ours, worst)}"
+        f"The robot {robot.name} is not simulated as its file says. In {np.sum(wrong)} of {len(wrong)} random states "
+        f"a frame differs from MuJoCo's own by up to {off[worst]:.2g} times (1 plus the largest velocity), in a "
+        f"state with {made.contacts[worst]} contacts; {TOLERANCE:g} is allowed. {_cause(scene, made, ours, worst)}"
     )
 
 
@@ -149,7 +150,7 @@ def _cause(scene: Scene, made: Frames, ours: Numbers, row: int) -> str:
     if _off(ours[row, : len(theirs)], theirs) <= TOLERANCE:
         return (
             f"MuJoCo's solver stops before the minimum there (tolerance={scene.whole.opt.tolerance:g}), and a step "
-            'here does not: write <option tolerance="1e-14"/>.'
+            'here does not. Write <option tolerance="1e-14"/>.'
         )
     wider, narrower = copy(scene.whole), copy(scene.whole)
     for model, by in ((wider, EDGE), (narrower, -EDGE)):
@@ -160,8 +161,8 @@ def _cause(scene: Scene, made: Frames, ours: Numbers, row: int) -> str:
         one, other = (scene.whole.geom(geom).name or "without a name" for geom in min((met - sure) or (sure - met)))
         return (
             f"MuJoCo's own frame is decided by rounding errors there, since the geoms {one} and {other} are exactly as "
-            "far apart as where contact begins: move or resize one of them, or write contype and conaffinity with "
-            "which they do not meet."
+            "far apart as where contact begins. Move or resize one of them, or set contype and conaffinity so that "
+            "the two never touch."
         )
     return (
         "Remove from the file what MJX computes in another way, such as contacts of meshes, or a solver that stops "
@@ -236,7 +237,7 @@ def frames_of(scene: Scene) -> Frames:
                 rows.append([*before, data.qpos.copy(), data.qvel.copy(), pose, touching])
     if not rows:
         raise UserError(
-            f"The robot {scene.robot.name} diverges in its first frame in MuJoCo itself: write a smaller timestep."
+            f"The robot {scene.robot.name} diverges in its first frame, in MuJoCo itself. Write a smaller timestep."
         )
     return Frames(*(np.array(column) for column in zip(*rows, strict=True)))
 

@@ -56,11 +56,14 @@ def path_of(name: str, xml: str) -> str:
         found = resources.files(package) / path
     except (ImportError, TypeError, ValueError) as error:
         raise UserError(
-            f"The robot {name!r} has its model in {xml!r}, and there is no package {package!r}: write "
-            "PACKAGE:PATH, of a package that can be imported."
+            f"The robot {name!r} has its model in {xml!r}, and there is no package {package!r}. Write PACKAGE:PATH, "
+            "with a package that can be imported."
         ) from error
     if not found.is_file():
-        raise UserError(f"The robot {name!r} has its model in {xml!r}, and there is no file {found}.")
+        raise UserError(
+            f"The robot {name!r} has its model in {xml!r}, and there is no file {found}. Correct the path after the "
+            "colon."
+        )
     return str(found)
 
 
@@ -73,13 +76,15 @@ def read(name: str, xml: str) -> mujoco.MjSpec:
     path = path_of(name, xml)
     if xml in BUILT_IN and hashlib.sha256(read_file(Path(path))).hexdigest() != BUILT_IN[xml]:
         raise UserError(
-            f"The model of the robot {name}, {path}, is not the one that the paper's trials were made with. Install "
-            "the package that has it again, or copy the file into a package of yours to use it as it is."
+            f"The model of the robot {name}, {path}, is not the file with which the paper's trials were made. "
+            "Install its package again. To use the changed file, copy it into a package of your own."
         )
     try:
         return mujoco.MjSpec.from_file(path)
     except (ValueError, OSError, mujoco.FatalError) as error:
-        raise UserError(f"The model of the robot {name} cannot be read: {in_one_line(error)}") from error
+        raise UserError(
+            f"The model of the robot {name} cannot be read: {in_one_line(error)}. Correct {path}."
+        ) from error
 
 
 def compiled(name: str, spec: mujoco.MjSpec) -> mujoco.MjModel:
@@ -93,7 +98,9 @@ def compiled(name: str, spec: mujoco.MjSpec) -> mujoco.MjModel:
     try:
         model = spec.compile()
     except (ValueError, OSError, mujoco.FatalError, UserWarning) as error:  # a warning where filters make it an error
-        raise UserError(f"The model of the robot {name} cannot be compiled: {in_one_line(error)}") from error
+        raise UserError(
+            f"The model of the robot {name} cannot be compiled: {in_one_line(error)}. Correct its file."
+        ) from error
     if total > 0:
         mujoco.mj_setTotalmass(model, total)
         mujoco.mj_setConst(model, mujoco.MjData(model))
@@ -137,7 +144,7 @@ def require_unedited(name: str, xml: str, body: str | None) -> None:
         UserError: when it was edited meanwhile: trials would be stored as those of the old body.
     """
     if body_hash(own_model(name, xml)) != body:
-        raise UserError(f"The model of the robot {name} was edited while this process ran: start it again.")
+        raise UserError(f"The model of the robot {name} was edited while this process ran. Start the process again.")
 
 
 def is_cosmetic(name: str) -> bool:

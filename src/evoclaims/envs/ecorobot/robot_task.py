@@ -63,9 +63,9 @@ class RobotTask(ABC):
         counts = {"episode_steps": self.episode_steps, "examined_episodes": self.examined_episodes}
         require_at_least(1, f"{self.name}'s", **counts)
         if not isinstance(self.robot, Robot):
-            raise UserError(f"{self.name}'s robot must be a Robot, such as ANT, not {self.robot!r}.")
+            raise UserError(f"{self.name} has robot={self.robot!r}. Write a Robot, such as ANT.")
         if self.sensor is not None and not callable(getattr(self.sensor, "read", None)):
-            raise UserError(f"{self.name}'s sensor must be Rangefinders(…), PieSlices(…) or None, not {self.sensor!r}.")
+            raise UserError(f"{self.name} has sensor={self.sensor!r}. Write Rangefinders(…), PieSlices(…) or None.")
         # The built-in robots fit; to compile them takes longer than to load a paper.
         if not fits_as_built_in(self.robot):
             self._require_fit()
@@ -74,7 +74,10 @@ class RobotTask(ABC):
         """Compile the robot among the boxes, and check that it can act and starts where the task says."""
         model, robot = self.scene.whole, self.robot
         if not model.nu:
-            raise UserError(f"The model of the robot {robot.name} has no actuators, so that it cannot act: write some.")
+            raise UserError(
+                f"The model of the robot {robot.name} has no actuators, so it cannot act. Add an <actuator> section "
+                "to its file."
+            )
         if self.start is None:
             return
         data = mujoco.MjData(model)
@@ -84,9 +87,9 @@ class RobotTask(ABC):
         place = data.xpos[1][:2]
         if not np.allclose(place, self.start, atol=1e-5):
             raise UserError(
-                f"{self.name} starts its robots at x {self.start[0]:g} and y {self.start[1]:g}, and the first two "
-                f"positions of {robot.name} put it at x {place[0]:g} and y {place[1]:g}: its torso needs a free joint, "
-                "or slides along x and y as its first joints, at x 0 and y 0."
+                f"{self.name} starts its robots at x {self.start[0]:g} and y {self.start[1]:g}, but with these as "
+                f"the first two positions of {robot.name} its torso is at x {place[0]:g} and y {place[1]:g}. Give "
+                "the torso a free joint, or slides along x and y as its first joints, and place it at x 0 and y 0."
             )
 
     def check(self) -> None:

@@ -39,7 +39,7 @@ class Robot:
         seen_velocities: how many velocities a policy sees, from the first; None for all.
         velocity_limit: shown velocities are clipped to it.
         contacts: most contacts kept, the nearest ones.
-        touching: contacts of which seldom more touch at a time. Steps with more take longer; results are the same.
+        touching: how many contacts touch at a time in most steps. Steps with more take longer, with the same results.
         body: a hash of what it is made of, part of its trials' ids; None for the built-in robots, whose files stay.
 
     A built-in robot's file is simulated as the paper's code does: one iteration of the solver, explicit damping. Any
@@ -94,13 +94,13 @@ class Robot:
         for name, (given, most) in sizes.items():
             if given is not None and given > most:
                 raise UserError(
-                    f"The robot {self.name} has {name}={given}, and its model has {most}: write at most {most}."
+                    f"The robot {self.name} has {name}={given}, but its model has {most}. Write at most {most}."
                 )
         if self.start is not None:
             if len(self.start) != model.nq:
                 raise UserError(
-                    f"The robot {self.name} starts at {len(self.start)} positions, and its model has {model.nq}: write "
-                    f"{model.nq} numbers as its start."
+                    f"The robot {self.name} has a start of {len(self.start)} positions, but its model has "
+                    f"{model.nq}. Write {model.nq} numbers."
                 )
             for joint in np.flatnonzero(
                 np.isin(model.jnt_type, (mujoco.mjtJoint.mjJNT_FREE, mujoco.mjtJoint.mjJNT_BALL))
@@ -109,22 +109,22 @@ class Robot:
                 if not any(self.start[at : at + 4]):
                     raise UserError(
                         f"The robot {self.name} starts with the orientation 0 0 0 0 (positions {at} to {at + 3}), "
-                        "which is not a rotation: write 1 0 0 0 for upright."
+                        "which is not a rotation. Write 1 0 0 0 for upright."
                     )
         low, high = model.actuator_ctrlrange.T
         if self.scales_actions and not np.all(low < high):
             motor = model.actuator(int(np.argmin(low < high)))
             raise UserError(
-                f"The robot {self.name} has scales_actions=True, and its actuator {motor.name or motor.id} has the "
-                f"ctrlrange {motor.ctrlrange[0]:g} {motor.ctrlrange[1]:g}, so that actions span nothing: "
-                "write a ctrlrange whose first number is below its second, or leave out scales_actions."
+                f"The robot {self.name} has scales_actions=True, but its actuator {motor.name or motor.id} has the "
+                f"ctrlrange {motor.ctrlrange[0]:g} {motor.ctrlrange[1]:g}, which is empty. Write a ctrlrange whose "
+                "first number is below its second, or leave out scales_actions."
             )
 
     def _require_numbers(self) -> None:
         """Check types, signs and order of what does not depend on the model."""
         for name in ("name", "xml"):
             if not isinstance(getattr(self, name), str) or not getattr(self, name):
-                raise UserError(f"A robot's {name} is a text that is not empty, not {getattr(self, name)!r}.")
+                raise UserError(f"A robot has {name}={getattr(self, name)!r}. Write text that is not empty.")
         least = {"frames": 1, "contacts": 1, "touching": 0, "free_coordinates": 0, "seen_velocities": 0}
         for name, lowest in least.items():
             given = getattr(self, name)
@@ -132,11 +132,11 @@ class Robot:
                 continue
             if not isinstance(given, int) or isinstance(given, bool) or given < lowest:
                 raise UserError(
-                    f"The robot {self.name} has {name}={given!r}: write a whole number of at least {lowest}."
+                    f"The robot {self.name} has {name}={given!r}. Write a whole number of at least {lowest}."
                 )
         for name in ("normal_velocity", "scales_actions"):
             if not isinstance(getattr(self, name), bool):
-                raise UserError(f"The robot {self.name} has {name}={getattr(self, name)!r}: write True or False.")
+                raise UserError(f"The robot {self.name} has {name}={getattr(self, name)!r}. Write True or False.")
         for name in (
             "torso_radius",
             "forward_reward",
@@ -149,18 +149,18 @@ class Robot:
             signed = name in ("forward_reward", "control_cost", "healthy_reward")
             if not _is_number(given) or math.isinf(given) or (given < 0 and not signed):
                 allowed = "a finite number" if signed else "a finite number of at least 0"
-                raise UserError(f"The robot {self.name} has {name}={given!r}: write {allowed}.")
+                raise UserError(f"The robot {self.name} has {name}={given!r}. Write {allowed}.")
         for name in ("healthy_pitch", "velocity_limit"):
             given = getattr(self, name)
             if not _is_number(given) or given <= 0:
-                raise UserError(f"The robot {self.name} has {name}={given!r}: write a number above 0, or math.inf.")
+                raise UserError(f"The robot {self.name} has {name}={given!r}. Write a number above 0, or math.inf.")
         heights = self.healthy_height
         if not _are_numbers(heights) or len(heights) != 2 or not heights[0] < heights[1]:
             raise UserError(
-                f"The robot {self.name} has healthy_height={heights!r}: write the lowest height and the highest, in m."
+                f"The robot {self.name} has healthy_height={heights!r}. Write the lowest height and the highest, in m."
             )
         if self.start is not None and (not _are_numbers(self.start) or not all(map(math.isfinite, self.start))):
-            raise UserError(f"The robot {self.name} has start={self.start!r}: write a tuple of finite numbers.")
+            raise UserError(f"The robot {self.name} has start={self.start!r}. Write a tuple of finite numbers.")
 
     @property
     def file(self) -> str:

@@ -135,7 +135,10 @@ class Scene:
             with jax.ensure_compile_time_eval():
                 model = jax.device_get(mjx.put_model(explicit, impl="jax"))
         except (NotImplementedError, ValueError, AssertionError) as error:
-            raise UserError(f"MJX cannot simulate the model of the robot {self.robot.name}: {error}") from error
+            raise UserError(
+                f"MJX cannot simulate the model of the robot {self.robot.name}: {str(error).removesuffix('.')}. Remove "
+                "this from its file."
+            ) from error
         # Erase the boxes that happen to come first, or programs would depend on them.
         geoms = box_geoms(self.model)
         blank = {name: np.array(getattr(model, name)) for name in self.turns}
@@ -206,8 +209,8 @@ def _compiled(robot: Robot, boxes: tuple[Box, ...]) -> mujoco.MjModel:
     spec = model_files.read(robot.name, robot.xml)
     if any(geom.group == WORLD_GROUP for geom in spec.worldbody.geoms):
         raise UserError(
-            f"The robot {robot.name} has a geom of the world in group {WORLD_GROUP}, which is that of a task's boxes: "
-            "give its floor another group."
+            f"The robot {robot.name} has a geom of the world in group {WORLD_GROUP}, which is the group of a task's "
+            "boxes. Give its floor another group."
         )
     if robot.is_built_in:
         option = spec.option
@@ -259,9 +262,9 @@ def _require_contacts(name: str, model: mujoco.MjModel) -> None:
                 for geom in (one, other)
             ]
             raise UserError(
-                f"The robot {name} has a {pair[0]} ({names[0]}) and a {pair[1]} ({names[1]}) that can touch, of which "
-                "MJX computes no contacts, or other ones than MuJoCo. Write another type of geom, such as spheres, or "
-                "contype and conaffinity with which they do not meet."
+                f"The robot {name} has a {pair[0]} ({names[0]}) and a {pair[1]} ({names[1]}) that can touch. For "
+                "this pair MJX computes no contacts, or others than MuJoCo. Write another type of geom, such as "
+                "spheres, or set contype and conaffinity so that the two never touch."
             )
 
 

@@ -36,7 +36,8 @@ class _Rays:
         """Check the numbers."""
         if self.count < 1 or not 0 < self.reach < math.inf:
             raise UserError(
-                f"A sensor has at least 1 ray and a finite reach above 0 m, not {self.count} and {self.reach}."
+                f"A sensor has count={self.count} and reach={self.reach}. Write at least 1 ray, and a finite reach "
+                "above 0, in m."
             )
 
 

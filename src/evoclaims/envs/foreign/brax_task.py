@@ -48,7 +48,10 @@ class BraxTask(JaxTask):
             try:
                 return envs.get_environment(self.environment_id, **self.settings)
             except (TypeError, ValueError) as error:
-                raise UserError(f"Brax makes no {self.environment_id} with {dict(self.settings)}: {error}.") from error
+                raise UserError(
+                    f"Brax cannot make {self.environment_id!r} with {dict(self.settings)}: "
+                    f"{str(error).removesuffix('.')}. Check the name and the settings."
+                ) from error
 
     @cached_property
     def actions(self) -> Range:

@@ -27,7 +27,7 @@ class GymnasiumEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
             UserError: when the task has no such level.
         """
         if level is not None and not 0 <= level < task.levels:
-            raise UserError(f"{task.name} has levels 0 to {task.levels - 1}, not {level}.")
+            raise UserError(f"{task.name} has no level {level}. Use one from 0 to {task.levels - 1}.")
         self.task = task
         self.level = task.levels - 1 if level is None else level
         self.observation_space = gymnasium.spaces.Box(-np.inf, np.inf, (task.observation_size,), np.float32)

@@ -48,12 +48,15 @@ class GymnasiumTask(ForeignTask):
         try:
             import gymnasium
         except ImportError as error:
-            raise UserError(f"{self.name} is an environment of Gymnasium: pip install gymnasium ({error}).") from error
+            raise UserError(
+                f"{self.name} needs Gymnasium, which cannot be imported ({error}). Install it: pip install gymnasium."
+            ) from error
         try:
             return gymnasium.make(self.environment_id, max_episode_steps=self.episode_steps, **self.settings)
         except (gymnasium.error.Error, TypeError, ModuleNotFoundError) as error:
             raise UserError(
-                f"Gymnasium makes no {self.environment_id!r} with {dict(self.settings)}: {error}"
+                f"Gymnasium cannot make {self.environment_id!r} with {dict(self.settings)}: "
+                f"{str(error).removesuffix('.')}. Check the name and the settings."
             ) from error
 
     @cached_property
@@ -107,8 +110,9 @@ class GymnasiumTask(ForeignTask):
     def reset(self, *_: Any, **__: Any) -> NoReturn:
         """Raise a `UserError`: this runs on the host, and not in a compiled program."""
         raise UserError(
-            f"{self.name} is an environment of Gymnasium, which runs on the host: train on it by a TrainingLoop, or "
-            "take the same environment from gymnax or Brax (GymnaxTask, BraxTask), on which every method trains."
+            f"{self.name} is an environment of Gymnasium, which runs on the host and not in compiled programs. Train "
+            "on it with a TrainingLoop, or take the same environment from gymnax or Brax (GymnaxTask, BraxTask), on "
+            "which every method trains."
         )
 
     step = episode = examine = reset

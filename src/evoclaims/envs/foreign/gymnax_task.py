@@ -37,13 +37,16 @@ class GymnaxTask(JaxTask):
         try:
             import gymnax
         except ImportError as error:
-            raise UserError(f"{self.name} is an environment of gymnax: pip install gymnax ({error}).") from error
+            raise UserError(
+                f"{self.name} needs gymnax, which cannot be imported ({error}). Install it: pip install gymnax."
+            ) from error
         try:
             environment, parameters = gymnax.make(self.environment_id)
             return environment, parameters.replace(**self.parameters)
         except (ValueError, TypeError) as error:
             raise UserError(
-                f"gymnax makes no {self.environment_id!r} with {dict(self.parameters)}: {error}."
+                f"gymnax cannot make {self.environment_id!r} with {dict(self.parameters)}: "
+                f"{str(error).removesuffix('.')}. Check the name and the parameters."
             ) from error
 
     @cached_property

@@ -75,7 +75,10 @@ def actions_of(space: Any, what: str) -> Choice | Range:
     if hasattr(space, "low") and hasattr(space, "high"):
         low, high = (np.broadcast_to(np.asarray(x, np.float64), space.shape) for x in (space.low, space.high))
         return Range(tuple(map(float, low.ravel())), tuple(map(float, high.ravel())), tuple(space.shape))
-    raise UserError(f"The actions of {what} are a {type(space).__name__}; only Discrete and Box ones can be chosen.")
+    raise UserError(
+        f"The actions of {what} are a {type(space).__name__}, which no policy can choose here. Use an environment "
+        "whose actions are Discrete or a Box."
+    )
 
 
 @pytree
@@ -128,11 +131,11 @@ class Descriptor:
         """Reject places that are none, and an area without room."""
         if len(self.places) != 2 or not all(isinstance(place, int) and place >= 0 for place in self.places):
             raise UserError(
-                f"A descriptor's places are {self.places!r}. They must be two positions in the "
-                "observation, counted from 0."
+                f"A descriptor has places={self.places!r}. Write two positions in the observation, counted from 0, "
+                "such as (0, 1)."
             )
         if len(self.area) != 2:
-            raise UserError(f"A descriptor's area is {self.area!r}. It must be a range for each of its two numbers.")
+            raise UserError(f"A descriptor has area={self.area!r}. Write two ranges, such as ((-1, 1), (-1, 1)).")
         for lowest, highest in self.area:
             if not (math.isfinite(lowest) and math.isfinite(highest) and lowest < highest):
                 raise UserError(
@@ -241,8 +244,8 @@ class JaxTask(ForeignTask):
         if self.descriptor is not None:
             if max(self.descriptor.places) >= state.observation.size:  # jax would take the last number instead
                 raise UserError(
-                    f"{self.name}'s descriptor reads the places {self.descriptor.places} of its observation, which has "
-                    f"{state.observation.size} numbers, counted from 0."
+                    f"{self.name}'s descriptor reads the places {self.descriptor.places} of its observation, which "
+                    f"has {state.observation.size} numbers. Write places from 0 to {state.observation.size - 1}."
                 )
             metrics |= {name: state.observation[at] for name, at in zip("xy", self.descriptor.places, strict=True)}
         return Episode(fitness=total, success=(total >= self.threshold).astype(jnp.float32), metrics=metrics)

@@ -66,7 +66,10 @@ class SimpleAlu(Circuit):
         require_known("operation list", self.operations, OPERATIONS)
         require_known("multiplexer reading", self.multiplexer, get_args(MultiplexerReading))
         if not 1 <= self.level_count <= len(OPERATIONS[self.operations]):
-            raise UserError(f"Simple ALU has 1 to {len(OPERATIONS[self.operations])} levels, not {self.level_count}.")
+            raise UserError(
+                f"Simple ALU has level_count={self.level_count}. Write a number from 1 to "
+                f"{len(OPERATIONS[self.operations])}."
+            )
         super().__post_init__()
 
     @cached_property

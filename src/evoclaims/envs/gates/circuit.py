@@ -52,18 +52,25 @@ class TruthTable:
         for name, part, dtype in wanted:
             if part.ndim != 2 or len(part) != rows or part.dtype != dtype:
                 raise MisfitError(
-                    f"a truth table's {name} have shape {part.shape} and type {part.dtype}, and it takes [{rows} rows, "
-                    f"…] of type {np.dtype(dtype)}"
+                    f"a truth table has {name} of shape {part.shape} and type {part.dtype}: write an array of shape "
+                    f"[{rows}, …] and type {np.dtype(dtype)}"
                 )
         if self.active.shape != self.targets.shape:
             raise MisfitError(
-                f"a truth table's active outputs have shape {self.active.shape}, and its targets {self.targets.shape}"
+                f"a truth table has active outputs of shape {self.active.shape} and targets of shape "
+                f"{self.targets.shape}: give both one shape"
             )
         if not self.active.any(axis=1).all():  # its share of wrong answers would be NaN
-            raise MisfitError("a truth table has a row that asks nothing: none of its outputs is active")
+            raise MisfitError(
+                "a truth table has a row without an active output, which asks nothing: activate at least one output "
+                "of each row"
+            )
         levels = self.rows_at_level
         if not levels or levels[0] < 1 or levels[-1] != rows or any(b <= a for a, b in pairwise(levels)):
-            raise MisfitError(f"a truth table's levels ask for {levels} rows, which must increase up to all {rows}")
+            raise MisfitError(
+                f"a truth table has rows_at_level={levels}: write numbers above 0 that increase up to {rows}, the "
+                "number of all rows"
+            )
 
     @property
     def rows(self) -> int:

@@ -31,7 +31,7 @@ class NParity(Circuit):
     def __post_init__(self) -> None:
         """Check the size."""
         if not 2 <= self.bits <= 12:
-            raise UserError(f"N-parity takes 2 to 12 bits, not {self.bits}.")
+            raise UserError(f"N-parity has bits={self.bits}. Write a number from 2 to 12.")
         super().__post_init__()
 
     @cached_property

@@ -110,7 +110,16 @@ class Omnibus(Assertion):
 
 
 def any_differ(*measures: NumberReading, margin: float | None = None) -> Omnibus:
-    """Assert that at least two of three or more measures, each of other trials, differ; see `Omnibus`."""
+    """Assert that at least two of several measures differ; see `Omnibus`.
+
+    Args:
+        measures: three or more, each of another condition.
+        margin: with it the claim is refuted if each pair is equivalent within this difference, in the measure's unit;
+            without it only support can be shown.
+
+    Raises:
+        UserError: for something that is not a measure, or measures in two units.
+    """
     if not all(isinstance(measure, NumberReading) for measure in measures):
         raise UserError("any_differ compares measures of trials, such as any_differ(a.reward, b.reward, c.reward).")
     return Omnibus(comparable(*measures) if measures else (), margin)

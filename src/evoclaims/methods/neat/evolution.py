@@ -148,7 +148,11 @@ def _evaluate(
 
 @dataclass(frozen=True)
 class Neat(GenomeMethod):
-    """NEAT whose genomes are the policies' networks."""
+    """NEAT (Stanley and Miikkulainen 2002) whose genomes are the policies' networks.
+
+    Attributes:
+        settings: all hyperparameters; the defaults are the paper's.
+    """
 
     name: ClassVar[str] = "neat"
     revision: ClassVar[int] = 1

@@ -36,13 +36,13 @@ class Attribute:
         """Check the probabilities and sizes."""
         if self.std < 0 or self.power < 0 or self.bound <= 0:
             raise UserError(
-                "An attribute's spread and noise are 0 or more and its bound is above 0, not "
-                f"{self.std}, {self.power} and {self.bound}."
+                f"An attribute has std={self.std}, power={self.power} and bound={self.bound}. Write a std and a "
+                "power of at least 0, and a bound above 0."
             )
         if self.mutate_rate < 0 or self.replace_rate < 0 or self.mutate_rate + self.replace_rate > 1:
             raise UserError(
-                f"The rates of mutation and replacement are {self.mutate_rate} and {self.replace_rate}. "
-                "They must be probabilities whose sum is at most 1."
+                f"An attribute has mutate_rate={self.mutate_rate} and replace_rate={self.replace_rate}. Write "
+                "probabilities whose sum is at most 1."
             )
 
 
@@ -64,7 +64,7 @@ class Mutation:
         for field in fields(self):
             value = getattr(self, field.name)
             if isinstance(value, float) and not 0 <= value <= 1:
-                raise UserError(f"The probability of {field.name} is {value}. It must be between 0 and 1.")
+                raise UserError(f"A probability of NEAT is {field.name}={value}. Write a number from 0 to 1.")
 
 
 @dataclass(frozen=True)
@@ -103,8 +103,8 @@ class Species:
         require_at_least(0, "NEAT's", stagnation=self.stagnation, elites=self.elites)
         if not (0 < self.survival <= 1 and 0 <= self.change <= 1 and self.threshold > 0):
             raise UserError(
-                "Of a species a share in (0, 1] survives, it changes by a share in [0, 1], and its threshold is above "
-                f"0: not {self.survival}, {self.change} and {self.threshold}."
+                f"NEAT's species have survival={self.survival}, change={self.change} and threshold={self.threshold}. "
+                "Write a survival above 0 and at most 1, a change from 0 to 1, and a threshold above 0."
             )
 
 
@@ -131,11 +131,11 @@ class Settings:
         """Check names and sizes."""
         check_activations((*self.activations, self.output))
         if not self.activations:
-            raise UserError("NEAT needs at least one activation function.")
+            raise UserError(f'NEAT has activations={self.activations}. Write at least one, such as ("tanh",).')
         if self.population < 2 * self.species.most:
             raise UserError(
-                f"A population of {self.population} is too small for {self.species.most} species: it needs at least "
-                f"{2 * self.species.most} genomes."
+                f"NEAT has population={self.population}, too few for {self.species.most} species. Write at least "
+                f"{2 * self.species.most}, or allow fewer species (most)."
             )
 
     def check_fits(self, inputs: int, outputs: int) -> None:
@@ -143,7 +143,8 @@ class Settings:
         if self.nodes < inputs + outputs or self.connections < inputs * outputs:
             raise UserError(
                 f"A network of {inputs} inputs and {outputs} outputs starts with {inputs + outputs} nodes and "
-                f"{inputs * outputs} connections; at most {self.nodes} and {self.connections} are allowed."
+                f"{inputs * outputs} connections, but nodes={self.nodes} and connections={self.connections} are the "
+                "most allowed. Write larger ones."
             )
 
 

@@ -169,7 +169,7 @@ def test_an_empty_map_of_elites_is_drawn() -> None:
 
 
 def test_only_a_maze_has_a_map_of_elites() -> None:
-    with pytest.raises(UserError, match="over the area of a maze, which 'obstacles' is not"):
+    with pytest.raises(UserError, match="'obstacles' is not a maze"):
         draw_elites(Obstacles(), np.zeros((2, 2)), "", "svg")
 
 

@@ -158,7 +158,10 @@ def draw_elites(task: RobotTask, fitnesses: NDArray[np.floating], title: str, fi
         UserError: for a task without an area, another format, or when matplotlib is not installed.
     """
     if not isinstance(task, Maze):
-        raise UserError(f"A map of elites lies over the area of a maze, which {task.name!r} is not.")
+        raise UserError(
+            f"{task.name!r} is not a maze, so it has no area on which elites can be drawn. Use a maze, such as "
+            "DeceptiveMaze or SteppingStones."
+        )
     filled = np.isfinite(fitnesses)
     ground = task.reachable(fitnesses.shape)
     counts = f"{filled.sum():,} elites; {(filled & ground).sum():,} of {ground.sum():,} reachable cells hold one"

@@ -1,4 +1,4 @@
-"""Notices keep processes from running the same trials twice, and a dead process never keeps others waiting."""
+"""Leases keep processes from running the same trials twice, and a dead process never keeps others waiting."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ import pytest
 from evoclaims.claims.fetching import RunMissing
 from evoclaims.core.errors import UserError
 from evoclaims.report.live_line import describe
-from evoclaims.trials import notice as notices
-from evoclaims.trials.notice import announced, notice_path, sweep
+from evoclaims.trials import lease as leases
+from evoclaims.trials.lease import announced, lease_path, sweep
 from evoclaims.trials.progress import RunProgress, ignore
 from evoclaims.trials.store import Store
 
@@ -32,7 +32,7 @@ GONE = 2**22 + 1
 SCRIPT = """
 import sys
 from pathlib import Path
-from evoclaims.trials.notice import announced
+from evoclaims.trials.lease import announced
 
 def tell(text):
     print("waits", flush=True)
@@ -68,15 +68,15 @@ def runner(tmp_path: Path) -> Iterator[subprocess.Popen[str]]:
 
 @pytest.fixture
 def hasty(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Notices count for half a second, and are refreshed ten times in it."""
-    monkeypatch.setattr(notices, "FRESH_SECONDS", 0.5)
-    monkeypatch.setattr(notices, "REFRESH_SECONDS", 0.05)
+    """Leases count for half a second, and are refreshed ten times in it."""
+    monkeypatch.setattr(leases, "FRESH_SECONDS", 0.5)
+    monkeypatch.setattr(leases, "REFRESH_SECONDS", 0.05)
 
 
 def forge(root: Path, condition: str = CONDITION, **fields: Any) -> Path:
-    """Write a notice as filelock does, of another process on another host unless the fields say otherwise."""
-    plain = {"pid": 1, "host": "elsewhere", "mode": "lease", "token": "a" * 32, "duration": notices.FRESH_SECONDS}
-    path = notice_path(root, condition)
+    """Write a lease as filelock does, of another process on another host unless the fields say otherwise."""
+    plain = {"pid": 1, "host": "elsewhere", "mode": "lease", "token": "a" * 32, "duration": leases.FRESH_SECONDS}
+    path = lease_path(root, condition)
     path.parent.mkdir(exist_ok=True)
     path.write_text("\n".join(["filelock/2", *(f"{name}={value}" for name, value in {**plain, **fields}.items()), ""]))
     return path
@@ -96,7 +96,7 @@ def never(seconds: float) -> None:
 
 def test_a_notice_says_who_runs_the_condition_and_goes_with_the_block(tmp_path: Path) -> None:
     with announced(tmp_path, CONDITION, sleep=never):
-        owner = filelock.SoftFileLease(notice_path(tmp_path, CONDITION)).owner
+        owner = filelock.SoftFileLease(lease_path(tmp_path, CONDITION)).owner
         assert owner is not None
         assert (owner.pid, owner.hostname.partition("?")[0]) == (os.getpid(), socket.gethostname())
     assert list((tmp_path / "running").iterdir()) == []
@@ -111,7 +111,7 @@ def test_a_notice_goes_when_the_block_fails(tmp_path: Path) -> None:
 def test_nobody_waits_for_its_own_process(tmp_path: Path) -> None:
     with announced(tmp_path, CONDITION):
         assert waits(tmp_path, sleep=never) == []
-        assert notice_path(tmp_path, CONDITION).exists()
+        assert lease_path(tmp_path, CONDITION).exists()
 
 
 def test_a_process_waits_for_another_that_lives_and_says_for_whom(
@@ -137,15 +137,13 @@ def test_a_killed_process_keeps_nobody_waiting(tmp_path: Path, runner: subproces
         runner.wait()
     else:
         os.waitid(os.P_PID, runner.pid, os.WEXITED | os.WNOWAIT)
-    assert notice_path(tmp_path, CONDITION).exists()
+    assert lease_path(tmp_path, CONDITION).exists()
     assert waits(tmp_path, sleep=never) == []
     assert list((tmp_path / "running").iterdir()) == []
 
 
 def test_processes_that_start_together_agree_on_one(tmp_path: Path) -> None:
-    forge(
-        tmp_path, pid=GONE, host=filelock_host(tmp_path)
-    )  # a killed run has left its notice: all want to take it over
+    forge(tmp_path, pid=GONE, host=filelock_host(tmp_path))  # a killed run has left its lease: all want to take it over
     processes = [start(tmp_path) for _ in range(3)]
     said = [process.stdout.readline().strip() for process in processes if process.stdout]
     for process in processes:
@@ -157,7 +155,7 @@ def test_processes_that_start_together_agree_on_one(tmp_path: Path) -> None:
 def test_a_later_process_with_the_same_number_keeps_nobody_waiting(
     tmp_path: Path, runner: subprocess.Popen[str]
 ) -> None:
-    path = notice_path(tmp_path, CONDITION)
+    path = lease_path(tmp_path, CONDITION)
     before, _, born = path.read_text().rstrip().rpartition("start=")
     path.write_text(f"{before}start={int(born) - 1}\n")
     assert waits(tmp_path, sleep=never) == []
@@ -181,7 +179,7 @@ def test_a_notice_of_another_host_counts_until_it_is_refreshed_no_more(tmp_path:
 def test_where_files_cannot_be_exchanged_a_stale_notice_goes_too(
     tmp_path: Path, hasty: None, monkeypatch: pytest.MonkeyPatch, kind: str
 ) -> None:
-    """As on network folders, on which filelock leaves every notice where it is."""
+    """As on network folders, on which filelock leaves every lease where it is."""
     for module in ("_soft", "_util"):
         monkeypatch.setattr(f"filelock.{module}.exchange_names", lambda *names: False, raising=False)
     ended = {"host": filelock_host(tmp_path), "pid": GONE}
@@ -192,7 +190,7 @@ def test_where_files_cannot_be_exchanged_a_stale_notice_goes_too(
 def filelock_host(root: Path) -> str:
     """Return the name that filelock gives this machine."""
     with announced(root, OTHER):
-        owner = filelock.SoftFileLease(notice_path(root, OTHER)).owner
+        owner = filelock.SoftFileLease(lease_path(root, OTHER)).owner
         assert owner is not None
         return owner.hostname
 
@@ -217,7 +215,7 @@ def test_a_stopped_process_keeps_others_waiting_no_longer_than_one_elsewhere(
 
 def test_a_notice_is_refreshed_through_a_chunk_of_any_length(tmp_path: Path, hasty: None) -> None:
     """Nobody calls anything here: while XLA computes, the process does nothing else."""
-    path = notice_path(tmp_path, CONDITION)
+    path = lease_path(tmp_path, CONDITION)
     with announced(tmp_path, CONDITION):
         os.utime(path, (1.0, 1.0))
         end = time.monotonic() + 60.0
@@ -229,7 +227,7 @@ def test_a_notice_is_refreshed_through_a_chunk_of_any_length(tmp_path: Path, has
 
 def test_a_process_that_was_taken_over_from_leaves_the_others_notice_alone(tmp_path: Path, hasty: None) -> None:
     with announced(tmp_path, CONDITION):
-        path = notice_path(tmp_path, CONDITION)
+        path = lease_path(tmp_path, CONDITION)
         path.unlink()
         forge(tmp_path)
         os.utime(path, (1.0, 1.0))
@@ -252,7 +250,7 @@ def test_a_text_that_is_no_notice_is_stale(tmp_path: Path, hasty: None, text: st
 def test_an_odd_file_where_a_notice_belongs_keeps_nobody_waiting_for_ever(
     tmp_path: Path, hasty: None, make: Callable[[Path], None]
 ) -> None:
-    path = notice_path(tmp_path, CONDITION)
+    path = lease_path(tmp_path, CONDITION)
     path.parent.mkdir()
     make(path)
     sweep(tmp_path)
@@ -317,7 +315,7 @@ def test_a_container_with_the_hosts_name_breaks_no_notice_of_the_host(
     inside: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path = forge(tmp_path, OTHER, pid=GONE, host=socket.gethostname())  # as filelock writes it on the host itself
-    monkeypatch.setattr(notices, "_INITIAL", 1 if inside else os.stat("/proc/self/ns/pid").st_ino)
+    monkeypatch.setattr(leases, "_INITIAL", 1 if inside else os.stat("/proc/self/ns/pid").st_ino)
     sweep(tmp_path)
     assert path.exists() is inside
 

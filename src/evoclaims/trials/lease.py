@@ -1,7 +1,7 @@
-"""Notices that a condition is running, with its progress, so that processes that share a store do not repeat trials.
+"""Leases on running conditions, and their progress, so that processes that share a store do not repeat trials.
 
-A notice is a filelock lease on a file in `running/`, which a thread refreshes while the condition runs. Notices are
-hints, not locks: a missed or lost notice costs repeated work, never a wrong record, so failures to write one are
+A lease is one of filelock on a file in `running/`, which a thread refreshes while the condition runs. Leases are
+hints, not locks: a missed or lost lease costs repeated work, never a wrong record, so failures to write one are
 ignored. A lost file of progress costs a line of progress.
 """
 
@@ -25,11 +25,11 @@ from evoclaims.trials.progress import RunProgress, Watcher
 from evoclaims.trials.result_codec import checked_id
 
 FRESH_SECONDS: Final = 60.0
-"""A notice is valid for this long after its last refresh, by the clock of the waiting process: its own process may be
+"""A lease is valid for this long after its last refresh, by the clock of the waiting process: its own process may be
 on another machine, or stopped (SIGSTOP, Ctrl-Z). If that process was on this machine and has ended, it is invalid."""
 
 REFRESH_SECONDS: Final = 15.0
-"""Time between two refreshes: on a slow network folder, a few may be late before the notice looks stale."""
+"""Time between two refreshes: on a slow network folder, a few may be late before the lease looks stale."""
 
 _CONTAINER: Final = "?pidns-"
 """What filelock adds to the host name in its own PID namespace, as in a container; a number follows."""
@@ -38,19 +38,19 @@ _INITIAL: Final = 0xEFFFFFFC
 """The number of the host's own PID namespace, fixed by Linux; filelock adds nothing there."""
 
 
-def notice_path(store_root: Path, condition_id: str) -> Path:
-    """Return the path of a condition's notice; raise a `UserError` for a text that is not an id."""
+def lease_path(store_root: Path, condition_id: str) -> Path:
+    """Return the path of a condition's lease; raise a `UserError` for a text that is not an id."""
     return store_root / "running" / f"{checked_id(condition_id, 'condition')}.lock"
 
 
 def progress_path(store_root: Path, condition_id: str) -> Path:
-    """Return the path of the progress beside a condition's notice (see `running`)."""
-    return notice_path(store_root, condition_id).with_suffix(".progress")
+    """Return the path of the progress beside a condition's lease (see `running`)."""
+    return lease_path(store_root, condition_id).with_suffix(".progress")
 
 
 def is_announced(store_root: Path, condition_id: str) -> bool:
     """Whether a process says that it runs a condition, and has not ended as far as is known here."""
-    path = notice_path(store_root, condition_id)
+    path = lease_path(store_root, condition_id)
     return path.exists() and not _has_ended(_lease(path).owner)
 
 
@@ -69,11 +69,11 @@ def announced(
     Args:
         store_root: the store's folder.
         condition_id: the condition to run.
-        tell: receives a line of progress each time it looks at another process's notice.
+        tell: receives a line of progress each time it looks at another process's lease.
         poll: seconds between two looks.
         sleep: how to wait.
     """
-    path = notice_path(store_root, condition_id)
+    path = lease_path(store_root, condition_id)
     with contextlib.suppress(OSError):
         path.parent.mkdir(parents=True, exist_ok=True)
     lease = _lease(path)
@@ -99,7 +99,7 @@ def announced(
 
 
 def sweep(store_root: Path) -> None:
-    """Remove the notices and progress files of this machine's ended processes: nobody else may ever look at them."""
+    """Remove the leases and progress files of this machine's ended processes: nobody else may ever look at them."""
     for path in sorted((store_root / "running").glob("*.lock")):
         lease = _lease(path)
         if _has_ended(lease.owner):
@@ -126,7 +126,7 @@ def _is_ours(lease: filelock.SoftFileLease) -> bool:
 
 
 def _refreshed(path: Path) -> int:
-    """Return when a notice was last refreshed, by the clock of its writer; 0 without one."""
+    """Return when a lease was last refreshed, by the clock of its writer; 0 without one."""
     try:
         return path.lstat().st_mtime_ns
     except OSError:
