@@ -16,14 +16,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from trial_toys import walk
 
-from evoclaims.trials.lanes import Compiled, Lanes, picked, width_for
+from evoclaims.trials.lanes import Compiled, Lanes, picked
+from evoclaims.trials.layout import Layout, width_for
 from evoclaims.trials.runner import run
 from evoclaims.trials.store import Store
 
 pytestmark = pytest.mark.oldest
 
 
-def _lanes(devices: int, layout: str = "vector") -> Lanes:
+def _lanes(devices: int, layout: Layout = Layout.VECTOR) -> Lanes:
     """Return lanes over devices that need not exist."""
     lanes = object.__new__(Lanes)
     lanes.devices = [None] * devices  # type: ignore[list-item]
@@ -64,7 +65,7 @@ def test_a_batch_uses_no_more_devices_than_it_has_trials(data: st.DataObject, fu
     width = lanes.width(active, full)
     assert width % min(devices, full) == 0
     assert active <= width <= full + min(devices, full) - 1
-    assert _lanes(devices, "alone").width(active, full) == full
+    assert _lanes(devices, Layout.ALONE).width(active, full) == full
 
 
 @given(st.data(), counts, st.integers(1, 8))
@@ -86,7 +87,7 @@ def test_an_arrangement_places_every_active_lane_once_and_loads_devices_evenly(
 
 @given(counts, st.integers(1, 8))
 def test_on_a_cpu_every_lane_is_a_call_of_its_own_on_one_device(full: int, devices: int) -> None:
-    lanes = _lanes(devices, "alone")
+    lanes = _lanes(devices, Layout.ALONE)
     assert len(lanes._homes(full)) == full
     assert lanes.arrangement(range(full), full) == list(range(full))
 
@@ -114,9 +115,9 @@ def _started() -> Any:
     return _cached[0]
 
 
-@pytest.mark.parametrize("layout", ["alone", "vector"])
+@pytest.mark.parametrize("layout", Layout)
 def test_each_size_of_a_share_is_compiled_once_a_device_in_a_run(
-    layout: str,
+    layout: Layout,
     tmp_path: Path,
     cpus: list[Any],
     monkeypatch: pytest.MonkeyPatch,
@@ -133,9 +134,9 @@ def test_each_size_of_a_share_is_compiled_once_a_device_in_a_run(
     monkeypatch.setattr(Lanes, "_compile", spy)
     with jax.log_compiles(), caplog.at_level(logging.WARNING, "jax"):
         results = run(walk(chance=0.35, hazard=0.04), range(1, 6), Store(tmp_path), cpus)
-    assert sizes == ({1: 1} if layout == "alone" else {3: 2, 1: 2})  # lanes of a share, on how many devices
+    assert sizes == ({1: 1} if layout.alone else {3: 2, 1: 2})  # lanes of a share, on how many devices
     compiled = [r for r in caplog.records if r.getMessage().startswith("Compiling ")]
-    starts = 1 if layout == "alone" else 2
+    starts = 1 if layout.alone else 2
     assert len(compiled) == starts + 2 * sizes.total(), [r.getMessage() for r in compiled]
     assert len({result.metrics["steps"] for result in results}) > 1
 

@@ -28,7 +28,7 @@ from evoclaims.core.waiting import waiting, working_time
 from evoclaims.methods.training_loop import TrainingLoop
 from evoclaims.trials import failed
 from evoclaims.trials.batches import StoredTrials
-from evoclaims.trials.devices import layout_on, usable_cores
+from evoclaims.trials.layout import layout_on
 from evoclaims.trials.loop_messages import (
     MARK,
     Answer,
@@ -243,10 +243,9 @@ class LoopTrials:
 
     def make(self, owed: Sequence[int], tell: Watcher) -> None:
         """Run trials and store each as it ends; those that have ended stay when anything is raised."""
-        at_a_time = usable_cores() if layout_on(self._devices[0].platform) == "alone" else 1
         running = [RunningLoop(TrialSpec(self._stored.condition, seed)) for seed in owed]
         began, stored = time.monotonic(), set[int]()
-        with ThreadPoolExecutor(at_a_time) as pool:
+        with ThreadPoolExecutor(layout_on(self._devices[0].platform).threads(1)) as pool:
             try:
                 for one in running:
                     pool.submit(self._attend, one)

@@ -263,7 +263,7 @@ def _timing(run: Run, header: Header) -> dict[str, Any]:
         "batch": len(header.batch),
         "started": header.started,
     }
-    return {**timing, "processor": header.processor_seconds} if run.lanes.layout == "alone" else timing
+    return {**timing, "processor": header.processor_seconds} if run.lanes.layout.alone else timing
 
 
 def _rearranged(run: Run, batch: Batch) -> Batch:
