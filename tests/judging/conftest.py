@@ -39,11 +39,16 @@ class StoredSource:
     label: str
     trials: dict[int, TrialResult]
     backwards: bool = False
+    deterministic: bool = False
+    existing: int | None = None
     asked: list[tuple[int, ...]] = field(default_factory=list)
 
     @property
     def fingerprint(self) -> str:
         return f"id of {self.label}"
+
+    def shares_trials_with(self, other: Any) -> bool:
+        return False
 
     def fetch(self, seeds: Sequence[int]) -> Sequence[TrialResult]:
         self.asked.append(tuple(seeds))

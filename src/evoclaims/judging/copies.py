@@ -9,7 +9,7 @@ from collections.abc import Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from evoclaims.judging.assertion import Assertion
-from evoclaims.judging.sample import Declared, Trials
+from evoclaims.judging.sample import Trials
 from evoclaims.trials.result import COMPLETE, RETURNED, TRAINED_BY, TrialResult
 
 
@@ -39,7 +39,7 @@ def copies(assertion: Assertion, trials: Trials) -> Copies:
     left_out, sentences, alone = set[int](), list[str](), ""
     count = max(map(len, trials.values()), default=0)
     for source in assertion.drawn():
-        if isinstance(source, Declared) and source.deterministic:
+        if source.deterministic:
             continue
         mine = trials[source.fingerprint]
         groups = _groups(mine)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from evoclaims.core.errors import UnknownNameError, UserError, require_known
 from evoclaims.judging.measure import Event, Measure, Profile
 from evoclaims.judging.reading import Better
-from evoclaims.judging.sample import Declared, Limited, Source, UnreadableTrialError
+from evoclaims.judging.sample import Source, UnreadableTrialError
 from evoclaims.judging.window import Window
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.spec import Condition
@@ -118,7 +118,7 @@ class TrialGroup:
             """Raise an error that lists the known measures."""
             if name.startswith("_") or hasattr(type(self), name):
                 return object.__getattribute__(self, name)  # raises what the property itself has raised
-            known = {known for known in dir(type(self)) if not known.startswith("_")} - {*dir(Limited), *dir(Declared)}
+            known = {known for known in dir(type(self)) if not known.startswith("_")} - set(dir(Source))
             raise UnknownMeasureError("measure", name, known)
 
     @property
