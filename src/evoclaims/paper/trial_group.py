@@ -45,8 +45,7 @@ def steps_to(source: Source, condition: Condition, curve: str, value: float, lev
         )
     if not 0 <= wanted < levels:
         raise UserError(f"{source.label} has levels 0 to {levels - 1}, not {wanted}.")
-    cost, budget = condition.cost, float(condition.environment_steps)
-    chunk = condition.budget.chunk(cost)
+    budget = float(condition.environment_steps)
     imported = condition.existing is not None
     advice = "" if imported else "give the condition the progression 'whole_budget', or "
     name = f"environment steps until {curve} is {float(value):.12g}" + f" on level {wanted}" * (levels > 1)
@@ -68,7 +67,7 @@ def steps_to(source: Source, condition: Condition, curve: str, value: float, lev
         return first
 
     # Reports of imported trials are perhaps unevenly far apart, at steps that are no multiples of the longest distance.
-    window = Window(budget, float(chunk * cost) if chunk > 1 else 0.0, as_reported=imported)
+    window = Window(budget, float(condition.report_distance), as_reported=imported)
     return Measure(source, name, read, "lower", window)
 
 

@@ -256,6 +256,12 @@ class Condition:
         """Environment steps of one trial that spends the whole budget."""
         return self.steps * self.cost
 
+    @property
+    def report_distance(self) -> int:
+        """Most environment steps between two reports of a trial; 0 where each step of the method is reported."""
+        chunk = self.budget.chunk(self.cost)
+        return chunk * self.cost if chunk > 1 else 0
+
 
 @dataclass(frozen=True)
 class TrialSpec:
