@@ -150,7 +150,10 @@ class Estimator:
         device by its budget, at the median pace of the others.
         """
         layout = layout_on(self.platform)
-        lacking = {key: tuple(self._missing(one)) for key, one in wanted.items()}
+        lacking = {
+            key: tuple(StoredTrials(self.store, one.condition, self.any_version, self.time_limit).missing(one.seeds))
+            for key, one in wanted.items()
+        }
         counts = {key: len(lacking[key]) or len(one.seeds) for key, one in wanted.items()}
         read = cache(self._committed)  # many conditions may have the same names: faults planted in one
         found = {key: self._by_earlier(one, counts[key], read) for key, one in wanted.items()}
@@ -165,12 +168,6 @@ class Estimator:
             key: Owed(lacking[key], one or Cost(compiling, pace * steps[key], counts[key], layout, "budget"))
             for key, one in known.items()
         }
-
-    def _missing(self, one: Wanted) -> list[int]:
-        """Return the seeds whose trials must be run."""
-        if one.condition.existing is not None:
-            return []
-        return StoredTrials(self.store, one.condition, self.any_version, self.time_limit).missing(one.seeds)
 
     def _by_earlier(self, one: Wanted, trials: int, read: Committed) -> _Known:
         """Return what so many trials cost by earlier ones: of the condition itself, or else of its names."""
