@@ -17,7 +17,6 @@ from evoclaims.core.errors import UserError, in_one_line
 from evoclaims.core.printable import printable
 from evoclaims.envs.base import Checked
 from evoclaims.judging.verdict import Outcome
-from evoclaims.methods.training_loop import TrainingLoop
 from evoclaims.paper import references
 from evoclaims.paper.cost import Estimator, Owed, Wanted, measured, took
 from evoclaims.paper.reproduction import Names, Tier
@@ -81,7 +80,7 @@ def main(options: argparse.Namespace) -> int:
     if options.measure:
         for names, one in owed.items():
             condition = wanted[names].condition
-            if one.cost.basis == "budget" and not isinstance(condition.method, TrainingLoop):  # that has no steps
+            if one.cost.basis == "budget" and condition.loop is None:  # which has no steps
                 try:
                     owed[names] = replace(one, cost=measured(condition, chosen, one.cost.trials))
                 except KeyboardInterrupt:

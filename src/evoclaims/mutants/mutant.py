@@ -11,7 +11,6 @@ from evoclaims.envs.gates.circuit import Circuit
 from evoclaims.methods.cma_es import CmaEs
 from evoclaims.methods.map_elites import MapElites
 from evoclaims.methods.mechanisms.observed import Observed
-from evoclaims.methods.training_loop import TrainingLoop
 from evoclaims.mutants import faults
 from evoclaims.mutants.faults import Fault, plant
 from evoclaims.paper.config import import_module
@@ -79,7 +78,7 @@ def with_task(says: str, change: Callable[[Any], Any], only: type | tuple[type, 
 
 def _where_compiled(mutant: Mutant) -> Mutant:
     """Skip training loops: they call none of our methods' functions and import tasks anew: no fault reaches them."""
-    return replace(mutant, change=lambda one: None if isinstance(one.method, TrainingLoop) else mutant.change(one))
+    return replace(mutant, change=lambda one: None if one.loop else mutant.change(one))
 
 
 def _staying(one: Condition) -> Condition | None:

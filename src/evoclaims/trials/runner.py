@@ -17,7 +17,6 @@ import numpy as np
 from evoclaims.core.errors import UserError
 from evoclaims.core.packages import absent
 from evoclaims.core.waiting import working_time
-from evoclaims.methods.training_loop import TrainingLoop
 from evoclaims.trials import checkpoint
 from evoclaims.trials.batches import Batch, Run, StoredTrials, batches, drop_finished_checkpoints, halved, is_exhausted
 from evoclaims.trials.checkpoint import Header
@@ -103,8 +102,8 @@ Maker = Callable[[Sequence[int], Watcher], None]
 def _maker(stored: StoredTrials, devices: Sequence[jax.Device], checkpoint_seconds: float, most: int) -> Maker:
     """Return what makes a condition's trials: a process for each, or compiled programs, at first of `most` trials."""
     _ = stored.condition.steps  # a budget that no counter holds is refused before training, not after it
-    if isinstance(stored.condition.method, TrainingLoop):
-        return LoopTrials(stored, devices).make
+    if stored.condition.loop is not None:
+        return LoopTrials(stored, stored.condition.loop, devices).make
     for component in (stored.condition.method, stored.condition.task):
         if missing := absent(component):
             raise UserError(

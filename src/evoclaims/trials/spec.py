@@ -154,7 +154,7 @@ class Condition:
         return {
             "engine": ENGINE_REVISION,
             "method": _described(self.method, "method"),
-            "task": _described(self.task, "" if isinstance(self.method, TrainingLoop) else "task"),
+            "task": _described(self.task, "" if self.loop else "task"),
             "progression": self.progression,
             "budget": as_plain(self.budget),
         }
@@ -200,6 +200,11 @@ class Condition:
         return str((self.plain["method"], self.progression, self.budget, kind))
 
     @property
+    def loop(self) -> TrainingLoop | None:
+        """The training loop that makes the trials; None where the engine compiles method and task."""
+        return self.method if isinstance(self.method, TrainingLoop) else None
+
+    @property
     def existing(self) -> tuple[TrialResult, ...] | None:
         """All trials that there can be, by seed from 0, where no more can be run; None for what the harness runs."""
         return None
@@ -238,7 +243,7 @@ class Condition:
             UserError: when there are more than counters hold: 32-bit integers on devices, and floats in records.
         """
         steps = self.budget.steps(self.cost)
-        if steps >= 2**31 and not isinstance(self.method, TrainingLoop):
+        if steps >= 2**31 and self.loop is None:
             raise UserError(
                 f"{self.label} has a budget of {steps} steps, and a trial takes at most {2**31 - 1}. Make "
                 "the budget smaller."
