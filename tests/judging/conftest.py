@@ -41,14 +41,12 @@ class StoredSource:
     backwards: bool = False
     deterministic: bool = False
     existing: int | None = None
+    table_rows: frozenset[tuple[str, int]] = frozenset()
     asked: list[tuple[int, ...]] = field(default_factory=list)
 
     @property
     def fingerprint(self) -> str:
         return f"id of {self.label}"
-
-    def shares_trials_with(self, other: Any) -> bool:
-        return False
 
     def fetch(self, seeds: Sequence[int]) -> Sequence[TrialResult]:
         self.asked.append(tuple(seeds))

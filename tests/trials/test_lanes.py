@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 from trial_toys import walk
 
 from evoclaims.trials.lanes import Compiled, Lanes, picked
-from evoclaims.trials.layout import Layout, width_for
+from evoclaims.trials.layout import Layout
 from evoclaims.trials.runner import run
 from evoclaims.trials.store import Store
 
@@ -36,35 +36,26 @@ counts = st.integers(1, 40)
 
 
 @given(st.data(), counts, st.integers(1, 8))
-def test_there_are_never_fewer_lanes_than_active_trials(data: st.DataObject, full: int, devices: int) -> None:
-    active = data.draw(st.integers(0, full))
-    width = width_for(active, devices, full)
-    assert width >= max(active, 1)
-    assert width % devices == 0
-    assert width <= -(-full // devices) * devices
-
-
-@given(st.data(), counts, st.integers(1, 8))
 def test_fewer_active_trials_never_need_more_lanes(data: st.DataObject, full: int, devices: int) -> None:
     active = data.draw(st.integers(1, full))
-    assert width_for(active - 1, devices, full) <= width_for(active, devices, full)
+    assert Layout.VECTOR.width(active - 1, full, devices) <= Layout.VECTOR.width(active, full, devices)
 
 
 @given(counts)
 def test_lanes_halve_so_that_few_widths_are_compiled(full: int) -> None:
-    widths = {width_for(active, 1, full) for active in range(1, full + 1)}
-    assert len(widths) <= full.bit_length() + 1
-    assert width_for(full, 1, full) == full
-    assert width_for(1, 1, full) <= 2
+    widths = [Layout.VECTOR.width(active, full, 1) for active in range(1, full + 1)]
+    assert len(set(widths)) <= full.bit_length() + 1
+    assert widths[-1] == full
+    assert widths[0] <= 2
 
 
 @given(st.data(), counts, st.integers(1, 8))
 def test_a_batch_uses_no_more_devices_than_it_has_trials(data: st.DataObject, full: int, devices: int) -> None:
-    active = data.draw(st.integers(1, full))
+    active = data.draw(st.integers(0, full))
     lanes = _lanes(devices)
     width = lanes.width(active, full)
     assert width % min(devices, full) == 0
-    assert active <= width <= full + min(devices, full) - 1
+    assert max(active, 1) <= width <= full + min(devices, full) - 1
     assert _lanes(devices, Layout.ALONE).width(active, full) == full
 
 

@@ -31,8 +31,9 @@ class Source(Protocol):
     def deterministic(self) -> bool:
         """Whether the trials have no chance in them, so that they may be copies of each other."""
 
-    def shares_trials_with(self, other: Source) -> bool:
-        """Whether another source, of another fingerprint, reads some of the same trials."""
+    @property
+    def table_rows(self) -> frozenset[tuple[str, int]]:
+        """The rows of a table, by its hash, that the trials are read from; none for trials that are run."""
 
     def fetch(self, seeds: Sequence[int]) -> Sequence[TrialResult]:
         """Return one trial per seed, in any order; run missing ones, or raise if nothing may run."""

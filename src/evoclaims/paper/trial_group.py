@@ -144,9 +144,10 @@ class TrialGroup:
         """How many trials there are, where no more can be run; None where missing ones are run."""
         return None if self.condition.existing is None else len(self.condition.existing)
 
-    def shares_trials_with(self, other: Source) -> bool:
-        """Whether another group reads some of the same trials from a table."""
-        return isinstance(other, TrialGroup) and self.condition.shares_trials_with(other.condition)
+    @property
+    def table_rows(self) -> frozenset[tuple[str, int]]:
+        """The rows of a table that the trials are read from."""
+        return self.condition.table_rows
 
     def measure(
         self,

@@ -241,11 +241,10 @@ class Imported(Condition):
         """
         return tuple(self._trial(k, seed, rows) for k, (seed, rows) in enumerate(self._rows.by_seed()))
 
-    def shares_trials_with(self, other: Condition) -> bool:
-        """Whether both read a row of one table."""
-        if not isinstance(other, Imported) or other.table.sha256 != self.table.sha256:
-            return False
-        return not set(self._rows.chosen).isdisjoint(other._rows.chosen)
+    @cached_property
+    def table_rows(self) -> frozenset[tuple[str, int]]:
+        """The rows of the table that the trials are read from."""
+        return frozenset((self.table.sha256, row) for row in self._rows.chosen)
 
     @cached_property
     def _rows(self) -> TrialRows:

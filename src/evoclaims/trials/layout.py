@@ -44,8 +44,16 @@ class Layout(Enum):
         return FAST_TO_COMPILE if self.alone and condition.environment_steps <= SHORT else None
 
     def width(self, active: int, full: int, devices: int) -> int:
-        """Return the number of lanes for `active` of `full` trials; alone, idle lanes cost nothing and stay."""
-        return full if self.alone else width_for(active, min(devices, full), full)
+        """Return the number of lanes for `active` of `full` trials: side by side, `full` halved while they fit.
+
+        It depends only on these counts, so that a resumed run uses the same programs. Alone, idle lanes cost nothing.
+        """
+        if self.alone:
+            return full
+        lanes, used = full, min(devices, full)
+        while lanes > 1 and active <= lanes // 2:
+            lanes = -(-lanes // 2)
+        return -(-lanes // used) * used
 
     def homes(self, width: int, devices: Sequence[jax.Device]) -> Sequence[jax.Device]:
         """Return the device of each call, which all have equally many of the lanes; a CPU is one device."""
@@ -65,19 +73,6 @@ class Layout(Enum):
 def layout_on(platform: str) -> Layout:
     """Return how trials are laid out on devices of a platform, such as "cpu"."""
     return Layout.ALONE if platform == "cpu" else Layout.VECTOR
-
-
-def width_for(active: int, devices: int, full: int) -> int:
-    """Return the number of lanes for `active` trials: `full` halved while they fit, a multiple of the devices.
-
-    It depends only on these counts, so that a resumed run uses the same programs.
-    """
-    lanes = max(full, 1)
-    while active <= lanes // 2:
-        lanes = -(-lanes // 2)
-        if lanes == 1:
-            break
-    return -(-lanes // devices) * devices
 
 
 def _alone(function: Callable[..., Any], *arguments: Any) -> Any:

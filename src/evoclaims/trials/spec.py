@@ -209,9 +209,10 @@ class Condition:
         """All trials that there can be, by seed from 0, where no more can be run; None for what the harness runs."""
         return None
 
-    def shares_trials_with(self, other: Condition) -> bool:
-        """Whether some of the same trials have another id here; it is False for what the harness runs."""
-        return False
+    @property
+    def table_rows(self) -> frozenset[tuple[str, int]]:
+        """The rows of a table, by its hash, that the trials are read from; none for what the harness runs."""
+        return frozenset()
 
     @property
     def label(self) -> str:
