@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -40,7 +41,7 @@ class StoredSource:
     trials: dict[int, TrialResult]
     backwards: bool = False
     deterministic: bool = False
-    existing: int | None = None
+    limit: float = math.inf
     table_rows: frozenset[tuple[str, int]] = frozenset()
     asked: list[tuple[int, ...]] = field(default_factory=list)
 

@@ -63,7 +63,7 @@ def main(options: argparse.Namespace) -> int:
             raise UserError(f"The variant {variant} changes no condition that claims of the {options.tier} tier read.")
     else:
         read = _read(reports)
-    used = [names for names in read if tier.condition(*names).existing is None]
+    used = [names for names in read if not tier.condition(*names).existing]
     for names in used:
         task = tier.condition(*names).task
         if isinstance(task, Checked):
@@ -114,7 +114,7 @@ def main(options: argparse.Namespace) -> int:
     for names in read:
         if names not in used:
             condition, n = tier.condition(*names), counts[names]
-            few = f", and the design looks at {n}" if len(condition.existing or ()) < n else ""
+            few = f", and the design looks at {n}" if len(condition.existing) < n else ""
             console.print(f"{' on '.join(names)}: nothing to run: {where_from(condition)}{few}")
     _print_spent(console, tier, {names: costs[names] for names in used})
     ends = ", ".join(f"{end.symbol} {end}" for end in (Outcome.SUPPORTED, Outcome.REFUTED, Outcome.SMALLER))

@@ -218,9 +218,8 @@ def _decidable(attainable: PValues, alpha: float) -> bool:
 def _shortage(assertion: Assertion, look: Look, design: Design) -> str:
     """Say which source has too few trials for a look, which is then not taken; empty if none has."""
     for source in assertion.sources():
-        existing = source.existing
-        if existing is not None and design.seeds(look.n)[-1] >= existing:
-            few = f"there are {existing}" if existing > 1 else "there is 1" if existing else "there are none"
+        if design.seeds(look.n)[-1] >= source.limit:
+            few = f"there are {source.limit}" if source.limit > 1 else "there is 1"
             return f"underpowered: needs n = {design.seeds(look.n)[-1] + 1} trials of {source.label}, and {few}"
     return ""
 

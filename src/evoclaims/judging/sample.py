@@ -24,8 +24,8 @@ class Source(Protocol):
         """Id of the condition; equal fingerprints mean the same trials."""
 
     @property
-    def existing(self) -> int | None:
-        """How many trials there are, with seeds from 0; None where missing ones are run."""
+    def limit(self) -> float:
+        """How many trials there can be, with seeds from 0; infinite where missing ones are run."""
 
     @property
     def deterministic(self) -> bool:

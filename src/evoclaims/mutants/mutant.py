@@ -37,7 +37,7 @@ class Mutant:
     def conditions(self, sound: Conditions, target: str) -> dict[Names, Condition]:
         """Return the faulty conditions of one method, or one task, by the names under which claims ask for them."""
         place = 0 if self.part == "method" else 1
-        run_here = {names: one for names, one in sound.items() if names[place] == target and one.existing is None}
+        run_here = {names: one for names, one in sound.items() if names[place] == target and not one.existing}
         changed = {names: self.change(one) for names, one in run_here.items()}
         return {names: one for names, one in changed.items() if one is not None and one.id != sound[names].id}
 

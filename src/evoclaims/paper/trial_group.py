@@ -46,7 +46,7 @@ def steps_to(source: Source, condition: Condition, curve: str, value: float, lev
     if not 0 <= wanted < levels:
         raise UserError(f"{source.label} has levels 0 to {levels - 1}, not {wanted}.")
     budget = float(condition.environment_steps)
-    imported = condition.existing is not None
+    imported = bool(condition.existing)
     advice = "" if imported else "give the condition the progression 'whole_budget', or "
     name = f"environment steps until {curve} is {float(value):.12g}" + f" on level {wanted}" * (levels > 1)
 
@@ -140,9 +140,9 @@ class TrialGroup:
         return self.get(self.condition, seeds)
 
     @property
-    def existing(self) -> int | None:
-        """How many trials there are, where no more can be run; None where missing ones are run."""
-        return None if self.condition.existing is None else len(self.condition.existing)
+    def limit(self) -> float:
+        """How many trials there can be; infinite where missing ones are run."""
+        return len(self.condition.existing) or math.inf
 
     @property
     def table_rows(self) -> frozenset[tuple[str, int]]:
@@ -164,9 +164,8 @@ class TrialGroup:
         Raises:
             UnknownNameError: for a metric that imported trials do not have; of others it is known when they have run.
         """
-        if read is None and self.condition.existing is not None:
-            known = self.condition.existing[0].metrics
-            require_known(f"metric of {self.label}", name, known)
+        if read is None and self.condition.existing:
+            require_known(f"metric of {self.label}", name, self.condition.existing[0].metrics)
         return Measure(self, name, read or (lambda t: t.metrics[name]), better, unit=unit)
 
     def event(self, name: str, holds: Callable[[TrialResult], bool]) -> Event:

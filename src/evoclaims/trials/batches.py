@@ -68,7 +68,7 @@ class StoredTrials:
 
     def missing(self, seeds: Sequence[int]) -> list[int]:
         """Return the seeds whose trials must be run, damaged ones among them: whoever runs those names the file."""
-        if self.condition.existing is not None:
+        if self.condition.existing:
             return []
         there = {result.seed for result in self.sound(seeds) if answers(result, self.time_limit)}
         return [seed for seed in seeds if seed not in there]

@@ -234,7 +234,7 @@ class Imported(Condition):
 
     @cached_property
     def existing(self) -> tuple[TrialResult, ...]:
-        """All trials of the table, in the order of its seeds.
+        """All trials of the table, at least one, in the order of its seeds.
 
         Raises:
             UserError: when the table cannot be read, or lacks what it should have.
@@ -303,8 +303,7 @@ def into_store(condition: Condition, seeds: Sequence[int], store: Store) -> list
     Raises:
         UserError: when the table cannot be read, or the store is damaged or cannot be written.
     """
-    existing = condition.existing or ()
-    found = [existing[seed] for seed in seeds if seed < len(existing)]
+    found = [condition.existing[seed] for seed in seeds if seed < len(condition.existing)]
     lacking = [trial for trial in found if store.made_with(trial.id, condition.versions) is None]
     if lacking:
         store.check_writable()
@@ -315,6 +314,6 @@ def into_store(condition: Condition, seeds: Sequence[int], store: Store) -> list
 
 def where_from(condition: Condition) -> str:
     """Say how many trials exist and where they come from, as a clause."""
-    count, digits = len(condition.existing or ()), condition.plain.get("imported", {}).get("sha256", "")[:12]
+    count, digits = len(condition.existing), condition.plain.get("imported", {}).get("sha256", "")[:12]
     trials = "1 trial is" if count == 1 else f"{count} trials are"
     return f"{trials} imported from {condition.label}, sha256 {digits}"

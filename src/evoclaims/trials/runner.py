@@ -75,7 +75,7 @@ def run(
     Raises:
         UserError: when the store is damaged or cannot be written, or the device's memory does not hold one trial.
     """
-    if condition.existing is not None:
+    if condition.existing:
         return into_store(condition, seeds, store)
     stored = StoredTrials(store, condition, any_version, time_limit)
     wanted = list(dict.fromkeys(seeds))

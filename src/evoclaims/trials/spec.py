@@ -205,9 +205,9 @@ class Condition:
         return self.method if isinstance(self.method, TrainingLoop) else None
 
     @property
-    def existing(self) -> tuple[TrialResult, ...] | None:
-        """All trials that there can be, by seed from 0, where no more can be run; None for what the harness runs."""
-        return None
+    def existing(self) -> tuple[TrialResult, ...]:
+        """All trials that there can be, by seed from 0, where no more can be run; none for what the harness runs."""
+        return ()
 
     @property
     def table_rows(self) -> frozenset[tuple[str, int]]:
