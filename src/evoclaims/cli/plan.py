@@ -114,7 +114,7 @@ def main(options: argparse.Namespace) -> int:
     for names in read:
         if names not in used:
             condition, n = tier.condition(*names), counts[names]
-            few = f", and the design looks at {n}" if condition.limit < n else ""
+            few = f", and the design looks at {n}" if len(condition.existing) < n else ""
             console.print(f"{' on '.join(names)}: nothing to run: {where_from(condition)}{few}")
     _print_spent(console, tier, {names: costs[names] for names in used})
     ends = ", ".join(f"{end.symbol} {end}" for end in (Outcome.SUPPORTED, Outcome.REFUTED, Outcome.SMALLER))

@@ -142,7 +142,7 @@ class TrialGroup:
     @property
     def limit(self) -> float:
         """How many trials there can be; infinite where missing ones are run."""
-        return self.condition.limit
+        return len(self.condition.existing) or math.inf
 
     @property
     def table_rows(self) -> frozenset[tuple[str, int]]:

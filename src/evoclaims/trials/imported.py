@@ -15,6 +15,7 @@ from evoclaims.core.packages import DEPENDS_ON
 from evoclaims.core.provenance import version_of
 from evoclaims.trials.result import Status, TrialResult, check_shares, check_success, digest
 from evoclaims.trials.spec import Condition, TrialSpec
+from evoclaims.trials.store import Store
 from evoclaims.trials.table_file import TableFile, read_table
 
 
@@ -294,6 +295,21 @@ class Imported(Condition):
             f"{self.table.name} has no number in row {row + 1} of the column {self.columns[name]!r}: write nan for a "
             "trial that diverged, or say empty_means_diverged=True if all empty cells mean that."
         )
+
+
+def into_store(condition: Condition, seeds: Sequence[int], store: Store) -> list[TrialResult]:
+    """Return the existing trials of some seeds, as far as there are any, after writing what a store lacks into it.
+
+    Raises:
+        UserError: when the table cannot be read, or the store is damaged or cannot be written.
+    """
+    found = [condition.existing[seed] for seed in seeds if seed < len(condition.existing)]
+    lacking = [trial for trial in found if store.made_with(trial.id, condition.versions) is None]
+    if lacking:
+        store.check_writable()
+    for trial in lacking:
+        store.put(trial, {})
+    return found
 
 
 def where_from(condition: Condition) -> str:

@@ -9,7 +9,6 @@ import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
-from functools import partial
 from typing import Any, Final
 
 import jax
@@ -22,6 +21,7 @@ from evoclaims.trials import checkpoint
 from evoclaims.trials.batches import Batch, Run, StoredTrials, batches, drop_finished_checkpoints, halved, is_exhausted
 from evoclaims.trials.checkpoint import Header
 from evoclaims.trials.devices import single_threaded_linear_algebra
+from evoclaims.trials.imported import into_store
 from evoclaims.trials.lanes import Lanes, picked
 from evoclaims.trials.loop_trials import LoopTrials
 from evoclaims.trials.memory import give_back
@@ -75,11 +75,14 @@ def run(
     Raises:
         UserError: when the store is damaged or cannot be written, or the device's memory does not hold one trial.
     """
+    if condition.existing:
+        return into_store(condition, seeds, store)
     stored = StoredTrials(store, condition, any_version, time_limit)
-    wanted = [seed for seed in dict.fromkeys(seeds) if seed < condition.limit]
+    wanted = list(dict.fromkeys(seeds))
     make: Maker | None = None  # it asks for all that running needs, which reading does not
     while not stored.answer(found := [stored.get(seed) for seed in wanted]):
         if make is None:
+            warn_of_edited_bodies(condition, store)
             make = _maker(stored, devices, checkpoint_seconds, len(wanted))
         store.check_writable()
         with (
@@ -97,10 +100,7 @@ Maker = Callable[[Sequence[int], Watcher], None]
 
 
 def _maker(stored: StoredTrials, devices: Sequence[jax.Device], checkpoint_seconds: float, most: int) -> Maker:
-    """Return what makes trials: a table that has them, a process for each, or programs, at first of `most` trials."""
-    if stored.condition.existing:
-        return partial(_copy, stored)
-    warn_of_edited_bodies(stored.condition, stored.store)
+    """Return what makes a condition's trials: a process for each, or compiled programs, at first of `most` trials."""
     _ = stored.condition.steps  # a budget that no counter holds is refused before training, not after it
     if stored.condition.loop is not None:
         return LoopTrials(stored, stored.condition.loop, devices).make
@@ -121,11 +121,6 @@ def _maker(stored: StoredTrials, devices: Sequence[jax.Device], checkpoint_secon
             give_back()  # when nothing holds the compiled programs any more
 
     return make
-
-
-def _copy(stored: StoredTrials, owed: Sequence[int], tell: Watcher) -> None:
-    for seed in owed:
-        stored.store.put(stored.condition.existing[seed], {})
 
 
 def _run_batches(run: Run, owed: Sequence[int]) -> int:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -209,11 +208,6 @@ class Condition:
     def existing(self) -> tuple[TrialResult, ...]:
         """All trials that there can be, by seed from 0, where no more can be run; none for what the harness runs."""
         return ()
-
-    @property
-    def limit(self) -> float:
-        """How many trials there can be, by seed from 0; infinite for what the harness runs."""
-        return len(self.existing) or math.inf
 
     @property
     def table_rows(self) -> frozenset[tuple[str, int]]:
