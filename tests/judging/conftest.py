@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -41,7 +40,7 @@ class StoredSource:
     trials: dict[int, TrialResult]
     backwards: bool = False
     deterministic: bool = False
-    limit: float = math.inf
+    limit: float = float("inf")
     table_rows: frozenset[tuple[str, int]] = frozenset()
     asked: list[tuple[int, ...]] = field(default_factory=list)
 

@@ -70,7 +70,7 @@ def test_an_arrangement_places_every_active_lane_once_and_loads_devices_evenly(
     assert len(order) == width
     assert sorted(lane for lane in order if lane is not None) == active
     assert order == lanes.arrangement(active, width)
-    used = len(lanes._homes(width))
+    used = len(lanes._shares(width)[1])
     assert used == min(devices, full)
     loads = [sum(lane is not None for lane in share) for share in np.array(order, dtype=object).reshape(used, -1)]
     assert max(loads) - min(loads) <= 1
@@ -79,7 +79,7 @@ def test_an_arrangement_places_every_active_lane_once_and_loads_devices_evenly(
 @given(counts, st.integers(1, 8))
 def test_on_a_cpu_every_lane_is_a_call_of_its_own_on_one_device(full: int, devices: int) -> None:
     lanes = _lanes(devices, Layout.ALONE)
-    assert len(lanes._homes(full)) == full
+    assert len(lanes._shares(full)[1]) == full
     assert lanes.arrangement(range(full), full) == list(range(full))
 
 

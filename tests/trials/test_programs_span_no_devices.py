@@ -35,11 +35,10 @@ class EmptySumWalker(Walker):
 
 
 @pytest.fixture(params=Layout)
-def layout(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> Layout:
+def layout(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> Any:
     """How trials are laid out, on a CPU and on accelerators."""
     monkeypatch.setattr("evoclaims.trials.lanes.layout_on", lambda platform: request.param)
-    found: Layout = request.param
-    return found
+    return request.param
 
 
 def test_every_program_is_compiled_for_one_device(layout: Layout, cpus: list[Any]) -> None:

@@ -66,7 +66,7 @@ class Lanes:
 
     def programs(self, width: int) -> list[Compiled]:
         """Return the programs of each share of `width` lanes, compiling missing ones."""
-        size, homes = self._size(width), self._homes(width)
+        size, homes = self._shares(width)
         missing = [home for home in dict.fromkeys(homes) if (size, home) not in self._compiled]
         if missing:
             began = working_time()
@@ -84,9 +84,9 @@ class Lanes:
     def place(self, tree: Any, width: int) -> tuple[Any, ...]:
         """Split a tree of host arrays with leading axis [width] into shares, each on its device."""
         leaves, structure = jax.tree.flatten(tree)
-        size = self._size(width)
+        size, homes = self._shares(width)
         shares = [[leaf[first : first + size] for leaf in leaves] for first in range(0, width, size)]
-        placed = zip(shares, self._homes(width), strict=True)
+        placed = zip(shares, homes, strict=True)
         return tuple(jax.device_put(jax.tree.unflatten(structure, share), home) for share, home in placed)
 
     @staticmethod
@@ -98,7 +98,7 @@ class Lanes:
         """Start one trial per lane; None makes an idle lane."""
         known = np.array([0 if seed is None else seed for seed in seeds], np.int32)
         idle = np.array([seed is None for seed in seeds])
-        size, homes = self._size(width), self._homes(width)
+        size, homes = self._shares(width)
         began = working_time()
         with self._settings():
             lowered = [self._lowered(self._program.start, home, _seeds(size)) for home in dict.fromkeys(homes)]
@@ -128,18 +128,14 @@ class Lanes:
 
     def arrangement(self, active: Sequence[int], width: int) -> list[int | None]:
         """Deal active lanes to the shares in turn, so that all shares have about equal work."""
-        size = self._size(width)
-        shares = width // size
-        hands = [list(active[share::shares]) for share in range(shares)]
+        size, homes = self._shares(width)
+        hands = [list(active[share :: len(homes)]) for share in range(len(homes))]
         return [lane for hand in hands for lane in [*hand, *[None] * (size - len(hand))]]
 
-    def _size(self, width: int) -> int:
-        """Return the number of lanes per share: all that one call advances."""
-        return width // len(self._homes(width))
-
-    def _homes(self, width: int) -> Sequence[jax.Device]:
-        """Return the device of each share."""
-        return self.layout.homes(width, self.devices)
+    def _shares(self, width: int) -> tuple[int, Sequence[jax.Device]]:
+        """Return the number of lanes per share, which one call advances, and the device of each share."""
+        homes = self.layout.homes(width, self.devices)
+        return width // len(homes), homes
 
     def _side_by_side(self, function: Callable[..., Any], *arguments: Sequence[Any]) -> list[Any]:
         """Call the function for all shares, on one thread per core or device; jax releases the interpreter lock."""
