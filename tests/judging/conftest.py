@@ -40,7 +40,7 @@ class StoredSource:
     trials: dict[int, TrialResult]
     backwards: bool = False
     deterministic: bool = False
-    limit: float = float("inf")
+    existing: float = float("inf")
     table_rows: frozenset[tuple[str, int]] = frozenset()
     asked: list[tuple[int, ...]] = field(default_factory=list)
 

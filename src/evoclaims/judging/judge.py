@@ -218,8 +218,8 @@ def _decidable(attainable: PValues, alpha: float) -> bool:
 def _shortage(assertion: Assertion, look: Look, design: Design) -> str:
     """Say which source has too few trials for a look, which is then not taken; empty if none has."""
     for source in assertion.sources():
-        if design.seeds(look.n)[-1] >= source.limit:
-            few = f"there are {source.limit}" if source.limit > 1 else "there is 1"
+        if design.seeds(look.n)[-1] >= source.existing:
+            few = f"there are {source.existing}" if source.existing > 1 else "there is 1"
             return f"underpowered: needs n = {design.seeds(look.n)[-1] + 1} trials of {source.label}, and {few}"
     return ""
 

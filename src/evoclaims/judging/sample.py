@@ -24,7 +24,7 @@ class Source(Protocol):
         """Id of the condition; equal fingerprints mean the same trials."""
 
     @property
-    def limit(self) -> float:
+    def existing(self) -> float:
         """How many trials there can be, with seeds from 0; infinite where missing ones are run."""
 
     @property

@@ -140,7 +140,7 @@ class TrialGroup:
         return self.get(self.condition, seeds)
 
     @property
-    def limit(self) -> float:
+    def existing(self) -> float:
         """How many trials there can be; infinite where missing ones are run."""
         return len(self.condition.existing) or math.inf
 
