@@ -11,13 +11,15 @@ from hypothesis import strategies as st
 
 from evoclaims.claims.workload import Order, Work, Workload
 from evoclaims.paper.cost import Cost
+from evoclaims.trials.layout import Layout
 
 
 def load(claims: Mapping[str, str], programs: str = "", **seconds: float) -> Workload:
     """Return claims on conditions of one letter each; those in `programs` share their programs."""
+    costs = {name: Cost(0, took, 10, Layout.ALONE) for name, took in seconds.items()}
     works = {
-        name: Work(name, "shared" if name in programs else name, 0, ("file",) * (took > 0), Cost(0, took, 10, "alone"))
-        for name, took in seconds.items()
+        name: Work(name, "shared" if name in programs else name, 0, ("file",) * (cost.work > 0), cost)
+        for name, cost in costs.items()
     }
     return Workload("store", {claim: tuple(needs) for claim, needs in claims.items()}, works)
 

@@ -13,6 +13,7 @@ from evoclaims.claims.workload import Watching, Work, Workload, remaining
 from evoclaims.envs.gates.parity import NParity
 from evoclaims.methods.hand_built import HandBuilt
 from evoclaims.paper.cost import Basis, Cost
+from evoclaims.trials.layout import Layout
 from evoclaims.trials.lease import Running, announced, shared
 from evoclaims.trials.progress import RunProgress
 from evoclaims.trials.spec import Budget, Condition
@@ -51,7 +52,7 @@ def store(tmp_path: Path) -> Store:
 
 def took(seconds: float, basis: Basis = "here") -> Cost:
     """Return the cost of a batch on an accelerator."""
-    return Cost(0.0, seconds, 10, "vector", basis)
+    return Cost(0.0, seconds, 10, Layout.VECTOR, basis)
 
 
 def watching(store: Store, workers: int = 2) -> Watching:

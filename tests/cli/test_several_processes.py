@@ -27,13 +27,14 @@ from evoclaims.methods.hand_built import HandBuilt
 from evoclaims.paper.cost import Cost
 from evoclaims.trials import gpus
 from evoclaims.trials.integrity import verify
+from evoclaims.trials.layout import Layout
 from evoclaims.trials.spec import Budget, Condition
 from evoclaims.trials.store import Store
 
 ORDER = WorkOrder("store", "smoke", "cpu", 0, 10)
 
 
-def _batch(name: str, work: float, compile_seconds: float = 0.0, layout: str = "vector") -> MissingBatch:
+def _batch(name: str, work: float, compile_seconds: float = 0.0, layout: Layout = Layout.VECTOR) -> MissingBatch:
     return MissingBatch(Job("", name, "parity"), tuple(range(10)), Cost(compile_seconds, work, 10, layout))
 
 
@@ -229,8 +230,8 @@ def test_conditions_of_two_shares_have_several_gpus_and_there_are_always_enough(
 
 
 def test_processes_are_as_many_as_keep_the_cores_busy() -> None:
-    running = [_batch(str(i), 1000.0, 0.0, "alone") for i in range(50)]  # ten trials each
-    compiling = [_batch(str(i), 0.0, 10.0, "alone") for i in range(50)]
+    running = [_batch(str(i), 1000.0, 0.0, Layout.ALONE) for i in range(50)]  # ten trials each
+    compiling = [_batch(str(i), 0.0, 10.0, Layout.ALONE) for i in range(50)]
     assert useful_processes(running, 64) == 6
     assert useful_processes(running, 2) == 1
     assert useful_processes(compiling, 64) == 64

@@ -27,6 +27,7 @@ from evoclaims.cli.cluster.submissions import Seen, State, load_all
 from evoclaims.cli.processes.job import Job, MissingBatch
 from evoclaims.cli.submit import dealt
 from evoclaims.paper.cost import Cost
+from evoclaims.trials.layout import Layout
 from evoclaims.trials.lease import announced, lease_path
 from evoclaims.trials.store import Store
 
@@ -288,7 +289,8 @@ def test_a_time_is_written_as_slurm_does_or_as_we_do(text: str, minutes: int) ->
 @given(st.lists(st.floats(0.1, 1000)), st.integers(1, 5))
 def test_batches_of_this_machine_are_dealt_once_and_evenly(seconds: list[float], jobs: int) -> None:
     each = sorted(seconds, reverse=True)
-    batches = [MissingBatch(Job("", "m", str(i)), (0,), Cost(0.0, took, 1, "alone")) for i, took in enumerate(each)]
+    costs = [Cost(0.0, took, 1, Layout.ALONE) for took in each]
+    batches = [MissingBatch(Job("", "m", str(i)), (0,), cost) for i, cost in enumerate(costs)]
     hands = dealt(batches, jobs)
     assert sorted((one.job.task for hand in hands for one in hand), key=int) == [one.job.task for one in batches]
     sums = [sum(one.cost.seconds() for one in hand) for hand in hands]

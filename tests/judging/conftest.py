@@ -39,6 +39,9 @@ class StoredSource:
     label: str
     trials: dict[int, TrialResult]
     backwards: bool = False
+    deterministic: bool = False
+    existing: float = float("inf")
+    table_rows: frozenset[tuple[str, int]] = frozenset()
     asked: list[tuple[int, ...]] = field(default_factory=list)
 
     @property

@@ -13,7 +13,7 @@ from probes import COPY, CURRICULUM, PROBES, SELECTION, Probe
 from small_methods import METHODS, Entry
 
 from evoclaims.envs.base import Episode, PolicyFn
-from evoclaims.trials import lanes
+from evoclaims.trials.layout import FAST_TO_COMPILE, Layout
 from evoclaims.trials.runner import run
 from evoclaims.trials.spec import Budget, Condition
 from evoclaims.trials.store import Store
@@ -47,7 +47,7 @@ HELD_TO = [(name, probe) for name in METHODS for probe in PROBES.values() if _st
 @pytest.fixture
 def _as_shipped(monkeypatch: pytest.MonkeyPatch) -> None:
     """Compile every trial as a user's short ones are: what takes thousands of steps is worth that."""
-    monkeypatch.setattr(lanes, "options_for", lambda condition, layout: lanes.FAST_TO_COMPILE)
+    monkeypatch.setattr(Layout, "options", lambda layout, condition: FAST_TO_COMPILE)
 
 
 @pytest.mark.usefixtures("_as_shipped")

@@ -19,6 +19,7 @@ from evoclaims.report.live_line import (
     describe_all,
     duration,
 )
+from evoclaims.trials.layout import Layout
 from evoclaims.trials.lease import Running
 from evoclaims.trials.progress import RunProgress
 
@@ -161,7 +162,7 @@ def test_a_length_of_time_is_written_as_people_write_it(seconds: float, words: s
 
 
 def test_a_run_of_hours_is_announced_with_what_is_unknown_of_it_and_a_short_one_is_not() -> None:
-    def announced(layout: str = "alone", **seconds: float | None) -> str:
+    def announced(layout: Layout = Layout.ALONE, **seconds: float | None) -> str:
         costs = {
             name: Cost(0.0, 9e9, 10, layout, "budget") if took is None else Cost(1.0, took, 10, layout, "elsewhere")
             for name, took in seconds.items()
@@ -169,7 +170,7 @@ def test_a_run_of_hours_is_announced_with_what_is_unknown_of_it_and_a_short_one_
         works = {name: Work(name, name, 0, ("file",), cost) for name, cost in costs.items()}
         return beforehand(Workload("store", {}, works))
 
-    assert announced() == announced(a=3_599.0) == announced(a=None) == announced("vector", a=9_000.0) == ""
+    assert announced() == announced(a=3_599.0) == announced(a=None) == announced(Layout.VECTOR, a=9_000.0) == ""
     assert announced(a=5_400.0, b=5_400.0).startswith(
         "The missing trials take up to 3 hours of a processor's core. `evoclaims"
     )

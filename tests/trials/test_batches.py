@@ -13,6 +13,7 @@ from trial_toys import StoppedError, stopping
 from evoclaims.core.provenance import collect
 from evoclaims.trials import checkpoint
 from evoclaims.trials.lanes import Lanes
+from evoclaims.trials.layout import Layout
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.store import Store
 
@@ -107,7 +108,7 @@ def test_more_trials_may_be_asked_for_than_the_stopped_run_had(
 @pytest.fixture
 def side_by_side(monkeypatch: pytest.MonkeyPatch) -> list[tuple[int, int]]:
     """Lay trials out as on a GPU; gives the steps and the number of lanes of every chunk that is run."""
-    monkeypatch.setattr("evoclaims.trials.lanes.layout_on", lambda platform: "vector")
+    monkeypatch.setattr("evoclaims.trials.lanes.layout_on", lambda platform: Layout.VECTOR)
     chunks: list[tuple[int, int]] = []
     advance = Lanes.advance
 

@@ -13,6 +13,7 @@ import pytest
 from evoclaims.core import files
 from evoclaims.core.errors import UserError
 from evoclaims.trials import devices
+from evoclaims.trials.layout import Layout, layout_on
 
 
 def test_an_unknown_device_is_a_sentence_with_the_known_ones() -> None:
@@ -33,7 +34,7 @@ def test_a_gpu_that_is_not_there_is_a_sentence_with_the_remedy(monkeypatch: pyte
 
 def test_the_cpu_can_always_be_asked_for() -> None:
     assert {device.platform for device in devices.choose("cpu")} == {"cpu"}
-    assert devices.layout_on(devices.choose("cpu")[0].platform) == "alone"
+    assert layout_on(devices.choose("cpu")[0].platform) is Layout.ALONE
 
 
 SCRIPT = """

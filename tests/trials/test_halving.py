@@ -12,6 +12,7 @@ from climbers import SEEDS, Log, digests, run_climbers
 
 from evoclaims.trials import checkpoint
 from evoclaims.trials.lanes import Lanes
+from evoclaims.trials.layout import Layout
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.store import Store
 
@@ -90,7 +91,7 @@ def test_trials_side_by_side_on_several_devices_are_all_run_once(
     store: Store, cpus: list[Any], small_memory: Small, puts: Counter[int], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Their bits may depend on the number of lanes, so that only the trials are compared."""
-    monkeypatch.setattr("evoclaims.trials.lanes.layout_on", lambda platform: "vector")
+    monkeypatch.setattr("evoclaims.trials.lanes.layout_on", lambda platform: Layout.VECTOR)
     small_memory("advance", 4, from_step=2)
     results = run_climbers(store, cpus)
     assert [result.seed for result in results] == list(SEEDS)

@@ -184,7 +184,7 @@ def test_the_budget_of_curves_is_the_longest_and_its_reports_are_as_far_apart_as
 ) -> None:
     condition = table(CURVES.replace("3,100", "3,150"), step="global_step")
     assert condition.environment_steps == 300
-    assert condition.budget.chunk(condition.method.cost(condition.task)) == 150
+    assert condition.report_distance == 150
     assert table(where=SAC).environment_steps == 0
 
 

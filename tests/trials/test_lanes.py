@@ -16,14 +16,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from trial_toys import walk
 
-from evoclaims.trials.lanes import Compiled, Lanes, picked, width_for
+from evoclaims.trials.lanes import Compiled, Lanes, picked
+from evoclaims.trials.layout import Layout
 from evoclaims.trials.runner import run
 from evoclaims.trials.store import Store
 
 pytestmark = pytest.mark.oldest
 
 
-def _lanes(devices: int, layout: str = "vector") -> Lanes:
+def _lanes(devices: int, layout: Layout = Layout.VECTOR) -> Lanes:
     """Return lanes over devices that need not exist."""
     lanes = object.__new__(Lanes)
     lanes.devices = [None] * devices  # type: ignore[list-item]
@@ -35,36 +36,27 @@ counts = st.integers(1, 40)
 
 
 @given(st.data(), counts, st.integers(1, 8))
-def test_there_are_never_fewer_lanes_than_active_trials(data: st.DataObject, full: int, devices: int) -> None:
-    active = data.draw(st.integers(0, full))
-    width = width_for(active, devices, full)
-    assert width >= max(active, 1)
-    assert width % devices == 0
-    assert width <= -(-full // devices) * devices
-
-
-@given(st.data(), counts, st.integers(1, 8))
 def test_fewer_active_trials_never_need_more_lanes(data: st.DataObject, full: int, devices: int) -> None:
     active = data.draw(st.integers(1, full))
-    assert width_for(active - 1, devices, full) <= width_for(active, devices, full)
+    assert Layout.VECTOR.width(active - 1, full, devices) <= Layout.VECTOR.width(active, full, devices)
 
 
 @given(counts)
 def test_lanes_halve_so_that_few_widths_are_compiled(full: int) -> None:
-    widths = {width_for(active, 1, full) for active in range(1, full + 1)}
-    assert len(widths) <= full.bit_length() + 1
-    assert width_for(full, 1, full) == full
-    assert width_for(1, 1, full) <= 2
+    widths = [Layout.VECTOR.width(active, full, 1) for active in range(1, full + 1)]
+    assert len(set(widths)) <= full.bit_length() + 1
+    assert widths[-1] == full
+    assert widths[0] <= 2
 
 
 @given(st.data(), counts, st.integers(1, 8))
 def test_a_batch_uses_no_more_devices_than_it_has_trials(data: st.DataObject, full: int, devices: int) -> None:
-    active = data.draw(st.integers(1, full))
+    active = data.draw(st.integers(0, full))
     lanes = _lanes(devices)
     width = lanes.width(active, full)
     assert width % min(devices, full) == 0
-    assert active <= width <= full + min(devices, full) - 1
-    assert _lanes(devices, "alone").width(active, full) == full
+    assert max(active, 1) <= width <= full + min(devices, full) - 1
+    assert _lanes(devices, Layout.ALONE).width(active, full) == full
 
 
 @given(st.data(), counts, st.integers(1, 8))
@@ -78,7 +70,7 @@ def test_an_arrangement_places_every_active_lane_once_and_loads_devices_evenly(
     assert len(order) == width
     assert sorted(lane for lane in order if lane is not None) == active
     assert order == lanes.arrangement(active, width)
-    used = len(lanes._homes(width))
+    used = len(lanes._shares(width)[1])
     assert used == min(devices, full)
     loads = [sum(lane is not None for lane in share) for share in np.array(order, dtype=object).reshape(used, -1)]
     assert max(loads) - min(loads) <= 1
@@ -86,8 +78,8 @@ def test_an_arrangement_places_every_active_lane_once_and_loads_devices_evenly(
 
 @given(counts, st.integers(1, 8))
 def test_on_a_cpu_every_lane_is_a_call_of_its_own_on_one_device(full: int, devices: int) -> None:
-    lanes = _lanes(devices, "alone")
-    assert len(lanes._homes(full)) == full
+    lanes = _lanes(devices, Layout.ALONE)
+    assert len(lanes._shares(full)[1]) == full
     assert lanes.arrangement(range(full), full) == list(range(full))
 
 
@@ -114,9 +106,9 @@ def _started() -> Any:
     return _cached[0]
 
 
-@pytest.mark.parametrize("layout", ["alone", "vector"])
+@pytest.mark.parametrize("layout", Layout)
 def test_each_size_of_a_share_is_compiled_once_a_device_in_a_run(
-    layout: str,
+    layout: Layout,
     tmp_path: Path,
     cpus: list[Any],
     monkeypatch: pytest.MonkeyPatch,
@@ -133,9 +125,9 @@ def test_each_size_of_a_share_is_compiled_once_a_device_in_a_run(
     monkeypatch.setattr(Lanes, "_compile", spy)
     with jax.log_compiles(), caplog.at_level(logging.WARNING, "jax"):
         results = run(walk(chance=0.35, hazard=0.04), range(1, 6), Store(tmp_path), cpus)
-    assert sizes == ({1: 1} if layout == "alone" else {3: 2, 1: 2})  # lanes of a share, on how many devices
+    assert sizes == ({1: 1} if layout.alone else {3: 2, 1: 2})  # lanes of a share, on how many devices
     compiled = [r for r in caplog.records if r.getMessage().startswith("Compiling ")]
-    starts = 1 if layout == "alone" else 2
+    starts = 1 if layout.alone else 2
     assert len(compiled) == starts + 2 * sizes.total(), [r.getMessage() for r in compiled]
     assert len({result.metrics["steps"] for result in results}) > 1
 

@@ -13,6 +13,7 @@ from trial_toys import Walker, walk
 
 from evoclaims.methods.base import Progress
 from evoclaims.trials.lanes import Lanes
+from evoclaims.trials.layout import Layout
 from evoclaims.trials.runner import run
 from evoclaims.trials.store import Store
 
@@ -33,22 +34,22 @@ class EmptySumWalker(Walker):
         return super().step(key, task, level, state + nothing)
 
 
-@pytest.fixture(params=["alone", "vector"])
-def layout(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> str:
+@pytest.fixture(params=Layout)
+def layout(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> Any:
     """How trials are laid out, on a CPU and on accelerators."""
     monkeypatch.setattr("evoclaims.trials.lanes.layout_on", lambda platform: request.param)
-    return str(request.param)
+    return request.param
 
 
-def test_every_program_is_compiled_for_one_device(layout: str, cpus: list[Any]) -> None:
+def test_every_program_is_compiled_for_one_device(layout: Layout, cpus: list[Any]) -> None:
     programs = Lanes(walk(), cpus).programs(4)
-    assert len(programs) == {"alone": 4, "vector": 2}[layout]
+    assert len(programs) == (4 if layout.alone else 2)
     for program in {id(one): one for one in programs}.values():
         for compiled in (program.advance, program.score):
             assert "num_partitions" not in compiled.as_text().splitlines()[0]  # type: ignore[attr-defined]
 
 
-def test_a_step_may_close_over_an_array_without_elements(layout: str, cpus: list[Any], tmp_path: Path) -> None:
+def test_a_step_may_close_over_an_array_without_elements(layout: Layout, cpus: list[Any], tmp_path: Path) -> None:
     condition = replace(walk(chance=0.2), method=EmptySumWalker(chance=0.2))
     results = run(condition, range(3), Store(tmp_path), cpus)
     assert [result.status for result in results] == ["done"] * 3

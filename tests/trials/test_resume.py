@@ -15,6 +15,7 @@ from evoclaims.methods.cma_es import CmaEs
 from evoclaims.networks.all_skips import AllSkips
 from evoclaims.trials import checkpoint
 from evoclaims.trials.lanes import Lanes
+from evoclaims.trials.layout import Layout
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.spec import Budget, Condition
 from evoclaims.trials.store import Store
@@ -122,7 +123,7 @@ def test_a_trial_stored_elsewhere_after_the_checkpoint_is_not_run_again(
 def test_a_batch_that_has_narrowed_goes_on_to_the_same_bits(
     store: Store, tmp_path: Path, cpus: list[Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("evoclaims.trials.lanes.layout_on", lambda platform: "vector")
+    monkeypatch.setattr("evoclaims.trials.lanes.layout_on", lambda platform: Layout.VECTOR)
     wanted = run_climbers(Store(tmp_path / "whole"), cpus)
     with pytest.raises(StoppedError):
         run_climbers(store, cpus, stopping(5))

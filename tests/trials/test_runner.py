@@ -14,6 +14,7 @@ from trial_toys import walk
 
 from evoclaims.core.errors import UserError
 from evoclaims.trials.lanes import Lanes
+from evoclaims.trials.layout import Layout
 from evoclaims.trials.progress import RunProgress
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.result_codec import dump
@@ -41,9 +42,9 @@ def test_only_the_missing_trials_are_run(store: Store, cpus: list[Any], puts: Co
     assert results[0].timing["batch"] == 2
 
 
-@pytest.mark.parametrize("layout", ["alone", "vector"])
+@pytest.mark.parametrize("layout", Layout)
 def test_a_report_tells_of_the_trials_that_run_whatever_lanes_they_have_moved_to(
-    layout: str, store: Store, cpus: list[Any], monkeypatch: pytest.MonkeyPatch
+    layout: Layout, store: Store, cpus: list[Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("evoclaims.trials.lanes.layout_on", lambda platform: layout)
     log = Log()

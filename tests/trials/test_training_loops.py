@@ -260,7 +260,7 @@ run(condition(toy_loops.never_returns, file={str(tmp_path / "pids")!r}), [0], St
 def test_an_interrupted_run_goes_on_with_the_trials_that_it_lacks(
     tmp_path: Path, store: Store, cpus: list[Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("evoclaims.trials.loop_trials.usable_cores", lambda: 1)
+    monkeypatch.setattr("evoclaims.trials.layout.usable_cores", lambda: 1)
     begun = tmp_path / "begun"
     noting = condition(toy_loops.notes, file=str(begun))
 

@@ -15,6 +15,7 @@ from evoclaims.methods.cma_es import CmaEs
 from evoclaims.methods.ppo import Ppo
 from evoclaims.methods.random_search import RandomSearch
 from evoclaims.networks.all_skips import AllSkips
+from evoclaims.trials.layout import Layout
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.runner import run
 from evoclaims.trials.spec import Budget, Condition
@@ -77,7 +78,7 @@ def test_trials_side_by_side_climb_and_end_as_trials_one_after_the_other(
     """The "vector" layout, which narrows as trials end; its arithmetic may round otherwise, so no digests here."""
     seeds, condition = range(5), walk(chance=0.25)
     loop = run(condition, seeds, Store(tmp_path / "alone"), cpus)
-    monkeypatch.setattr("evoclaims.trials.lanes.layout_on", lambda platform: "vector")
+    monkeypatch.setattr("evoclaims.trials.lanes.layout_on", lambda platform: Layout.VECTOR)
     vector = run(condition, seeds, Store(tmp_path / "vector"), cpus)
     for one, other in zip(loop, vector, strict=True):
         assert (one.seed, one.status) == (other.seed, other.status)

@@ -11,18 +11,19 @@ import pytest
 from trial_toys import walk
 
 from evoclaims.trials.lanes import Lanes
-from evoclaims.trials.program import Program, TrialState, over_trials
+from evoclaims.trials.layout import Layout
+from evoclaims.trials.program import Program, TrialState
 
 SEEDS = np.arange(8, dtype=np.int32)
 IDLE = np.arange(8) == 6
 
 
-def _advanced(layout: str, chunks: list[int], **toy: Any) -> list[TrialState]:
+def _advanced(layout: Layout, chunks: list[int], **toy: Any) -> list[TrialState]:
     """Return the state after each chunk, on the host."""
     program = Program(walk(**toy))
-    start = jax.jit(over_trials(program.start, layout))
-    advance = jax.jit(over_trials(program.advance, layout))
-    width = 1 if layout == "alone" else len(SEEDS)
+    start = jax.jit(layout.over_trials(program.start))
+    advance = jax.jit(layout.over_trials(program.advance))
+    width = 1 if layout.alone else len(SEEDS)
     shares, states = [start(SEEDS[i : i + width], IDLE[i : i + width]) for i in range(0, len(SEEDS), width)], []
     for until in chunks:
         shares = [advance(share, jnp.full(width, until, jnp.int32))[0] for share in shares]
@@ -34,8 +35,8 @@ def _leaves(state: TrialState, lane: int) -> list[bytes]:
     return [np.asarray(leaf)[lane].tobytes() for leaf in jax.tree.leaves(state)]
 
 
-@pytest.mark.parametrize("layout", ["alone", "vector"])
-def test_the_state_of_a_trial_that_has_ended_no_longer_changes(layout: str) -> None:
+@pytest.mark.parametrize("layout", Layout)
+def test_the_state_of_a_trial_that_has_ended_no_longer_changes(layout: Layout) -> None:
     half, whole = _advanced(layout, [6, 12], chance=0.4, hazard=0.05)
     ended = np.asarray(half.ascent.finished | half.diverged)
     assert 0 < ended.sum() < len(SEEDS) - 1
@@ -44,25 +45,25 @@ def test_the_state_of_a_trial_that_has_ended_no_longer_changes(layout: str) -> N
         assert same == (bool(ended[lane]) or bool(IDLE[lane]))
 
 
-@pytest.mark.parametrize("layout", ["alone", "vector"])
-def test_an_idle_lane_takes_no_step(layout: str) -> None:
+@pytest.mark.parametrize("layout", Layout)
+def test_an_idle_lane_takes_no_step(layout: Layout) -> None:
     (state,) = _advanced(layout, [12], chance=0.1)
     assert state.steps[6] == 0
     assert np.asarray(state.steps)[~IDLE].min() > 0
 
 
 def test_chunks_of_any_length_lead_to_the_same_bits() -> None:
-    whole = _advanced("alone", [12], chance=0.1, hazard=0.02)[-1]
-    parts = _advanced("alone", [1, 2, 7, 12], chance=0.1, hazard=0.02)[-1]
+    whole = _advanced(Layout.ALONE, [12], chance=0.1, hazard=0.02)[-1]
+    parts = _advanced(Layout.ALONE, [1, 2, 7, 12], chance=0.1, hazard=0.02)[-1]
     assert [leaf.tobytes() for leaf in jax.tree.leaves(whole)] == [leaf.tobytes() for leaf in jax.tree.leaves(parts)]
 
 
 def test_no_trial_goes_beyond_its_budget() -> None:
-    (state,) = _advanced("alone", [1000], steps=5)
+    (state,) = _advanced(Layout.ALONE, [1000], steps=5)
     assert np.asarray(state.steps)[~IDLE].tolist() == [5] * 7
 
 
 def test_a_step_that_is_not_healthy_solves_nothing() -> None:
-    (state,) = _advanced("alone", [12], hazard=1.0)
+    (state,) = _advanced(Layout.ALONE, [12], hazard=1.0)
     assert np.asarray(state.diverged)[~IDLE].all()
     assert (np.asarray(state.ascent.solved_at) == -1).all()

@@ -89,7 +89,7 @@ class Pilots:
     def _read(self, names: Names) -> None:
         found = pilots.load(pilots.path_of(self._folder, self._tier, *names))
         self._unfit[names] = pilots.unfit(found, self.groups[names].condition, self._design, self._readings[names])
-        if self.groups[names].existing is not None:
+        if self.groups[names].condition.existing:
             self._unfit[names] = "its trials are imported, and there are no others"
         self.trials[names] = found
 

@@ -17,7 +17,6 @@ from evoclaims.core.errors import UserError, in_one_line
 from evoclaims.core.printable import printable
 from evoclaims.envs.base import Checked
 from evoclaims.judging.verdict import Outcome
-from evoclaims.methods.training_loop import TrainingLoop
 from evoclaims.paper import references
 from evoclaims.paper.cost import Estimator, Owed, Wanted, measured, took
 from evoclaims.paper.reproduction import Names, Tier
@@ -64,7 +63,7 @@ def main(options: argparse.Namespace) -> int:
             raise UserError(f"The variant {variant} changes no condition that claims of the {options.tier} tier read.")
     else:
         read = _read(reports)
-    used = [names for names in read if tier.condition(*names).existing is None]
+    used = [names for names in read if not tier.condition(*names).existing]
     for names in used:
         task = tier.condition(*names).task
         if isinstance(task, Checked):
@@ -81,7 +80,7 @@ def main(options: argparse.Namespace) -> int:
     if options.measure:
         for names, one in owed.items():
             condition = wanted[names].condition
-            if one.cost.basis == "budget" and not isinstance(condition.method, TrainingLoop):  # that has no steps
+            if one.cost.basis == "budget" and condition.loop is None:  # which has no steps
                 try:
                     owed[names] = replace(one, cost=measured(condition, chosen, one.cost.trials))
                 except KeyboardInterrupt:
@@ -115,9 +114,8 @@ def main(options: argparse.Namespace) -> int:
     for names in read:
         if names not in used:
             condition, n = tier.condition(*names), counts[names]
-            few = f", and the design looks at {n}" if len(condition.existing or ()) < n else ""
-            line = f"{' on '.join(names)}: nothing to run: {where_from(condition)}{few}"
-            console.print(line)
+            few = f", and the design looks at {n}" if len(condition.existing) < n else ""
+            console.print(f"{' on '.join(names)}: nothing to run: {where_from(condition)}{few}")
     _print_spent(console, tier, {names: costs[names] for names in used})
     ends = ", ".join(f"{end.symbol} {end}" for end in (Outcome.SUPPORTED, Outcome.REFUTED, Outcome.SMALLER))
     console.print(

@@ -88,7 +88,7 @@ def main(options: argparse.Namespace) -> int:
     if options.run or options.stored:
         _make(project, pilots, {names: one for names, one in wanted.items() if pilots.unfit(names)}, design, options)
     powers = pilots.powers(chosen, options.draws)
-    imported = bool(wanted) and all(condition.existing is not None for condition in wanted.values())
+    imported = bool(wanted) and all(condition.existing for condition in wanted.values())
     advice = [] if imported else [_advice(options)]
     if not any(one.power for one in powers):
         first = "; ".join(troubles(powers)[:1]) or "no claim has a test"

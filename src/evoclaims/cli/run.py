@@ -77,7 +77,7 @@ def main(options: argparse.Namespace) -> int:
     if options.variant and not (options.method and options.on):
         chosen = to_run(running, chosen)
     wanted = {Job("", *names): tier.condition(*names) for names in chosen}
-    for job in [job for job, condition in wanted.items() if condition.existing is not None]:
+    for job in [job for job, condition in wanted.items() if condition.existing]:
         print(f"{job.label} ({options.tier}): nothing to run: {where_from(wanted.pop(job))}")
     if options.retry:
         for condition in wanted.values():

@@ -49,7 +49,7 @@ def load(project: Project, tier: str, method: str, task: str, seed: int) -> Stor
     """
     reproduction, store = project.reproduction, project.store
     condition, title = reproduction.tier(tier).condition(method, task), f"{method} on {task} ({tier})"
-    if condition.existing is not None:
+    if condition.existing:
         raise UserError(f"{title} has no champion: its {where_from(condition)}.")
     spec = TrialSpec(condition, seed)
     result = store.get(spec.id, condition.versions)

@@ -94,7 +94,7 @@ def watch_of(project: Project, tier: str) -> tuple[Watch, list[str]]:
     found: list[Watched] = []
     left_out: list[str] = []
     for names, group in sorted(pilots.groups.items()):
-        if group.existing is not None:  # an imported table has no new seeds
+        if group.condition.existing:  # an imported table has no new seeds
             continue
         mine = references.of_condition(reproduction.references, tier, *names, group.condition.id)
         pilot = () if pilots.unfit(names) else pilots.trials[names]

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from evoclaims.judging.assertion import Assertion
-from evoclaims.judging.sample import Declared, Trials
+from evoclaims.judging.sample import Trials
 from evoclaims.trials.result import COMPLETE, RETURNED, TRAINED_BY, TrialResult
 
 SHORT: Final = 10_000
@@ -46,7 +46,7 @@ def copies(assertion: Assertion, trials: Trials) -> Copies:
     left_out, sentences, alone = set[int](), list[str](), ""
     count = max(map(len, trials.values()), default=0)
     for source in assertion.drawn():
-        if isinstance(source, Declared) and source.deterministic:
+        if source.deterministic:
             continue
         mine = trials[source.fingerprint]
         groups = _groups(mine)

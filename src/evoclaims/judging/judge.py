@@ -12,7 +12,7 @@ from evoclaims.judging.assertion import Assertion, Finding
 from evoclaims.judging.copies import Copies, copies
 from evoclaims.judging.design import Design, Look
 from evoclaims.judging.exact import MAX_TRIALS
-from evoclaims.judging.sample import Limited, Source, Trials, UnreadableTrialError
+from evoclaims.judging.sample import Source, Trials, UnreadableTrialError
 from evoclaims.judging.spending import overspent
 from evoclaims.judging.verdict import Outcome, PValues, Verdict
 from evoclaims.trials.failed import place, why
@@ -218,9 +218,8 @@ def _decidable(attainable: PValues, alpha: float) -> bool:
 def _shortage(assertion: Assertion, look: Look, design: Design) -> str:
     """Say which source has too few trials for a look, which is then not taken; empty if none has."""
     for source in assertion.sources():
-        existing = source.existing if isinstance(source, Limited) else None
-        if existing is not None and design.seeds(look.n)[-1] >= existing:
-            few = f"there are {existing}" if existing > 1 else "there is 1" if existing else "there are none"
+        if design.seeds(look.n)[-1] >= source.existing:
+            few = f"there are {source.existing}" if source.existing > 1 else "there is 1"
             return f"underpowered: needs n = {design.seeds(look.n)[-1] + 1} trials of {source.label}, and {few}"
     return ""
 

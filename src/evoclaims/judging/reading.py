@@ -13,7 +13,6 @@ import numpy as np
 
 from evoclaims.core.errors import UserError, require_known
 from evoclaims.judging.sample import (
-    Limited,
     Sample,
     Source,
     Trials,
@@ -175,7 +174,7 @@ def require_independent(*readings: NumberReading) -> None:
     """
     for one, other in combinations(readings, 2):
         a, b = one.source, other.source
-        if a.fingerprint == b.fingerprint or (isinstance(a, Limited) and a.shares_trials_with(b)):
+        if a.fingerprint == b.fingerprint or a.table_rows & b.table_rows:
             raise UserError(
                 f"{one.describe()!r} and {other.describe()!r} read the same trials, which a rank test "
                 "cannot compare. Use a profile's falls() or rises() for levels, never_above_itself() for "

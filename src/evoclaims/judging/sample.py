@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Protocol, runtime_checkable
+from typing import Any, Protocol
 
 from evoclaims.core.errors import guess
 from evoclaims.judging.effect import median
@@ -13,7 +13,7 @@ from evoclaims.trials.result import TRAINED_BY, TrialResult
 
 
 class Source(Protocol):
-    """A condition whose trials can be fetched by seed."""
+    """Trials that can be fetched by seed."""
 
     @property
     def label(self) -> str:
@@ -23,29 +23,20 @@ class Source(Protocol):
     def fingerprint(self) -> str:
         """Id of the condition; equal fingerprints mean the same trials."""
 
-    def fetch(self, seeds: Sequence[int]) -> Sequence[TrialResult]:
-        """Return one trial per seed, in any order; run missing ones, or raise if nothing may run."""
-
-
-@runtime_checkable
-class Limited(Source, Protocol):
-    """A source that may be limited to existing trials, whose seeds count from 0."""
-
     @property
-    def existing(self) -> int | None:
-        """How many trials there are; None where missing ones are run."""
-
-    def shares_trials_with(self, other: Source) -> bool:
-        """Whether another source, of another fingerprint, reads some of the same trials."""
-
-
-@runtime_checkable
-class Declared(Source, Protocol):
-    """A source that says whether its trials have no chance in them."""
+    def existing(self) -> float:
+        """How many trials there can be, with seeds from 0; infinite where missing ones are run."""
 
     @property
     def deterministic(self) -> bool:
-        """Whether they may be copies of each other."""
+        """Whether the trials have no chance in them, so that they may be copies of each other."""
+
+    @property
+    def table_rows(self) -> frozenset[tuple[str, int]]:
+        """The rows of a table, by its hash, that the trials are read from; none for trials that are run."""
+
+    def fetch(self, seeds: Sequence[int]) -> Sequence[TrialResult]:
+        """Return one trial per seed, in any order; run missing ones, or raise if nothing may run."""
 
 
 Trials = Mapping[str, tuple[TrialResult, ...]]

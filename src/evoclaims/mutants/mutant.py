@@ -11,7 +11,6 @@ from evoclaims.envs.gates.circuit import Circuit
 from evoclaims.methods.cma_es import CmaEs
 from evoclaims.methods.map_elites import MapElites
 from evoclaims.methods.mechanisms.observed import Observed
-from evoclaims.methods.training_loop import TrainingLoop
 from evoclaims.mutants import faults
 from evoclaims.mutants.faults import Fault, plant
 from evoclaims.paper.config import import_module
@@ -38,7 +37,7 @@ class Mutant:
     def conditions(self, sound: Conditions, target: str) -> dict[Names, Condition]:
         """Return the faulty conditions of one method, or one task, by the names under which claims ask for them."""
         place = 0 if self.part == "method" else 1
-        run_here = {names: one for names, one in sound.items() if names[place] == target and one.existing is None}
+        run_here = {names: one for names, one in sound.items() if names[place] == target and not one.existing}
         changed = {names: self.change(one) for names, one in run_here.items()}
         return {names: one for names, one in changed.items() if one is not None and one.id != sound[names].id}
 
@@ -79,7 +78,7 @@ def with_task(says: str, change: Callable[[Any], Any], only: type | tuple[type, 
 
 def _where_compiled(mutant: Mutant) -> Mutant:
     """Skip training loops: they call none of our methods' functions and import tasks anew: no fault reaches them."""
-    return replace(mutant, change=lambda one: None if isinstance(one.method, TrainingLoop) else mutant.change(one))
+    return replace(mutant, change=lambda one: None if one.loop else mutant.change(one))
 
 
 def _staying(one: Condition) -> Condition | None:

@@ -75,7 +75,7 @@ class Archive:
         """Reference trials and imported ones by id."""
         files = sorted(self.references.rglob("*.jsonl")) if self.references is not None else ()
         found: dict[str, list[TrialResult]] = defaultdict(list)
-        for trials in (*(condition.existing or () for condition in self.existing), *map(references.load, files)):
+        for trials in (*(condition.existing for condition in self.existing), *map(references.load, files)):
             for trial in trials:
                 found[trial.id].append(trial)
         return dict(found)

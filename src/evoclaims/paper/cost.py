@@ -24,8 +24,9 @@ from evoclaims.core.provenance import machine_class
 from evoclaims.paper import references
 from evoclaims.paper.reproduction import Names, Reproduction
 from evoclaims.trials.batches import StoredTrials
-from evoclaims.trials.devices import layout_on, usable_cores
+from evoclaims.trials.devices import usable_cores
 from evoclaims.trials.lanes import Lanes
+from evoclaims.trials.layout import Layout, layout_on
 from evoclaims.trials.result import COMPLETE, TrialResult
 from evoclaims.trials.spec import Condition
 from evoclaims.trials.store import Store
@@ -56,14 +57,14 @@ class Batch:
     Attributes:
         trials: at least one, each once.
         compile, run: seconds, until the last trial had ended.
-        layout: see `program.over_trials`.
+        layout: of the trials on their devices.
         processor: seconds of a processor's cores that running took; None where the records do not say.
     """
 
     trials: Sequence[TrialResult]
     compile: float
     run: float
-    layout: str
+    layout: Layout
     processor: float | None
 
     def work(self, condition: Condition, trials: int) -> float:
@@ -73,10 +74,10 @@ class Batch:
         """
         same = self.trials[0].condition == condition.id
         steps = [max(float(trial.metrics.get("environment_steps", 0.0)), 1.0) for trial in self.trials]
-        if self.layout != "alone":
-            return self.run if same else self.run / max(steps) * condition.environment_steps
-        used = self.processor or self.run * min(usable_cores(), len(steps))  # not recorded: as if here
-        return used * trials / len(steps) if same else used / sum(steps) * condition.environment_steps * trials
+        calls, wanted = self.layout.calls(len(steps)), self.layout.calls(trials)
+        used = self.processor or self.run * min(usable_cores(), calls)  # not recorded: as if here
+        longest = sorted(steps)[-calls:]  # trials of one call take as long as the longest
+        return used * wanted / calls if same else used / sum(longest) * condition.environment_steps * wanted
 
 
 @dataclass(frozen=True)
@@ -87,19 +88,19 @@ class Cost:
         compile: seconds.
         work: seconds of running: of one core if each trial is a call of its own, else of the device.
         trials: how many.
-        layout: see `program.over_trials`.
+        layout: of the trials on their devices.
         basis: what it is estimated by.
     """
 
     compile: float
     work: float
     trials: int
-    layout: str
+    layout: Layout
     basis: Basis = "here"
 
     def seconds(self, cores: int = 1) -> float:
         """Return the time that the batch takes in a process with so many cores."""
-        return self.compile + self.work / (min(self.trials, cores) if self.layout == "alone" else 1)
+        return self.compile + self.work / min(self.layout.calls(self.trials), cores)
 
 
 @dataclass(frozen=True)
@@ -149,17 +150,17 @@ class Estimator:
         device by its budget, at the median pace of the others.
         """
         layout = layout_on(self.platform)
-        lacking = {key: tuple(self._missing(one)) for key, one in wanted.items()}
+        lacking = {
+            key: tuple(StoredTrials(self.store, one.condition, self.any_version, self.time_limit).missing(one.seeds))
+            for key, one in wanted.items()
+        }
         counts = {key: len(lacking[key]) or len(one.seeds) for key, one in wanted.items()}
         read = cache(self._committed)  # many conditions may have the same names: faults planted in one
         found = {key: self._by_earlier(one, counts[key], read) for key, one in wanted.items()}
         both = [(one.here.seconds(), one.elsewhere.seconds()) for one in found.values() if one.here and one.elsewhere]
         scale = sum(here for here, _ in both) / sum(there for _, there in both) if both else None
         known = {key: one.at(scale) for key, one in found.items()}
-        steps = {
-            key: one.condition.environment_steps * (counts[key] if layout == "alone" else 1)
-            for key, one in wanted.items()
-        }
+        steps = {key: one.condition.environment_steps * layout.calls(counts[key]) for key, one in wanted.items()}
         paces = [one.work / max(steps[key], 1) for key, one in known.items() if one]
         pace = statistics.median(paces) if paces else STEP_SECONDS
         compiling = statistics.median(one.compile for one in known.values() if one) if paces else COMPILE_SECONDS
@@ -167,12 +168,6 @@ class Estimator:
             key: Owed(lacking[key], one or Cost(compiling, pace * steps[key], counts[key], layout, "budget"))
             for key, one in known.items()
         }
-
-    def _missing(self, one: Wanted) -> list[int]:
-        """Return the seeds whose trials must be run."""
-        if one.condition.existing is not None:
-            return []
-        return StoredTrials(self.store, one.condition, self.any_version, self.time_limit).missing(one.seeds)
 
     def _by_earlier(self, one: Wanted, trials: int, read: Committed) -> _Known:
         """Return what so many trials cost by earlier ones: of the condition itself, or else of its names."""
@@ -251,7 +246,7 @@ def took(trials: Iterable[TrialResult]) -> dict[str, float]:
     """Return the seconds of one accelerator that trials have taken, with compiling, by its kind; CPUs do not count."""
     seconds: dict[str, float] = defaultdict(float)
     for batch in by_batch(trial for trial in trials if trial.status == "done" and trial.device):
-        if batch.layout != "alone":
+        if not batch.layout.alone:
             seconds[str(batch.trials[0].device["kind"])] += batch.run + batch.compile
     return dict(seconds)
 
@@ -259,8 +254,7 @@ def took(trials: Iterable[TrialResult]) -> dict[str, float]:
 def measured(condition: Condition, devices: Sequence[jax.Device], trials: int) -> Cost:
     """Compile, and time a few steps of one trial per core or device: what so many whole budgets would take."""
     lanes = Lanes(condition, devices)
-    alone = lanes.layout == "alone"
-    width = usable_cores() if alone else len(lanes.devices)
+    width = lanes.layout.threads(len(devices))
     state = lanes.start(list(range(width)), width)
     state, _ = lanes.advance(state, 1, width)
     until = min(4, condition.steps)
@@ -268,7 +262,7 @@ def measured(condition: Condition, devices: Sequence[jax.Device], trials: int) -
     _, report = lanes.advance(state, until, width)
     spent = time.perf_counter() - began
     per_step = spent / max(int(np.max(report.steps)) - 1, 1)
-    return Cost(lanes.seconds, per_step * condition.steps * (trials if alone else 1), trials, lanes.layout)
+    return Cost(lanes.seconds, per_step * condition.steps * lanes.layout.calls(trials), trials, lanes.layout)
 
 
 def _best(batches: Sequence[Batch], condition: Condition) -> Batch | None:

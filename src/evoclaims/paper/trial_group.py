@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from evoclaims.core.errors import UnknownNameError, UserError, require_known
 from evoclaims.judging.measure import Event, Measure, Profile
 from evoclaims.judging.reading import Better
-from evoclaims.judging.sample import Declared, Limited, Source, UnreadableTrialError
+from evoclaims.judging.sample import Source, UnreadableTrialError
 from evoclaims.judging.window import Window
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.spec import Condition
@@ -45,9 +45,8 @@ def steps_to(source: Source, condition: Condition, curve: str, value: float, lev
         )
     if not 0 <= wanted < levels:
         raise UserError(f"{source.label} has no level {wanted}. Use one from 0 to {levels - 1}.")
-    cost, budget = condition.cost, float(condition.environment_steps)
-    chunk = condition.budget.chunk(cost)
-    imported = condition.existing is not None
+    budget = float(condition.environment_steps)
+    imported = bool(condition.existing)
     advice = "" if imported else "give the condition the progression 'whole_budget', or "
     name = f"environment steps until {curve} is {float(value):.12g}" + f" on level {wanted}" * (levels > 1)
 
@@ -68,7 +67,7 @@ def steps_to(source: Source, condition: Condition, curve: str, value: float, lev
         return first
 
     # Reports of imported trials are perhaps unevenly far apart, at steps that are no multiples of the longest distance.
-    window = Window(budget, float(chunk * cost) if chunk > 1 else 0.0, as_reported=imported)
+    window = Window(budget, float(condition.report_distance), as_reported=imported)
     return Measure(source, name, read, "lower", window)
 
 
@@ -118,7 +117,7 @@ class TrialGroup:
             """Raise an error that lists the known measures."""
             if name.startswith("_") or hasattr(type(self), name):
                 return object.__getattribute__(self, name)  # raises what the property itself has raised
-            known = {known for known in dir(type(self)) if not known.startswith("_")} - {*dir(Limited), *dir(Declared)}
+            known = {known for known in dir(type(self)) if not known.startswith("_")} - set(dir(Source))
             raise UnknownMeasureError("measure", name, known)
 
     @property
@@ -141,13 +140,14 @@ class TrialGroup:
         return self.get(self.condition, seeds)
 
     @property
-    def existing(self) -> int | None:
-        """How many trials there are, where no more can be run; None where missing ones are run."""
-        return None if self.condition.existing is None else len(self.condition.existing)
+    def existing(self) -> float:
+        """How many trials there can be; infinite where missing ones are run."""
+        return len(self.condition.existing) or math.inf
 
-    def shares_trials_with(self, other: Source) -> bool:
-        """Whether another group reads some of the same trials from a table."""
-        return isinstance(other, TrialGroup) and self.condition.shares_trials_with(other.condition)
+    @property
+    def table_rows(self) -> frozenset[tuple[str, int]]:
+        """The rows of a table that the trials are read from."""
+        return self.condition.table_rows
 
     def measure(
         self,
@@ -165,9 +165,8 @@ class TrialGroup:
             UnknownNameError: for a metric that imported trials do not have. Other trials have to run first: then a
                 missing metric makes the claim an error.
         """
-        if read is None and self.condition.existing is not None:
-            known = self.condition.existing[0].metrics
-            require_known(f"metric of {self.label}", name, known)
+        if read is None and self.condition.existing:
+            require_known(f"metric of {self.label}", name, self.condition.existing[0].metrics)
         return Measure(self, name, read or (lambda t: t.metrics[name]), better, unit=unit)
 
     def event(self, name: str, holds: Callable[[TrialResult], bool]) -> Event:

@@ -105,7 +105,7 @@ def _briefly(progress: RunProgress) -> str:
 
 def beforehand(load: Workload) -> str:
     """Return what is to be known before a run of hours on processors; empty for a shorter one."""
-    costs = [work.cost for work in load.conditions.values() if work.missing and work.cost.layout == "alone"]
+    costs = [work.cost for work in load.conditions.values() if work.missing and work.cost.layout.alone]
     seconds = sum(cost.work for cost in costs if cost.basis != "budget")
     if seconds < HOUR:
         return ""

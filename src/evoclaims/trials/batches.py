@@ -68,6 +68,8 @@ class StoredTrials:
 
     def missing(self, seeds: Sequence[int]) -> list[int]:
         """Return the seeds whose trials must be run, damaged ones among them: whoever runs those names the file."""
+        if self.condition.existing:
+            return []
         there = {result.seed for result in self.sound(seeds) if answers(result, self.time_limit)}
         return [seed for seed in seeds if seed not in there]
 
@@ -184,7 +186,7 @@ def _resumed(run: Run, interrupted: Header) -> Batch | None:
     header, state = restored
     lanes, width = run.lanes, len(header.lanes)
     stored = frozenset(filter(run.stored.has, header.seeds))
-    if lanes.layout == "alone":
+    if lanes.layout.alone:
         # Bits do not depend on other lanes: a lane whose trial is stored becomes idle, and costs nothing.
         header = replace(header, lanes=[None if seed in stored else seed for seed in header.lanes])
         state = replace(state, idle=state.idle | np.array([seed is None for seed in header.lanes]))
@@ -235,12 +237,12 @@ def _started(run: Run, header: Header) -> Batch:
 
 
 def _platform(lanes: Lanes) -> str:
-    """Hash what determines a computation's bits; in the layout "vector", also the number of devices.
+    """Hash what determines a computation's bits; where trials share calls, also the number of devices.
 
     So does the code of the project's own methods and tasks: a trial is not begun by one and ended by another.
     """
-    devices = len(lanes.devices) if lanes.layout == "vector" else None
-    fixed = [what_fixes_bits(provenance(lanes.devices, lanes.condition)), lanes.layout, devices]
+    devices = None if lanes.layout.alone else len(lanes.devices)
+    fixed = [what_fixes_bits(provenance(lanes.devices, lanes.condition)), lanes.layout.value, devices]
     code = dict(lanes.condition.code)
     return content_hash([*fixed, code] if code else fixed)
 
@@ -265,7 +267,7 @@ def halved(run: Run, tried: Header) -> int:
     header = checkpoint.newest(run.store.checkpoints, tried)
     lanes = (header or tried).lanes
     left = [lane for lane, seed in enumerate(lanes) if seed is not None and not run.stored.has(seed)]
-    least = 1 if run.lanes.layout == "alone" else len(run.lanes.devices)
+    least = 1 if run.lanes.layout.alone else len(run.lanes.devices)
     if len(left) <= least:
         each = "" if least == 1 else ", one on each device"
         raise UserError(

@@ -22,9 +22,9 @@ from evoclaims.methods.neat.evolution import GenomeMethod
 from evoclaims.networks.genome import Genome
 from evoclaims.networks.graph import GraphNetwork
 from evoclaims.networks.substrate import Substrate
-from evoclaims.trials.devices import MATMUL_PRECISION, layout_on
-from evoclaims.trials.lanes import options_for
-from evoclaims.trials.program import over_trials, score_every_level
+from evoclaims.trials.devices import MATMUL_PRECISION
+from evoclaims.trials.layout import layout_on
+from evoclaims.trials.program import score_every_level
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.result_making import named_leaves, provenance
 from evoclaims.trials.spec import Condition
@@ -82,7 +82,7 @@ def replay(condition: Condition, result: TrialResult, parameters: Any, devices: 
     arguments = jax.tree.map(lambda leaf: np.asarray(leaf)[None], (np.int32(result.seed), parameters))
     layout = layout_on(devices[0].platform)
     with jax.default_matmul_precision(MATMUL_PRECISION):
-        compiled = jax.jit(over_trials(score, layout), compiler_options=options_for(condition, layout))
+        compiled = jax.jit(layout.over_trials(score), compiler_options=layout.options(condition))
         episode: Episode = jax.device_get(compiled(*jax.device_put(arguments, devices[0])))
     again = {"success": episode.success[0], "fitness": episode.fitness[0]}
     for name, values in again.items():

@@ -199,8 +199,3 @@ def choose(name: str) -> list[jax.Device]:
             f"jax {jax.__version__} finds no hardware for {wish}. Install jax for CUDA "
             '(pip install "jax[cuda13]", Python 3.12 or newer) on a machine with a GPU, or ask for the device "cpu".'
         ) from error
-
-
-def layout_on(platform: str) -> str:
-    """Return how trials are laid out on devices of a platform, such as "cpu" (see `program.over_trials`)."""
-    return "alone" if platform == "cpu" else "vector"

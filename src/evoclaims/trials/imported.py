@@ -123,26 +123,6 @@ class _Unknown:
     levels: int = 1
     packages: tuple[str, ...] = ()
 
-    def cost(self, task: Any) -> int:
-        """Return 1: steps are counted as the table counts them."""
-        return 1
-
-
-@dataclass(frozen=True)
-class _Reports:
-    """Stands for the budget, of which a table shows when there were reports."""
-
-    of: Imported
-
-    def chunk(self, cost: int) -> int:
-        """Return the most steps between two reports of a trial, the first of which follows the start."""
-        gaps = (
-            later - earlier
-            for trial in self.of.existing
-            for earlier, later in pairwise((0.0, *trial.curves.get(STEPS, ())))
-        )
-        return max(1, math.ceil(max(gaps, default=0.0)))
-
 
 @dataclass(frozen=True)
 class Imported(Condition):
@@ -176,11 +156,10 @@ class Imported(Condition):
     method: Any = field(init=False, repr=False, default=_Unknown())
     task: Any = field(init=False, repr=False, default=_Unknown())
     progression: Any = field(init=False, repr=False, default="whole_budget")
-    budget: Any = field(init=False, repr=False, compare=False)
+    budget: Any = field(init=False, repr=False, default=None)
 
     def __post_init__(self) -> None:
         """Reject a table from which no number is read, and two axes of a curve."""
-        object.__setattr__(self, "budget", _Reports(self))
         if not self.columns:
             raise UserError(
                 f"Imported({str(self.path)!r}) names no metric. Write metric=..., the column of what was measured."
@@ -241,30 +220,31 @@ class Imported(Condition):
         chosen = ", ".join(f"{name} {value}" for name, value in self.where.items())
         return f"{Path(self.path).name}{f' ({chosen})' if chosen else ''}"
 
-    @property
-    def steps(self) -> int:
-        """None are run."""
-        return 0
-
     @cached_property
     def environment_steps(self) -> int:
         """The steps of the longest curve; 0 without curves."""
         return math.ceil(max((trial.curves[STEPS][-1] for trial in self.existing if trial.curves), default=0.0))
 
     @cached_property
+    def report_distance(self) -> int:
+        """Most steps between two reports of a trial, the first of which follows the start; 0 where each is reported."""
+        reported = ((0.0, *trial.curves.get(STEPS, ())) for trial in self.existing)
+        longest = max((later - earlier for steps in reported for earlier, later in pairwise(steps)), default=0.0)
+        return math.ceil(longest) if longest > 1.0 else 0
+
+    @cached_property
     def existing(self) -> tuple[TrialResult, ...]:
-        """All trials of the table, in the order of its seeds.
+        """All trials of the table, at least one, in the order of its seeds.
 
         Raises:
             UserError: when the table cannot be read, or lacks what it should have.
         """
         return tuple(self._trial(k, seed, rows) for k, (seed, rows) in enumerate(self._rows.by_seed()))
 
-    def shares_trials_with(self, other: Condition) -> bool:
-        """Whether both read a row of one table."""
-        if not isinstance(other, Imported) or other.table.sha256 != self.table.sha256:
-            return False
-        return not set(self._rows.chosen).isdisjoint(other._rows.chosen)
+    @cached_property
+    def table_rows(self) -> frozenset[tuple[str, int]]:
+        """The rows of the table that the trials are read from."""
+        return frozenset((self.table.sha256, row) for row in self._rows.chosen)
 
     @cached_property
     def _rows(self) -> TrialRows:
@@ -323,8 +303,7 @@ def into_store(condition: Condition, seeds: Sequence[int], store: Store) -> list
     Raises:
         UserError: when the table cannot be read, or the store is damaged or cannot be written.
     """
-    existing = condition.existing or ()
-    found = [existing[seed] for seed in seeds if seed < len(existing)]
+    found = [condition.existing[seed] for seed in seeds if seed < len(condition.existing)]
     lacking = [trial for trial in found if store.made_with(trial.id, condition.versions) is None]
     if lacking:
         store.check_writable()
@@ -335,6 +314,6 @@ def into_store(condition: Condition, seeds: Sequence[int], store: Store) -> list
 
 def where_from(condition: Condition) -> str:
     """Say how many trials exist and where they come from, as a clause."""
-    count, digits = len(condition.existing or ()), condition.plain.get("imported", {}).get("sha256", "")[:12]
+    count, digits = len(condition.existing), condition.plain.get("imported", {}).get("sha256", "")[:12]
     trials = "1 trial is" if count == 1 else f"{count} trials are"
     return f"{trials} imported from {condition.label}, sha256 {digits}"

@@ -12,43 +12,21 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any
 
 import jax
 import numpy as np
 from jax.sharding import SingleDeviceSharding
 
 from evoclaims.core.waiting import working_time
-from evoclaims.trials.devices import MATMUL_PRECISION, layout_on, usable_cores
+from evoclaims.trials.devices import MATMUL_PRECISION
+from evoclaims.trials.layout import layout_on
 from evoclaims.trials.memory import give_back
-from evoclaims.trials.program import Program, Report, Score, TrialState, over_trials
+from evoclaims.trials.program import Program, Report, Score, TrialState
 from evoclaims.trials.spec import Condition
-
-SHORT: Final = 100_000
-"""On a CPU, trials of up to so many environment steps are compiled fast rather than run fast."""
-
-FAST_TO_COMPILE: Final = {"xla_backend_optimization_level": 1, "xla_llvm_disable_expensive_passes": True}
 
 Shares = tuple[TrialState, ...]
 """The states of a batch, leaves [lanes of the share]: each share is on one device, and one call advances it."""
-
-
-def options_for(condition: Condition, layout: str) -> dict[str, Any] | None:
-    """Return the compiler options; they depend only on condition and layout, so that bits do, too."""
-    return FAST_TO_COMPILE if layout == "alone" and condition.environment_steps <= SHORT else None
-
-
-def width_for(active: int, devices: int, full: int) -> int:
-    """Return the number of lanes for `active` trials: `full` halved while they fit, a multiple of the devices.
-
-    It depends only on these counts, so that a resumed run uses the same programs.
-    """
-    lanes = max(full, 1)
-    while active <= lanes // 2:
-        lanes = -(-lanes // 2)
-        if lanes == 1:
-            break
-    return -(-lanes // devices) * devices
 
 
 @dataclass(frozen=True)
@@ -69,7 +47,7 @@ class Lanes:
     Attributes:
         condition: the condition to compile.
         devices: where it runs.
-        layout: see `program.over_trials`.
+        layout: how trials are laid out on them.
         seconds: spent on compiling so far.
     """
 
@@ -83,15 +61,12 @@ class Lanes:
         self._compiled: dict[tuple[int, jax.Device], Compiled] = {}
 
     def width(self, active: int, full: int) -> int:
-        """Return the number of lanes for `active` of `full` trials.
-
-        Where each trial is its own call, idle lanes cost nothing, so the number stays.
-        """
-        return full if self.layout == "alone" else width_for(active, min(len(self.devices), full), full)
+        """Return the number of lanes for `active` of `full` trials."""
+        return self.layout.width(active, full, len(self.devices))
 
     def programs(self, width: int) -> list[Compiled]:
         """Return the programs of each share of `width` lanes, compiling missing ones."""
-        size, homes = self._size(width), self._homes(width)
+        size, homes = self._shares(width)
         missing = [home for home in dict.fromkeys(homes) if (size, home) not in self._compiled]
         if missing:
             began = working_time()
@@ -103,15 +78,15 @@ class Lanes:
     def shapes(self, lanes: int) -> Any:
         """Return shapes and dtypes of the state of `lanes` lanes, as `gather` returns it."""
         with self._settings():
-            one = jax.eval_shape(over_trials(self._program.start, self.layout), *_seeds(1))
+            one = jax.eval_shape(self.layout.over_trials(self._program.start), *_seeds(1))
         return jax.tree.map(lambda leaf: jax.ShapeDtypeStruct((lanes, *leaf.shape[1:]), leaf.dtype), one)
 
     def place(self, tree: Any, width: int) -> tuple[Any, ...]:
         """Split a tree of host arrays with leading axis [width] into shares, each on its device."""
         leaves, structure = jax.tree.flatten(tree)
-        size = self._size(width)
+        size, homes = self._shares(width)
         shares = [[leaf[first : first + size] for leaf in leaves] for first in range(0, width, size)]
-        placed = zip(shares, self._homes(width), strict=True)
+        placed = zip(shares, homes, strict=True)
         return tuple(jax.device_put(jax.tree.unflatten(structure, share), home) for share, home in placed)
 
     @staticmethod
@@ -123,7 +98,7 @@ class Lanes:
         """Start one trial per lane; None makes an idle lane."""
         known = np.array([0 if seed is None else seed for seed in seeds], np.int32)
         idle = np.array([seed is None for seed in seeds])
-        size, homes = self._size(width), self._homes(width)
+        size, homes = self._shares(width)
         began = working_time()
         with self._settings():
             lowered = [self._lowered(self._program.start, home, _seeds(size)) for home in dict.fromkeys(homes)]
@@ -153,26 +128,18 @@ class Lanes:
 
     def arrangement(self, active: Sequence[int], width: int) -> list[int | None]:
         """Deal active lanes to the shares in turn, so that all shares have about equal work."""
-        size = self._size(width)
-        shares = width // size
-        hands = [list(active[share::shares]) for share in range(shares)]
+        size, homes = self._shares(width)
+        hands = [list(active[share :: len(homes)]) for share in range(len(homes))]
         return [lane for hand in hands for lane in [*hand, *[None] * (size - len(hand))]]
 
-    def _size(self, width: int) -> int:
-        """Return the number of lanes per share: one, or all that a device runs side by side."""
-        if self.layout == "alone":
-            return 1
-        return width // max(count for count in range(1, len(self.devices) + 1) if width % count == 0)
-
-    def _homes(self, width: int) -> list[jax.Device]:
-        """Return the device of each share. A CPU is one device: all its trials share the programs."""
-        shares = width // self._size(width)
-        return [self.devices[0]] * shares if self.layout == "alone" else self.devices[:shares]
+    def _shares(self, width: int) -> tuple[int, Sequence[jax.Device]]:
+        """Return the number of lanes per share, which one call advances, and the device of each share."""
+        homes = self.layout.homes(width, self.devices)
+        return width // len(homes), homes
 
     def _side_by_side(self, function: Callable[..., Any], *arguments: Sequence[Any]) -> list[Any]:
         """Call the function for all shares, on one thread per core or device; jax releases the interpreter lock."""
-        threads = usable_cores() if self.layout == "alone" else len(self.devices)
-        with ThreadPoolExecutor(threads) as pool:
+        with ThreadPoolExecutor(self.layout.threads(len(self.devices))) as pool:
             calls = [pool.submit(function, *each) for each in zip(*arguments, strict=True)]
             try:
                 return [call.result() for call in calls]
@@ -193,11 +160,10 @@ class Lanes:
         """Trace a single-trial function for the lanes of a share on a device; `arguments` are shapes and dtypes."""
         place = SingleDeviceSharding(home)
         placed = jax.tree.map(lambda leaf: jax.ShapeDtypeStruct(leaf.shape, leaf.dtype, sharding=place), arguments)
-        laid_out = over_trials(function, self.layout)
-        return jax.jit(laid_out, donate_argnums=(0,) if donate else ()).lower(*placed)
+        return jax.jit(self.layout.over_trials(function), donate_argnums=(0,) if donate else ()).lower(*placed)
 
     def _finished(self, lowered: Any) -> Any:
-        return lowered.compile(options_for(self.condition, self.layout))
+        return lowered.compile(self.layout.options(self.condition))
 
     def _compile(self, size: int, homes: Sequence[jax.Device]) -> dict[jax.Device, Compiled]:
         """Compile the repeated programs ahead of time, to measure compile time and run time separately."""

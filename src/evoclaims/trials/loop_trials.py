@@ -28,7 +28,7 @@ from evoclaims.core.waiting import waiting, working_time
 from evoclaims.methods.training_loop import TrainingLoop
 from evoclaims.trials import failed
 from evoclaims.trials.batches import StoredTrials
-from evoclaims.trials.devices import layout_on, usable_cores
+from evoclaims.trials.layout import layout_on
 from evoclaims.trials.loop_messages import (
     MARK,
     Answer,
@@ -126,6 +126,7 @@ SCORED_BY: Final = "scored_by"
 
 def trained_record(
     spec: TrialSpec,
+    loop: TrainingLoop,
     trained: Trained,
     curves: Mapping[str, Sequence[float]],
     timing: Mapping[str, Any],
@@ -138,7 +139,6 @@ def trained_record(
     are NaN: a claim that reads such a number is an error. A trial has diverged when its function returned a NaN, or
     reported a number that is not finite, or its policy's scores are not.
     """
-    assert isinstance(spec.condition.method, TrainingLoop)
     returned, scores = trained.metrics, trained.scores
     broken = not trained.finite or any(map(math.isnan, returned.values()))
     if scores is None:  # the last level at most is known
@@ -166,7 +166,7 @@ def trained_record(
         metrics |= returned | known | scores.metrics
     status: Status = "diverged" if broken else "done"
     origin = {
-        TRAINED_BY: spec.condition.method.place,
+        TRAINED_BY: loop.place,
         SCORED_BY: "training function" if scores is None else "examination",
         RETURNED: {
             "metrics": content_hash(dict(returned)),
@@ -213,7 +213,7 @@ class RunningLoop:
 class LoopTrials:
     """Makes a training loop's trials."""
 
-    def __init__(self, stored: StoredTrials, devices: Sequence[jax.Device]) -> None:
+    def __init__(self, stored: StoredTrials, loop: TrainingLoop, devices: Sequence[jax.Device]) -> None:
         """Start nothing yet.
 
         Raises:
@@ -222,19 +222,19 @@ class LoopTrials:
         """
         self._stored = stored
         self._devices = devices
-        self._method: TrainingLoop = stored.condition.method  # type: ignore[assignment]
-        missing = [name for name in self._method.packages if stored.condition.versions[name] is None]
+        self._loop = loop
+        missing = [name for name in loop.packages if stored.condition.versions[name] is None]
         if missing:
             raise UserError(
-                f"The training loop {self._method.name!r} needs {', '.join(missing)}, which is not "
+                f"The training loop {loop.name!r} needs {', '.join(missing)}, which is not "
                 f"installed. Install it: pip install {' '.join(missing)}"
             )
         _ = stored.condition.task.horizon  # a task without one is refused before training, not after it
         self._request = {
-            "function": self._method.place,
+            "function": loop.place,
             "task": to_plain(stored.condition.task),
             "budget": to_plain(stored.condition.budget),
-            "settings": to_plain(dict(self._method.settings)),
+            "settings": to_plain(dict(loop.settings)),
         }
         self._events: queue.SimpleQueue[RunningLoop | BaseException] = queue.SimpleQueue()
         self._lock = threading.Lock()  # of what follows
@@ -243,10 +243,9 @@ class LoopTrials:
 
     def make(self, owed: Sequence[int], tell: Watcher) -> None:
         """Run trials and store each as it ends; those that have ended stay when anything is raised."""
-        at_a_time = usable_cores() if layout_on(self._devices[0].platform) == "alone" else 1
         running = [RunningLoop(TrialSpec(self._stored.condition, seed)) for seed in owed]
         began, stored = time.monotonic(), set[int]()
-        with ThreadPoolExecutor(at_a_time) as pool:
+        with ThreadPoolExecutor(layout_on(self._devices[0].platform).threads(1)) as pool:
             try:
                 for one in running:
                     pool.submit(self._attend, one)
@@ -322,7 +321,7 @@ class LoopTrials:
         timing = {"run": one.seconds, "compile": 0.0, "batch": 1, "started": one.began}
         ending = ""
         if isinstance(one.outcome, Trained):
-            result = trained_record(one.spec, one.outcome, one.curves, timing, self._devices)
+            result = trained_record(one.spec, self._loop, one.outcome, one.curves, timing, self._devices)
         elif isinstance(one.outcome, Failed):
             result = make_unfinished(one.spec, "crashed", one.curves, timing, self._devices, one.outcome.reason)
             failed.remember(result)

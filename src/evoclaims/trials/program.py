@@ -1,10 +1,10 @@
-"""The three programs of a condition (start, advance, score), written for one trial and batched over many."""
+"""The three programs of a condition (start, advance, score), written for one trial."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import cached_property
 from typing import Any
 
 import jax
@@ -205,20 +205,3 @@ class Program:
         """Whether no further step will be taken."""
         done = trial.diverged | trial.idle | (trial.steps >= self.condition.steps)
         return done if self.condition.progression == "whole_budget" else done | trial.ascent.finished
-
-
-def over_trials(function: Callable[..., Any], layout: str) -> Callable[..., Any]:
-    """Batch a single-trial function over a leading trial axis of all its arguments.
-
-    "alone" runs one trial at a time (an axis of length one): on a CPU, whose cores other trials fill, this costs
-    nothing, a trial's bits do not depend on other trials, and a trial that has ended costs nothing. "vector" runs
-    trials side by side: on an accelerator a step's time is mostly kernel launches, which they share.
-    """
-    layouts: dict[str, Callable[..., Any]] = {"alone": partial(_alone, function), "vector": jax.vmap(function)}
-    return layouts[layout]
-
-
-def _alone(function: Callable[..., Any], *arguments: Any) -> Any:
-    """Remove the arguments' leading axis of length one, call the function, and add the axis to its results."""
-    trial = jax.tree.map(lambda leaf: jnp.squeeze(leaf, 0), arguments)
-    return jax.tree.map(lambda leaf: leaf[None], function(*trial))

@@ -17,7 +17,6 @@ import numpy as np
 from evoclaims.core.errors import UserError
 from evoclaims.core.packages import absent
 from evoclaims.core.waiting import working_time
-from evoclaims.methods.training_loop import TrainingLoop
 from evoclaims.trials import checkpoint
 from evoclaims.trials.batches import Batch, Run, StoredTrials, batches, drop_finished_checkpoints, halved, is_exhausted
 from evoclaims.trials.checkpoint import Header
@@ -76,7 +75,7 @@ def run(
     Raises:
         UserError: when the store is damaged or cannot be written, or the device's memory does not hold one trial.
     """
-    if condition.existing is not None:
+    if condition.existing:
         return into_store(condition, seeds, store)
     stored = StoredTrials(store, condition, any_version, time_limit)
     wanted = list(dict.fromkeys(seeds))
@@ -103,8 +102,8 @@ Maker = Callable[[Sequence[int], Watcher], None]
 def _maker(stored: StoredTrials, devices: Sequence[jax.Device], checkpoint_seconds: float, most: int) -> Maker:
     """Return what makes a condition's trials: a process for each, or compiled programs, at first of `most` trials."""
     _ = stored.condition.steps  # a budget that no counter holds is refused before training, not after it
-    if isinstance(stored.condition.method, TrainingLoop):
-        return LoopTrials(stored, devices).make
+    if stored.condition.loop is not None:
+        return LoopTrials(stored, stored.condition.loop, devices).make
     for component in (stored.condition.method, stored.condition.task):
         if missing := absent(component):
             raise UserError(
@@ -263,7 +262,7 @@ def _timing(run: Run, header: Header) -> dict[str, Any]:
         "batch": len(header.batch),
         "started": header.started,
     }
-    return {**timing, "processor": header.processor_seconds} if run.lanes.layout == "alone" else timing
+    return {**timing, "processor": header.processor_seconds} if run.lanes.layout.alone else timing
 
 
 def _rearranged(run: Run, batch: Batch) -> Batch:

@@ -157,7 +157,7 @@ class Condition:
         return {
             "engine": ENGINE_REVISION,
             "method": _described(self.method, "method"),
-            "task": _described(self.task, "" if isinstance(self.method, TrainingLoop) else "task"),
+            "task": _described(self.task, "" if self.loop else "task"),
             "progression": self.progression,
             "budget": as_plain(self.budget),
         }
@@ -203,13 +203,19 @@ class Condition:
         return str((self.plain["method"], self.progression, self.budget, kind))
 
     @property
-    def existing(self) -> tuple[TrialResult, ...] | None:
-        """All trials that there can be, by seed from 0, where no more can be run; None for what the harness runs."""
-        return None
+    def loop(self) -> TrainingLoop | None:
+        """The training loop that makes the trials; None where the engine compiles method and task."""
+        return self.method if isinstance(self.method, TrainingLoop) else None
 
-    def shares_trials_with(self, other: Condition) -> bool:
-        """Whether some of the same trials have another id here; it is False for what the harness runs."""
-        return False
+    @property
+    def existing(self) -> tuple[TrialResult, ...]:
+        """All trials that there can be, by seed from 0, where no more can be run; none for what the harness runs."""
+        return ()
+
+    @property
+    def table_rows(self) -> frozenset[tuple[str, int]]:
+        """The rows of a table, by its hash, that the trials are read from; none for what the harness runs."""
+        return frozenset()
 
     @property
     def label(self) -> str:
@@ -241,7 +247,7 @@ class Condition:
             UserError: when there are more than counters hold: 32-bit integers on devices, and floats in records.
         """
         steps = self.budget.steps(self.cost)
-        if steps >= 2**31 and not isinstance(self.method, TrainingLoop):
+        if steps >= 2**31 and self.loop is None:
             raise UserError(
                 f"{self.label} has a budget of {steps} steps, and a trial takes at most {2**31 - 1}. Make "
                 "the budget smaller."
@@ -258,6 +264,12 @@ class Condition:
     def environment_steps(self) -> int:
         """Environment steps of one trial that spends the whole budget."""
         return self.steps * self.cost
+
+    @property
+    def report_distance(self) -> int:
+        """Most environment steps between two reports of a trial; 0 where each step of the method is reported."""
+        chunk = self.budget.chunk(self.cost)
+        return chunk * self.cost if chunk > 1 else 0
 
 
 @dataclass(frozen=True)

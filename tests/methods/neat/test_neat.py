@@ -17,6 +17,7 @@ from evoclaims.envs.gates.parity import NParity
 from evoclaims.methods.neat.evolution import Neat
 from evoclaims.methods.neat.settings import PAPER, Mutation, Settings, Species
 from evoclaims.trials.lanes import Lanes
+from evoclaims.trials.layout import Layout
 from evoclaims.trials.progress import RunProgress
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.runner import run
@@ -111,7 +112,7 @@ def test_a_trial_alone_is_the_same_trial_to_the_bit(
 def test_trials_side_by_side_have_the_same_structure_and_nearly_the_same_numbers(
     batch: list[TrialResult], tmp_path: Path, device: list[Any], programs: None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("evoclaims.trials.lanes.layout_on", lambda platform: "vector")
+    monkeypatch.setattr("evoclaims.trials.lanes.layout_on", lambda platform: Layout.VECTOR)
     store = Store(tmp_path)
     for one, other in zip(batch, run(CONDITION, SEEDS, store, device), strict=True):
         assert (one.seed, one.status, one.levels["solved_at"]) == (other.seed, other.status, other.levels["solved_at"])
