@@ -38,7 +38,7 @@ LEARNED = [
     pytest.param(
         "goal_ppo",
         marks=expected(
-            Outcome.INCONCLUSIVE,
+            Outcome.REFUTED,
             because="shown the next stone, PPO crosses several stones, and in some trials reaches the target in most "
             "episodes; in the published code no stone pays (docs/protocol.md)",
         ),
@@ -146,8 +146,8 @@ def test_ppo_reaches_the_first_of_three_stones(trials, verdict, method):
     [
         pytest.param("hyperneat", marks=third_look),
         pytest.param("cma_es", marks=expected(Outcome.REFUTED, because=LUCKY)),
-        pytest.param("map_elites", marks=third_look),
-        pytest.param("ppo", marks=third_look),
+        pytest.param("map_elites", marks=[third_look, expected(Outcome.SMALLER, because=LUCKY)]),
+        pytest.param("ppo", marks=[third_look, expected(Outcome.SMALLER, because=LUCKY)]),
         pytest.param("goal_ppo", marks=expected(Outcome.REFUTED, because=LUCKY)),
     ],
 )
@@ -216,6 +216,7 @@ def test_map_elites_collects_as_little_as_ppo(trials, verdict):
     read="0.8 of the cells, more than PPO's path",
     since=FIRST,
 )
+@expected(Outcome.REFUTED, because="most archives have no elite on more than a fifth of the cells")
 def test_map_elites_explores_the_maze(trials, verdict):
     map_elites = trials("map_elites", on="stones")
     ppo = trials("ppo", on="stones")
@@ -366,7 +367,13 @@ def test_map_elites_covers_both_mazes(trials, verdict):
     "method",
     [
         pytest.param("neat", marks=expected(Outcome.REFUTED, because="goal-conditioned PPO collects more: see S4")),
-        pytest.param("cma_es", marks=third_look),
+        pytest.param(
+            "cma_es",
+            marks=[
+                third_look,
+                expected(Outcome.SMALLER, because="goal-conditioned PPO crosses more stones on average: see S3"),
+            ],
+        ),
     ],
 )
 def test_neat_and_cma_es_perform_best(trials, verdict, method):
