@@ -30,7 +30,7 @@ LEVEL = jnp.zeros((), jnp.int32)
 
 SMALL = METHODS["map_elites"].method
 # With the fusions that conftest.py asks for, jax 0.10 makes a program of this step that keeps no elite.
-BENCH = Workbench(SMALL, METHODS["map_elites"].task, USUAL_FUSIONS)
+BENCH = Workbench(SMALL, METHODS["map_elites"].task)
 X, Y = SMALL.cells  # told apart by their numbers
 (X_MIN, X_MAX), (Y_MIN, Y_MAX) = Plane.area
 WIDTH, HEIGHT = (X_MAX - X_MIN) / X, (Y_MAX - Y_MIN) / Y
@@ -328,7 +328,7 @@ def test_trials_side_by_side_in_a_loop_are_the_trials_one_by_one() -> None:
         return jax.lax.while_loop(lambda carry: carry[0] < steps, body, (jnp.zeros((), jnp.int32), state))[1]
 
     with jax.debug_key_reuse(False):  # jax takes the keys of any loop under vmap for used
-        together = jax.jit(jax.vmap(trial))(keys, starts)
+        together = jax.jit(jax.vmap(trial), compiler_options=USUAL_FUSIONS)(keys, starts)
     for i, one in enumerate(alone):
         close(one, jax.tree.map(lambda leaf, i=i: leaf[i], together), tolerance=1e-4)
 

@@ -8,16 +8,19 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import numpy as np
+from usual_fusions import USUAL_FUSIONS
 
 from evoclaims.methods.base import Progress
 
 
 class Workbench:
-    """Runs a method's pure functions; a seed stands for all the keys of a run."""
+    """Runs a method's pure functions, its step compiled as for users; a seed stands for all the keys of a run."""
 
-    def __init__(self, method: Any, task: Any, options: Any = None) -> None:
+    def __init__(self, method: Any, task: Any) -> None:
         self.method, self.task, self.traces = method, task, 0
-        self.step: Callable[[Any, Any, Any], tuple[Any, Progress]] = jax.jit(self._traced, compiler_options=options)
+        self.step: Callable[[Any, Any, Any], tuple[Any, Progress]] = jax.jit(
+            self._traced, compiler_options=USUAL_FUSIONS
+        )
         self._init = jax.jit(lambda key: method.init(key, task))
         self._examine = jax.jit(lambda state, level: task.examine(method.best(task, state), jax.random.key(0), level))
 
