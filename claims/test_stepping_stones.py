@@ -325,7 +325,7 @@ def test_cma_es_is_below_neat_among_three_stones(trials, verdict):
     smoke=None,
     because=A_LATER_SENTENCE,
 )
-@expected(Outcome.REFUTED, because="no archive of ten has an elite at the target")
+@expected(Outcome.REFUTED, because="no archive of thirty has an elite at the target")
 def test_map_elites_reaches_the_end_of_the_maze(trials, verdict):
     verdict(trials("map_elites", on="stones").has_found_the_target.in_most_trials())
 

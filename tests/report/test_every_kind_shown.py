@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 from laboratory import CONDITIONS, Laboratory, record
+from unpacked import whole
 
 from evoclaims.claims.as_published import AsPublished
 from evoclaims.claims.claim import Claim, ClaimTest
@@ -16,7 +17,6 @@ from evoclaims.judging.assertion import Assertion
 from evoclaims.judging.kinds.omnibus import any_differ
 from evoclaims.judging.power import Draws, power
 from evoclaims.judging.verdict import Outcome
-from evoclaims.report.html import html
 from evoclaims.report.markdown import markdown
 from evoclaims.report.run_summary import run_summary
 from evoclaims.report.terminal_table import verdict_table
@@ -85,7 +85,7 @@ def test_each_kind_is_judged_kept_and_shown(lab: Laboratory, kind: str) -> None:
     assert report.verdict.evidence
     assert ClaimReport.from_json(report.to_json()) == report
     page = lab.page(report)
-    for text in (verdict_table([report], 160, False), run_summary([report]), markdown(page), html(page)):
+    for text in (verdict_table([report], 160, False), run_summary([report]), markdown(page), whole(page)):
         assert str(apart) in text
         assert "NaN" not in text
     table = overview({"full": [report]}, {"T1": "Better is better"}, Reader(lab.archive))

@@ -340,7 +340,7 @@ def _rows(part: Part) -> Iterator[Markup]:
 
     def at(value: float) -> str:
         shown = min(max(value, low), high)
-        return f"{SPARK_EDGE + (shown - low) / ((high - low) or 1.0) * (SPARK_WIDTH - 2 * SPARK_EDGE):.3g}"
+        return f"{round(SPARK_EDGE + (shown - low) / ((high - low) or 1.0) * (SPARK_WIDTH - 2 * SPARK_EDGE), 1):g}"
 
     for bound in part.bounds:
         yield Markup('<path class="compared" d="M{} 0V{}"/>').format(at(bound.value), SPARK_HEIGHT)
@@ -350,7 +350,7 @@ def _rows(part: Part) -> Iterator[Markup]:
     for index, values in enumerate(rows):
         up = f"{(index + 0.5) * SPARK_HEIGHT / len(rows):.3g}"
         if len(values) <= SPARK_DOTS:
-            places = "".join(f"M{at(value)} {up}h0" for value in sorted(values))
+            places = "".join(f"M{place} {up}h0" for place in dict.fromkeys(map(at, sorted(values))))
         else:
             first, middle, last = (at(float(one)) for one in np.quantile(values, [0.05, 0.5, 0.95]))
             yield Markup('<path class="middle" d="M{} {}H{}"/>').format(first, up, last)

@@ -182,9 +182,10 @@ def packed(pieces: Mapping[str, str]) -> Markup:
     """Return HTML by name as one text in the alphabet of base64: JSON, compressed with gzip.
 
     Evidence repeats the same words a thousand times, so that this is a tenth of the size. The same pieces give the same
-    text.
+    text. Names end with the tier: gzip looks back for 32 KB alone, and claims of one tier are alike.
     """
-    plain = json.dumps(pieces, ensure_ascii=False, separators=(",", ":")).encode()
+    alike = dict(sorted(pieces.items(), key=lambda piece: piece[0].rpartition("-")[::-1]))
+    plain = json.dumps(alike, ensure_ascii=False, separators=(",", ":")).encode()
     return Markup(base64.b64encode(gzip.compress(plain, mtime=0)).decode())  # noqa: S704
 
 
