@@ -61,7 +61,7 @@ def test_the_full_plan_fits_eighty_columns_and_says_there_what_it_says_on_a_wide
         for timing in (json.loads(line)["timing"] for line in committed.read_text().splitlines())
     }
     seconds = sum(timing["run"] + timing["compile"] for timing in batches.values())
-    assert took[:4] == duration(seconds).split()
+    assert [word for word in took if word != "–"][:4] == duration(seconds).split()  # one column for each card
 
 
 @pytest.mark.oldest

@@ -201,8 +201,10 @@ def test_a_claim_that_another_of_its_name_replaces_is_a_sentence(project: Any, s
 
 def test_claims_in_a_file_that_pytest_takes_for_none_of_tests_are_a_sentence(project: Any, sentence: Sentence) -> None:
     project.write("def test_other():\n    pass\n")
-    (project.path / "claims" / "more.py").write_text("from evoclaims import claim\n\n@claim('a', ...)\n")
-    (project.path / "claims" / "helpers.py").write_text('"""No claim, which is made by @claim(...)."""\n')
+    (project.path / "claims" / "more.py").write_text(
+        "from evoclaims import claim\n\n@claim('a', ...)\ndef test(): ...\n"
+    )
+    (project.path / "claims" / "helpers.py").write_text('"""No claim, which is made so:\n@claim(...)\n"""\n')
     result = project.run()
     assert result.ret == pytest.ExitCode.INTERRUPTED
     sentence(result, "more.py has a test with @claim(...), and pytest takes no file of this name for one of tests")

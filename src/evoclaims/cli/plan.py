@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+import textwrap
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Final
@@ -189,10 +190,10 @@ def _print_spent(console: PlainSpokenConsole, tier: Tier, costs: Costs) -> None:
         return
     if kinds := _kinds(costs):
         console.print("\nMeasured on the committed reference trials: what they took, with compiling.")
-        table = plain_table(("condition", *(f"took on one\n{kind}" for kind in kinds)), ())
+        table = plain_table(("condition", *(_head([kind]) for kind in kinds)), ())
         for names in costs:
-            table.add_row(" on ".join(names), *(_took(costs, [names], kind) for kind in kinds))
-        table.add_row("total", *(_took(costs, list(costs), kind) for kind in kinds), style="bold")
+            table.add_row(" on ".join(names), *(_took(costs, [names], [kind]) for kind in kinds))
+        table.add_row("total", *(_took(costs, list(costs), [kind]) for kind in kinds), style="bold")
         console.print_whole(table)
     n = tier.design.last.n
     few = [f"{' on '.join(names)} ({len(trials)})" for names, trials in costs.items() if len(trials) < n]
@@ -205,20 +206,26 @@ def _kinds(costs: Costs) -> list[str]:
     return sorted({kind for trials in costs.values() for kind in took(trials)})
 
 
-def _took(costs: Costs, names: Sequence[Names], kind: str) -> str:
-    """Return the time that the reference trials of some conditions took on a kind of accelerator."""
+def _head(kinds: Sequence[str]) -> str:
+    """Return the heading of a column of times on these kinds of accelerators."""
+    kind = kinds[0] if len(kinds) == 1 else "accelerator"
+    return "\n".join(["took on one", *textwrap.wrap(kind, 14)])  # two columns fit 80
+
+
+def _took(costs: Costs, names: Sequence[Names], kinds: Sequence[str]) -> str:
+    """Return the time that the reference trials of some conditions took on these kinds of accelerators."""
     found = {name: took(costs[name]) for name in names}
-    seconds = sum(each.get(kind, 0.0) for each in found.values())
+    seconds = sum(each.get(kind, 0.0) for each in found.values() for kind in kinds)
     missing = any(not costs[name] for name in names)
     if not seconds:
         return "not run" if missing else "–"
-    elsewhere = any(costs[name] and kind not in each for name, each in found.items())
+    elsewhere = any(costs[name] and each.keys().isdisjoint(kinds) for name, each in found.items())
     return duration(seconds) + AND_ELSEWHERE * elsewhere + AND_MORE * missing
 
 
 def _claims(reports: Sequence[ClaimReport], costs: Costs) -> Table:
     kinds = _kinds(costs)
-    heads = [f"took on one\n{kind}" for kind in kinds]
+    heads = [_head(kinds)] if kinds else []  # one for all kinds, so that it fits 80 columns
     table = plain_table(("claim", "n", "α", "p for", "p\nagainst", "can\nend", *heads), (), names=0)
     table.columns[0].justify = "left"
     for report in reports:
@@ -233,6 +240,6 @@ def _claims(reports: Sequence[ClaimReport], costs: Costs) -> Table:
                 f"{look.supported:.2g}",
                 f"{look.refuted:.2g}",
                 "".join(reach) or "no",
-                *(_took(costs, used, kind) for kind in kinds if look is report.attainable[-1]),
+                *(_took(costs, used, kinds) for _ in heads if look is report.attainable[-1]),
             )
     return table
