@@ -40,6 +40,11 @@ def _rewards(method: str, task: str, reward: Reward) -> list[float]:
     return [reward(trial) for trial in trials]
 
 
+def _judged(method: str, task: str, reward: Reward) -> list[float]:
+    """Return the rewards of the ten trials a side by which the claims about obstacles are judged."""
+    return _rewards(method, task, reward)[:10]
+
+
 def _line(cells: Sequence[str]) -> str:
     """Return a line of a table; an empty cell is one space."""
     return "\n|" + "".join(f" {cell} |" if cell else " |" for cell in cells) + "\n"
@@ -75,16 +80,16 @@ def test_comparisons_with_the_control_cost_given_back_are_those_of_the_trials(
     part: str, one: str, other: str, task: str
 ) -> None:
     found = (
-        _higher(_rewards(one, task, reward), _rewards(other, task, reward)) for reward in (_examined, _without_cost)
+        _higher(_judged(one, task, reward), _judged(other, task, reward)) for reward in (_examined, _without_cost)
     )
     assert f"| {part} | {' | '.join(f'A12 {text}' for text in found)} |" in PROTOCOL
 
 
 def test_without_the_control_cost_ppo_would_not_be_above_cma_es() -> None:
-    ppo, cma_es = (_rewards(method, "obstacles", _without_cost) for method in ("ppo", "cma_es"))
+    ppo, cma_es = (_judged(method, "obstacles", _without_cost) for method in ("ppo", "cma_es"))
     tests = GreaterTests(ppo, cma_es, REPRODUCTION.tiers["full"].design.a12_margin)
     told = f"PPO is as high in {tests.wins:.2f} of all pairs, p = {tests.smaller.p:.2g})"
-    assert tests.p.outcome(REPRODUCTION.tiers["full"].design.last.alpha) is Outcome.INCONCLUSIVE
+    assert tests.p.outcome(REPRODUCTION.tiers["full"].design.last.alpha) is Outcome.SMALLER
     assert told in " ".join(PROTOCOL.split())
 
 
