@@ -167,8 +167,8 @@ def actions_of(task: Any, policy: Callable[[Any], Any]) -> tuple[str, bool]:
             raise _EnoughError
         held = copy.deepcopy(observation)  # which an environment may overwrite
         action = policy(observation)
-        observations.append(held)
         seen.append(_plain_action(action))
+        observations.append(held)
         return action
 
     try:
