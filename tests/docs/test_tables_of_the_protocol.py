@@ -79,9 +79,7 @@ def test_rewards_among_stones_in_training_and_after_it_are_those_of_the_trials(m
 def test_comparisons_with_the_control_cost_given_back_are_those_of_the_trials(
     part: str, one: str, other: str, task: str
 ) -> None:
-    found = (
-        _higher(_judged(one, task, reward), _judged(other, task, reward)) for reward in (_examined, _without_cost)
-    )
+    found = (_higher(_judged(one, task, reward), _judged(other, task, reward)) for reward in (_examined, _without_cost))
     assert f"| {part} | {' | '.join(f'A12 {text}' for text in found)} |" in PROTOCOL
 
 
