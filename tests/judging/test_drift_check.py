@@ -51,6 +51,15 @@ def test_trials_that_now_diverge_are_drift(case) -> None:
     assert check_drift([case(["diverged"] * 5)]).drifted
 
 
+@pytest.mark.parametrize(("metric", "a12"), [("score", 0.0), ("environment_steps", 1.0)])
+def test_a_trial_that_failed_counts_as_the_worst(case, metric: str, a12: float) -> None:
+    """Fewer steps are better, so that a failed trial has taken more than any other."""
+    found = case(["diverged"] * 5, metrics=(metric,))
+    earlier = tuple(replace(one, metrics={**one.metrics, "environment_steps": 100.0}) for one in found.reference)
+    (row,) = check_drift([replace(found, reference=earlier)]).rows
+    assert (row.a12, row.drifted) == (a12, True)
+
+
 def test_the_suite_pays_holms_correction_over_methods(case) -> None:
     def suite(others: int):  # type: ignore[no-untyped-def]
         steady = [case([0.51, 0.55, 0.59, 0.63, 0.67], method=f"m{n}") for n in range(others)]

@@ -198,7 +198,7 @@ def _columns(
     for metric in metrics:
         row = DriftRow(label, metric, len(new), len(earlier), "no drift")
         try:
-            sides = [[number_of(trial, label, metric) for trial in side] for side in (new, earlier)]
+            sides = [[_number_of(trial, label, metric) for trial in side] for side in (new, earlier)]
         except (UnreadableTrialError, KeyError) as error:
             lacking = isinstance(error, KeyError)
             detail = f"a finished trial has no metric {metric!r}" if lacking else str(error)
@@ -217,14 +217,15 @@ def _columns(
     return (Columns(tuple(tested), np.stack(ranks, axis=1), len(new), wide) if tested else None), without
 
 
-def number_of(trial: TrialResult, label: str, metric: str) -> float:
-    """Return a measure of a trial; the lowest number for one that failed.
+def _number_of(trial: TrialResult, label: str, metric: str) -> float:
+    """Return a measure of a trial; the worst number for one that failed.
 
     Raises:
         KeyError: when a finished trial lacks it.
         UnreadableTrialError: when it is NaN.
     """
-    return read_number(trial, f"{label}: {metric}", lambda one: measured(one, metric), -math.inf)
+    worst = math.inf if metric in LOWER else -math.inf
+    return read_number(trial, f"{label}: {metric}", lambda one: measured(one, metric), worst)
 
 
 def _decided(row: DriftRow, p_holm: float, shown: bool, alpha: float, families: int) -> DriftRow:
