@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -15,8 +15,10 @@ from custom_robots import BASE, Texts
 from evoclaims.core.errors import UserError
 from evoclaims.envs.ecorobot import fidelity, physics
 from evoclaims.envs.ecorobot.boxes import Box
-from evoclaims.envs.ecorobot.fidelity import check, require_fidelity
+from evoclaims.envs.ecorobot.fidelity import check, require_fidelity, require_likeness
 from evoclaims.envs.ecorobot.locomotion import Locomotion
+from evoclaims.envs.ecorobot.obstacles import Obstacles
+from evoclaims.envs.ecorobot.physics import Body
 from evoclaims.envs.ecorobot.robots import ANT
 from evoclaims.envs.ecorobot.scene import Scene
 
@@ -40,13 +42,7 @@ SLIDER = """
 def test_a_step_that_differs_by_a_millionth_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     scene = Scene(Texts(tmp_path, monkeypatch).robot(BASE), ())
     check(scene)
-    frame = physics._frame
-
-    def faulty(*arguments: Any) -> Any:
-        body = frame(*arguments)
-        return replace(body, velocity=body.velocity * (1 + 1e-6))
-
-    monkeypatch.setattr(physics, "_frame", faulty)
+    monkeypatch.setattr(physics, "_frame", _off_by_a_millionth(physics._frame))
     with pytest.raises(UserError, match="rover is not simulated as its file says. In .* random states a frame"):
         check(scene)
 
@@ -92,6 +88,28 @@ def test_a_robot_is_checked_once_a_machine(tmp_path: Path, monkeypatch: pytest.M
         assert [checks(scene), checks(scene)] == [1, 0]
 
 
+def test_a_release_that_moves_our_robots_otherwise_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    check(Scene(ANT, ()))
+    monkeypatch.setattr(physics, "_frame", _off_by_a_millionth(physics._frame))
+    with pytest.raises(UserError, match=r"ant does not move as MuJoCo in C says: of 288 random frames \d+ .* MJX 3\."):
+        check(Scene(ANT, ()))
+
+
+def test_our_robots_are_checked_when_a_step_is_traced(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Once a process, whatever boxes there are; not when a task is planned."""
+    checked: list[Scene] = []
+    monkeypatch.setattr(fidelity, "check", checked.append)
+    task = Obstacles()
+    with _cached_in(tmp_path):
+        require_likeness.cache_clear()
+        task.check()
+        state = jax.eval_shape(task.reset, jax.random.key(0), 0)
+        assert not checked
+        for _ in range(2):
+            jax.eval_shape(task.plain_step, state, jax.ShapeDtypeStruct((task.action_size,), "float32"))
+    assert checked == [Scene(task.robot, ())]
+
+
 def test_a_robot_that_is_refused_is_checked_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def refuse(scene: Scene) -> None:
         raise UserError("refused")
@@ -104,6 +122,14 @@ def test_a_robot_that_is_refused_is_checked_again(tmp_path: Path, monkeypatch: p
                 task.check()
             with pytest.raises(UserError, match="refused"):
                 _ = task.observation_size
+
+
+def _off_by_a_millionth(frame: Callable[..., Body]) -> Callable[..., Body]:
+    def faulty(*arguments: Any) -> Body:
+        body = frame(*arguments)
+        return replace(body, velocity=body.velocity * (1 + 1e-6))
+
+    return faulty
 
 
 @contextmanager

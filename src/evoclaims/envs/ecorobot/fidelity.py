@@ -1,8 +1,9 @@
 """Whether a robot is simulated as its file says: frames of our step beside frames of MuJoCo in C.
 
 A custom robot's model may have what a step does not simulate, or what MJX computes in another way. The robot is
-refused then, before anything is trained. What has passed is remembered beside the compiled programs, so that a model is
-checked once a machine.
+refused then, before anything is trained. A built-in robot, whose model is known, shows whether a release of MJX
+simulates what the release of MuJoCo does. What has passed is remembered beside the compiled programs, so that a model
+is checked once a machine and release.
 """
 
 from __future__ import annotations
@@ -30,6 +31,7 @@ from evoclaims.core.provenance import versions
 from evoclaims.envs.ecorobot import physics
 from evoclaims.envs.ecorobot.physics import Body
 from evoclaims.envs.ecorobot.pose import torso
+from evoclaims.envs.ecorobot.robots import Robot
 from evoclaims.envs.ecorobot.scene import Scene
 from evoclaims.kernels import in_numpy
 
@@ -37,6 +39,11 @@ Numbers = NDArray[np.float64]
 
 TOLERANCE: Final = 1e-8
 """Largest difference of a velocity after one frame, and of a position, in float64: a share of 1 plus the largest."""
+MOST: Final = 0.8
+"""Share of frames in which a built-in robot must move as MuJoCo says.
+
+With MuJoCo 3.17 they are 0.89 to 1: where capsules touch the ground, MJX finds other points than MuJoCo in C.
+"""
 RUNS: Final = 12
 """Runs with random motors from which frames are taken."""
 FRAMES: Final = 240
@@ -73,8 +80,23 @@ def require_fidelity(scene: Scene) -> None:
     Raises:
         UserError: when a frame differs from MuJoCo's by more than `TOLERANCE`.
     """
-    if scene.robot.is_built_in:
-        return
+    if not scene.robot.is_built_in:
+        _check_once(scene)
+
+
+@lru_cache(maxsize=64)
+def require_likeness(robot: Robot) -> None:
+    """Check a built-in robot, alone on the ground, in float64, once a machine, before it is simulated.
+
+    Raises:
+        UserError: when fewer than `MOST` of the frames are MuJoCo's.
+    """
+    if robot.is_built_in:
+        _check_once(Scene(robot, ()))
+
+
+def _check_once(scene: Scene) -> None:
+    """Check a scene that has not passed on this machine."""
     record = _record(scene)
     if record is not None and _has_passed(record):
         return
@@ -118,15 +140,22 @@ def check(scene: Scene) -> None:
     """Compare frames of a robot among its boxes with MuJoCo's.
 
     Raises:
-        UserError: as `require_fidelity` does.
+        UserError: as `require_fidelity` and `require_likeness` do.
     """
     # A thread of its own, since this is called while a program is traced.
     with ThreadPoolExecutor(1) as own:
         off, made, ours = own.submit(_differences, scene).result()
     wrong = ~(off <= TOLERANCE)  # NaN is wrong, too
-    if not wrong.any():
-        return
     robot = scene.robot
+    if wrong.mean() <= (1 - MOST if robot.is_built_in else 0.0):
+        return
+    if robot.is_built_in:
+        made_with = versions()
+        raise UserError(
+            f"The robot {robot.name} does not move as MuJoCo in C says: of {len(wrong)} random frames "
+            f"{np.sum(~wrong)} are the same, and nine in ten with MuJoCo 3.17. MuJoCo is {made_with['mujoco']} and MJX "
+            f"{made_with['mujoco-mjx']}. Install other versions of mujoco and mujoco-mjx, or report it."
+        )
     worst = int(np.nanargmax(np.where(wrong, np.nan_to_num(off, nan=np.inf), -1.0)))
     crowded = wrong & (made.contacts > robot.contacts)
     if crowded.any() and not (wrong & ~crowded).any():

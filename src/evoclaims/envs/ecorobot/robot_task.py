@@ -21,7 +21,7 @@ from evoclaims.core.pytree import select, strong
 from evoclaims.envs.base import Episode, PolicyFn, TaskState, averaged, fitting, played
 from evoclaims.envs.ecorobot import physics
 from evoclaims.envs.ecorobot.boxes import Box
-from evoclaims.envs.ecorobot.fidelity import require_fidelity
+from evoclaims.envs.ecorobot.fidelity import require_fidelity, require_likeness
 from evoclaims.envs.ecorobot.outing import Outing, Ruling
 from evoclaims.envs.ecorobot.pose import Pose, torso
 from evoclaims.envs.ecorobot.robots import SIMPLE_ROB, Robot, fits_as_built_in
@@ -218,6 +218,7 @@ class RobotTask(ABC):
         A step in which the simulation diverges (`physics.is_stable`) is undone: no reward, and the episode ends.
         """
         self.check()
+        require_likeness(self.robot)
         outing: Outing = state.inner
         control = action
         if self.robot.scales_actions:
