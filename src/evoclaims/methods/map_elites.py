@@ -24,6 +24,7 @@ from evoclaims.methods.champion import policy_of
 from evoclaims.networks.mlp import Mlp
 
 if TYPE_CHECKING:  # where it is used it is imported, which takes time
+    from qdax.core.containers.mapelites_repertoire import MapElitesRepertoire
     from qdax.core.map_elites import MAPElites
 
 
@@ -137,12 +138,16 @@ class MapElites:
         """
         draw_key, vary_key, episode_key = streams(key, "draw", "vary", "episode")
         drawn = lecun_uniform(draw_key, self.network, task.observation_size, task.action_size, self.batch)
-        with implicit_promotions():
-            varied, _ = self._algorithm().ask(state.archive, None, vary_key)
-        population = jnp.where(state.evaluated < self.initial, drawn, varied)
+        population = jnp.where(state.evaluated < self.initial, drawn, self.vary(vary_key, state.archive))
         after = self.insert(task, state, population, self._evaluate(task, episode_key, level, population))
         # All elites come from checked batches.
         return after, self._progress(task, after, healthy=jnp.all(jnp.isfinite(population)))
+
+    def vary(self, key: PRNGKeyArray, archive: MapElitesRepertoire) -> Float[Array, "batch parameters"]:
+        """Return children of the archive's elites."""
+        with implicit_promotions():
+            children: Float[Array, "batch parameters"] = self._algorithm().ask(archive, None, key)[0]
+        return children
 
     def insert(
         self, task: Task, state: MapElitesState, population: Float[Array, "batch parameters"], episodes: Episode

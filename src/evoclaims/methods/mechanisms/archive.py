@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Any, ClassVar
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar, Final
 
 import jax
 import jax.numpy as jnp
@@ -14,9 +14,16 @@ from numpy.typing import NDArray
 
 from evoclaims.envs.base import Episode, Task
 from evoclaims.methods.champion import policy_of
-from evoclaims.methods.map_elites import MapElites
+from evoclaims.methods.map_elites import MapElites, MapElitesState
 from evoclaims.methods.mechanisms.observed import Observed, Question
 from evoclaims.networks.mlp import Mlp
+
+APART: Final = 10.0
+"""Of the two parents of a line, in each parameter."""
+LINE: Final = 0.1
+"""The line_sigma of their variation."""
+CHILDREN: Final = 1_024
+"""So many that a tenth more or less shows in a trial: their "line" has a deviation of 0.04."""
 
 
 @dataclass(frozen=True)
@@ -64,6 +71,7 @@ class MapElitesMechanisms(Observed):
             "true": jnp.mean((table == new).astype(jnp.float32)),
             "best": jnp.mean(jnp.maximum(new, self._best(task, batch, jnp.ones(batch.shape[0], bool))) == inserted),
             "near": self._distance(before.archive, after.archive),
+            "line": self._along(jax.random.fold_in(key, 2), after),
         }
 
     def _episodes(self, task: Spread, vectors: Float[Array, "n parameters"]) -> Episode:
@@ -85,6 +93,23 @@ class MapElitesMechanisms(Observed):
         at = jnp.where(inside[:, None], cell, cells)  # writes beyond the table are dropped
         empty = jnp.full(self.of.cells, -jnp.inf)
         return empty.at[at[:, 0], at[:, 1]].max(episodes.fitness, mode="drop")
+
+    def _along(self, key: PRNGKeyArray, state: MapElitesState) -> Float[Array, ""]:
+        """Return the "line" of children of two elites: one at the origin, one at `APART` in each parameter.
+
+        A half of them has two parents, in the mean. Nobody is so far from a parent as the other one is.
+        """
+        archive, size = state.archive, state.archive.genotypes.shape[1]
+        two = jnp.arange(archive.fitnesses.shape[0]) < 2
+        pair = archive.replace(
+            genotypes=jnp.where(jnp.arange(two.size)[:, None] == 1, APART, jnp.zeros_like(archive.genotypes)),
+            fitnesses=jnp.where(two[:, None], 0.0, -jnp.inf),
+        )
+        children = replace(self.of, line_sigma=LINE, batch=CHILDREN).vary(key, pair)
+        along = jnp.mean(children, axis=1)  # of a parent 0 or APART
+        moved = jnp.minimum(jnp.abs(along), jnp.abs(along - APART)) / APART
+        noise = (self.of.iso_sigma / APART) ** 2 / size
+        return jnp.sqrt(jnp.maximum(2 * (jnp.mean(moved**2) - noise), 0.0)) / LINE
 
     def _distance(self, before: Any, after: Any) -> Float[Array, ""]:
         """Return how far new elites are from the nearest old one; 0 while there is no old one."""
