@@ -38,7 +38,7 @@ class PaperTrials(TrialGroup):
 
     @property
     def success_so_far(self) -> Profile:
-        """Success of the final policy, averaged over each level and all before it."""
+        """Success of the final policy on each level, averaged with all levels before it."""
         return Profile(
             self,
             "success averaged over the levels so far",
@@ -53,7 +53,7 @@ class PaperTrials(TrialGroup):
 
     @property
     def reward(self) -> Measure:
-        """Episode reward of the final policy, in what the task pays for."""
+        """Episode reward of the final policy on the last level, in the task's own unit."""
         return replace(super().reward, unit=self._paid)
 
     @property
@@ -137,24 +137,24 @@ class PaperTrials(TrialGroup):
 
     @property
     def speed(self) -> Measure:
-        """How far the final policy comes in a step, m, averaged over the examination's episodes."""
+        """Metres that the final policy advances in a step, averaged over the examination's episodes."""
         return self.measure("m a step", lambda t: t.metrics["furthest"] / t.metrics["episode_steps"])
 
     @property
     def reward_before_costs(self) -> Measure:
-        """Episode reward of the final policy with its control cost given back."""
+        """Episode reward of the final policy, without subtracting the control cost."""
         return self.measure(
             "reward before costs", lambda t: t.metrics["last_fitness"] + t.metrics["control_cost"], unit=self._paid
         )
 
     @property
     def reward_in_training(self) -> Measure:
-        """Reward of the best individual of the last generation in its one episode; for methods that evolve."""
+        """Reward of the last generation's best individual in its only episode; for methods that evolve."""
         return self.measure("reward of training's best episode", lambda t: t.curves["fitness"][-1], unit=self._paid)
 
     @property
     def reward_gained(self) -> Measure:
-        """Reward per episode at the last report of training, less that at the first; for tasks of one level."""
+        """Reward per episode at the last report of training, minus that at the first; for tasks with one level."""
         return self.measure(
             "reward gained", lambda t: t.curves["fitness"][-1] - t.curves["fitness"][0], unit=self._paid
         )
@@ -165,13 +165,13 @@ class PaperTrials(TrialGroup):
         return self.measure("share of steps upside-down", lambda t: t.metrics["upside_down"], better="lower")
 
     def is_overturned(self, share: float) -> Event:
-        """The robot is upside-down in more than a share of the final policy's steps."""
+        """The robot is upside-down in more than `share` of the final policy's steps."""
         return self.event(
             f"upside-down in more than {share:g} of the steps", lambda t: t.metrics["upside_down"] > share
         )
 
     def pays(self, share: float) -> Event:
-        """The final policy's control cost is more than a share of its reward before costs."""
+        """The final policy's control cost is more than `share` of its reward before costs."""
         return self.event(
             f"control cost above {share:g} of the reward",
             lambda t: t.metrics["control_cost"] > share * (t.metrics["last_fitness"] + t.metrics["control_cost"]),
@@ -219,11 +219,11 @@ class PaperTrials(TrialGroup):
     # Of mechanisms (reproductions/nisioti2025/mechanisms.py).
 
     def on_average(self, curve: str) -> Measure:
-        """Mean of a number over the reports of training."""
+        """Mean of a training curve over all reports."""
         return self.measure(f"{curve} on average", lambda t: math.fsum(t.curves[curve]) / len(t.curves[curve]))
 
     def share(self, part: str, other: str) -> Measure:
-        """Share of a count in that and another one, both added up over the reports of training."""
+        """Sum of the curve `part` over all reports, as a share of the sum of `part` and `other`."""
 
         def read(t: Any) -> float:
             mine, others = math.fsum(t.curves[part]), math.fsum(t.curves[other])
@@ -232,22 +232,22 @@ class PaperTrials(TrialGroup):
         return self.measure(f"share of {part} against {other}", read)
 
     def at_the_end(self, curve: str) -> Measure:
-        """A number at the last report of training."""
+        """Value of a training curve at the last report."""
         return self.measure(f"{curve} at the end", lambda t: t.curves[curve][-1])
 
     def fall(self, curve: str) -> Measure:
-        """How much a number falls in a generation, from the first report of training to the last."""
+        """How much a training curve falls per generation, from the first report to the last."""
         return self.measure(
             f"fall of {curve} in a generation",
             lambda t: (t.curves[curve][0] - t.curves[curve][-1]) / (t.curves["steps"][-1] - t.curves["steps"][0]),
         )
 
     def always(self, curve: str, value: float) -> Event:
-        """A number is exactly `value` at every report of training."""
+        """A training curve is exactly `value` at every report."""
         return self.event(f"{curve} is always {value:g}", lambda t: all(one == value for one in t.curves[curve]))
 
     def reports_above(self, curve: str, value: float) -> Measure:
-        """How many reports of training have at least `value`."""
+        """Number of reports at which a training curve has at least `value`."""
         return self.measure(
             f"reports with {curve} of {value:g}", lambda t: sum(one >= value for one in t.curves[curve])
         )

@@ -1,14 +1,16 @@
-"""The example of docs/judging.md: one verdict, computed from the committed records without evoclaims."""
+"""The examples of docs/judging.md: a table of verdicts, and one verdict computed from the records without evoclaims."""
 
 from __future__ import annotations
 
+import os
 import re
+import shlex
 import subprocess
 import sys
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
-SECTION = (ROOT / "docs" / "judging.md").read_text(encoding="utf-8").partition("## One verdict, by hand")[2]
+PAGE, _, SECTION = (ROOT / "docs" / "judging.md").read_text(encoding="utf-8").partition("## One verdict, by hand")
 
 
 def test_the_verdict_computed_by_hand_is_that_of_the_records(tmp_path: Path) -> None:
@@ -16,10 +18,17 @@ def test_the_verdict_computed_by_hand_is_that_of_the_records(tmp_path: Path) -> 
     told = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True).stdout
     assert code.rstrip().endswith(f"\n# {told.strip()}")
     (p,) = re.findall(r"p = \S+ against", told)
-    asked = ["status", "--tier", "full", "--only", "O5", "--why", "--storage", str(tmp_path)]
+    shown = r"`evoclaims (status .*?)` prints this table:\n\n```text\n(.*?)```"
+    ((command, table),) = re.findall(shown, PAGE, re.DOTALL)
+    asked = [*shlex.split(command), "--why", "--storage", str(tmp_path)]
     judged = subprocess.run(
-        [sys.executable, "-m", "evoclaims", *asked], cwd=ROOT, capture_output=True, text=True
+        [sys.executable, "-m", "evoclaims", *asked],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        env={**os.environ, "COLUMNS": "104"},
     ).stdout
+    assert judged.replace("†", " ").startswith(table)
     assert re.search(
         rf"O5\b.*smaller than claimed.*{re.escape(p)} an effect as large as claimed <= alpha = 0\.04", judged, re.DOTALL
     )

@@ -186,6 +186,10 @@ def test_trials_that_drifted_from_the_committed_ones_fail_the_run(project: Any) 
     assert result.ret == 0
     result.stdout.fnmatch_lines(["reference trials: * comparisons, 0 drifted*", "to the bit: 10 trials *, 0 changed"])
     assert project.run("--claims-stored", "--claims-committed", own_store=True).ret == 0
+    references.write(path, [replace(t, digest=digest("done", {"unread": 1.0}, {}, {}, b"")) for t in stored])
+    result = project.run(own_store=True)
+    assert result.ret == 0  # changed bits are counted, and fail no run
+    result.stdout.fnmatch_lines(["reference trials: * 0 drifted*", "to the bit: 10 trials *, 10 changed: *"])
     worse = {"mean_success": 0.5}
     made = [replace(t, metrics={**t.metrics, **worse}, digest=digest("done", worse, {}, {}, b"")) for t in stored]
     references.write(path, made)

@@ -303,17 +303,17 @@ class Compound(Assertion):
 
 @dataclass(frozen=True)
 class AllOf(Compound):
-    """Supported when every part is (intersection-union: no correction), refuted when some part is after Holm's."""
+    """All parts hold.
+
+    Supported when every part is (intersection-union: no correction), refuted when some part is after Holm's.
+    """
 
     kind: ClassVar[str] = "all of"
     entry: ClassVar[Entry] = Entry(
         syntax=("(a.reward > b.reward) & (a.reward > c.reward)",),
         null="One of the parts does not hold.",
-        supported=(
-            "Each part is, at the same α: the intersection–union test needs no correction. A test of several "
-            "conditions before pairs of them (any_differ) is one more part."
-        ),
-        refuted="One of the parts is after Holm's correction: each more part is one more chance to err.",
+        supported="Each part is supported at the same α. The intersection–union test needs no correction.",
+        refuted="One part is refuted after Holm's correction, because each part is one more chance to err.",
         source="Berger 1982 (intersection–union test), Holm 1979",
     )
     joint: ClassVar[str] = "and"
@@ -322,14 +322,17 @@ class AllOf(Compound):
 
 @dataclass(frozen=True)
 class AnyOf(Compound):
-    """Supported when some part is after Holm's correction, refuted when every part is."""
+    """At least one part holds.
+
+    Supported when some part is after Holm's correction, refuted when every part is.
+    """
 
     kind: ClassVar[str] = "any of"
     entry: ClassVar[Entry] = Entry(
         syntax=("(a.reward > b.reward) | (a.reward > c.reward)",),
         null="None of the parts holds.",
-        supported="One of the parts is after Holm's correction.",
-        refuted="Each part is.",
+        supported="One part is supported after Holm's correction.",
+        refuted="Each part is refuted.",
         source="Holm 1979",
     )
     joint: ClassVar[str] = "or"

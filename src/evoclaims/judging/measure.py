@@ -58,7 +58,7 @@ class Measure(NumberReading):
     def __mul__(self, factor: float) -> Measure:
         """Return this measure times a number above 0, for ratios: `2 * a.environment_steps < b.environment_steps`.
 
-        Every value must be 0 or above: twice a loss would be worse, and not twice as good.
+        Every value must be at least 0, because twice a negative reward is not twice as good.
 
         Raises:
             UserError: when `factor` is no finite number above 0.

@@ -19,7 +19,8 @@ ALPHA: Final = 0.05
 def detectable_a12(n: int) -> float:
     """Return the A12 that a two-sided rank test of `n` against `n` trials detects with power 1/3, to two digits.
 
-    The alternatives are Lehmann's (1953): F_A is a power of F_B, so that the exact power has a closed form.
+    The alternatives are Lehmann's (1953): F_A is a power of F_B, so that the exact power has a closed form. Two normal
+    distributions give the same two digits.
 
     Args:
         n: trials a side, at least 4: fewer detect nothing at 0.05.

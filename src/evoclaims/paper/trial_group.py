@@ -156,10 +156,10 @@ class TrialGroup:
         better: Better = "higher",
         unit: str = "",
     ) -> Measure:
-        """Return a measure of these trials, such as `measure("steps", lambda t: t.metrics["steps"], "lower")`.
+        """A custom measure, such as `measure("steps", lambda t: t.metrics["steps"], "lower")`.
 
-        Without `read` it is the metric of that name: `measure("steps", better="lower")`. Measures of two units are
-        not compared.
+        Without `read` it is the metric with this name: `measure("steps", better="lower")`. Measures with different
+        units are not compared.
 
         Raises:
             UnknownNameError: for a metric that imported trials do not have. Other trials have to run first: then a
@@ -170,12 +170,12 @@ class TrialGroup:
         return Measure(self, name, read or (lambda t: t.metrics[name]), better, unit=unit)
 
     def event(self, name: str, holds: Callable[[TrialResult], bool]) -> Event:
-        """Return an event, which holds in a trial or does not."""
+        """A custom event, such as `event("is fast", lambda t: t.metrics["steps"] < 100)`."""
         return Event(self, name, holds)
 
     @property
     def success(self) -> Profile:
-        """Success of the final policy on each level's own table."""
+        """Success of the final policy on each level."""
         return Profile(self, "success", lambda t: t.levels["success"], self.condition.task.levels)
 
     @property
@@ -190,12 +190,12 @@ class TrialGroup:
 
     @property
     def reward(self) -> Measure:
-        """Episode reward of the final policy on the last level, averaged over the evaluation's episodes."""
+        """Episode reward of the final policy on the last level, averaged over the examination's episodes."""
         return self.measure("episode reward", lambda t: t.metrics["last_fitness"])
 
     @property
     def furthest_solved(self) -> Measure:
-        """Highest level solved while training; -1 for none."""
+        """Highest level solved while training, or -1."""
         return self.measure("furthest level solved", lambda t: t.metrics["furthest_solved"])
 
     @property
@@ -205,11 +205,11 @@ class TrialGroup:
 
     @property
     def environment_steps(self) -> Measure:
-        """Environment steps that the trial has spent; fewer than the budget where it ends once all is solved."""
+        """Environment steps that the trial has spent: fewer than the budget if it ended early."""
         return self.measure("environment steps", lambda t: t.metrics["environment_steps"], "lower")
 
     def steps_to(self, curve: str, value: float, level: int | None = None) -> Measure:
-        """Environment steps at the first report with at least `value` in a training curve; censored where never.
+        """Environment steps at the first report at which a training curve has at least `value`.
 
         Only reports count in which the trial trains on `level`, counted from 0 (default: the last).
         """

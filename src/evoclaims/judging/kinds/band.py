@@ -19,7 +19,7 @@ from evoclaims.judging.verdict import Bound, Interval, PValues
 
 @dataclass(frozen=True)
 class Band(Assertion):
-    """The median is in [lo, hi], both finite (so that a failed trial, whose value is infinite, is outside).
+    """The median is in the range from `lo` to `hi`. Both are finite, so a failed trial is outside.
 
     Supported when both one-sided sign tests reject (at n = 10 and alpha = 0.05: at least 9 trials >= lo and at least
     9 <= hi). Refuted when a sign test finds the median below lo or above hi, each at alpha / 2.
@@ -31,12 +31,9 @@ class Band(Assertion):
     kind: ClassVar[str] = "band"
     entry: ClassVar[Entry] = Entry(
         syntax=("a.furthest_reached.between(4, 6)",),
-        null=(
-            "A trial is at most the highest value, or at least the lowest, with probability 1/2 at most: so the "
-            "median is outside."
-        ),
-        supported="Two sign tests reject both; a trial at an end counts as inside.",
-        refuted="A sign test, at α/2 for each end, finds the median beyond one.",
+        null="The median is below the range, or above it.",
+        supported="One sign test rejects that it is below, another that it is above. A trial at an end is inside.",
+        refuted="One of two sign tests shows that the median is below the range, or above it, at α/2.",
         source="Dixon and Mood 1946 (sign test); both tests have to reject: Schuirmann 1987",
     )
 

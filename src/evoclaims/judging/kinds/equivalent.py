@@ -19,7 +19,7 @@ from evoclaims.judging.window import total
 
 @dataclass(frozen=True)
 class Equivalent(Assertion):
-    """`left` and `right` differ by less than `margin` (in the measure's unit).
+    """Two conditions differ by less than `margin`, in the measure's unit.
 
     Supported when both one-sided rank tests reject (A + margin above B, and B above A - margin). Refuted when a rank
     test finds one beyond the margin of the other; these are two tests, so each is at alpha / 2.
@@ -31,9 +31,9 @@ class Equivalent(Assertion):
     kind: ClassVar[str] = "equivalent"
     entry: ClassVar[Entry] = Entry(
         syntax=("a.reward.equivalent_to(b.reward, margin=5)",),
-        null="One of the two is beyond the other by at least the margin.",
-        supported="Two rank tests reject, each with the margin added on one side.",
-        refuted="A rank test, at α/2 for each direction, finds one beyond the other by more than the margin.",
+        null="One side is above the other by at least the margin.",
+        supported="Two rank tests reject that. One adds the margin to the first side, the other to the second.",
+        refuted="One of two rank tests shows that one side is above the other by more than the margin, at α/2.",
         source="Schuirmann 1987 (two one-sided tests), with the rank test",
     )
 

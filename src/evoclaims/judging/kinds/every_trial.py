@@ -14,15 +14,18 @@ from evoclaims.judging.verdict import PValues
 
 @dataclass(frozen=True)
 class EveryTrial(Assertion):
-    """Supported when the event holds in every trial of the design's last look, refuted otherwise."""
+    """An event holds in every trial.
+
+    Supported when it holds in every trial of the design's last look, refuted otherwise.
+    """
 
     event: EventReading
     kind: ClassVar[str] = "exact"
     entry: ClassVar[Entry] = Entry(
         syntax=("a.solves_every_level.in_every_trial()",),
-        null="None: this is a fact about trials without chance, such as those of a control.",
-        supported="It holds in each trial of the last look.",
-        refuted="It fails in one.",
+        null="None, because nothing is tested. Use it for trials without randomness, such as those of a control.",
+        supported="The event holds in each trial of the last look.",
+        refuted="The event does not hold in one of them.",
         source="No test",
     )
 

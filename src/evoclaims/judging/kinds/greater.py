@@ -87,10 +87,10 @@ def _share(a: Sequence[float], b: Sequence[float]) -> float:
 
 @dataclass(frozen=True)
 class Greater(Assertion):
-    """`above` is above `below`: supported by the rank test.
+    """Trials of one condition are above those of another.
 
-    Refuted by the reverse rank test, or where the two are equal within the design's A12 margin. Smaller than claimed
-    where only an effect as large as the margin is rejected.
+    `above` above `below` is supported by the rank test. Refuted by the reverse rank test, or where the two are equal
+    within the design's A12 margin. Smaller than claimed where only an effect as large as the margin is rejected.
     """
 
     above: NumberReading
@@ -103,16 +103,18 @@ class Greater(Assertion):
             "2 * a.environment_steps < b.environment_steps",
         ),
         null=(
-            "The first is stochastically no larger than the second: each split of the pooled trials is equally likely."
+            "The first side is stochastically no larger than the second. If both have one distribution, all splits of "
+            "the pooled trials are equally likely."
         ),
         supported=(
-            "The rank test rejects that: the share of splits with a sum of ranks as large, ties counted exactly."
+            "The rank test rejects that. Its p is the share of all splits in which the ranks of the first side have "
+            "at least this sum, ties included."
         ),
         refuted=(
-            "The rank test rejects the reverse; or both sides are shown to be equal within the margin, as neither "
-            "reaches it. Smaller than claimed: only the first is shown not to reach it, by Hoeffding's bound over all "
-            "pairs of trials, ties counted as wins. The margin is the A12 that the paper's own design detects with "
-            "power 1/3 (0.71 for ten trials a side)."
+            "The rank test shows the reverse, or neither side reaches the margin. If only the first does not reach it, "
+            "the claim is smaller than claimed. Hoeffding's bound over all pairs of trials shows this; ties count as "
+            "wins. The margin is an A12 that the paper's own design detects with power 1/3 (0.71 for ten trials a "
+            "side)."
         ),
         source=(
             "Mann and Whitney 1947, as a permutation test on mid-ranks; A12: Vargha and Delaney 2000; where "

@@ -84,9 +84,9 @@ class Solves(MostTrials):
             "a.solves_every_level.in_most_trials()",
             "a.solves_every_level.in_most_trials(p0=0.5)",
         ),
-        null="It holds with a probability of p0 (0.7) at most.",
-        supported="The binomial test rejects that; in a trial without a result it does not hold.",
-        refuted="The binomial test rejects that it holds with a probability of at least p0.",
+        null="The event holds with a probability of at most p0 (default: 0.7).",
+        supported="A binomial test rejects that. In a trial without a result the event does not hold.",
+        refuted="A binomial test rejects that the event holds with a probability of at least p0.",
         source="Clopper and Pearson 1934 (binomial test)",
     )
 
@@ -98,8 +98,8 @@ class Stays(MostTrials):
     kind: ClassVar[str] = "stays"
     entry: ClassVar[Entry] = Entry(
         syntax=("a.solves_no_level_beyond(0).stays()",),
-        null="The bound is kept with a probability of p0 (0.7) at most.",
-        supported="The binomial test rejects that; a trial without a result has not kept it.",
-        refuted="The binomial test rejects that it is kept with a probability of at least p0.",
+        null="The bound is kept with a probability of at most p0 (default: 0.7).",
+        supported="A binomial test rejects that. A trial without a result has not kept the bound.",
+        refuted="A binomial test rejects that the bound is kept with a probability of at least p0.",
         source="Clopper and Pearson 1934 (binomial test)",
     )

@@ -36,7 +36,7 @@ SPLIT_SEED: Final = 20250714
 
 @dataclass(frozen=True)
 class Omnibus(Assertion):
-    """At least two of several conditions differ: a Kruskal-Wallis test by permutations.
+    """At least two of several conditions differ.
 
     Attributes:
         measures: of three or more conditions.
@@ -50,11 +50,11 @@ class Omnibus(Assertion):
         syntax=("any_differ(a.reward, b.reward, c.reward)", "any_differ(a.reward, b.reward, c.reward, margin=5)"),
         null="All conditions have one distribution.",
         supported=(
-            "The permutation test of Kruskal and Wallis's H rejects that: over all splits of the pooled trials into "
-            f"groups if there are at most {MOST_SPLITS:,}; else over {DRAWN:,} that are drawn once, of which b have an "
-            f"H as large, with p = (b + 1) / ({DRAWN:,} + 1)."
+            "A permutation test rejects that. Its p is the share of splits of the pooled trials with at least this H "
+            f"(Kruskal and Wallis). Up to {MOST_SPLITS:,} splits are all counted. Of more, {DRAWN:,} are drawn once. "
+            f"If b of these have at least this H, p is (b + 1) / ({DRAWN:,} + 1)."
         ),
-        refuted="Never without a margin: no trials show that nothing differs. With one: each pair is equivalent.",
+        refuted="Without a margin never, since no trials show that nothing differs. With a margin: each pair is equal.",
         source="Kruskal and Wallis 1952; p of drawn splits: Phipson and Smyth 2010",
     )
 

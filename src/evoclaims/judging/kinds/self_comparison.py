@@ -25,7 +25,7 @@ SPLIT_SEED = 20250714
 
 @dataclass(frozen=True)
 class SelfComparison(Assertion):
-    """The measure is never above itself: splits of its trials into two halves are judged as in `greater`.
+    """A measure is never above itself: halves of its trials are compared as in `greater`.
 
     Up to ten trials, all splits are judged; for more, a fixed sample of splits. Supported when the share of supported
     splits is at most alpha. For a sample of splits, refuted only when an exact binomial test at alpha says that the
@@ -36,12 +36,12 @@ class SelfComparison(Assertion):
     kind: ClassVar[str] = "self-comparison"
     entry: ClassVar[Entry] = Entry(
         syntax=("a.reward.never_above_itself()",),
-        null="None: a control of the judge, which compares halves of the same trials as greater does.",
+        null="None, because this is a control of the judge. It compares halves of the same trials, as greater does.",
         supported=(
-            "At most a share of α of the splits into halves is found different: all splits of up to ten trials,"
-            " else 252 drawn once."
+            "The judge finds a difference in at most a share of α of the splits into halves. Of up to ten trials these "
+            "are all splits, of more trials 252 that are drawn once."
         ),
-        refuted="More are; where splits are drawn, an exact binomial test at α has to say so.",
+        refuted="It finds more. If splits are drawn, an exact binomial test at α must show this.",
         source="By construction of the rank test",
     )
 

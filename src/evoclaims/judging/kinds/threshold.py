@@ -22,7 +22,7 @@ _OPPOSITE: dict[Side, Side] = {"above": "below", "below": "above"}
 
 @dataclass(frozen=True)
 class Threshold(Assertion):
-    """The median is above a number, or below it: an exact sign test each way.
+    """The median is above a number, or below it.
 
     A trial at the number counts for neither direction, so that ties decide nothing. A trial without a result has the
     worst value, which may count against the claim and never counts for it.
@@ -34,9 +34,9 @@ class Threshold(Assertion):
     kind: ClassVar[str] = "threshold"
     entry: ClassVar[Entry] = Entry(
         syntax=("a.reward > 90", "a.reward < 90"),
-        null="A trial is on the claimed side of the number with probability 1/2 at most, so that the median is not.",
-        supported="The sign test rejects that; a trial at the number counts as not on the claimed side.",
-        refuted="The sign test rejects the same of the other side; a trial at the number is not on that one either.",
+        null="The median is not on the claimed side of the number.",
+        supported="A sign test rejects that. A trial exactly at the number is not on the claimed side.",
+        refuted="A sign test shows that the median is on the other side. A trial at the number is not there either.",
         source="Dixon and Mood 1946 (sign test)",
     )
 

@@ -27,7 +27,7 @@ def kendall_s(profile: Sequence[float]) -> int:
 
 @dataclass(frozen=True)
 class Trend(Assertion):
-    """The profile of most trials falls, or rises, with the level: an exact sign test each way of Kendall's S.
+    """The values of most trials fall, or rise, with the level.
 
     A trial is one draw, whatever its number of levels. Were its pairs of levels the draws, as in a permutation test of
     the sum of S, a method of which half of the trials rise and half fall would be found to fall in 17 of 100 samples
@@ -42,9 +42,9 @@ class Trend(Assertion):
             "a.success.falls()",
             "a.success.rises()",
         ),
-        null="With a probability of 1/2 at most, more pairs of a trial's values fall than rise (Kendall's S).",
-        supported="The sign test rejects that; a trial with as many of both, or without a result, does not fall.",
-        refuted="The sign test rejects the same of rising; such a trial does not rise either.",
+        null="At most half of all trials fall. A trial falls if more pairs of its levels fall than rise (Kendall's S).",
+        supported="A sign test rejects that. A trial with as many of both, or without a result, does not fall.",
+        refuted="A sign test shows that most trials rise. A trial with as many of both does not rise either.",
         source="Kendall 1938; Dixon and Mood 1946 (sign test)",
     )
 
