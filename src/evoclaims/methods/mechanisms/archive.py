@@ -52,8 +52,11 @@ class MapElitesMechanisms(Observed):
     Metrics: "kept", the share of elites whose cell still has one at least as fit after the step; "true", the share of
     cells that hold what the elite itself earns and where it ends; "best", the share of cells that are right after one
     more batch of random networks; "near", how far new elites are from the nearest old one, in standard deviations of
-    the noise on a parameter, root mean square over parameters.
+    the noise on a parameter, root mean square over parameters; "line", how far children of two distant elites are from
+    a parent on the line through both, as a share of what the variation's line_sigma says, root mean square.
     """
+
+    revision: ClassVar[int] = 2
 
     of: MapElites = MapElites(network=Mlp(()), batch=64, initial=64, cells=(7, 5), iso_sigma=0.1, line_sigma=0.0)
 
