@@ -26,7 +26,7 @@ class Copies:
 
     Attributes:
         trials: the trials that count: of each source, those at the positions where no source has a copy. Positions are
-            left out for all sources together, since a test may pair trials by their seeds.
+            left out for all sources together, so that these keep equally many trials.
         kept: how many trials per source count.
         sentence: names the copies; empty if there are none.
         alone: the label of a source whose trials are all copies of one; empty without one.

@@ -77,7 +77,7 @@ def _kinds(ours: Sequence[ClaimReport], papers: Sequence[ClaimReport], agents: i
         ],
     )
     yield (
-        "judged by a reading that is younger than its trials",
+        "judged by a reading that was written after its trials ran",
         [
             f"{report.name} ({report.outcome}): written {report.readings[0].since}, first trial {_date(report)}"
             for report in ours

@@ -32,7 +32,7 @@ class ReadAs:
 
     @property
     def late(self) -> bool:
-        """Whether the reading is younger than its trials, so that it may have been chosen by their result."""
+        """Whether the reading was written after its trials ran, so that it may have been chosen by their result."""
         return bool(self.since and self.trials_since) and moment(self.since) > moment(self.trials_since)
 
 
