@@ -14,7 +14,6 @@ from evoclaims.claims.as_published import AsPublished
 from evoclaims.claims.claim import Claim, ClaimTest
 from evoclaims.claims.session import Session
 from evoclaims.judging.assertion import Assertion
-from evoclaims.judging.kinds.omnibus import any_differ
 from evoclaims.judging.power import Draws, power
 from evoclaims.judging.verdict import Outcome
 from evoclaims.report.markdown import markdown
@@ -39,13 +38,8 @@ CLAIMS: dict[str, tuple[Make, Outcome, Outcome]] = {
     "exact": (lambda a, b, c: a.event("is high", high).in_every_trial(), SUPPORTED, REFUTED),
     "self-comparison": (lambda a, b, c: a.mean_success.never_above_itself(), SUPPORTED, SUPPORTED),
     "threshold": (lambda a, b, c: a.mean_success > 0.6, SUPPORTED, REFUTED),
-    "omnibus": (
-        lambda a, b, c: any_differ(a.mean_success, b.mean_success, c.mean_success, margin=0.25),
-        SUPPORTED,
-        REFUTED,
-    ),
     "all of": (
-        lambda a, b, c: any_differ(a.reward, b.reward, c.reward) & (2 * b.mean_success < 3 * a.mean_success),
+        lambda a, b, c: (a.reward > c.reward) & (2 * b.mean_success < 3 * a.mean_success),
         SUPPORTED,
         INCONCLUSIVE,
     ),

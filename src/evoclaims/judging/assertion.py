@@ -309,10 +309,7 @@ class AllOf(Compound):
     entry: ClassVar[Entry] = Entry(
         syntax=("(a.reward > b.reward) & (a.reward > c.reward)",),
         null="One of the parts does not hold.",
-        supported=(
-            "Each part is, at the same α: the intersection–union test needs no correction. A test of several "
-            "conditions before pairs of them (any_differ) is one more part."
-        ),
+        supported="Each part is, at the same α: the intersection–union test needs no correction.",
         refuted="One of the parts is after Holm's correction: each more part is one more chance to err.",
         source="Berger 1982 (intersection–union test), Holm 1979",
     )
