@@ -1,19 +1,16 @@
-"""Genomes as graphs and as JSON: nothing is lost."""
+"""Genomes as JSON: nothing is lost."""
 
 from __future__ import annotations
 
 import json
-import sys
 from typing import Any
 
 import jax.numpy as jnp
 import numpy as np
-import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from evoclaims.core.errors import UserError
-from evoclaims.networks.export import to_json, to_networkx
+from evoclaims.networks.export import genome_json
 from evoclaims.networks.genome import EMPTY, Connections, Genome, Nodes
 from evoclaims.networks.graph import GraphNetwork
 
@@ -42,28 +39,10 @@ def _genome(numbers: Any = None) -> Genome:
     )
 
 
-def test_the_graph_has_every_gene_under_its_historical_marking() -> None:
-    graph = to_networkx(_genome(), NETWORK)
-    assert list(graph) == [0, 1, 7, 3, 2]
-    kinds = {0: "input", 1: "input", 7: "hidden", 3: "output", 2: "output"}
-    functions = {0: "identity", 1: "identity", 7: "gauss", 3: "sigmoid", 2: "sigmoid"}
-    for slot, key in enumerate(graph):
-        assert graph.nodes[key] == {
-            "kind": kinds[key],
-            "bias": float(np.float32(slot / 7 - 1)),
-            "response": float(np.float32((slot + 5) / 7 - 1)),
-            "activation": functions[key],
-        }
-    weights = [float(np.float32((10 + i) / 7 - 1)) for i in range(4)]
-    assert dict(graph.edges) == {
-        ends: {"weight": weight} for ends, weight in zip([(0, 7), (7, 2), (1, 3), (3, 2)], weights, strict=True)
-    }
-
-
 @settings(deadline=None)
 @given(st.lists(FLOATS, min_size=14, max_size=14))
 def test_json_holds_every_gene_to_the_bit(numbers: list[float]) -> None:
-    plain = json.loads(to_json(_genome(np.array(numbers, np.float32)), NETWORK))
+    plain = json.loads(genome_json(_genome(np.array(numbers, np.float32)), NETWORK))
     assert (plain["inputs"], plain["outputs"], plain["activations"]) == (2, 2, ["sin", "abs", "gauss"])
     assert (plain["output"], plain["capacity"]) == ("sigmoid", {"nodes": 7, "connections": 5})
     assert [(node["key"], node["activation"]) for node in plain["nodes"]] == [(0, 0), (1, 0), (7, 2), (3, 1), (2, 0)]
@@ -80,7 +59,7 @@ def _with_one_nan(numbers: list[float]) -> Any:
 
 
 def test_json_is_standard_json_with_a_gene_a_line() -> None:
-    text = to_json(_genome([float("inf")] * 14), NETWORK)
+    text = genome_json(_genome([float("inf")] * 14), NETWORK)
 
     def refuse(word: str) -> None:
         raise AssertionError(word)
@@ -89,10 +68,3 @@ def test_json_is_standard_json_with_a_gene_a_line() -> None:
     assert plain["nodes"][2] == {"key": 7, "bias": "inf", "response": "inf", "activation": 2}
     assert plain["connections"][3] == {"source": 3, "target": 2, "weight": "inf"}
     assert sum('"key"' in line for line in text.splitlines()) == 5
-
-
-def test_a_graph_without_networkx_says_how_to_install_it(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "networkx", None)
-    with pytest.raises(UserError, match=r'networkx is not installed.*pip install "evoclaims\[pictures\]"'):
-        to_networkx(_genome(), NETWORK)
-    assert json.loads(to_json(_genome(), NETWORK))["inputs"] == 2

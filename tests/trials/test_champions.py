@@ -170,24 +170,3 @@ def test_a_genome_comes_back_with_the_network_that_it_describes(ran: Any) -> Non
         condition = _condition(name)
         parameters = champions.load(store, condition, result)
         assert champions.network_of(condition, parameters) is None
-        assert champions.substrate_of(condition, parameters) is None
-
-
-def test_only_a_genome_that_draws_on_a_substrate_has_one(ran: Any) -> None:
-    store, (result, *_) = ran("neat")
-    assert champions.substrate_of(_condition("neat"), champions.load(store, _condition("neat"), result)) is None
-    store, results = ran("hyperneat")
-    condition = _condition("hyperneat")
-    for result in results:
-        genome = champions.load(store, condition, result)
-        drawn = champions.substrate_of(condition, genome)
-        assert drawn is not None
-        substrate, weights = drawn
-        assert [len(layer) for layer in substrate.layers] == [4, 3, 1]
-        assert [matrix.shape for matrix in weights] == [(3, 4), (1, 3)]
-        signal = np.array([1.0, 0.0, 1.0, 1.0])
-        for matrix in weights:
-            signal = np.tanh(matrix @ signal)
-        encoding = METHODS["hyperneat"].encoding(condition.task)  # type: ignore[attr-defined]
-        acted = encoding.apply(encoding.express(genome), jnp.array([1.0, 0.0, 1.0]))
-        np.testing.assert_allclose(acted, signal, rtol=1e-5)

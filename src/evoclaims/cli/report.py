@@ -7,15 +7,11 @@ from dataclasses import replace
 from datetime import UTC, datetime
 from importlib import metadata
 from pathlib import Path
-from typing import Any
 
 from evoclaims.cli.project import ALL_TIERS, Project, open_project
 from evoclaims.cli.store_folder import APART
-from evoclaims.cli.stored_trial import Stored, run_again
 from evoclaims.cli.terminal import REPORT, write
 from evoclaims.core.errors import UserError
-from evoclaims.envs.ecorobot.robot_task import RobotTask
-from evoclaims.envs.ecorobot.views import pictures
 from evoclaims.figures import figure
 from evoclaims.figures.replication import replications
 from evoclaims.figures.sheet import svg
@@ -23,14 +19,10 @@ from evoclaims.paper.archive import Archive
 from evoclaims.paper.reproduction import Reproduction
 from evoclaims.report import across, table_cells, watch_chart
 from evoclaims.report.build import gather
-from evoclaims.report.champion import network
 from evoclaims.report.formatting import listed
 from evoclaims.report.html import html
 from evoclaims.report.markdown import markdown
 from evoclaims.report.model import PaperFigure
-from evoclaims.trials import devices
-from evoclaims.trials.result import TrialResult
-from evoclaims.trials.spec import Condition
 from evoclaims.verdicts import history, mutation_matrix, watch_file
 from evoclaims.verdicts.robustness import matrix
 
@@ -84,7 +76,6 @@ def main(options: argparse.Namespace) -> int:
         archive,
         history.load(reproduction.folder / history.FILE),
         sentences={report.name: report.statement for report in verdicts[tiers[0]]},
-        draws=(trajectory, network) if options.trajectories else (network,),
         put_to_the_paper=by_the_paper,
         mutants=mutation_matrix.load(reproduction.folder / mutation_matrix.FILE),
     )
@@ -117,12 +108,3 @@ def _tried(project: Project, tier: str) -> list[str]:
             project.archive.trials(condition, seeds)[0] for condition in reproduction.changed_by(name, tier).values()
         )
     ]
-
-
-def trajectory(condition: Condition, result: TrialResult, parameters: Any, title: str) -> bytes | None:
-    """Draw the paths of a champion on a robot's task in its evaluation, run again; None for other tasks."""
-    if not isinstance(condition.task, RobotTask):
-        return None
-    trial = Stored(title, condition, result, parameters, Path())
-    (device, *_) = devices.choose("auto")
-    return pictures.draw(condition.task, run_again(trial, condition.task, device).torsos, title, "svg")

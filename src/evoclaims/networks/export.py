@@ -1,4 +1,4 @@
-"""Genomes for other programs: as a directed graph of networkx, and as plain JSON that loses no bit."""
+"""Genomes for other programs: as plain JSON that loses no bit."""
 
 from __future__ import annotations
 
@@ -8,37 +8,13 @@ from typing import Any, Final
 import jax
 
 from evoclaims.core.canonical import as_plain
-from evoclaims.core.drawing import optional
 from evoclaims.networks.genome import Genome
 from evoclaims.networks.graph import GraphNetwork
 
 FORMAT: Final = "evoclaims genome 1"
 
 
-def to_networkx(genome: Genome, network: GraphNetwork) -> Any:
-    """Return one genome's network as a `networkx.DiGraph`.
-
-    Nodes, in topological order, are historical markings. Their attributes are `kind` ("input", "output", "hidden"),
-    `bias`, `response` and `activation`, the name of the function applied: for an input "identity", for an output the
-    network's output function, whose argument other nodes see (see `networks.graph`). Edges have a `weight`.
-
-    Raises:
-        UserError: when networkx is not installed.
-    """
-    graph = optional("networkx").DiGraph()
-    nodes, connections = _genes(genome)
-    fixed = {"input": "identity", "output": network.output}
-    ends = ["input"] * network.inputs + ["output"] * network.outputs  # by key
-    for node in nodes:
-        kind = ends[node["key"]] if node["key"] < len(ends) else "hidden"
-        function = fixed.get(kind, network.activations[node["activation"]])
-        graph.add_node(node["key"], kind=kind, bias=node["bias"], response=node["response"], activation=function)
-    for connection in connections:
-        graph.add_edge(connection["source"], connection["target"], weight=connection["weight"])
-    return graph
-
-
-def to_json(genome: Genome, network: GraphNetwork) -> str:
+def genome_json(genome: Genome, network: GraphNetwork) -> str:
     """Return one genome as JSON, one gene per line.
 
     Genes are in slot order. A node's `activation` indexes `activations`; connections name the keys of both ends;

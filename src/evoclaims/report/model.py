@@ -23,14 +23,6 @@ from evoclaims.verdicts.robustness import Robustness
 
 
 @dataclass(frozen=True)
-class ShownChampion:
-    """The best individual of a condition's typical trial: which, or why it has no picture; an SVG's bytes, or none."""
-
-    says: str
-    picture: bytes = b""
-
-
-@dataclass(frozen=True)
 class ConditionTrials:
     """The trials of one condition behind one or more claims.
 
@@ -39,14 +31,12 @@ class ConditionTrials:
         says: in words, how many trials with how many points each.
         settings: names and values of everything that was fixed.
         curves: panels over training.
-        champion: its best individual.
     """
 
     label: str
     says: str
     settings: tuple[tuple[str, str], ...]
     curves: tuple[CurvePanel, ...]
-    champion: ShownChampion
 
 
 @dataclass(frozen=True)
