@@ -16,7 +16,6 @@ from evoclaims.claims.session import Session
 from evoclaims.judging.assertion import Assertion
 from evoclaims.judging.power import Draws, power
 from evoclaims.judging.verdict import Outcome
-from evoclaims.report.markdown import markdown
 from evoclaims.report.run_summary import run_summary
 from evoclaims.report.terminal_table import verdict_table
 from evoclaims.report.trial_summary import Reader
@@ -79,7 +78,7 @@ def test_each_kind_is_judged_kept_and_shown(lab: Laboratory, kind: str) -> None:
     assert report.verdict.evidence
     assert ClaimReport.from_json(report.to_json()) == report
     page = lab.page(report)
-    for text in (verdict_table([report], 160, False), run_summary([report]), markdown(page), whole(page)):
+    for text in (verdict_table([report], 160, False), run_summary([report]), whole(page)):
         assert str(apart) in text
         assert "NaN" not in text
     table = overview({"full": [report]}, {"T1": "Better is better"}, Reader(lab.archive))

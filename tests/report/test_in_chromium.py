@@ -138,7 +138,7 @@ def test_without_a_script_the_sentences_verdicts_and_reasons_are_there_and_the_e
         browser.open(f"{address}#G1-full")
     finally:
         browser.send("Emulation.setScriptExecutionDisabled", value=False)
-    assert "report.md" in browser.evaluate("document.querySelector('noscript').textContent")
+    assert "status --as json" in browser.evaluate("document.querySelector('noscript').textContent")
     assert browser.evaluate("document.querySelector('noscript').checkVisibility()")
     assert browser.evaluate("document.querySelector('#G1-full .reason').checkVisibility()")
     assert browser.evaluate("document.querySelector('#unpackable').checkVisibility()") is False

@@ -151,7 +151,7 @@ def _reading(add: _Add) -> None:
         "run nothing; exit status 1 when a supported verdict is vacuous or a claim names no line and date",
     )
 
-    report = add("report", "write a web page and a Markdown file about all claims from the trials at hand; run nothing")
+    report = add("report", "write a web page about all claims from the trials at hand; run nothing")
     report.add_argument("--out", metavar="FOLDER", help="folder to write (report/)")
 
     champion = add("champion", "replay a stored trial's champion on every level, or export its genome")
@@ -289,16 +289,12 @@ def _comparing(add: _Add) -> None:
 
 
 def _exporting(add: _Add) -> None:
-    """Add what writes trials and verdicts for other programs and pages."""
-    export = add("export", "write the trials at hand, or the verdicts that they give, as a table")
-    export.add_argument("--verdicts", action="store_true", help="one row per claim instead of one per trial")
+    """Add what writes trials for other programs and pages."""
+    export = add("export", "write the trials at hand as a table")
     export.add_argument("--as", dest="form", metavar="FORM", default="json", help="json (default), csv or parquet")
-    export.add_argument("--out", metavar="FILE", help="file to write (report/trials.FORM, report/verdicts.FORM)")
+    export.add_argument("--out", metavar="FILE", help="file to write (report/trials.FORM)")
 
     tables = add(
         "tables", "write the tables in Markdown files again, from the reference trials; exit status 1 if one changed"
     )
     tables.add_argument("files", nargs="+", metavar="FILE", help="such as README.md")
-
-    badge = add("badge", "draw the number of claims with each outcome, as a small SVG picture")
-    badge.add_argument("--out", metavar="FILE", help="file to write (report/claims-TIER.svg)")

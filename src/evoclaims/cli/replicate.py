@@ -19,7 +19,6 @@ from evoclaims.judging.repetition import Answer, Prediction, Spread
 from evoclaims.report import replication_cells
 from evoclaims.report.console import GAP, PlainSpokenConsole, plain_table
 from evoclaims.report.formatting import number
-from evoclaims.report.markdown import numbers
 from evoclaims.report.replication_cells import PROTOCOL, SYMBOLS, ours, published
 from evoclaims.verdicts import export
 
@@ -86,7 +85,7 @@ ALL: Final = "all"
 _FORMS: Final[Mapping[str, Callable[[Sequence[Replication]], bytes]]] = {
     "csv": lambda found: export.as_csv([one.row() for one in found]),
     "json": lambda found: export.as_json([one.row() for one in found]),
-    "markdown": lambda found: (numbers(found) + "\n").encode(),
+    "markdown": lambda found: (replication_cells.markdown(found) + "\n").encode(),
 }
 """Writers by the names of their forms."""
 

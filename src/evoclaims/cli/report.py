@@ -1,4 +1,4 @@
-"""`evoclaims report`: a web page and a Markdown file about all claims."""
+"""`evoclaims report`: a web page about all claims."""
 
 from __future__ import annotations
 
@@ -21,7 +21,6 @@ from evoclaims.report import across, table_cells, watch_chart
 from evoclaims.report.build import gather
 from evoclaims.report.formatting import listed
 from evoclaims.report.html import html
-from evoclaims.report.markdown import markdown
 from evoclaims.report.model import PaperFigure
 from evoclaims.verdicts import history, mutation_matrix, watch_file
 from evoclaims.verdicts.robustness import matrix
@@ -51,7 +50,7 @@ def paper_figures(
 
 
 def main(options: argparse.Namespace) -> int:
-    """Judge from the trials at hand, write both files, and print where they are."""
+    """Judge from the trials at hand, write the page, and print where it is."""
     project = open_project(options.storage)
     reproduction, archive = project.reproduction, project.archive
     tiers = list(reproduction.tiers)[::-1]  # the paper's own sentences come first
@@ -89,10 +88,9 @@ def main(options: argparse.Namespace) -> int:
         watch=watch_chart.shown(watch_file.load(reproduction.folder / watch_file.FILE)[1]),
         generated=f"Written on {datetime.now(UTC):%Y-%m-%d %H:%M} UTC by evoclaims {metadata.version('evoclaims')}.",
     )
-    folder = Path(options.out or REPORT)
-    for name, text in (("index.html", html(page)), ("report.md", markdown(page))):
-        write(folder / name, text.encode(), "folder", ours=options.out is None)
-        print(f"wrote {folder / name}")
+    out = Path(options.out or REPORT) / "index.html"
+    write(out, html(page).encode(), "folder", ours=options.out is None)
+    print(f"wrote {out}")
     for board in page.boards:
         print(f"claims ({board.tier}): {table_cells.totals(verdicts[board.tier])}")
     return 0

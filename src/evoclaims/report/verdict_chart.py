@@ -9,7 +9,6 @@ from typing import Final
 
 from evoclaims.core.printable import printable
 from evoclaims.judging.verdict import Outcome
-from evoclaims.report.badge import BLUE, GREEN, GREY, ORANGE, RED
 
 ROW, FLAT_ROW, COLUMN, LEFT, TOP, KEY = 56, 22, 150, 220, 58, 145
 """Sizes in units: height of a row, also where all marks are on its line, width of a column, room left of and above the
@@ -18,11 +17,12 @@ marks, width of a part of the key."""
 LEVEL: Final = 0.5
 """The height of a mark on its line."""
 
+GREY: Final = "#616161"
 _COLOURS: Final = {
-    Outcome.SUPPORTED: GREEN,
-    Outcome.REFUTED: RED,
-    Outcome.SMALLER: ORANGE,
-    Outcome.INCONCLUSIVE: BLUE,
+    Outcome.SUPPORTED: "#2e7d32",
+    Outcome.REFUTED: "#c62828",
+    Outcome.SMALLER: "#a04000",
+    Outcome.INCONCLUSIVE: "#1565c0",
     Outcome.ERROR: "#000000",
     Outcome.NOT_RUN: GREY,
 }
