@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import functools
 import gzip
+import hashlib
 import json
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
@@ -16,7 +17,6 @@ from urllib.parse import quote
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
-from evoclaims.core.content_policy import exactly
 from evoclaims.judging.verdict import Outcome
 from evoclaims.report import across, charts, formatting, replication_cells, verdict_chart
 from evoclaims.report.across import timeline_chart
@@ -233,7 +233,7 @@ def chart_svg(chart: VerdictChart) -> Markup:
 def policy(style: str, script: str) -> str:
     """Return the page's Content-Security-Policy: nothing from outside, and no script or style but its own."""
     return (
-        f"default-src 'none'; img-src data:; style-src {exactly(style)}; script-src {exactly(script)}; "
+        f"default-src 'none'; img-src data:; style-src {_exactly(style)}; script-src {_exactly(script)}; "
         "base-uri 'none'; form-action 'none'"
     )
 
@@ -254,3 +254,8 @@ def _choices(values: Iterator[str]) -> list[str]:
 def _asset(name: str) -> Markup:
     """Return a file of the package as it is."""
     return Markup((resources.files("evoclaims.report") / "assets" / name).read_text(encoding="utf-8"))  # noqa: S704
+
+
+def _exactly(text: str) -> str:
+    """Return what a Content-Security-Policy allows exactly this script or style by."""
+    return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"
