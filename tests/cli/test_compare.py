@@ -234,20 +234,6 @@ def test_a_damaged_record_is_said_and_the_rest_is_compared(evoclaims: Evoclaims)
     assert f"not read: Cannot use {store.record_files(store.ids()[0])[-1]}: it is not one whole JSON text" in out
 
 
-def test_a_timeline_shows_the_versions_that_differ(accepted: Evoclaims) -> None:
-    kept = history.load(FILE)
-    (now,) = kept["smoke", "a"]
-    old = replace(now, accepted="2020-01-01", versions={**now.versions, "jax": "0.4.0"})
-    FILE.write_text(history.dump({**kept, ("smoke", "a"): (old, now)}))
-    status, out, _ = accepted("compare", "--timeline", "a")
-    first, second, third = out.splitlines()
-    assert (status, first) == (0, "a (smoke)")
-    assert second.startswith("  2020-01-01  supported (n = 10: p = 0.0282 <= alpha = 0.05)  ")
-    assert f"jax 0.4.0 -> {now.versions['jax']}" in third
-    assert accepted("compare", "--timeline", "--out=it.svg")[1].splitlines()[5:] == ["wrote it.svg"]
-    assert Path("it.svg").read_text().count("<path") == 0 < Path("it.svg").read_text().count("supported (n = 10")
-
-
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
@@ -255,10 +241,6 @@ def test_a_timeline_shows_the_versions_that_differ(accepted: Evoclaims) -> None:
         (("--fail=refuted",), "'refuted' is not a change of a verdict"),
         (("a", "b", "c"), "Two stores or two revisions can be compared, not 3."),
         (("--tier=ful",), "There is no tier named 'ful'."),
-        (("--timeline", "x"), "There is no accepted claim named 'x'. Known: a, b."),
-        (("--out=it.svg",), "--out draws what --timeline lists: add --timeline."),
-        (("HEAD", "--timeline"), "--timeline shows only the accepted verdicts"),
-        (("--timeline", "--fail=*->*"), "--timeline shows only the accepted verdicts"),
         (("nothing",), "There is neither a git revision nor a folder called nothing."),
         (("pyproject.toml",), "There is neither a git revision nor a folder called pyproject.toml."),
         (("./nothing",), "There is neither a git revision nor a folder called ./nothing."),
@@ -304,7 +286,6 @@ def test_a_torn_reference_of_a_revision_is_one_sentence(accepted: Evoclaims, git
 
 
 def test_before_the_first_accept_there_is_nothing_to_compare_with(evoclaims: Evoclaims) -> None:
-    for arguments in ((), ("--timeline",)):
-        status, _, err = evoclaims("compare", *arguments)
-        assert status == 2
-        assert "No verdict has been accepted yet: run `evoclaims accept` to accept the current ones." in err
+    status, _, err = evoclaims("compare")
+    assert status == 2
+    assert "No verdict has been accepted yet: run `evoclaims accept` to accept the current ones." in err

@@ -5,13 +5,10 @@ from __future__ import annotations
 from dataclasses import replace
 from xml.etree import ElementTree
 
-import pytest
-
-from evoclaims.core.errors import UnknownNameError, UserError
 from evoclaims.judging.verdict import Outcome
 from evoclaims.report.across import timeline_chart
 from evoclaims.report.verdict_chart import svg
-from evoclaims.verdicts.acceptance import timeline
+from evoclaims.verdicts.acceptance import described
 from evoclaims.verdicts.history import AcceptedVerdict
 
 SVG = "{http://www.w3.org/2000/svg}"
@@ -30,7 +27,7 @@ FIRST = AcceptedVerdict(
 )
 
 
-def test_a_claims_verdicts_come_by_date_with_the_versions_that_differ() -> None:
+def test_an_entry_says_what_has_changed_since_the_one_before() -> None:
     second = replace(
         FIRST,
         outcome=Outcome.REFUTED,
@@ -40,41 +37,13 @@ def test_a_claims_verdicts_come_by_date_with_the_versions_that_differ() -> None:
         device="NVIDIA H200",
         revision=f"{'b' * 40}-dirty",
     )
-    third = replace(second, reason="no trial has ended", p=None, n=0, accepted="2025-05-06", fingerprint="e" * 64)
-    assert timeline({("full", "G1"): (FIRST, second, third)}).splitlines() == [
-        "G1 (full)",
-        "  2025-01-02  supported (n = 10: p = 0.0282 <= alpha = 0.04)  python 3.11.7, jax 0.10.2, cpu",
-        "  2025-03-04  refuted (n = 10: p = 0.00865 against it <= alpha = 0.04)  jax 0.10.2 -> 0.11.2, "
-        "device cpu -> NVIDIA H200, revision aaaaaaaaaaaa -> bbbbbbbbbbbb-dirty",
-        "  a new history: what is judged has changed (fingerprint ffffffffffff -> eeeeeeeeeeee)",
-        "  2025-05-06  refuted (n = 0: no trial has ended)",
-    ]
-
-
-def test_a_claim_is_chosen_with_all_its_cases_or_one() -> None:
-    history = {("smoke", name): (FIRST,) for name in ("G10", "G1[b]", "G1[a]", "G2")}
-    heads = {
-        choice: [line for line in timeline(history, choice).splitlines() if line[0] != " "]
-        for choice in ("", "G1", "G1[b]")
-    }
-    assert heads["G1"] == ["G1[a] (smoke)", "G1[b] (smoke)"]
-    assert heads["G1[b]"] == ["G1[b] (smoke)"]
-    assert heads[""] == ["G1[a] (smoke)", "G1[b] (smoke)", "G2 (smoke)", "G10 (smoke)"]
-
-
-def test_a_claim_without_a_verdict_is_one_sentence() -> None:
-    with pytest.raises(UnknownNameError, match=r"There is no accepted claim named 'G1\[c\]'\. Did you mean"):
-        timeline({("smoke", "G1[b]"): (FIRST,)}, "G1[c]")
-    with pytest.raises(UserError, match="No verdict has been accepted yet: run `evoclaims accept`"):
-        timeline({})
-
-
-def test_nothing_in_the_file_can_steer_the_terminal() -> None:
-    nasty = "\x1b[2J\n"
-    entry = replace(FIRST, device=nasty, revision=nasty, versions={"jax": nasty})
-    lines = timeline({("smoke", f"G1{nasty}"): (entry, replace(entry, revision="-, -", versions={nasty: "1"}))})
-    assert len(lines.splitlines()) == 3
-    assert all(line.isprintable() for line in lines.splitlines())
+    assert described(None, FIRST) == (
+        "2025-01-02  supported (n = 10: p = 0.0282 <= alpha = 0.04)  python 3.11.7, jax 0.10.2, cpu"
+    )
+    assert described(FIRST, second) == (
+        "2025-03-04  refuted (n = 10: p = 0.00865 against it <= alpha = 0.04)  jax 0.10.2 -> 0.11.2, "
+        "device cpu -> NVIDIA H200, revision aaaaaaaaaaaa -> bbbbbbbbbbbb-dirty"
+    )
 
 
 def test_a_chart_has_a_column_for_each_date_and_set_of_versions_and_a_ring_where_the_rules_changed() -> None:

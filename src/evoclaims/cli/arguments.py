@@ -206,7 +206,7 @@ def _keeping(add: _Add) -> None:
     )
     verify.add_argument("--dry-run", action="store_true", help="list bad files and leave them where they are")
 
-    merge = add("merge", "copy trials, champions and verdicts of other stores into one; existing files stay")
+    merge = add("merge", "copy trials and champions of other stores into one; existing files stay")
     merge.add_argument("stores", nargs="+", metavar="STORE", help="a folder of trials, such as another machine's")
     merge.add_argument("--dry-run", action="store_true", help="list what would be copied, and copy nothing")
 
@@ -232,11 +232,6 @@ def _comparing(add: _Add) -> None:
     compare.add_argument(
         "--fail", metavar="CHANGES", help="exit with 1 on these changes, such as 'supported->refuted,*->error'"
     )
-    compare.add_argument(
-        "--timeline", metavar="CLAIM", nargs="?", const="", help="list accepted verdicts by date, of CLAIM or of all"
-    )
-
-    compare.add_argument("--out", metavar="FILE", help="with --timeline: also draw it over dates and versions, as SVG")
 
     watch = add(
         "watch",

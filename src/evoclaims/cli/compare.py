@@ -13,16 +13,12 @@ from evoclaims.claims.fetching import StoredOnly
 from evoclaims.claims.session import Session
 from evoclaims.cli.project import Project, open_project
 from evoclaims.cli.store_folder import open_store
-from evoclaims.cli.terminal import write
 from evoclaims.core.errors import UserError
 from evoclaims.judging.drift_report import DriftReport
 from evoclaims.judging.tripwire import DigestCheck
 from evoclaims.paper.archive import Archive
-from evoclaims.report.across import timeline_chart
-from evoclaims.report.verdict_chart import svg
 from evoclaims.trials.store import Store
-from evoclaims.verdicts import comparison, history, transitions
-from evoclaims.verdicts.acceptance import timeline
+from evoclaims.verdicts import comparison, transitions
 from evoclaims.verdicts.comparison import GitRevision, Side, find_revision
 from evoclaims.verdicts.other_code import listed
 from evoclaims.verdicts.transitions import Kind
@@ -32,24 +28,12 @@ UNSAID = (Kind.SAME, Kind.NOT_RUN)
 
 
 def main(options: argparse.Namespace) -> int:
-    """Print what changed, or a timeline; 1 when a change that --fail names is among them."""
+    """Print what changed; 1 when a change that --fail names is among them."""
     patterns = transitions.parse_patterns(options.fail) if options.fail is not None else ()
     if len(options.places) > 2:
         raise UserError(f"Two stores or two revisions can be compared, not {len(options.places)}.")
     project = open_project(options.storage)
     tiers = project.tiers(options.tier)
-    if options.timeline is not None:
-        if options.places or patterns:
-            raise UserError("--timeline shows only the accepted verdicts. Leave out the other things to compare.")
-        kept = history.load(project.reproduction.folder / history.FILE)
-        asked = {key: entries for key, entries in kept.items() if key[0] in tiers}
-        print(timeline(asked, options.timeline))
-        if options.out is not None:
-            write(Path(options.out), svg(timeline_chart(asked, options.timeline)).encode())
-            print(f"wrote {options.out}")
-        return 0
-    if options.out is not None:
-        raise UserError("--out draws what --timeline lists: add --timeline.")
     old, new = (side.of(tiers) for side in _sides(project, tiers, options.places))
     found = transitions.compare(old.verdicts, new.verdicts)
     drift, digests = comparison.compare_trials(old, new)

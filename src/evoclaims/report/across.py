@@ -16,7 +16,7 @@ from evoclaims.report.console import SpelledTable
 from evoclaims.report.formatting import literal, p_value, plural, table
 from evoclaims.report.table_cells import NONE
 from evoclaims.report.verdict_chart import VerdictChart, VerdictMark
-from evoclaims.verdicts import acceptance
+from evoclaims.verdicts import acceptance, history
 from evoclaims.verdicts.across import Across, Cell
 from evoclaims.verdicts.export import Row
 from evoclaims.verdicts.history import History
@@ -136,18 +136,14 @@ def across_chart(found: Across) -> VerdictChart:
     return VerdictChart(headline(found), "height: A12; ring: drift", labels, rows)
 
 
-def timeline_chart(history: History, claim: str = "") -> VerdictChart:
-    """Return a chart of accepted verdicts by date and versions; a ring is a verdict under other rules than before.
-
-    Raises:
-        UserError: as `verdicts.acceptance.timeline` does.
-    """
+def timeline_chart(accepted: History) -> VerdictChart:
+    """Return a chart of accepted verdicts by date and versions; a ring is a verdict under other rules than before."""
     columns: dict[str, str] = {}
     rows: dict[str, dict[str, VerdictMark]] = {}
-    for tier, name in acceptance.chosen(history, claim):
+    for tier, name in sorted(accepted, key=history.in_order):
         marks = rows.setdefault(f"{name} ({tier})", {})
         before = None
-        for entry in history[tier, name]:
+        for entry in accepted[tier, name]:
             versions = ", ".join(f"{package} {version}" for package, version in sorted(entry.versions.items()))
             column = f"{entry.accepted}: {versions}"
             columns[column] = f"{entry.accepted}, jax {entry.versions.get('jax', 'unknown')}"

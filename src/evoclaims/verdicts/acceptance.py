@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from evoclaims.core.canonical import content_hash
-from evoclaims.core.errors import UnknownNameError, UserError
 from evoclaims.core.printable import printable
 from evoclaims.paper.archive import Archive
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.store import Store
 from evoclaims.verdicts.claim_report import ClaimReport
-from evoclaims.verdicts.history import AcceptedVerdict, History, eras, in_order, key_of
+from evoclaims.verdicts.history import AcceptedVerdict, History, key_of
 
 
 @dataclass(frozen=True)
@@ -140,40 +139,6 @@ def _joined(values: Iterable[Any]) -> str:
 
 SHORT = 12
 """Digits of a hash that are shown."""
-
-
-def timeline(history: History, claim: str = "") -> str:
-    """Return the entries of a claim ("G1", or one case of it, "G1[n_parity]"), or of all claims, one per line.
-
-    Raises:
-        UserError: when nothing has been accepted yet.
-        UnknownNameError: when the claim has no accepted verdict.
-    """
-    return "\n".join(line for key in chosen(history, claim) for line in _claim(*key, history[key]))
-
-
-def chosen(history: History, claim: str) -> list[tuple[str, str]]:
-    """Return the keys of a claim, or of one case of it, or of all claims, in order; raises as `timeline` does."""
-    if not history:
-        raise UserError("No verdict has been accepted yet: run `evoclaims accept` to accept the current ones.")
-    found = [key for key in sorted(history, key=in_order) if claim in ("", key[1], key[1].partition("[")[0])]
-    if not found:
-        raise UnknownNameError("accepted claim", claim, {name for _, name in history})
-    return found
-
-
-def _claim(tier: str, claim: str, entries: Sequence[AcceptedVerdict]) -> Iterator[str]:
-    yield f"{printable(claim)} ({printable(tier)})"
-    before: AcceptedVerdict | None = None
-    for era in eras(entries):
-        if before is not None:
-            yield (
-                "  a new history: what is judged has changed "
-                f"(fingerprint {before.fingerprint[:SHORT]} -> {era[0].fingerprint[:SHORT]})"
-            )
-        for entry in era:
-            yield f"  {described(before, entry)}"
-            before = entry
 
 
 def described(before: AcceptedVerdict | None, entry: AcceptedVerdict) -> str:
