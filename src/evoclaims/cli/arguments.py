@@ -10,7 +10,6 @@ _WITHOUT_TIER = {"jobs", "verify", "merge", "tables"}
 _TIERS = {
     "audit": ("full", "full (default: the paper's own sentences) or smoke"),
     **dict.fromkeys(("report", "accept", "compare", "export"), ("all", "smoke, full or all (default)")),
-    "replicate": ("full", "full (default: the paper's size) or smoke"),
 }
 """Defaults of --tier, and how it is explained, where they are not those of the other commands."""
 
@@ -186,16 +185,6 @@ def _reading(add: _Add) -> None:
     reproduce.add_argument(
         "--variant", metavar="NAME", default="", help="use the trials under this variant of the protocol"
     )
-
-    replicate = add("replicate", "compare the numbers that the paper has published with those of the trials at hand")
-    replicate.add_argument(
-        "--variant",
-        metavar="NAME",
-        default="",
-        help="use trials under this variant of the protocol; all: the protocol and each variant",
-    )
-    replicate.add_argument("--as", dest="form", metavar="FORM", help="write a file instead: csv, json or markdown")
-    replicate.add_argument("--out", metavar="FILE", help="file to write (report/replication.FORM)")
 
 
 def _keeping(add: _Add) -> None:

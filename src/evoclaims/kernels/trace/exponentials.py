@@ -1,6 +1,6 @@
 """Exponentials, logarithms and what is made of them, from simple operations.
 
-Errors, in units of the result's last place, were measured against float64: exp, log, log1p 2; expm1, logistic, pow 4; tanh 6.
+Errors, in units of the result's last place, against float64: exp, log, log1p 2; expm1, logistic, pow 4; tanh 6.
 A result below 1.2e-38 may be 0. NaN, infinities and signs are NumPy's, but a zero has no sign.
 """
 
