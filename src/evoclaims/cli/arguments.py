@@ -214,10 +214,10 @@ def _keeping(add: _Add) -> None:
 def _comparing(add: _Add) -> None:
     compare = add(
         "compare",
-        "compare the current verdicts with the accepted ones; or a git revision with the working tree; or a store "
-        "(OLD) with --storage; or two revisions, or two stores; run nothing",
+        "compare the current verdicts with the accepted ones; or a store (OLD) with --storage; or two stores; run "
+        "nothing",
     )
-    compare.add_argument("places", nargs="*", metavar="OLD [NEW]", help="a git revision or a folder of trials")
+    compare.add_argument("places", nargs="*", metavar="OLD [NEW]", help="a folder of trials")
     compare.add_argument(
         "--fail", metavar="CHANGES", help="exit with 1 on these changes, such as 'supported->refuted,*->error'"
     )
