@@ -16,7 +16,6 @@ from evoclaims.judging.effect import (
     iqm_interval,
     median,
     median_interval,
-    performance_profile,
 )
 
 values = st.lists(st.floats(-3, 3) | st.sampled_from([-math.inf, math.inf]), min_size=1, max_size=8)
@@ -74,10 +73,3 @@ def test_the_interval_of_the_interquartile_mean_resamples_each_stratum_by_itself
     low, high = iqm_interval([0.0] * 8 + [1.0] * 8)
     assert low < 0.5 < high
     assert iqm_interval([-math.inf] * 4 + [1.0] * 6)[0] == -math.inf
-
-
-@given(values)
-def test_a_performance_profile_is_the_share_above_each_value(data: list[float]) -> None:
-    profile = performance_profile(data)
-    assert [at for at, _ in profile] == sorted({-math.inf, *filter(math.isfinite, data)})
-    assert all(share == pytest.approx(sum(x > at for x in data) / len(data)) for at, share in profile)

@@ -51,18 +51,6 @@ def _iqm(values: Floats) -> Floats:
     return means
 
 
-def performance_profile(values: Sequence[float]) -> tuple[tuple[float, float], ...]:
-    """Return the performance profile of trials (Agarwal et al. 2021): the share of values above each threshold.
-
-    Returns:
-        (threshold, share): -inf and each distinct finite value, rising, which is where the share changes.
-    """
-    ordered = np.sort(np.asarray(values, np.float64))
-    thresholds = np.unique([-np.inf, *ordered[np.isfinite(ordered)]])
-    above = 1 - np.searchsorted(ordered, thresholds, side="right") / len(ordered)
-    return tuple(zip(thresholds.tolist(), above.tolist(), strict=True))
-
-
 def median(values: Sequence[float]) -> float:
     """Return the median; infinities (failed trials) rank as such."""
     return float(statistics.median(values))

@@ -209,7 +209,7 @@ def _environment() -> Environment:
     }
     environment.globals |= {"strip_svg": charts.strip_svg, "axis_svg": charts.axis_svg, "curves_svg": charts.curves_svg}
     environment.globals |= {"spark_svg": spark_svg, "plural": formatting.plural}
-    environment.globals |= {"history_svg": history_svg, "chart_svg": chart_svg, "profile_svg": charts.profile_svg}
+    environment.globals |= {"history_svg": history_svg, "chart_svg": chart_svg}
     environment.globals |= {"replication": replication_cells, "across_legend": across.LEGEND}
     return environment
 
