@@ -153,11 +153,10 @@ def _reading(add: _Add) -> None:
     report = add("report", "write a web page about all claims from the trials at hand; run nothing")
     report.add_argument("--out", metavar="FOLDER", help="folder to write (report/)")
 
-    champion = add("champion", "replay a stored trial's champion on every level, or export its genome")
+    champion = add("champion", "replay a stored trial's champion on every level")
     champion.add_argument("method", help="the method")
     champion.add_argument("--on", metavar="TASK", required=True, help="the task")
     champion.add_argument("--seed", type=int, default=0, help="the trial's seed (0)")
-    champion.add_argument("--out", metavar="FILE", help="also write its genome to this file, as JSON")
 
     look = add("look", "draw a robot's task, or show what a stored champion does in it")
     look.add_argument("task", help="the task")

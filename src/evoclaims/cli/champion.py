@@ -1,30 +1,21 @@
-"""`evoclaims champion`: a stored trial's champion, examined once more, or exported."""
+"""`evoclaims champion`: a stored trial's champion, examined once more."""
 
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 
 from evoclaims.cli.project import open_project
 from evoclaims.cli.stored_trial import describe, load
-from evoclaims.cli.terminal import styled, write
-from evoclaims.core.errors import UserError
-from evoclaims.networks.export import genome_json
+from evoclaims.cli.terminal import styled
 from evoclaims.report.console import PlainSpokenConsole, plain_table
 from evoclaims.trials import champions, devices
 from evoclaims.trials.champions import Replay
 
 
 def main(options: argparse.Namespace) -> int:
-    """Replay and, with --out, write; 1 when the replay differs from the record."""
+    """Replay; 1 when the replay differs from the record."""
     project, chosen = open_project(options.storage), devices.choose(options.device)
     trial = load(project, options.tier, options.method, options.on, options.seed)
-    graph = champions.network_of(trial.condition, trial.parameters)
-    if options.out is not None and graph is None:
-        raise UserError(
-            f"A champion of {options.method} has arrays of parameters and no genome to write. Leave --out out to "
-            f"replay it; its arrays are in {trial.file}."
-        )
     replay = champions.replay(trial.condition, trial.result, trial.parameters, chosen)
     print(f"{trial.title}\n  {describe(trial.result)}")
     # Each value as recorded and as replayed, to the last digit of a float32.
@@ -35,9 +26,7 @@ def main(options: argparse.Namespace) -> int:
     headings = ("level", "success", "recorded", "fitness", "recorded")
     PlainSpokenConsole(file=styled()).print(plain_table(headings, rows, names=0))
     print(_judgement(replay))
-    if options.out is not None and graph is not None:
-        write(Path(options.out), genome_json(trial.parameters, graph).encode())
-        print(f"wrote {options.out}")
+    print(f"Its parameters, as numpy.load reads them: {trial.file}")
     return int(not replay.exact)
 
 

@@ -17,9 +17,6 @@ from evoclaims.core.provenance import what_fixes_bits
 from evoclaims.envs.base import Episode
 from evoclaims.kernels import kernel_prng
 from evoclaims.methods.base import Policy
-from evoclaims.methods.neat.evolution import GenomeMethod
-from evoclaims.networks.genome import Genome
-from evoclaims.networks.graph import GraphNetwork
 from evoclaims.trials.devices import MATMUL_PRECISION
 from evoclaims.trials.layout import layout_on
 from evoclaims.trials.program import score_every_level
@@ -95,13 +92,6 @@ def replay(condition: Condition, result: TrialResult, parameters: Any, devices: 
         again={name: tuple(map(float, values)) for name, values in again.items()},
         elsewhere=tuple(sorted(name for name in here.keys() & there.keys() if here[name] != there[name])),
     )
-
-
-def network_of(condition: Condition, parameters: Any) -> GraphNetwork | None:
-    """Return the network of a champion that is a genome; None for any other champion."""
-    if not isinstance(parameters, Genome) or not isinstance(condition.method, GenomeMethod):
-        return None
-    return condition.method.network(condition.task)
 
 
 def _policy(condition: Condition) -> Policy:
