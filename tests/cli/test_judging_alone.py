@@ -28,7 +28,6 @@ OPTIONS = [
     "--ignore=claims",
     "--lf",
     "--claims-only=b",
-    "--claims-tier=full",
     "--claims-trials=2",
     "--claims-variant=traded",
     "--claims-json=out.json",
