@@ -251,9 +251,7 @@ def _comparing(add: _Add) -> None:
     )
     across.add_argument("--python", nargs="+", metavar="VERSION", help="an environment with each Python, such as 3.13")
     across.add_argument("--only", metavar="IDS", help="judge only these claims, such as G1,G7 or G6[neat-ppo]")
-    across.add_argument(
-        "--as", dest="form", metavar="FORM", help="also write it: markdown, csv, json, or a chart as svg"
-    )
+    across.add_argument("--as", dest="form", metavar="FORM", help="also write it: markdown, csv or json")
     across.add_argument("--out", metavar="FILE", help="file to write (report/across.FORM; .md for markdown)")
 
     bisect = add(

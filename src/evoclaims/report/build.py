@@ -13,7 +13,6 @@ from evoclaims.judging.verdict import Outcome
 from evoclaims.paper.archive import Archive
 from evoclaims.paper.reproduction import Reproduction
 from evoclaims.report import audit, replication_cells, table_cells, training_curves, trial_summary
-from evoclaims.report.across import timeline_chart
 from evoclaims.report.evidence import Part, judged_parts, unjudged_part
 from evoclaims.report.fault_grid import fault_grid
 from evoclaims.report.formatting import Anchors, clean, counted, listed, places, plural
@@ -58,8 +57,6 @@ def gather(
         if replication_cells.is_decided(report) and report.outcome is not Outcome.SUPPORTED
     }
     gathered = _Gathering(reproduction, reader, history, sentences, failing, tried)
-    keys = {key_of(report) for reports in verdicts.values() for report in reports}
-    accepted = {key: entries for key, entries in history.items() if key in keys}
     boards = tuple(
         Board(tier, tuple(gathered.section(report) for report in table_cells.in_the_papers_order(reports)))
         for tier, reports in verdicts.items()
@@ -73,7 +70,6 @@ def gather(
         variants={name: variant.says for name, variant in reproduction.variants.items()},
         put_to_the_paper=tuple(replication_cells.put_to_the_paper(put_to_the_paper)),
         faults=tuple(fault_grid(tried, tier, reports) for tier, reports in verdicts.items() if reports),
-        history=timeline_chart(accepted) if accepted else None,
     )
 
 

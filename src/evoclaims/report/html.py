@@ -18,14 +18,11 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from evoclaims.judging.verdict import Outcome
-from evoclaims.report import across, charts, formatting, replication_cells, verdict_chart
-from evoclaims.report.across import timeline_chart
+from evoclaims.report import across, charts, formatting, replication_cells
 from evoclaims.report.charts import spark_svg
 from evoclaims.report.fault_grid import LEGEND
 from evoclaims.report.formatting import plural
 from evoclaims.report.model import Page, Section
-from evoclaims.report.verdict_chart import VerdictChart
-from evoclaims.verdicts.history import key_of
 from evoclaims.verdicts.robustness import Robustness
 from evoclaims.verdicts.sentences import sentences
 
@@ -128,7 +125,6 @@ _CHAPTERS: Final = (
     ("faults", "Planted faults", "Which planted faults do the claims notice?"),
     ("across", "Releases", "Do other releases change a verdict?"),
     ("watch", "Nights", "Have trials changed, night by night?"),
-    ("history", "History", "Accepted verdicts by date and versions"),
     _FIGURES,
 )
 """The parts below the claims, as a `Page` and a template call them; what leads there; and their titles."""
@@ -209,7 +205,6 @@ def _environment() -> Environment:
     }
     environment.globals |= {"strip_svg": charts.strip_svg, "axis_svg": charts.axis_svg, "curves_svg": charts.curves_svg}
     environment.globals |= {"spark_svg": spark_svg, "plural": formatting.plural}
-    environment.globals |= {"history_svg": history_svg, "chart_svg": chart_svg}
     environment.globals |= {"replication": replication_cells, "across_legend": across.LEGEND}
     return environment
 
@@ -217,17 +212,6 @@ def _environment() -> Environment:
 def _cleaned(value: object) -> object:
     """Return what a template shows without control characters; markup is unchanged."""
     return formatting.clean(value) if isinstance(value, str) and not isinstance(value, Markup) else value
-
-
-def history_svg(section: Section) -> Markup:
-    """Draw the accepted verdicts of one claim over dates and versions."""
-    entries = tuple(entry for era in section.history for entry in era)
-    return chart_svg(timeline_chart({key_of(section.report): entries}))
-
-
-def chart_svg(chart: VerdictChart) -> Markup:
-    """Draw a chart, whose texts are escaped there."""
-    return Markup(verdict_chart.svg(chart))  # noqa: S704
 
 
 def policy(style: str, script: str) -> str:

@@ -135,27 +135,3 @@ def _revision(trial: TrialResult) -> str | None:
 def _joined(values: Iterable[Any]) -> str:
     """Return the different values as one text; unknown ones are left out."""
     return ", ".join(sorted({printable(value) for value in values if value}))
-
-
-SHORT = 12
-"""Digits of a hash that are shown."""
-
-
-def described(before: AcceptedVerdict | None, entry: AcceptedVerdict) -> str:
-    """Return an entry in one line, with what has changed since the entry before."""
-    why = entry.reason.removesuffix(f" at n = {entry.n}")
-    behind = _first(entry) if before is None else _changes(before, entry)
-    return printable(f"{entry.accepted}  {entry.outcome} (n = {entry.n}: {why}){behind and '  '}{behind}")
-
-
-def _first(entry: AcceptedVerdict) -> str:
-    """Return versions and device of the first verdict's trials."""
-    made_by = [f"{name} {entry.versions[name]}" for name in ("python", "jax") if name in entry.versions]
-    return ", ".join([*made_by, *filter(None, [entry.device])])
-
-
-def _changes(before: AcceptedVerdict, entry: AcceptedVerdict) -> str:
-    moved = changes(before, entry)
-    if before.revision != entry.revision:
-        moved.append(f"revision {before.short_revision(SHORT)} -> {entry.short_revision(SHORT)}")
-    return ", ".join(moved)
