@@ -22,7 +22,6 @@ from evoclaims.trials.store import Store
 from evoclaims.verdicts.across import Across, Judged, across, judged
 from evoclaims.verdicts.source_trials import SourceTrials
 
-SVG = "{http://www.w3.org/2000/svg}"
 CONDITION = Condition(HandBuilt(), NParity(2), "direct", Budget(generations=1, reports=1))
 HERE = {"device": {"platform": "cpu", "kind": "cpu"}, "machine": "Linux", "depends_on": ["jax"]}
 BY_VERSION: Mapping[str, float] = {"1": 0.5, "2": 0.5, "3": 0.25, "4": 0.5}
