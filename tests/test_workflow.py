@@ -29,9 +29,9 @@ def test_every_command_is_one_that_the_command_line_takes(arguments: list[str]) 
     assert parser().parse_args(arguments).command == arguments[0]
 
 
-def test_the_report_and_the_badge_are_written_where_they_are_uploaded_from() -> None:
+def test_reports_are_written_where_they_are_uploaded_from() -> None:
     written = {arguments[0]: parser().parse_args(arguments) for arguments in COMMANDS}
-    assert {"report", "badge", "export", "compare"} <= written.keys()
+    assert {"report", "export", "compare"} <= written.keys()
     assert re.findall(r"\n          path: (\S+/)\n", TEXT) == ["report/", ".evoclaims/"]
     assert {Path(options.out).parts[0] for options in written.values() if getattr(options, "out", None)} == {"report"}
 

@@ -7,7 +7,6 @@ from evoclaims.judging.design import FIXED_10 as FIXED_10
 from evoclaims.judging.design import SEQUENTIAL as SEQUENTIAL
 from evoclaims.judging.design import Design as Design
 from evoclaims.judging.design import Look as Look
-from evoclaims.judging.kinds.omnibus import any_differ as any_differ
 from evoclaims.judging.measure import Event as Event
 from evoclaims.judging.measure import Measure as Measure
 from evoclaims.judging.measure import Profile as Profile

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+import unpacked
 from tiny_project import Evoclaims, Project
 
 from evoclaims.trials.store import Store
@@ -102,7 +103,7 @@ def test_tables_of_readings_and_of_the_rest(audit: Evoclaims, evoclaims: Evoclai
 def test_the_page_of_a_claim_shows_its_readings_and_null_agents(audit: Evoclaims, evoclaims: Evoclaims) -> None:
     audit(CLAIMS, VACUOUS)
     assert evoclaims("report", "--tier=full")[0] == 0
-    text = (Path("report") / "report.md").read_text()
-    assert "Readings of the sentence: depends on the reading: supported as “all”; refuted as “none”." in text
+    text = unpacked.read(Path("report/index.html"))
+    assert "depends on the reading: supported as “all”; refuted as “none”" in text
     assert text.count("No null agent satisfies this assertion (zero).") == 2
     assert "Null agents that satisfy this assertion: zero" in text

@@ -1,17 +1,14 @@
-"""`evoclaims compare`: now against accepted, revisions, stores, and the gate that fails on chosen changes."""
+"""`evoclaims compare`: now against accepted, stores, and the gate that fails on chosen changes."""
 
 from __future__ import annotations
 
-import os
-import shutil
-import subprocess
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
-from tiny_project import Evoclaims, Project, aged, forget, out_of_time, spoiled, trials_of
+from tiny_project import Evoclaims, aged, forget, out_of_time, spoiled, trials_of
 
 from evoclaims.judging.verdict import Outcome
 from evoclaims.paper import references
@@ -22,36 +19,6 @@ from evoclaims.verdicts import history
 OWN = Path(".evoclaims")
 FILE = Path("verdicts.toml")
 pytestmark = pytest.mark.usefixtures("stored")
-
-
-@pytest.fixture
-def git(project: Project, monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
-    """A function that runs git in the project, which becomes a repository."""
-    for name in [name for name in os.environ if name.startswith("GIT_")]:
-        monkeypatch.delenv(name)
-    monkeypatch.setenv("GIT_CONFIG_GLOBAL", os.devnull)
-    monkeypatch.setenv("GIT_CONFIG_NOSYSTEM", "1")
-
-    def run(*arguments: str) -> None:
-        settings = ("-c", "user.name=t", "-c", "user.email=t@t", "-c", "init.defaultBranch=main")
-        subprocess.run(["git", *settings, *arguments], cwd=project.path, check=True, capture_output=True)
-
-    run("init", "--quiet", "--template=")
-    return run
-
-
-@pytest.fixture
-def with_branches(accepted: Evoclaims, git: Callable[..., None], kept: Path) -> None:
-    """The project is a repository with a branch `bare` without verdicts, and a branch `both` with some."""
-    if (kept / ".git").exists():
-        shutil.copytree(kept / ".git", ".git", dirs_exist_ok=True)
-        return
-    git("commit", "--allow-empty", "-m", "empty")
-    git("branch", "bare")
-    git("add", "verdicts.toml")
-    git("commit", "-m", "accepted")
-    git("branch", "both")
-    shutil.copytree(".git", kept / ".git")
 
 
 def _edit(**changes: Any) -> None:
@@ -136,42 +103,6 @@ def test_verdicts_of_now_come_from_reference_trials_where_the_store_has_none(acc
     assert "trials of the old side alone: smoke/right-parity, smoke/wrong-parity\n" in out
 
 
-def test_a_revisions_accepted_verdicts_are_compared_with_those_of_the_working_tree(
-    accepted: Evoclaims, git: Callable[..., None]
-) -> None:
-    path = references.path_of(Path("reference"), "smoke", "right", "parity")
-    right = trials_of(Store(OWN), "hand_built")
-    references.write(path, right)
-    git("add", ".")
-    git("commit", "-m", "sound")
-    assert accepted("compare", "HEAD", "--fail=*->*")[0] == 0
-    _edit(outcome=Outcome.REFUTED)
-    references.write(path, map(spoiled, right))
-    Path("tiny_paper.py").write_text(Path("tiny_paper.py").read_text() + "\n")
-    status, out, _ = accepted("compare", "HEAD", "--fail=supported->refuted")
-    assert status == 1
-    assert out.splitlines()[1] == "new: the working tree"
-    assert "  a (smoke): supported -> refuted\n" in out
-    assert "  DRIFT in smoke/right-parity: mean_success is " in out
-    assert "10 trials compared, 10 changed" in out
-    git("add", ".")
-    git("commit", "-m", "spoiled")
-    status, out, _ = accepted("compare", "HEAD", "HEAD~1", "--fail=supported->refuted")
-    assert (status, "  a (smoke): refuted -> supported\n" in out) == (0, True)
-    assert "new: the revision HEAD~1 (" in out
-
-
-def test_no_code_of_a_revision_is_run(accepted: Evoclaims, git: Callable[..., None]) -> None:
-    sound = Path("tiny_paper.py").read_text()
-    Path("tiny_paper.py").write_text("open('ran', 'w')\nraise SystemExit('the code of an old revision was run')\n")
-    git("add", ".")
-    git("commit", "-m", "mean")
-    Path("tiny_paper.py").write_text(sound)
-    status, out, _ = accepted("compare", "HEAD")
-    assert (status, "verdicts: 2 the same" in out) == (0, True)
-    assert not Path("ran").exists()
-
-
 def test_two_stores_are_each_judged_from_their_own_trials(evoclaims: Evoclaims) -> None:
     _copy("sound")
     _copy("spoiled", spoiled)
@@ -234,77 +165,26 @@ def test_a_damaged_record_is_said_and_the_rest_is_compared(evoclaims: Evoclaims)
     assert f"not read: Cannot use {store.record_files(store.ids()[0])[-1]}: it is not one whole JSON text" in out
 
 
-def test_a_timeline_shows_the_versions_that_differ(accepted: Evoclaims) -> None:
-    kept = history.load(FILE)
-    (now,) = kept["smoke", "a"]
-    old = replace(now, accepted="2020-01-01", versions={**now.versions, "jax": "0.4.0"})
-    FILE.write_text(history.dump({**kept, ("smoke", "a"): (old, now)}))
-    status, out, _ = accepted("compare", "--timeline", "a")
-    first, second, third = out.splitlines()
-    assert (status, first) == (0, "a (smoke)")
-    assert second.startswith("  2020-01-01  supported (n = 10: p = 0.0282 <= alpha = 0.05)  ")
-    assert f"jax 0.4.0 -> {now.versions['jax']}" in third
-    assert accepted("compare", "--timeline", "--out=it.svg")[1].splitlines()[5:] == ["wrote it.svg"]
-    assert Path("it.svg").read_text().count("<path") == 0 < Path("it.svg").read_text().count("supported (n = 10")
-
-
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
         (("--fail=supported->refutd",), "There is no outcome named 'refutd'. Did you mean 'refuted'?"),
         (("--fail=refuted",), "'refuted' is not a change of a verdict"),
-        (("a", "b", "c"), "Two stores or two revisions can be compared, not 3."),
+        (("a", "b", "c"), "Two stores can be compared, not 3."),
         (("--tier=ful",), "There is no tier named 'ful'."),
-        (("--timeline", "x"), "There is no accepted claim named 'x'. Known: a, b."),
-        (("--out=it.svg",), "--out draws what --timeline lists: add --timeline."),
-        (("HEAD", "--timeline"), "--timeline shows only the accepted verdicts"),
-        (("--timeline", "--fail=*->*"), "--timeline shows only the accepted verdicts"),
-        (("nothing",), "There is neither a git revision nor a folder called nothing."),
-        (("pyproject.toml",), "There is neither a git revision nor a folder called pyproject.toml."),
-        (("./nothing",), "There is neither a git revision nor a folder called ./nothing."),
-        (("/nothing",), "There is neither a git revision nor a folder called /nothing."),
-        (("\x1b[2J",), r"There is neither a git revision nor a folder called \x1b[2J."),
+        (("nothing",), "There is no trial store 'nothing': no folder has this name."),
+        (("\x1b[2J",), r"There is no trial store '\x1b[2J'"),
         (("claims",), "claims is not a trial store: it has no store.json, and a store has no test_claims.py in it."),
-        (("HEAD", "./claims"), "claims is not a trial store"),
-        (("both",), "both is both a folder and a git revision: write ./both for the folder, or the revision's hash, "),
-        (("bare",), "The revision bare has neither verdicts.toml nor reference trials in "),
-        (("--", "--output=x"), "There is neither a git revision nor a folder called --output=x."),
     ],
 )
-def test_a_users_mistake_is_one_sentence(
-    accepted: Evoclaims, with_branches: None, arguments: tuple[str, ...], said: str
-) -> None:
-    Path("both").mkdir()
+def test_a_users_mistake_is_one_sentence(accepted: Evoclaims, arguments: tuple[str, ...], said: str) -> None:
     Path("claims/__pycache__").mkdir(exist_ok=True)  # where Python writes bytecode: no name that tells a user anything
     status, _, err = accepted("compare", *arguments)
     assert (status, err.count("\n")) == (2, 1)
     assert said in err
 
 
-def test_without_a_repository_a_revision_is_one_sentence_and_folders_still_compare(
-    evoclaims: Evoclaims, project: Project, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("GIT_CEILING_DIRECTORIES", str(project.path.parent))
-    status, _, err = evoclaims("compare", "HEAD")
-    assert (status, "is not in a git repository" in err) == (2, True)
-    _copy("one")
-    assert evoclaims("compare", "one", "one")[0] == 0
-
-
-def test_a_torn_reference_of_a_revision_is_one_sentence(accepted: Evoclaims, git: Callable[..., None]) -> None:
-    path = references.path_of(Path("reference"), "smoke", "right", "parity")
-    path.parent.mkdir(parents=True)
-    path.write_text("torn\n")
-    git("add", ".")
-    git("commit", "-m", "torn")
-    path.unlink()
-    status, _, err = accepted("compare", "HEAD")
-    assert status == 2
-    assert "Line 1 of reference/smoke/right-parity.jsonl at HEAD is not a reference trial: it is not one whole" in err
-
-
 def test_before_the_first_accept_there_is_nothing_to_compare_with(evoclaims: Evoclaims) -> None:
-    for arguments in ((), ("--timeline",)):
-        status, _, err = evoclaims("compare", *arguments)
-        assert status == 2
-        assert "No verdict has been accepted yet: run `evoclaims accept` to accept the current ones." in err
+    status, _, err = evoclaims("compare")
+    assert status == 2
+    assert "No verdict has been accepted yet: run `evoclaims accept` to accept the current ones." in err

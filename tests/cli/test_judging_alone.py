@@ -28,7 +28,6 @@ OPTIONS = [
     "--ignore=claims",
     "--lf",
     "--claims-only=b",
-    "--claims-tier=full",
     "--claims-trials=2",
     "--claims-variant=traded",
     "--claims-json=out.json",
@@ -157,7 +156,7 @@ def test_claims_that_something_leaves_out_are_an_error_and_not_forgotten(
     assert not Path("verdicts.toml").exists()
 
 
-@pytest.mark.parametrize("command", ["status", "accept", "badge"])
+@pytest.mark.parametrize("command", ["status", "accept"])
 def test_claims_in_a_file_that_is_not_collected_are_missed_in_a_sentence(evoclaims: Evoclaims, command: str) -> None:
     Path("claims/test_claims.py").rename("claims/hill.py")
     status, out, err = evoclaims(command)

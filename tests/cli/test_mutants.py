@@ -113,12 +113,9 @@ def test_a_claim_that_notices_no_fault_is_called_insensitive_wherever_it_is_show
     _, out, _ = evoclaims("status")
     assert f"claims against planted faults: 1 insensitive, 1 not tried\nclaims (smoke): {counted}\n" in out
     assert out.count("✓ supported, insensitive") == 1
-    assert "wrote report/claims-smoke.svg: supported but insensitive 1 / refuted 1" in evoclaims("badge")[1]
     assert f"claims (smoke): {counted}" in evoclaims("report", "--tier=smoke")[1]
-    for page in ("report/report.md", "report/index.html"):
-        assert "Insensitive. Planted faults: 0 of 1 change this verdict" in unpacked.read(Path(page))
-    assert evoclaims("export", "--verdicts", "--tier=smoke", "--as=csv")[0] == 0
-    heading, *rows = csv.reader(Path("report/verdicts.csv").read_text().splitlines())
+    assert "Insensitive. Planted faults: 0 of 1 change this verdict" in unpacked.read(Path("report/index.html"))
+    heading, *rows = csv.reader(evoclaims("status", "--as=csv")[1].splitlines())
     assert [row[heading.index("faults")] for row in rows] == ["insensitive", "not tried"]
     run = project.run("-msmoke", own_store=True)
     run.stdout.fnmatch_lines(["claims against planted faults: 1 insensitive, 1 not tried", f"claims: {counted}"])

@@ -110,7 +110,7 @@ def test_other_programs_read_the_same_verdicts(status: Evoclaims) -> None:
     assert "There is no form of a table named 'jsn'. Did you mean 'json'?" in status("--as=jsn")[2]
 
 
-@pytest.mark.parametrize("command", ["status", "badge", "accept", "report"])
+@pytest.mark.parametrize("command", ["status", "accept", "report"])
 def test_a_torn_line_among_the_reference_trials_is_found_before_anything_is_judged(
     evoclaims: Evoclaims, monkeypatch: pytest.MonkeyPatch, command: str
 ) -> None:

@@ -27,10 +27,10 @@ READING = (
     ("accept",),
     ("compare",),
     ("export", "--as=csv"),
-    ("export", "--as=csv", "--verdicts"),
+    ("export", "--as=csv"),
+    ("status", "--as=csv"),
     ("report",),
     ("champion", "right", "--on=parity"),
-    ("badge",),
     ("run", "right", "--trials=10"),
     ("compare", "."),
     ("compare", HOSTILE),
@@ -111,9 +111,9 @@ def test_no_text_of_a_record_or_an_argument_steers_the_terminal(
 
 
 def test_no_text_steers_what_files_for_people_show(hostile: Store, capfd: pytest.CaptureFixture[str]) -> None:
-    for arguments in (("export", "--as=csv"), ("report",), ("accept",), ("badge",)):
+    for arguments in (("export", "--as=csv"), ("report",), ("accept",)):
         main(arguments)
-    for name in ("report/trials.csv", "report/report.md", "report/index.html", history.FILE, "report/claims-smoke.svg"):
+    for name in ("report/trials.csv", "report/index.html", history.FILE):
         text = Path(name).read_text()
         assert steering(text) - {"\t"} == set(), name
 

@@ -20,7 +20,6 @@ ELSEWHERE = {
     # files of this package
     "core/lazy.py": ["Path(str(module.__file__)).with_suffix('.pyi').read_text"],
     "cli/new.py": ["(layer / NEXT).read_text"],
-    "envs/ecorobot/views/page.py": ["(ASSETS / 'viewer.html').read_text", "(ASSETS / 'viewer.js').read_text"],
     "report/html.py": ["(resources.files('evoclaims.report') / 'assets' / name).read_text"],
     # what the system says
     "core/provenance.py": ["Path('/proc/cpuinfo').read_text", "distribution.read_text", "distribution.read_text"],

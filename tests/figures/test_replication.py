@@ -126,16 +126,5 @@ def test_without_the_number_of_published_trials_nothing_can_be_said(reporting: P
     assert {one.repetition.answer for one in _found(reporting).values()} == {Answer.UNKNOWN}
 
 
-def test_a_row_has_every_number(reporting: Paper) -> None:
-    reporting.put("one", "small", HALVED)
-    row = _found(reporting)["one on small: success at level 1", ""].row()
-    assert (row["published.mean"], row["published.place"], row["ours.trials"]) == (0.5, "Fig. 1", 10)
-    assert row["ours.values"] == HALVED
-    assert [prediction["spread"] for prediction in row["predictions"]] == [
-        "the bar is a standard deviation",
-        "the bar is a standard error",
-    ]
-
-
 def test_a_paper_without_published_numbers_has_none(paper: Paper, tmp_path: Path) -> None:
     assert _found(paper) == {}

@@ -7,18 +7,15 @@ import math
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from scipy.stats import kruskal
 
 from evoclaims.judging.effect import (
     a12,
     a12_interval,
     cliffs_delta,
-    epsilon_squared,
     iqm,
     iqm_interval,
     median,
     median_interval,
-    performance_profile,
 )
 
 values = st.lists(st.floats(-3, 3) | st.sampled_from([-math.inf, math.inf]), min_size=1, max_size=8)
@@ -76,18 +73,3 @@ def test_the_interval_of_the_interquartile_mean_resamples_each_stratum_by_itself
     low, high = iqm_interval([0.0] * 8 + [1.0] * 8)
     assert low < 0.5 < high
     assert iqm_interval([-math.inf] * 4 + [1.0] * 6)[0] == -math.inf
-
-
-@given(values)
-def test_a_performance_profile_is_the_share_above_each_value(data: list[float]) -> None:
-    profile = performance_profile(data)
-    assert [at for at, _ in profile] == sorted({-math.inf, *filter(math.isfinite, data)})
-    assert all(share == pytest.approx(sum(x > at for x in data) / len(data)) for at, share in profile)
-
-
-def test_epsilon_squared_is_the_share_of_the_ranks_variance_between_groups() -> None:
-    assert epsilon_squared([[1, 1], [2, 2], [3, 3]]) == pytest.approx(1.0)
-    assert epsilon_squared([[1, 3], [2, 2], [1, 3]]) == pytest.approx(0.0)
-    assert epsilon_squared([[5, 5], [5, 5]]) == 0.0
-    groups = [[1.0, 4.0, 2.0], [3.0, 3.0, -math.inf], [9.0, 4.0, 8.0]]
-    assert epsilon_squared(groups) == pytest.approx(kruskal(*groups).statistic / (9 - 1))

@@ -36,9 +36,6 @@ def collected(project: Any) -> Callable[..., list[str]]:
         (("-m", "not full"), ["a smoke", "b smoke", "plain"]),
         (("-m", "smoke or full"), ["a full", "a smoke", "b full", "b smoke"]),
         (("-m", "full and not smoke"), ["a full", "b full"]),
-        (("--claims-tier", "full"), ["a full", "b full", "plain"]),
-        (("--claims-tier", "smoke"), ["a smoke", "b smoke", "plain"]),
-        (("--claims-tier", "full", "-m", "smoke"), []),
         (("--claims-only", "b"), ["b smoke", "plain"]),
         (("--claims-only", "b, a"), ["a smoke", "b smoke", "plain"]),
         (("--claims-only", "b", "-m", "full"), ["b full"]),
@@ -102,7 +99,6 @@ def test_tests_are_chosen_by_the_ids_of_claims_which_are_parts_of_their_names(pr
         (("-m", "xfail"), "-m xfail"),
         (("-m", "full and smoke"), "-m 'full and smoke'"),
         (("-m", "smoke", "-k", "G11"), "-m smoke with -k G11"),
-        (("--claims-tier=full", "-m", "smoke"), "--claims-tier full with -m smoke, which are two tiers"),
     ],
 )
 def test_a_selection_that_finds_nothing_says_what_was_asked_and_how_claims_are_selected(
@@ -131,7 +127,6 @@ def test_the_full_tier_judges_the_papers_own_sentence(project: Any) -> None:
 @pytest.mark.parametrize(
     ("arguments", "text"),
     [
-        (("--claims-tier", "fulll"), "There is no tier named 'fulll'. Did you mean 'full'? Known: full, smoke."),
         (("--claims-only", "G1"), "There is no claim named 'G1'. Known: first, second."),
         (("--claims-only", "first,secnd"), "no claim named 'secnd'. Did you mean 'second'? Known: first, second."),
         (("--claims-undecided", "maybe"), "argument --claims-undecided: invalid choice: 'maybe'"),

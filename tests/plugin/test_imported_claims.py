@@ -132,7 +132,7 @@ def test_too_few_trials_are_inconclusive_and_say_how_many_it_needs(
     ours: Project, tier: str, count: int, said: str
 ) -> None:
     (ours.path / "runs.csv").write_text(_table(_numbers(0.3, count), _numbers(0.3)))
-    outcome, reason = _judged(ours, f"--claims-tier={tier}")
+    outcome, reason = _judged(ours, f"-m{tier}")
     assert outcome == "inconclusive"
     assert reason.startswith(said)
 

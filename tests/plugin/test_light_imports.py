@@ -33,7 +33,7 @@ def test_a_package_is_imported_without_what_its_names_need(tmp_path: Path, code:
 
 
 def test_a_project_without_claims_pays_nothing_for_the_plugin(tmp_path: Path) -> None:
-    (tmp_path / "test_it.py").write_text("def test_it(pytestconfig):\n    pytestconfig.getoption('claims_tier')\n")
+    (tmp_path / "test_it.py").write_text("def test_it(pytestconfig):\n    pytestconfig.getoption('claims_only')\n")
     code = "import pytest; status = pytest.main(['-p', 'evoclaims.plugin.hooks'])"
     assert _imported(f"{code}\nassert status == 0", tmp_path) == set()
 

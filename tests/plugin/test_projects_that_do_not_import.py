@@ -35,8 +35,6 @@ COMMANDS = [
     ("accept",),
     ("compare",),
     ("export",),
-    ("export", "--verdicts"),
-    ("badge",),
 ]
 
 

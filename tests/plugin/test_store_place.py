@@ -104,7 +104,6 @@ READING = (
     ("compare",),
     ("accept",),
     ("report",),
-    ("badge",),
     ("reference",),
     ("reproduce", "all"),
     ("champion", "right", "--on=parity"),

@@ -9,14 +9,12 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-import jax
 from made_trials import trial_of
 
 from evoclaims.claims.claim import Claim, ClaimTest
 from evoclaims.claims.fetching import StoredOnly
 from evoclaims.claims.judge import unjudged
 from evoclaims.claims.session import Session
-from evoclaims.core.keys import TRAINING, trial_key
 from evoclaims.envs.gates.parity import NParity
 from evoclaims.judging.assertion import Assertion
 from evoclaims.judging.design import Design
@@ -29,7 +27,6 @@ from evoclaims.paper.reproduction import Reproduction, Tier
 from evoclaims.report.build import gather
 from evoclaims.report.model import Page, Section
 from evoclaims.trials.result import TrialResult
-from evoclaims.trials.result_making import named_leaves
 from evoclaims.trials.spec import Budget, Condition
 from evoclaims.trials.store import Store
 from evoclaims.verdicts.claim_report import ClaimReport
@@ -90,14 +87,6 @@ class Laboratory:
         for trial in made:
             self.store.put(trial, {})
         return made
-
-    def put_genomes(self, values: Iterable[float]) -> None:
-        """Store a trial of NEAT for each value, each with a first genome of its own as its champion."""
-        condition = CONDITIONS["neat", "small"]
-        for seed, value in enumerate(values):
-            state = METHODS["neat"].init(trial_key(seed, TRAINING), condition.task)
-            champion = named_leaves(jax.device_get(METHODS["neat"].best(condition.task, state).parameters))
-            self.store.put(record(condition, seed, value), champion)
 
     def judge(self, assert_: Judge, tier: str = "full", case: str = "", **texts: str) -> ClaimReport:
         """Judge a claim from the store, as `evoclaims report` does."""

@@ -14,7 +14,6 @@ from evoclaims.judging.exact import sign_test
 from evoclaims.judging.reading import NumberReading
 from evoclaims.judging.sample import Trials
 from evoclaims.judging.verdict import Bound, PValues
-from evoclaims.report.markdown import markdown
 from evoclaims.report.run_summary import run_summary
 from evoclaims.report.terminal_table import verdict_table
 from evoclaims.verdicts.claim_report import ClaimReport
@@ -50,7 +49,7 @@ def test_a_new_kind_is_judged_and_shown_in_every_form(filled: Laboratory) -> Non
     assert ClaimReport.from_json(refuted.to_json()) == refuted
     page = filled.page(supported, refuted)
     assert [bound.value for bound in page.sections[1].parts[0].bounds] == [0.6]
-    for text in (verdict_table([refuted], 160, False), run_summary([refuted]), markdown(page)):
+    for text in (verdict_table([refuted], 160, False), run_summary([refuted])):
         assert "against 0.016" in text
     shown = whole(page)
     assert "the median of better on small: mean success over levels is at least 0.6" in shown

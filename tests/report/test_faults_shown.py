@@ -11,9 +11,7 @@ from unpacked import whole
 
 from evoclaims.judging.verdict import Outcome
 from evoclaims.report import table_cells
-from evoclaims.report.badge import BLUE, GREEN, colour_of, message_of
 from evoclaims.report.fault_grid import fault_grid
-from evoclaims.report.markdown import markdown
 from evoclaims.report.model import Board, Page, Section
 from evoclaims.report.run_summary import run_summary
 from evoclaims.report.terminal_table import verdict_table
@@ -38,9 +36,7 @@ def test_support_that_no_fault_could_change_is_counted_apart() -> None:
         Tally.SUPPORTED,
     ]
     assert table_cells.totals(REPORTS) == "2 supported, 1 supported but insensitive, 1 refuted"
-    assert message_of(REPORTS) == "supported 2 / supported but insensitive 1 / refuted 1"
     assert table_cells.faults(REPORTS) == "claims against planted faults: 1 sensitive, 2 insensitive, 1 not tried"
-    assert (colour_of(REPORTS[:1]), colour_of(REPORTS[:2])) == (GREEN, BLUE)
 
 
 def test_what_was_not_tried_is_called_so() -> None:
@@ -106,14 +102,6 @@ def test_the_report_shows_the_grid_and_the_score(filled: Laboratory) -> None:
     assert "Insensitive. Planted faults: 0 of 1 change this verdict, none of those in m0 or m1." in text
 
 
-def test_markdown_shows_the_grid_and_the_score(filled: Laboratory) -> None:
-    text = markdown(page(filled))
-    assert "| claim | verdict | fault 0&lt;b&gt; | fault 1&lt;b&gt; | no fault noticed in |" in text
-    assert "| T1 | ✓ supported | ● | ◐ | m1 |" in text
-    assert "insensitive | ○ | = | m0, m1 |" in text
-    assert "Planted faults: 1 of 2 change this verdict, none of those in m1." in text
-
-
 def test_a_scoreboard_counts_insensitive_support_apart(filled: Laboratory) -> None:
     sections = tuple(Section(one, one.name, (), ("§1",)) for one in REPORTS)
     board = Board("smoke", sections)
@@ -128,18 +116,15 @@ def test_a_scoreboard_counts_insensitive_support_apart(filled: Laboratory) -> No
     assert {Tally.INSENSITIVE, Tally.SMALLER}.isdisjoint(Board("smoke", sections[:1]).counts)
     assert board.others == ""
     shown = Page(title="A Paper", name="paper", boards=(board,))
-    assert "| tier | supported | supported but insensitive | refuted |" in markdown(shown)
-    assert "| smoke | 2 | 1 | 1 |" in markdown(shown)
     assert "controls:" not in whole(shown)
     assert '<li class="is-insensitive"><b>1</b> <span class="symbol" aria-hidden="true">✓</span>' in whole(shown)
 
 
 def test_without_a_matrix_no_claim_is_called_sensitive(filled: Laboratory) -> None:
     found = filled.page(filled.judge(better_wins))
-    for text in (whole(found), markdown(found)):
-        assert "Planted faults: not tried." in text
-        assert "Mutation score" in text
-        assert "sensitive" not in text.replace("insensitive", "")
+    assert "Planted faults: not tried." in whole(found)
+    assert "Mutation score" in whole(found)
+    assert "sensitive" not in whole(found).replace("insensitive", "")
 
 
 def test_a_scoreboard_counts_controls_and_mechanisms_apart_from_the_papers_claims() -> None:
@@ -149,6 +134,5 @@ def test_a_scoreboard_counts_controls_and_mechanisms_apart_from_the_papers_claim
     counted = "controls: 1 supported; mechanisms: 1 supported"
     assert (len(board.papers), sum(board.counts.values()), board.others) == (4, 4, counted)
     shown = Page(title="A Paper", name="paper", boards=(board,))
-    assert f"| smoke | 2 | 1 | 1 | 0 | 0 | 0 | 0 | {counted} |" in markdown(shown)
     assert f"<small>4 claims; {counted}</small>" in whole(shown)
     assert 'viewBox="0 0 4 1"' in whole(shown)

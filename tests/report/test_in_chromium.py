@@ -41,12 +41,12 @@ def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Chromium]:
 
 @pytest.fixture(scope="module")
 def address(tmp_path_factory: pytest.TempPathFactory) -> str:
-    """A report with claims of every end, at both tiers, with a drawn champion, a figure and hostile texts."""
+    """A report with claims of every end, at both tiers, with a figure and hostile texts."""
     folder = tmp_path_factory.mktemp("paper")
     lab = Laboratory(folder)
     lab.put("better", [1.0, 1.0, 1.0, 0.8, float("nan"), 1.0])
     lab.put("worse", [0.1, 0.2, 0.3, 0.3, 0.4, 0.5])
-    lab.put_genomes([1.0] * 6)
+    lab.put("neat", [1.0] * 6)
 
     def neat_wins(group: Any) -> Any:
         return group("neat").mean_success > group("worse").mean_success
@@ -138,7 +138,7 @@ def test_without_a_script_the_sentences_verdicts_and_reasons_are_there_and_the_e
         browser.open(f"{address}#G1-full")
     finally:
         browser.send("Emulation.setScriptExecutionDisabled", value=False)
-    assert "report.md" in browser.evaluate("document.querySelector('noscript').textContent")
+    assert "status --as json" in browser.evaluate("document.querySelector('noscript').textContent")
     assert browser.evaluate("document.querySelector('noscript').checkVisibility()")
     assert browser.evaluate("document.querySelector('#G1-full .reason').checkVisibility()")
     assert browser.evaluate("document.querySelector('#unpackable').checkVisibility()") is False
@@ -176,7 +176,7 @@ def test_every_image_loads(browser: Chromium, address: str) -> None:
           (image) => image.decode().then(() => [image.className, image.complete, image.naturalWidth])
         ))"""
     )
-    assert [name for name, *_ in images] == ["champion"] * 4 + [""]
+    assert [name for name, *_ in images] == [""]
     assert all(complete and width > 0 for _, complete, width in images)
     assert images[-1] == ["", True, 40]
 

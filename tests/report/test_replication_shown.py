@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-import io
 from dataclasses import replace
 
-import pytest
 from laboratory import Laboratory, better_solves, better_wins
-from rich.console import Console
 from unpacked import whole
 
-from evoclaims.cli import replicate
 from evoclaims.figures.replication import Replication
 from evoclaims.figures.trial_numbers import TrialNumber, TrialNumbers
 from evoclaims.judging.repetition import Agreement, PublishedMean, repetition
@@ -18,7 +14,6 @@ from evoclaims.judging.verdict import Outcome
 from evoclaims.paper.reported import Reported
 from evoclaims.report import replication_cells
 from evoclaims.report.build import gather
-from evoclaims.report.markdown import markdown
 from evoclaims.report.model import Page
 
 
@@ -49,48 +44,6 @@ def test_cells_say_what_is_published_what_is_ours_and_whether_it_repeats() -> No
     assert replication_cells.answer(_number([], error=None)) == "- cannot be said: not run"
 
 
-def _levels(count: int, variant: str = "") -> list[Replication]:
-    first = _number([700.0, 900.0] * 5, variant=variant)
-    return [replace(first, numbers=replace(first.numbers, name="success"), level=level) for level in range(count)]
-
-
-@pytest.mark.parametrize(("width", "lines_each"), [(80, 1), (60, 2)])
-def test_a_terminal_shows_a_block_for_each_condition_and_variant_and_breaks_only_between_readings(
-    width: int, lines_each: int
-) -> None:
-    found = [one for pair in zip(_levels(2), _levels(2, "rows"), strict=True) for one in pair]
-    console = Console(file=io.StringIO(), width=width)
-    shown = {}
-    for heading, table in replicate.blocks(found, width):
-        with console.capture() as capture:
-            console.print(table)
-        shown[heading] = [line.rstrip() for line in capture.get().splitlines()]
-    plain, rows = "<neat> on maze: success, the protocol", "<neat> on maze: success, rows"
-    assert list(shown) == [plain, rows]
-    assert shown[plain][0].split() == ["published", "ours", "95%", "of", "repetitions"]
-    assert shown[plain][1:] == shown[rows]  # the columns' names stand once
-    assert len(shown[rows]) == 2 * lines_each
-    assert " ".join(" ".join(shown[rows][:lines_each]).split()) == (
-        "✗ level 0 900 ± 20 800 ± 110 (10) 879.8–920.2 SD ✗, 836–964 SE ✗"
-    )
-
-
-@pytest.mark.parametrize("name", ["speed at rest", "success at level 4", " at "])
-def test_a_measure_may_have_at_in_its_name(name: str) -> None:
-    first = _number([900.0] * 10)
-    plain = replace(first, numbers=replace(first.numbers, name=name))
-    ((heading, table),) = replicate.blocks([plain], 80)
-    assert (heading, [*table.columns[1].cells], plain.measure) == (f"maze: {name}", ["<neat>"], name)
-    ((heading, table),) = replicate.blocks([replace(plain, level=2)], 80)
-    assert (heading, [*table.columns[1].cells]) == (f"<neat> on maze: {name}", ["level 2"])
-
-
-def test_a_block_says_why_a_number_has_no_interval() -> None:
-    ((heading, table),) = replicate.blocks([_number([], error=None)], 80)
-    assert heading == "maze: reward"
-    assert [[*column.cells] for column in table.columns] == [["-"], ["<neat>"], ["900"], ["–"], ["not run"]]
-
-
 def test_the_page_has_a_line_for_each_number_and_escapes_it() -> None:
     text = whole(PAGE)
     assert "Do the numbers replicate?" in text
@@ -106,17 +59,14 @@ def test_the_page_has_a_line_for_each_number_and_escapes_it() -> None:
 
 
 def test_markdown_has_the_same_table() -> None:
-    lines = markdown(PAGE).splitlines()
-    assert "## Do the numbers replicate?" in lines
+    lines = replication_cells.markdown(PAGE.numbers).splitlines()
     assert "| number | protocol | published | ours | replicates | 95% of repetitions |" in lines
     assert sum("&lt;neat&gt; on maze: reward" in line for line in lines) == 3
-    assert "the protocol: 1 contradicted, 1 cannot be said; by condition: 1 contradicted" in lines
 
 
 def test_without_numbers_nothing_is_said_of_them() -> None:
     bare = Page(title="A Paper", name="paper", boards=())
     assert "replicate?" not in whole(bare)
-    assert "replicate?" not in markdown(bare)
 
 
 def test_a_claim_that_the_papers_own_numbers_would_not_pass_says_so(filled: Laboratory) -> None:

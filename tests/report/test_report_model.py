@@ -9,18 +9,12 @@ from typing import Any
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from laboratory import CONDITIONS, HERE, Laboratory, better_solves, better_wins, neat_solves, record
+from laboratory import CONDITIONS, HERE, Laboratory, better_solves, better_wins, record
 from unpacked import whole
 
 from evoclaims.judging.verdict import Outcome
-from evoclaims.paper import references
 from evoclaims.paper.archive import Archive
-from evoclaims.report.build import gather
-from evoclaims.report.champion import typical
 from evoclaims.report.formatting import Anchors
-from evoclaims.report.markdown import markdown
-from evoclaims.report.model import ShownChampion
-from evoclaims.report.trial_summary import Reader
 from evoclaims.verdicts.history import AcceptedVerdict
 
 
@@ -188,8 +182,6 @@ def test_the_history_says_when_rules_changed_and_what_differs_now(filled: Labora
     section = shown(old, same)
     assert section.history == ((old,), (same,))
     page = filled.page(report, history={("full", "T1"): (old, same)})
-    assert "| 2026-01-01 | supported | why | fffffffff |" in markdown(page)
-    assert f"| 2026-02-02 | refuted | why | {now[:9]} (new) |" in markdown(page)
     shown_page = whole(page)
     assert shown_page.count('<tr class="era"><td>2026-02-02</td>') == shown_page.count('class="era"') == 1
     assert '<td title="jax 0.10.2">cpu, revision aaaaaaaaa-dirty</td>' in shown_page
@@ -197,66 +189,6 @@ def test_the_history_says_when_rules_changed_and_what_differs_now(filled: Labora
     assert shown(old).change == "What was fixed beforehand has changed since 2026-01-01: a new history begins."
     assert shown(replace(same, outcome=Outcome.SUPPORTED)).change == ""
     assert shown().history == ()
-
-
-def test_the_typical_trial_is_the_lower_median_of_the_finished_ones(lab: Laboratory) -> None:
-    lab.put("better", [0.9, 0.2, 0.6, 0.7, float("nan")])
-    lab.store.put(record(CONDITIONS["better", "small"], 5, 0.0, status="diverged"), {})
-    ids = [record(CONDITIONS["better", "small"], seed, 0.0).id for seed in range(6)]
-    trials = Reader(lab.archive).read(ids)
-    chosen = typical(trials)
-    assert chosen is not None
-    assert (chosen[0].seed, chosen[1]) == (2, "seed 2, the median of 4 by mean success")
-    equal = typical([replace(trial, score=0.5) for trial in reversed(trials)])
-    assert equal is not None
-    assert equal[0].seed == 0
-    assert typical(()) is None
-
-
-def test_a_champion_that_is_a_graph_is_drawn_and_others_say_why_not(lab: Laboratory) -> None:
-    lab.put_genomes([1.0] * 6)
-    lab.put("better", [1.0] * 6)
-
-    page = lab.page(lab.judge(neat_solves, id="neat"), lab.judge(better_solves, id="better"))
-    drawn, without = (page.conditions[section.conditions[0]].champion for section in page.sections[::-1])
-    assert drawn.says == "The champion: seed 0, the median of 6 by mean success."
-    assert drawn.picture.lstrip().startswith(b"<?xml")
-    says = "No parameters of these trials are kept, so there is no champion to show."
-    assert (without.picture, without.says) == (b"", says)
-    lab.store.champion_path(record(CONDITIONS["neat", "small"], 0, 1.0).id).write_bytes(b"torn")
-    torn = lab.page(lab.judge(neat_solves)).conditions[page.sections[1].conditions[0]].champion
-    assert (torn.picture, "it is not the champion that the trial's record names" in torn.says) == (b"", True)
-
-
-def test_committed_reference_trials_have_no_champion_to_draw(lab: Laboratory) -> None:
-    made = [replace(record(CONDITIONS["better", "small"], seed, 1.0), champion="a" * 64) for seed in range(6)]
-    references.write(references.path_of(lab.reproduction.references, "full", "better", "small"), made)
-    page = lab.page(lab.judge(better_solves))
-    assert page.sections[0].devices == "6 × cpu"
-    (condition,) = page.conditions.values()
-    assert condition.champion.says == (
-        "The champion’s parameters (seed 0, the median of 6 by mean success) are not in the store: "
-        "records alone are kept here."
-    )
-
-
-def test_the_first_drawing_of_a_champion_that_can_be_made_is_taken(lab: Laboratory) -> None:
-    lab.put_genomes([1.0] * 6)
-    report = lab.judge(neat_solves)
-
-    def champion(*draws: Any) -> ShownChampion:
-        page = gather(lab.reproduction, {"full": [report]}, lab.archive, {}, sentences={}, draws=draws)
-        (condition,) = page.conditions.values()
-        return condition.champion
-
-    def names(condition: Any, result: Any, parameters: Any, title: str) -> bytes:
-        return f"{title}|{result.seed}".encode()
-
-    title = "neat on n_parity, seed 0, the median of 6 by mean success"
-    assert champion(lambda *_: None, names, lambda *_: b"later").picture == f"{title}|0".encode()
-    assert champion(lambda *_: None).says.endswith("is no graph but arrays of weights, of which there is no drawing.")
-    large = champion(lambda *_: bytes(400_001))
-    assert (large.picture, "is too large for this page: 400 kB" in large.says) == (b"", True)
 
 
 @given(st.lists(st.tuples(st.text(), st.text(), st.sampled_from(["full", "smoke"])), max_size=20))

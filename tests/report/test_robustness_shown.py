@@ -9,7 +9,6 @@ from unpacked import whole
 
 from evoclaims.judging.verdict import Outcome
 from evoclaims.report.html import html
-from evoclaims.report.markdown import markdown
 from evoclaims.report.model import Board, Page, Section
 from evoclaims.verdicts.robustness import Robustness
 
@@ -33,24 +32,14 @@ def test_the_page_sets_off_what_hangs_on_a_detail() -> None:
     assert "never run" not in text
 
 
-def test_markdown_sets_off_what_hangs_on_a_detail() -> None:
-    lines = markdown(PAGE).splitlines()
-    assert "| claim | tier | the protocol | network | rows |" in lines
-    assert r"| G1\[&lt;b&gt;\] | smoke | refuted | **supported** | refuted |" in lines
-    assert "| G2 | smoke | supported | – | supported |" in lines
-    assert "* network: another &lt;network&gt;" in lines
-
-
 def test_a_verdict_stands_out_from_no_protocol_that_has_not_run() -> None:
     alone = replace(PAGE, robustness=(Robustness("G3", "full", Outcome.NOT_RUN, {"rows": Outcome.REFUTED}),))
     assert "<b>refuted</b>" not in whole(alone)
-    assert "| G3 | full | not run | refuted |" in markdown(alone).splitlines()
 
 
 def test_without_variants_nothing_is_said_of_them() -> None:
     bare = Page(title="A Paper", name="paper", boards=())
     assert "hang on a detail" not in whole(bare)
-    assert "hang on a detail" not in markdown(bare)
 
 
 def test_the_heading_of_a_variant_is_shown_whole() -> None:

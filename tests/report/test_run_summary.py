@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import re
+from html import escape
 
 import pytest
 from hand_made_verdicts import report
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
+from markdown_it import MarkdownIt
 
-from evoclaims.report.formatting import literal
+from evoclaims.report.formatting import clean, literal
 from evoclaims.report.run_summary import run_summary
 
+READER = MarkdownIt("commonmark").enable(["table", "strikethrough"])
 HOSTILE = "a | b `c` <script>alert(1)</script> & *d* _e_ [f](http://g) \n| new row |\r\n# heading \x1b[2J www.h.i @all"
 
 
@@ -73,3 +76,22 @@ def test_any_text_becomes_one_line_without_live_marks(text: str) -> None:
     assert len(shown.splitlines()) <= 1
     assert not re.search(r"(?<!\\)(?:\\\\)*[|`*_\[\]<>#]", shown)
     shown.encode()
+
+
+@given(st.text())
+@example("1. not a list")
+@example("- *a* _b_ `c` [d](http://e) <b>&amp; | ~~f~~ # g \\ http://h.i www.j.k + > !")
+@example("====")
+@example("- item")
+@example("+ item")
+@example("12) item")
+def test_any_text_is_shown_as_it_is(text: str) -> None:
+    shown = escape(clean(text), quote=False).replace('"', "&quot;")
+    assert READER.render(literal(text)) == (f"<p>{shown}</p>\n" if shown else "")
+
+
+@given(st.text(min_size=1))
+def test_any_text_stays_in_its_cell(text: str) -> None:
+    rendered = READER.render(f"| a | b |\n| --- | --- |\n| {literal(f'x{text}')} | y |\n")
+    assert rendered.count("<td>") == 2
+    assert "<td>y</td>" in rendered

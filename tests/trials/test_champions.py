@@ -24,8 +24,6 @@ from evoclaims.methods.neat.evolution import Neat
 from evoclaims.methods.neat.settings import Settings, Species
 from evoclaims.methods.ppo import Ppo
 from evoclaims.networks.all_skips import AllSkips
-from evoclaims.networks.genome import Genome
-from evoclaims.networks.graph import GraphNetwork
 from evoclaims.trials import champions
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.runner import run
@@ -156,38 +154,3 @@ def test_a_trial_without_a_champion_says_so(cpus: list[Any], tmp_path: Path) -> 
     assert stored is not None
     with pytest.raises(UserError, match="Seed 0 of walker on n_parity has no champion: it is crashed"):
         champions.load(store, condition, stored)
-
-
-def test_a_genome_comes_back_with_the_network_that_it_describes(ran: Any) -> None:
-    for name, sizes in (("neat", (3, 1)), ("hyperneat", (4, 1))):
-        store, (result, *_) = ran(name)
-        parameters = champions.load(store, _condition(name), result)
-        assert isinstance(parameters, Genome)
-        network = champions.network_of(_condition(name), parameters)
-        assert network == GraphNetwork(*sizes, ("tanh", "sin"), "tanh")
-    for name in ("cma_es", "ppo", "hand_built"):
-        store, (result, *_) = ran(name)
-        condition = _condition(name)
-        parameters = champions.load(store, condition, result)
-        assert champions.network_of(condition, parameters) is None
-        assert champions.substrate_of(condition, parameters) is None
-
-
-def test_only_a_genome_that_draws_on_a_substrate_has_one(ran: Any) -> None:
-    store, (result, *_) = ran("neat")
-    assert champions.substrate_of(_condition("neat"), champions.load(store, _condition("neat"), result)) is None
-    store, results = ran("hyperneat")
-    condition = _condition("hyperneat")
-    for result in results:
-        genome = champions.load(store, condition, result)
-        drawn = champions.substrate_of(condition, genome)
-        assert drawn is not None
-        substrate, weights = drawn
-        assert [len(layer) for layer in substrate.layers] == [4, 3, 1]
-        assert [matrix.shape for matrix in weights] == [(3, 4), (1, 3)]
-        signal = np.array([1.0, 0.0, 1.0, 1.0])
-        for matrix in weights:
-            signal = np.tanh(matrix @ signal)
-        encoding = METHODS["hyperneat"].encoding(condition.task)  # type: ignore[attr-defined]
-        acted = encoding.apply(encoding.express(genome), jnp.array([1.0, 0.0, 1.0]))
-        np.testing.assert_allclose(acted, signal, rtol=1e-5)

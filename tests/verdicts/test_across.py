@@ -6,7 +6,6 @@ import io
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from xml.etree import ElementTree
 
 import pytest
 from hand_made_verdicts import report
@@ -16,16 +15,13 @@ from evoclaims.core.packages import recorded
 from evoclaims.envs.gates.parity import NParity
 from evoclaims.methods.hand_built import HandBuilt
 from evoclaims.report import across as across_report
-from evoclaims.report.across import across_chart
 from evoclaims.report.console import PlainSpokenConsole
-from evoclaims.report.verdict_chart import svg
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.spec import Budget, Condition
 from evoclaims.trials.store import Store
 from evoclaims.verdicts.across import Across, Judged, across, judged
 from evoclaims.verdicts.source_trials import SourceTrials
 
-SVG = "{http://www.w3.org/2000/svg}"
 CONDITION = Condition(HandBuilt(), NParity(2), "direct", Budget(generations=1, reports=1))
 HERE = {"device": {"platform": "cpu", "kind": "cpu"}, "machine": "Linux", "depends_on": ["jax"]}
 BY_VERSION: Mapping[str, float] = {"1": 0.5, "2": 0.5, "3": 0.25, "4": 0.5}
@@ -129,22 +125,6 @@ def test_the_text_of_an_issue_begins_with_what_changed_and_ends_with_the_command
     )
     assert "| ✗ refuted, CHANGED<br>A12 0.00, p 5e-05, DRIFT<br>10 of 10 differ |" in text
     assert text.endswith("```sh\nevoclaims across --package jax 1 2\n```\n")
-
-
-def test_the_chart_marks_each_cell_as_high_as_its_effect_and_drift_by_a_ring(found: Across) -> None:
-    drawing = ElementTree.fromstring(svg(across_chart(found)))
-    marks = {
-        mark.findtext(f"{SVG}title"): mark for mark in drawing.iter() if mark.tag in (f"{SVG}circle", f"{SVG}path")
-    }
-    same, low = (
-        marks["✓ supported; same to the bit"],
-        marks["✗ refuted, CHANGED; A12 0.00, p 5e-05, DRIFT; 10 of 10 differ"],
-    )
-    assert float(low.attrib["cy"]) > float(same.attrib["cy"]) == float(marks["✓ supported"].attrib["cy"])
-    assert same.attrib["fill"] != low.attrib["fill"]
-    (ring,) = (mark for mark in drawing.iter(f"{SVG}circle") if mark.attrib["fill"] == "none")
-    assert (ring.attrib["cx"], ring.attrib["cy"]) == (low.attrib["cx"], low.attrib["cy"])
-    assert "no such release" in marks
 
 
 def test_rows_for_programs_have_numbers_and_one_for_each_environment_without_verdicts(found: Across) -> None:

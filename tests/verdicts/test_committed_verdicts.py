@@ -14,12 +14,13 @@ from reproductions.nisioti2025 import REPRODUCTION
 
 
 def test_committed_trials_give_the_accepted_verdicts_with_the_same_fingerprints(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(Path(__file__).parents[2])
-    out = tmp_path / "verdicts.json"
-    assert main(["export", "--verdicts", f"--storage={tmp_path}", f"--out={out}"]) == 0
-    rows = [row for row in json.loads(out.read_text())["rows"] if row["outcome"] != "not run"]
+    rows = []
+    for tier in REPRODUCTION.tiers:
+        assert main(["status", f"--tier={tier}", "--as=json", f"--storage={tmp_path}"]) == 0
+        rows += [row for row in json.loads(capsys.readouterr().out)["rows"] if row["outcome"] != "not run"]
     now = {
         (row["tier"], named(row["claim"], row["case"])): (row["outcome"], row["fingerprint"], row["n"], row["p"])
         for row in rows

@@ -1,6 +1,6 @@
 """The command line: `evoclaims COMMAND`, each in a module of its name.
 
-Before trials: plan, run, submit, jobs. Verdicts: status, audit, accept, compare, report, badge, export. Evidence:
+Before trials: plan, run, submit, jobs. Verdicts: status, audit, accept, compare, report, export. Evidence:
 reproduce, champion, look. Releases of libraries: across, bisect. Files: merge, verify, reference.
 """
 

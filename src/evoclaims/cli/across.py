@@ -19,7 +19,6 @@ from evoclaims.core.environments import Recipe, checked, checked_name, installed
 from evoclaims.core.errors import UnknownNameError, UserError
 from evoclaims.report import across as across_report
 from evoclaims.report.console import PlainSpokenConsole
-from evoclaims.report.verdict_chart import svg
 from evoclaims.verdicts import export
 from evoclaims.verdicts.across import Across, across
 
@@ -27,7 +26,6 @@ FORMS: Final[Mapping[str, Callable[[Across], bytes]]] = {
     "markdown": lambda found: across_report.markdown(found, _command()).encode(),
     "csv": lambda found: export.as_csv(across_report.rows(found)),
     "json": lambda found: export.as_json(across_report.rows(found)),
-    "svg": lambda found: svg(across_report.across_chart(found)).encode(),
 }
 """Writers by the names of their forms."""
 

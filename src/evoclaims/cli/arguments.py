@@ -10,7 +10,6 @@ _WITHOUT_TIER = {"jobs", "verify", "merge", "tables"}
 _TIERS = {
     "audit": ("full", "full (default: the paper's own sentences) or smoke"),
     **dict.fromkeys(("report", "accept", "compare", "export"), ("all", "smoke, full or all (default)")),
-    "replicate": ("full", "full (default: the paper's size) or smoke"),
 }
 """Defaults of --tier, and how it is explained, where they are not those of the other commands."""
 
@@ -151,20 +150,13 @@ def _reading(add: _Add) -> None:
         "run nothing; exit status 1 when a supported verdict is vacuous or a claim names no line and date",
     )
 
-    report = add("report", "write a web page and a Markdown file about all claims from the trials at hand; run nothing")
-    report.add_argument(
-        "--trajectories",
-        action="store_true",
-        help="run the champions of robots' tasks again and draw their paths (minutes)",
-    )
+    report = add("report", "write a web page about all claims from the trials at hand; run nothing")
     report.add_argument("--out", metavar="FOLDER", help="folder to write (report/)")
 
-    champion = add("champion", "replay a stored trial's champion on every level, and draw or export its network")
+    champion = add("champion", "replay a stored trial's champion on every level")
     champion.add_argument("method", help="the method")
     champion.add_argument("--on", metavar="TASK", required=True, help="the task")
     champion.add_argument("--seed", type=int, default=0, help="the trial's seed (0)")
-    champion.add_argument("--as", dest="form", metavar="FORM", help="also write its network: json, svg or png")
-    champion.add_argument("--out", metavar="FILE", help="file to write (figures/METHOD-TASK-SEED.FORM)")
 
     look = add("look", "draw a robot's task, or show what a stored champion does in it")
     look.add_argument("task", help="the task")
@@ -174,8 +166,8 @@ def _reading(add: _Add) -> None:
         "--as",
         dest="form",
         metavar="FORM",
-        help="path (default): a picture of the paths of all episodes; page: an episode in 3D, for a browser; gif: an "
-        "episode, animated; elites: the map of MAP-Elites",
+        help="path (default): a picture of the paths of all episodes; gif: an episode, animated; "
+        " elites: the map of MAP-Elites",
     )
     look.add_argument(
         "--episode", type=int, default=0, metavar="N", help="number of the evaluation's episode, from 0 (0)"
@@ -193,16 +185,6 @@ def _reading(add: _Add) -> None:
         "--variant", metavar="NAME", default="", help="use the trials under this variant of the protocol"
     )
 
-    replicate = add("replicate", "compare the numbers that the paper has published with those of the trials at hand")
-    replicate.add_argument(
-        "--variant",
-        metavar="NAME",
-        default="",
-        help="use trials under this variant of the protocol; all: the protocol and each variant",
-    )
-    replicate.add_argument("--as", dest="form", metavar="FORM", help="write a file instead: csv, json or markdown")
-    replicate.add_argument("--out", metavar="FILE", help="file to write (report/replication.FORM)")
-
 
 def _keeping(add: _Add) -> None:
     verify = add(
@@ -212,7 +194,7 @@ def _keeping(add: _Add) -> None:
     )
     verify.add_argument("--dry-run", action="store_true", help="list bad files and leave them where they are")
 
-    merge = add("merge", "copy trials, champions and verdicts of other stores into one; existing files stay")
+    merge = add("merge", "copy trials and champions of other stores into one; existing files stay")
     merge.add_argument("stores", nargs="+", metavar="STORE", help="a folder of trials, such as another machine's")
     merge.add_argument("--dry-run", action="store_true", help="list what would be copied, and copy nothing")
 
@@ -231,18 +213,13 @@ def _keeping(add: _Add) -> None:
 def _comparing(add: _Add) -> None:
     compare = add(
         "compare",
-        "compare the current verdicts with the accepted ones; or a git revision with the working tree; or a store "
-        "(OLD) with --storage; or two revisions, or two stores; run nothing",
+        "compare the current verdicts with the accepted ones; or a store (OLD) with --storage; or two stores; run "
+        "nothing",
     )
-    compare.add_argument("places", nargs="*", metavar="OLD [NEW]", help="a git revision or a folder of trials")
+    compare.add_argument("places", nargs="*", metavar="OLD [NEW]", help="a folder of trials")
     compare.add_argument(
         "--fail", metavar="CHANGES", help="exit with 1 on these changes, such as 'supported->refuted,*->error'"
     )
-    compare.add_argument(
-        "--timeline", metavar="CLAIM", nargs="?", const="", help="list accepted verdicts by date, of CLAIM or of all"
-    )
-
-    compare.add_argument("--out", metavar="FILE", help="with --timeline: also draw it over dates and versions, as SVG")
 
     watch = add(
         "watch",
@@ -274,9 +251,7 @@ def _comparing(add: _Add) -> None:
     )
     across.add_argument("--python", nargs="+", metavar="VERSION", help="an environment with each Python, such as 3.13")
     across.add_argument("--only", metavar="IDS", help="judge only these claims, such as G1,G7 or G6[neat-ppo]")
-    across.add_argument(
-        "--as", dest="form", metavar="FORM", help="also write it: markdown, csv, json, or a chart as svg"
-    )
+    across.add_argument("--as", dest="form", metavar="FORM", help="also write it: markdown, csv or json")
     across.add_argument("--out", metavar="FILE", help="file to write (report/across.FORM; .md for markdown)")
 
     bisect = add(
@@ -295,16 +270,12 @@ def _comparing(add: _Add) -> None:
 
 
 def _exporting(add: _Add) -> None:
-    """Add what writes trials and verdicts for other programs and pages."""
-    export = add("export", "write the trials at hand, or the verdicts that they give, as a table")
-    export.add_argument("--verdicts", action="store_true", help="one row per claim instead of one per trial")
+    """Add what writes trials for other programs and pages."""
+    export = add("export", "write the trials at hand as a table")
     export.add_argument("--as", dest="form", metavar="FORM", default="json", help="json (default), csv or parquet")
-    export.add_argument("--out", metavar="FILE", help="file to write (report/trials.FORM, report/verdicts.FORM)")
+    export.add_argument("--out", metavar="FILE", help="file to write (report/trials.FORM)")
 
     tables = add(
         "tables", "write the tables in Markdown files again, from the reference trials; exit status 1 if one changed"
     )
     tables.add_argument("files", nargs="+", metavar="FILE", help="such as README.md")
-
-    badge = add("badge", "draw the number of claims with each outcome, as a small SVG picture")
-    badge.add_argument("--out", metavar="FILE", help="file to write (report/claims-TIER.svg)")

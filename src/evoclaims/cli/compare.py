@@ -1,4 +1,4 @@
-"""`evoclaims compare`: two sets of verdicts and trials, current, of a git revision, or of a store."""
+"""`evoclaims compare`: two sets of verdicts and trials, accepted and current ones, or of two stores."""
 
 from __future__ import annotations
 
@@ -7,23 +7,18 @@ import os
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import chain
-from pathlib import Path
 
 from evoclaims.claims.fetching import StoredOnly
 from evoclaims.claims.session import Session
 from evoclaims.cli.project import Project, open_project
 from evoclaims.cli.store_folder import open_store
-from evoclaims.cli.terminal import write
 from evoclaims.core.errors import UserError
 from evoclaims.judging.drift_report import DriftReport
 from evoclaims.judging.tripwire import DigestCheck
 from evoclaims.paper.archive import Archive
-from evoclaims.report.across import timeline_chart
-from evoclaims.report.verdict_chart import svg
 from evoclaims.trials.store import Store
-from evoclaims.verdicts import comparison, history, transitions
-from evoclaims.verdicts.acceptance import timeline
-from evoclaims.verdicts.comparison import GitRevision, Side, find_revision
+from evoclaims.verdicts import comparison, transitions
+from evoclaims.verdicts.comparison import Side
 from evoclaims.verdicts.other_code import listed
 from evoclaims.verdicts.transitions import Kind
 
@@ -32,24 +27,12 @@ UNSAID = (Kind.SAME, Kind.NOT_RUN)
 
 
 def main(options: argparse.Namespace) -> int:
-    """Print what changed, or a timeline; 1 when a change that --fail names is among them."""
+    """Print what changed; 1 when a change that --fail names is among them."""
     patterns = transitions.parse_patterns(options.fail) if options.fail is not None else ()
     if len(options.places) > 2:
-        raise UserError(f"Two stores or two revisions can be compared, not {len(options.places)}.")
+        raise UserError(f"Two stores can be compared, not {len(options.places)}.")
     project = open_project(options.storage)
     tiers = project.tiers(options.tier)
-    if options.timeline is not None:
-        if options.places or patterns:
-            raise UserError("--timeline shows only the accepted verdicts. Leave out the other things to compare.")
-        kept = history.load(project.reproduction.folder / history.FILE)
-        asked = {key: entries for key, entries in kept.items() if key[0] in tiers}
-        print(timeline(asked, options.timeline))
-        if options.out is not None:
-            write(Path(options.out), svg(timeline_chart(asked, options.timeline)).encode())
-            print(f"wrote {options.out}")
-        return 0
-    if options.out is not None:
-        raise UserError("--out draws what --timeline lists: add --timeline.")
     old, new = (side.of(tiers) for side in _sides(project, tiers, options.places))
     found = transitions.compare(old.verdicts, new.verdicts)
     drift, digests = comparison.compare_trials(old, new)
@@ -73,46 +56,20 @@ def main(options: argparse.Namespace) -> int:
 def _sides(project: Project, tiers: Sequence[str], places: Sequence[str]) -> tuple[Side, Side]:
     """Return the old and the new side that the command line names."""
     reproduction = project.reproduction
-    if not places:
-        accepted = comparison.working_tree(reproduction)
-        if not accepted.verdicts:
-            raise UserError("No verdict has been accepted yet: run `evoclaims accept` to accept the current ones.")
-        now = replace(
-            comparison.store(reproduction, project.archive, project.judge(*tiers)),
-            name=f"judged from the store {project.store.root}, and from reference trials where it has no better ones",
-        )
-        return replace(accepted, name="accepted verdicts, and reference trials"), now
-    found = [_place(project, place) for place in places]
-    revisions = [place for place in found if isinstance(place, GitRevision)]
-    stores = [place for place in found if isinstance(place, Store)]
-    if revisions and stores:
-        raise UserError(
-            f"{revisions[0].name} is a revision and {stores[0].root} a store. Compare two revisions or two stores."
-        )
-    if revisions:
-        read = [comparison.revision(reproduction, place) for place in revisions]
-        return read[0], read[1] if len(read) == 2 else comparison.working_tree(reproduction)
-    return _stores(project, tiers, *[*stores, project.store][:2])
+    if places:
+        return _stores(project, tiers, *[*map(_store, places), project.store][:2])
+    accepted = comparison.committed(reproduction)
+    if not accepted.verdicts:
+        raise UserError("No verdict has been accepted yet: run `evoclaims accept` to accept the current ones.")
+    now = comparison.store(reproduction, project.archive, project.judge(*tiers))
+    name = f"judged from the store {project.store.root}, and from reference trials where it has no better ones"
+    return accepted, replace(now, name=name)
 
 
-def _place(project: Project, name: str) -> GitRevision | Store:
-    """Return what a name stands for."""
-    path, revision = Path(name), None
-    if not path.is_absolute() and not name.startswith("."):  # no git revision has such a name
-        try:
-            revision = find_revision(name, project.reproduction.folder)
-        except UserError:
-            if not os.path.isdir(path):  # without a repository, the name can still be a folder
-                raise
-    if revision is not None and os.path.isdir(path):
-        raise UserError(
-            f"{name} is both a folder and a git revision: write ./{name} for the folder, or "
-            f"the revision's hash, {revision.sha[:12]}."
-        )
-    if revision is not None:
-        return revision
-    if not os.path.isdir(path):
-        raise UserError(f"There is neither a git revision nor a folder called {name}.")
+def _store(name: str) -> Store:
+    """Return the store that the command line names."""
+    if not os.path.isdir(name):
+        raise UserError(f"There is no trial store {name!r}: no folder has this name. Check it.")
     return open_store(name)
 
 

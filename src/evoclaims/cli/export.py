@@ -1,4 +1,4 @@
-"""`evoclaims export`: trials or verdicts as a table for other programs."""
+"""`evoclaims export`: trials as a table for other programs."""
 
 from __future__ import annotations
 
@@ -24,25 +24,19 @@ def main(options: argparse.Namespace) -> int:
     project = open_project(options.storage)
     tiers = project.tiers(options.tier)
     damaged: list[DamagedFileError] = []
-    if options.verdicts:
-        what = "verdicts"
-        rows = export.verdict_rows(project.judge(*tiers))
-    else:
-        what = "trials"
-        names = {
-            condition: [name for name in known if name.tier in tiers]
-            for condition, known in names_of(project.reproduction).items()
-        }
-        trials = _trials(project, damaged)
-        rows = export.trial_rows((t for t in trials if options.tier == ALL_TIERS or names.get(t.condition)), names)
-        if not rows:
-            raise UserError(
-                f"Neither {options.storage} nor the reference trials hold a trial of this tier; "
-                "`evoclaims run` runs some."
-            )
-    out = Path(options.out or REPORT / f"{what}.{options.form}")
+    names = {
+        condition: [name for name in known if name.tier in tiers]
+        for condition, known in names_of(project.reproduction).items()
+    }
+    trials = _trials(project, damaged)
+    rows = export.trial_rows((t for t in trials if options.tier == ALL_TIERS or names.get(t.condition)), names)
+    if not rows:
+        raise UserError(
+            f"Neither {options.storage} nor the reference trials hold a trial of this tier; `evoclaims run` runs some."
+        )
+    out = Path(options.out or REPORT / f"trials.{options.form}")
     write(out, export.FORMS[options.form](rows), ours=options.out is None)
-    print(f"wrote {out}: {len(rows)} {what}")
+    print(f"wrote {out}: {len(rows)} trials")
     for error in damaged:
         print(f"left out: {error}", file=sys.stderr)
     return int(bool(damaged))

@@ -17,7 +17,7 @@ from evoclaims.cli.terminal import FIGURES, write
 from evoclaims.core.drawing import Format
 from evoclaims.core.errors import UnknownNameError, UserError
 from evoclaims.envs.ecorobot.robot_task import RobotTask
-from evoclaims.envs.ecorobot.views import page, pictures
+from evoclaims.envs.ecorobot.views import pictures
 from evoclaims.envs.ecorobot.views.motion import Motion, marks, motion
 from evoclaims.methods.map_elites import MapElites
 from evoclaims.paper.reproduction import Tier
@@ -186,7 +186,6 @@ def _elites(subject: Subject, ending: str) -> bytes:
 
 FORMS: Final[Mapping[str, Form]] = {
     "path": Form(PICTURE, _path),
-    "page": Form(("html",), lambda one, _: page.page(one.task, one.motion, one.episode_title)),
     "gif": Form(("gif",), lambda one, _: pictures.film(one.task, one.motion, one.episode_title)),
     "elites": Form(PICTURE, _elites, episodes=False),
 }

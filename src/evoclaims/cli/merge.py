@@ -1,4 +1,4 @@
-"""`evoclaims merge`: trials, champions and files of evidence of other stores, copied into one."""
+"""`evoclaims merge`: trials and champions of other stores, copied into one; claims are judged anew from them."""
 
 from __future__ import annotations
 
@@ -6,19 +6,17 @@ import argparse
 import os
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
 from evoclaims.cli.store_folder import open_store
 from evoclaims.core.canonical import canonical_json
 from evoclaims.core.errors import UserError
-from evoclaims.core.files import read_json
 from evoclaims.core.printable import printable
 from evoclaims.trials.failed import time_allowed
 from evoclaims.trials.result import COMPLETE, TrialResult
 from evoclaims.trials.store import DamagedFileError, Store
-from evoclaims.verdicts.claim_report import ClaimReport, evidence_path, save
 
 Fate = Literal["copied", "there", "differs", "damaged"]
 """What became of a file: copied; there already, alike; there and different, so that it stays; left out."""
@@ -113,46 +111,6 @@ def _same(one: Any, other: Any) -> bool:
     return canonical_json(one) == canonical_json(other)
 
 
-def merge_evidence(source: Store, into: Store, dry_run: bool = False) -> Iterator[Merged]:
-    """Copy the last verdict of each claim, where the other store has none.
-
-    Nothing is judged from these files: the next run with all trials writes them anew.
-
-    Raises:
-        UserError: when the disk is full or read-only.
-    """
-    for path in sorted((source.root / "verdicts").rglob("*.json")):
-        if path.name.startswith("."):
-            continue
-        report = _read(path, source.root)
-        if report is None:
-            yield Merged(path, "damaged", "it is left out: it holds no verdict of the claim that it is named after")
-            continue
-        target = evidence_path(report, into.root)
-        if target.exists():
-            there = _read(target, into.root)
-            if there is None or replace(there, evidence="") == replace(report, evidence=""):
-                yield Merged(path, "there")
-            else:
-                note = f"{report.outcome}, and {there.outcome} in {target}, which stays until claims are judged again"
-                yield Merged(path, "differs", note)
-            continue
-        if not dry_run:
-            saved = save(report, into.root)
-            if saved.unsaved:
-                raise UserError(saved.unsaved)
-        yield Merged(path, "copied")
-
-
-def _read(path: Path, root: Path) -> ClaimReport | None:
-    """Read a file of evidence; None where it is damaged, or in a place that is not its claim's."""
-    try:
-        report = ClaimReport.from_json(read_json(path))
-    except (OSError, ValueError):
-        return None
-    return report if evidence_path(report, root) == path else None
-
-
 def main(options: argparse.Namespace) -> int:
     """Copy what is whole and new, and name what differs or is damaged; 1 when trials differ or files are damaged."""
     into = open_store(options.storage)
@@ -161,14 +119,16 @@ def main(options: argparse.Namespace) -> int:
         into.check_writable()
     wrong = False
     for source in sources:
-        trials, trials_wrong = _counted(merge_trials(source, into, options.dry_run))
-        verdicts, _ = _counted(merge_evidence(source, into, options.dry_run))
-        damaged = trials["damaged"] + verdicts["damaged"]
-        wrong = wrong or trials_wrong or bool(damaged)
+        fates: Counter[str] = Counter()
+        for one in merge_trials(source, into, options.dry_run):
+            fates[one.fate] += 1
+            if one.reason:
+                print(one)
+        wrong = wrong or bool(fates["differs"] or fates["damaged"])
         copied = "to copy" if options.dry_run else "copied"
         print(
-            f"{source.root}: trials: {trials['copied']} {copied} into {into.root}, {trials['there']} there already, "
-            f"{trials['differs']} different; verdicts: {verdicts['copied']} {copied}; damaged files left out: {damaged}"
+            f"{source.root}: trials: {fates['copied']} {copied} into {into.root}, {fates['there']} there already, "
+            f"{fates['differs']} different; damaged files left out: {fates['damaged']}"
         )
     return int(wrong)
 
@@ -187,13 +147,3 @@ def _source(name: str, into: Store) -> Store:
             f"{name} is the store to copy into. Name other stores, or name the store to copy into with --storage."
         )
     return source
-
-
-def _counted(files: Iterator[Merged]) -> tuple[Counter[str], bool]:
-    """Print what differs or is damaged; return how many files have which fate, and whether any was printed."""
-    counts: Counter[str] = Counter()
-    for one in files:
-        counts[one.fate] += 1
-        if one.reason:
-            print(one)
-    return counts, bool(counts["differs"] or counts["damaged"])

@@ -1,4 +1,4 @@
-"""`evoclaims report`: a web page and a Markdown file about all claims."""
+"""`evoclaims report`: a web page about all claims."""
 
 from __future__ import annotations
 
@@ -7,15 +7,11 @@ from dataclasses import replace
 from datetime import UTC, datetime
 from importlib import metadata
 from pathlib import Path
-from typing import Any
 
 from evoclaims.cli.project import ALL_TIERS, Project, open_project
 from evoclaims.cli.store_folder import APART
-from evoclaims.cli.stored_trial import Stored, run_again
 from evoclaims.cli.terminal import REPORT, write
 from evoclaims.core.errors import UserError
-from evoclaims.envs.ecorobot.robot_task import RobotTask
-from evoclaims.envs.ecorobot.views import pictures
 from evoclaims.figures import figure
 from evoclaims.figures.replication import replications
 from evoclaims.figures.sheet import svg
@@ -23,14 +19,9 @@ from evoclaims.paper.archive import Archive
 from evoclaims.paper.reproduction import Reproduction
 from evoclaims.report import across, table_cells, watch_chart
 from evoclaims.report.build import gather
-from evoclaims.report.champion import network
 from evoclaims.report.formatting import listed
 from evoclaims.report.html import html
-from evoclaims.report.markdown import markdown
 from evoclaims.report.model import PaperFigure
-from evoclaims.trials import devices
-from evoclaims.trials.result import TrialResult
-from evoclaims.trials.spec import Condition
 from evoclaims.verdicts import history, mutation_matrix, watch_file
 from evoclaims.verdicts.robustness import matrix
 
@@ -59,7 +50,7 @@ def paper_figures(
 
 
 def main(options: argparse.Namespace) -> int:
-    """Judge from the trials at hand, write both files, and print where they are."""
+    """Judge from the trials at hand, write the page, and print where it is."""
     project = open_project(options.storage)
     reproduction, archive = project.reproduction, project.archive
     tiers = list(reproduction.tiers)[::-1]  # the paper's own sentences come first
@@ -84,7 +75,6 @@ def main(options: argparse.Namespace) -> int:
         archive,
         history.load(reproduction.folder / history.FILE),
         sentences={report.name: report.statement for report in verdicts[tiers[0]]},
-        draws=(trajectory, network) if options.trajectories else (network,),
         put_to_the_paper=by_the_paper,
         mutants=mutation_matrix.load(reproduction.folder / mutation_matrix.FILE),
     )
@@ -98,10 +88,9 @@ def main(options: argparse.Namespace) -> int:
         watch=watch_chart.shown(watch_file.load(reproduction.folder / watch_file.FILE)[1]),
         generated=f"Written on {datetime.now(UTC):%Y-%m-%d %H:%M} UTC by evoclaims {metadata.version('evoclaims')}.",
     )
-    folder = Path(options.out or REPORT)
-    for name, text in (("index.html", html(page)), ("report.md", markdown(page))):
-        write(folder / name, text.encode(), "folder", ours=options.out is None)
-        print(f"wrote {folder / name}")
+    out = Path(options.out or REPORT) / "index.html"
+    write(out, html(page).encode(), "folder", ours=options.out is None)
+    print(f"wrote {out}")
     for board in page.boards:
         print(f"claims ({board.tier}): {table_cells.totals(verdicts[board.tier])}")
     return 0
@@ -117,12 +106,3 @@ def _tried(project: Project, tier: str) -> list[str]:
             project.archive.trials(condition, seeds)[0] for condition in reproduction.changed_by(name, tier).values()
         )
     ]
-
-
-def trajectory(condition: Condition, result: TrialResult, parameters: Any, title: str) -> bytes | None:
-    """Draw the paths of a champion on a robot's task in its evaluation, run again; None for other tasks."""
-    if not isinstance(condition.task, RobotTask):
-        return None
-    trial = Stored(title, condition, result, parameters, Path())
-    (device, *_) = devices.choose("auto")
-    return pictures.draw(condition.task, run_again(trial, condition.task, device).torsos, title, "svg")

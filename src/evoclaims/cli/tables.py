@@ -37,7 +37,6 @@ from evoclaims.judging.verdict import Outcome
 from evoclaims.paper.reported import uncovered
 from evoclaims.report import replication_cells, verdict_overview, vocabulary
 from evoclaims.report.formatting import literal, plural, table
-from evoclaims.report.markdown import numbers, robustness
 from evoclaims.report.table_cells import NONE
 from evoclaims.report.tally import by_sentence, tally
 from evoclaims.report.trial_summary import Reader
@@ -208,7 +207,7 @@ def _details(project: Project, words: list[str], *_: str) -> str:
     tried = [name for name in variants if any(name in row.outcomes for row in rows)]
     left = ", ".join(name for name in variants if name not in tried)
     unjudged = f"No claim's trials have all run under: {literal(left)}." if left else ""
-    return "\n\n".join(filter(None, (robustness(rows, tried), unjudged)))
+    return "\n\n".join(filter(None, (_robustness(rows, tried), unjudged)))
 
 
 def _refutations(project: Project, words: list[str], *_: str) -> str:
@@ -240,6 +239,27 @@ def _tier(project: Project, words: list[str]) -> str:
     return tier
 
 
+def _robustness(rows: Sequence[Robustness], variants: Sequence[str]) -> str:
+    """Return one line per claim and a column per variant; a verdict that differs from the protocol's is bold."""
+    return table(
+        ("claim", "tier", "the protocol", *map(literal, variants)),
+        (
+            (
+                literal(row.claim),
+                literal(row.tier),
+                literal(row.plain),
+                *(
+                    f"**{literal(row.outcomes[name])}**"
+                    if name in row.hangs_on
+                    else literal(row.outcomes.get(name, NONE))
+                    for name in variants
+                ),
+            )
+            for row in rows
+        ),
+    )
+
+
 def _numbers(project: Project, words: list[str], *_: str) -> str:
     """Return the published numbers beside ours; the words are a tier and, for the variants too, "all"."""
     tier, *rest = words or list(project.reproduction.tiers)[-1:]
@@ -247,7 +267,7 @@ def _numbers(project: Project, words: list[str], *_: str) -> str:
     found = replications(project.archive, project.reproduction, tier, variants)
     (papers,) = project.judge_sessions([(project.as_published(tier), tier)])
     lines = [*replication_cells.totals(found), *replication_cells.put_to_the_paper(papers)]
-    return "\n\n".join((numbers(found), "\n".join(f"* {literal(line)}" for line in lines)))
+    return "\n\n".join((replication_cells.markdown(found), "\n".join(f"* {literal(line)}" for line in lines)))
 
 
 _KINDS: Final[Mapping[str, Callable[[Project, list[str], str], str]]] = {

@@ -18,8 +18,7 @@ def optional(module: str) -> Any:
         return importlib.import_module(module)
     except ImportError as error:
         raise UserError(
-            f"{module.partition('.')[0]} is not installed, which pictures and graphs of networks need: "
-            'pip install "evoclaims[pictures]".'
+            f'{module.partition(".")[0]} is not installed, which pictures need: pip install "evoclaims[pictures]".'
         ) from error
 
 

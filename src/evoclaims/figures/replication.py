@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 from evoclaims.core.errors import UnknownNameError
 from evoclaims.figures.figure import Scope
@@ -66,35 +65,6 @@ class Replication:
         return null is not None and any(
             one.low <= null <= one.high for one in self.repetition.predictions if one.of == "mean"
         )
-
-    def row(self) -> dict[str, Any]:
-        """Return it as one row of a table for other programs."""
-        common = {
-            "method": self.numbers.method,
-            "task": self.numbers.task,
-            "measure": self.measure,
-            "tier": self.tier,
-            "variant": self.variant,
-            "published.mean": self.reported.value,
-            "published.error": self.reported.error,
-            "published.trials": self.reported.trials,
-            "published.place": self.reported.place,
-            "ours.mean": self.numbers.mean if self.numbers.values else None,
-            "ours.deviation": self.numbers.deviation if len(self.numbers.values) > 1 else None,
-            "ours.trials": len(self.numbers.values),
-            "ours.values": list(self.numbers.values),
-            "answer": self.repetition.answer,
-            "agreement": self.agreement,
-            "needed": self.repetition.needed,
-            "null": self.reported.null,
-            "holds_null": self.holds_null,
-            "reason": self.repetition.reason,
-        }
-        predictions = [
-            {"spread": p.spread, "of": p.of, "low": p.low, "high": p.high, "ours": p.ours, "answer": p.answer}
-            for p in self.repetition.predictions
-        ]
-        return {**common, "predictions": predictions}
 
 
 def replications(

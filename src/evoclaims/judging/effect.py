@@ -37,16 +37,6 @@ def a12(a: Sequence[float], b: Sequence[float]) -> float:
     return (cliffs_delta(a, b) + 1) / 2
 
 
-def epsilon_squared(groups: Sequence[Sequence[float]]) -> float:
-    """Return the share of the variance of ranks that lies between groups, in [0, 1]; 0 for constant data."""
-    from scipy.stats import rankdata  # its import takes longer than the collection of claims, which needs this module
-
-    ranks = rankdata(np.concatenate(groups))
-    parts = np.split(ranks - ranks.mean(), np.cumsum(list(map(len, groups)))[:-1])
-    total = sum(float((part**2).sum()) for part in parts)
-    return sum(len(part) * float(part.mean()) ** 2 for part in parts) / total if total else 0.0
-
-
 def iqm(values: Sequence[float]) -> float:
     """Return the mean of the middle half of values (interquartile mean), as rliable does; NaN for inf - inf."""
     return float(_iqm(np.asarray(values, np.float64)))
@@ -54,23 +44,11 @@ def iqm(values: Sequence[float]) -> float:
 
 def _iqm(values: Floats) -> Floats:
     """Return the interquartile means of the last axis."""
-    from scipy.stats import trim_mean  # as above
+    from scipy.stats import trim_mean  # its import takes longer than the collection of claims, which needs this module
 
     with np.errstate(invalid="ignore"):
         means: Floats = trim_mean(values, 0.25, axis=-1)
     return means
-
-
-def performance_profile(values: Sequence[float]) -> tuple[tuple[float, float], ...]:
-    """Return the performance profile of trials (Agarwal et al. 2021): the share of values above each threshold.
-
-    Returns:
-        (threshold, share): -inf and each distinct finite value, rising, which is where the share changes.
-    """
-    ordered = np.sort(np.asarray(values, np.float64))
-    thresholds = np.unique([-np.inf, *ordered[np.isfinite(ordered)]])
-    above = 1 - np.searchsorted(ordered, thresholds, side="right") / len(ordered)
-    return tuple(zip(thresholds.tolist(), above.tolist(), strict=True))
 
 
 def median(values: Sequence[float]) -> float:

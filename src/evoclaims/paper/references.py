@@ -59,18 +59,12 @@ def load(path: Path) -> tuple[TrialResult, ...]:
         if error.errno == errno.ENAMETOOLONG:  # no file has such a name
             return ()
         raise UserError(f"The reference trials {path} cannot be read: {error.strerror or error}. {_MEND}") from error
-    return records(data, str(path), _MEND)
-
-
-def records(data: bytes, name: str, advice: str = "") -> tuple[TrialResult, ...]:
-    """Return the reference trials in the contents of a file called `name`; raises as `load` does."""
     results = []
     for number, line in enumerate(data.splitlines(), start=1):
         try:
             results.append(parse(line))
         except RecordError as error:
-            message = f"Line {number} of {name} is not a reference trial: {error.reason}. {advice}"
-            raise UserError(message.rstrip()) from error
+            raise UserError(f"Line {number} of {path} is not a reference trial: {error.reason}. {_MEND}") from error
     return tuple(results)
 
 

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Final
 
 import pytest
 
-from evoclaims.core.errors import UnknownNameError, UserError
+from evoclaims.core.errors import UserError
 from evoclaims.core.files import read_text
 from evoclaims.core.tiers import TIERS
 from evoclaims.plugin.progress import progress_of
@@ -32,7 +32,6 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     """Add the options."""
     group = parser.getgroup("claims", "claims of a paper (evoclaims)")
     group.addoption("--claims-storage", metavar="DIR", help="folder of trials (.evoclaims in the project's root)")
-    group.addoption("--claims-tier", metavar="TIER", help="judge this tier's claims: smoke or full; as -m TIER")
     group.addoption("--claims-trials", metavar="N", type=int, help="judge by one look at N trials a condition")
     group.addoption("--claims-only", metavar="IDS", help="judge only these claims, such as G1,G7 or G6[neat-ppo]")
     group.addoption("--claims-device", metavar="DEVICE", default="auto", help="auto (default), cpu or gpu")
@@ -76,11 +75,9 @@ def check(config: pytest.Config) -> None:
     Raises:
         pytest.UsageError: with a sentence.
     """
-    tier, changes = config.getoption("claims_tier"), config.getoption("claims_compare_fail")
+    changes = config.getoption("claims_compare_fail")
     try:
         _check_root(config)
-        if tier is not None and tier not in TIERS:
-            raise UnknownNameError("tier", tier, TIERS)
         if changes is not None:
             _check_changes(config, changes)
         if config.getoption("claims_committed") and not config.getoption("claims_stored"):
@@ -93,10 +90,7 @@ def check(config: pytest.Config) -> None:
 
 
 def wanted_tiers(config: pytest.Config) -> set[str]:
-    """Return the tiers that the options select; "full" only when --claims-tier or -m names it positively."""
-    tier = config.getoption("claims_tier")
-    if tier is not None:
-        return {tier}
+    """Return the tiers that the options select; "full" only when -m names it positively."""
     named = re.sub(r"\bnot\s+full\b", "", config.getoption("markexpr") or "")
     return set(TIERS) if re.search(r"\bfull\b", named) else {"smoke"}
 

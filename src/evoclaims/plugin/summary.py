@@ -227,11 +227,9 @@ class Summary:
 
     def _asked(self) -> str:
         """Say which options together have selected no claim; nothing where none of them was given."""
-        mark, tier = self._config.getoption("markexpr", ""), self._config.getoption("claims_tier")
-        given = {"--claims-tier": tier, "-m": mark, "-k": self._config.getoption("keyword", "")}
+        given = {"-m": self._config.getoption("markexpr", ""), "-k": self._config.getoption("keyword", "")}
         options = [f"{option} {shlex.quote(value)}" for option, value in given.items() if value]
-        two = ", which are two tiers" if mark in TIERS and tier not in (None, mark) else ""
-        return f" by {' with '.join(options)}{two}" if options else ""
+        return f" by {' with '.join(options)}" if options else ""
 
     def _safe(self, text: str) -> str:
         return self._drawn(shown(text))

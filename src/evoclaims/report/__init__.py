@@ -1,1 +1,1 @@
-"""Reports on the claims for readers: a web page, Markdown, a badge."""
+"""Reports on the claims for readers: tables and a web page."""

@@ -1,4 +1,4 @@
-"""Claims by environments, and accepted verdicts by date: as tables, as charts, and kept in a store for the report."""
+"""Claims by environments: as tables, and kept in a store for the report."""
 
 from __future__ import annotations
 
@@ -15,11 +15,8 @@ from evoclaims.core.files import read_file, write_atomically
 from evoclaims.report.console import SpelledTable
 from evoclaims.report.formatting import literal, p_value, plural, table
 from evoclaims.report.table_cells import NONE
-from evoclaims.report.verdict_chart import VerdictChart, VerdictMark
-from evoclaims.verdicts import acceptance
 from evoclaims.verdicts.across import Across, Cell
 from evoclaims.verdicts.export import Row
-from evoclaims.verdicts.history import History
 from evoclaims.verdicts.source_trials import versions_of
 
 COLUMN: Final = 22
@@ -126,46 +123,6 @@ def cell_lines(cell: Cell | None) -> tuple[str, ...]:
     return verdict, drift, bits
 
 
-def across_chart(found: Across) -> VerdictChart:
-    """Return a chart in which marks are as high as A12 against the first environment."""
-    rows = {
-        claim: {one.label: _mark(found.cells.get((claim, one.label)), one.trouble) for one in found.environments}
-        for claim in found.claims
-    }
-    labels = {one.label: one.label for one in found.environments}
-    return VerdictChart(headline(found), "height: A12; ring: drift", labels, rows)
-
-
-def timeline_chart(history: History, claim: str = "") -> VerdictChart:
-    """Return a chart of accepted verdicts by date and versions; a ring is a verdict under other rules than before.
-
-    Raises:
-        UserError: as `verdicts.acceptance.timeline` does.
-    """
-    columns: dict[str, str] = {}
-    rows: dict[str, dict[str, VerdictMark]] = {}
-    for tier, name in acceptance.chosen(history, claim):
-        marks = rows.setdefault(f"{name} ({tier})", {})
-        before = None
-        for entry in history[tier, name]:
-            versions = ", ".join(f"{package} {version}" for package, version in sorted(entry.versions.items()))
-            column = f"{entry.accepted}: {versions}"
-            columns[column] = f"{entry.accepted}, jax {entry.versions.get('jax', 'unknown')}"
-            ringed = before is not None and before.fingerprint != entry.fingerprint
-            marks[column] = VerdictMark(entry.outcome, acceptance.described(before, entry), ringed=ringed)
-            before = entry
-    title, note = "Accepted verdicts by date", "ring: other rules than before"
-    return VerdictChart(title, note, dict(sorted(columns.items())), rows)
-
-
-def _mark(cell: Cell | None, trouble: str) -> VerdictMark:
-    """Return the mark of a claim in an environment, which says what the table says."""
-    if cell is None:
-        return VerdictMark(None, trouble or "no verdict")
-    a12 = 0.5 if cell.drift is None or cell.drift.a12 is None else cell.drift.a12
-    return VerdictMark(cell.outcome, "; ".join(cell_lines(cell)), a12, cell.drifted)
-
-
 FILE: Final = "across.json"
 
 
@@ -177,20 +134,24 @@ class AcrossShown:
         made: when (ISO 8601).
         command: that made it.
         headline: what changed against the first environment, in a sentence.
-        lines: what the chart has no room for.
-        chart: verdicts by environment.
+        lines: what the table has no room for.
+        labels: of the environments.
+        rows: of each claim its name, and the lines of each environment's cell.
     """
 
     made: str
     command: str
     headline: str
     lines: tuple[str, ...]
-    chart: VerdictChart
+    labels: tuple[str, ...]
+    rows: tuple[tuple[str, tuple[tuple[str, ...], ...]], ...]
 
 
 def keep(found: Across, store: Path, made: str, command: str) -> None:
     """Write what was found into the folder of a store, in place of what was found before."""
-    shown = AcrossShown(made, command, headline(found), tuple(found.lines), across_chart(found))
+    labels = tuple(one.label for one in found.environments)
+    rows = ((claim, tuple(cell_lines(found.cells.get((claim, label))) for label in labels)) for claim in found.claims)
+    shown = AcrossShown(made, command, headline(found), tuple(found.lines), labels, tuple(rows))
     write_atomically(store / FILE, msgspec.json.encode(shown))
 
 

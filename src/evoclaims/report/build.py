@@ -8,20 +8,16 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from evoclaims.core.errors import UserError
 from evoclaims.judging.design import Design
 from evoclaims.judging.verdict import Outcome
 from evoclaims.paper.archive import Archive
 from evoclaims.paper.reproduction import Reproduction
 from evoclaims.report import audit, replication_cells, table_cells, training_curves, trial_summary
-from evoclaims.report.across import timeline_chart
-from evoclaims.report.champion import Draw, champion_of, network
 from evoclaims.report.evidence import Part, judged_parts, unjudged_part
 from evoclaims.report.fault_grid import fault_grid
 from evoclaims.report.formatting import Anchors, clean, counted, listed, places, plural
-from evoclaims.report.model import Board, ConditionTrials, Page, Section, ShownChampion
+from evoclaims.report.model import Board, ConditionTrials, Page, Section
 from evoclaims.report.trial_summary import Reader, TrialSummary
-from evoclaims.trials.store import Store
 from evoclaims.verdicts import other_code
 from evoclaims.verdicts.claim_report import ClaimReport
 from evoclaims.verdicts.history import AcceptedVerdict, History, eras, key_of
@@ -40,7 +36,6 @@ def gather(
     history: History,
     *,
     sentences: Mapping[str, str],
-    draws: Sequence[Draw] = (network,),
     put_to_the_paper: Sequence[ClaimReport] = (),
     mutants: Matrix | None = None,
 ) -> Page:
@@ -52,7 +47,6 @@ def gather(
         archive: source of trials; each is read once.
         history: accepted verdicts.
         sentences: the paper's own sentences by claim, such as "G1[n_parity]".
-        draws: ways of drawing a champion, in the order in which they are tried.
         put_to_the_paper: reports of claims that were judged from the paper's own numbers.
         mutants: the committed matrix of planted faults; None for none.
     """
@@ -62,9 +56,7 @@ def gather(
         for report in put_to_the_paper
         if replication_cells.is_decided(report) and report.outcome is not Outcome.SUPPORTED
     }
-    gathered = _Gathering(reproduction, archive.store, reader, history, sentences, draws, failing, tried)
-    keys = {key_of(report) for reports in verdicts.values() for report in reports}
-    accepted = {key: entries for key, entries in history.items() if key in keys}
+    gathered = _Gathering(reproduction, reader, history, sentences, failing, tried)
     boards = tuple(
         Board(tier, tuple(gathered.section(report) for report in table_cells.in_the_papers_order(reports)))
         for tier, reports in verdicts.items()
@@ -78,7 +70,6 @@ def gather(
         variants={name: variant.says for name, variant in reproduction.variants.items()},
         put_to_the_paper=tuple(replication_cells.put_to_the_paper(put_to_the_paper)),
         faults=tuple(fault_grid(tried, tier, reports) for tier, reports in verdicts.items() if reports),
-        history=timeline_chart(accepted) if accepted else None,
     )
 
 
@@ -105,11 +96,9 @@ class _Gathering:
     """What a report's sections share while it is built: what `gather` was given, and what has been read so far."""
 
     reproduction: Reproduction
-    store: Store
     reader: Reader
     history: History
     sentences: Mapping[str, str]
-    draws: Sequence[Draw]
     failing: Mapping[tuple[str, str], str]
     mutants: Matrix
     anchors: Anchors = field(default_factory=Anchors)
@@ -132,7 +121,7 @@ class _Gathering:
             paper=sentence if sentence != report.statement else "",
             design="" if tier is None else _in_words(tier.design),
             parts=_parts(report, read),
-            conditions=tuple(self._condition(report.tier, source) for source in report.sources if source.trials),
+            conditions=tuple(self._condition(source) for source in report.sources if source.trials),
             made=made,
             warnings=(
                 *_broken(every),
@@ -149,7 +138,7 @@ class _Gathering:
             power=table_cells.power(report),
         )
 
-    def _condition(self, tier: str, source: SourceTrials) -> str:
+    def _condition(self, source: SourceTrials) -> str:
         """Return the key of a condition with this number of trials, after gathering its data."""
         key = f"{source.condition}-{len(source.trials)}"
         if key not in self.conditions:
@@ -157,17 +146,8 @@ class _Gathering:
             panels, rest = training_curves.panels(trials)
             settings = _flat(self.reader.settings.get(source.condition, {}))
             says = f"{plural(len(trials), 'trial')}. {rest}".strip()
-            champion = self._champion(tier, source, trials)
-            self.conditions[key] = ConditionTrials(source.label, says, settings, panels, champion)
+            self.conditions[key] = ConditionTrials(source.label, says, settings, panels)
         return key
-
-    def _champion(self, tier: str, source: SourceTrials, trials: Sequence[TrialSummary]) -> ShownChampion:
-        """Return a condition's champion; the condition is found by its names."""
-        try:
-            condition = self.reproduction.tier(tier).condition(source.method, source.task)
-        except UserError as error:
-            return ShownChampion(str(error))
-        return champion_of(self.store, condition, trials, self.draws)
 
 
 def _parts(report: ClaimReport, read: Mapping[str, Sequence[TrialSummary]]) -> tuple[Part, ...]:

@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 from markupsafe import Markup, escape
 
-from evoclaims.report.evidence import Dot, Part, Strip, in_short
+from evoclaims.report.evidence import Dot, Part, Strip
 from evoclaims.report.formatting import large, number, plural
 from evoclaims.report.training_curves import CurvePanel, Line
 
@@ -26,8 +26,6 @@ MOST: Final = 1e300
 LEAST: Final = 1e-300
 """The smallest difference that ticks tell apart: below, floats run out of digits."""
 
-_DASHES: Final = ("none", "6 3", "2 2", "8 2 2 2")
-"""How the lines of several conditions are distinguished."""
 
 DOT, BLOCK = 7.0, 44.0
 """Width of a dot, and of the widest block of close values, which fits into the edges."""
@@ -93,26 +91,6 @@ def axis_svg(part: Part) -> Markup:
     if _right(part) < WIDTH - EDGE:
         pieces.append(_text("tick", WIDTH - APART / 2, 14, "no number"))
     return _svg(WIDTH, AXIS if part.bounds else 18.0, pieces, "")
-
-
-def profile_svg(part: Part) -> Markup:
-    """Draw the performance profiles of a part's strips on their axis: the share of trials above each value."""
-    strips = [strip for strip in part.strips if strip.dots and strip.profile]
-    if len(strips) < 2:
-        return Markup("")
-    scale, top = _Scale(*part_scale(part), right=_right(part)), 11.0 * len(strips) + 4
-    share = _Scale(0.0, 1.0, top + HEIGHT, top)
-    pieces = [Markup('<path class="rule" d="M{0} {1}V{2}H{3}"/>').format(EDGE, top, top + HEIGHT, scale.right)]
-    for value, label in ((1.0, "100 %"), (0.0, "0 %")):
-        pieces.append(_text("small", EDGE - 3, share(value) + 3, label, "end"))
-    for index, (name, strip) in enumerate(zip(in_short([strip.label for strip in strips]), strips, strict=True)):
-        (_, first), *steps = strip.profile
-        path = f"M{_at(EDGE)} {_at(share(first))}" + "".join(f"H{_at(scale(at))}V{_at(share(up))}" for at, up in steps)
-        key = f"M{_at(EDGE)} {11 * index + 6}h20"
-        drawn = Markup('<path class="line" stroke-dasharray="{}" d="{}H{}{}"><title>{}</title></path>')
-        pieces.append(drawn.format(_DASHES[index % len(_DASHES)], path, _at(scale.right), key, strip.label))
-        pieces.append(_text("small", EDGE + 24, 11 * index + 9, name, "start"))
-    return _svg(WIDTH, top + HEIGHT + 4, pieces, "performance profiles: the share of trials above each value")
 
 
 def curves_svg(panel: CurvePanel, name: str) -> Markup:

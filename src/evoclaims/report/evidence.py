@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from statistics import median
 from typing import Final
 
-from evoclaims.judging.effect import iqm, iqm_interval, performance_profile
+from evoclaims.judging.effect import iqm, iqm_interval
 from evoclaims.judging.sample import Sample
 from evoclaims.judging.verdict import Bound, Direction, Evidence, Interval, Outcome, Verdict
 from evoclaims.report.formatting import clean, number, p_value
@@ -36,7 +36,6 @@ class Strip:
         apart: trials without one, as (seed, why): "diverged", "NaN".
         median: of all values that the judge used; None if there are none.
         least: what the median is at least, where values beyond a limit are not observed and it is one of them.
-        profile: thresholds and the share of trials above each (`performance_profile`); empty for events.
     """
 
     label: str
@@ -44,7 +43,6 @@ class Strip:
     apart: tuple[tuple[int, str], ...]
     median: float | None
     least: float | None = None
-    profile: tuple[tuple[float, float], ...] = ()
 
     @property
     def n(self) -> int:
@@ -104,7 +102,7 @@ def judged_parts(verdict: Verdict) -> tuple[Part, ...]:
             numbers=_numbers(evidence),
             detail=evidence.detail,
             event=evidence.events,
-            strips=tuple(_strip(sample, evidence.events) for sample in evidence.samples),
+            strips=tuple(_strip(sample) for sample in evidence.samples),
             bounds=tuple(bound for bound in evidence.bounds if bound.on_axis),
             spans=tuple(interval for interval in evidence.intervals if interval.on_axis),
             decided=index == verdict.deciding and len(verdict.evidence) > 1,
@@ -136,7 +134,7 @@ def _why(trial: TrialSummary) -> str:
     return "no mean success" if trial.score is None else number(trial.score)
 
 
-def _strip(sample: Sample, events: bool) -> Strip:
+def _strip(sample: Sample) -> Strip:
     """Return a sample with failed trials, and those beyond a limit, set apart."""
     failed = dict(zip(sample.failed, sample.endings, strict=True))
     pairs = list(zip(sample.seeds, sample.values, strict=True))
@@ -144,8 +142,7 @@ def _strip(sample: Sample, events: bool) -> Strip:
     shown = {dot.seed for dot in dots}
     beyond = "" if sample.limit is None else f"> {number(sample.limit)}"
     apart = tuple((seed, failed.get(seed, beyond or number(value))) for seed, value in pairs if seed not in shown)
-    profile = () if events else performance_profile(sample.values)
-    return Strip(clean(sample.label), dots, apart, sample.median, _least(sample, median), profile)
+    return Strip(clean(sample.label), dots, apart, sample.median, _least(sample, median))
 
 
 def _least(sample: Sample, statistic: Callable[[Sequence[float]], float]) -> float | None:

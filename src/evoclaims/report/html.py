@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import functools
 import gzip
+import hashlib
 import json
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
@@ -16,16 +17,12 @@ from urllib.parse import quote
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
-from evoclaims.core.content_policy import exactly
 from evoclaims.judging.verdict import Outcome
-from evoclaims.report import across, charts, formatting, replication_cells, verdict_chart
-from evoclaims.report.across import timeline_chart
+from evoclaims.report import across, charts, formatting, replication_cells
 from evoclaims.report.charts import spark_svg
 from evoclaims.report.fault_grid import LEGEND
 from evoclaims.report.formatting import plural
 from evoclaims.report.model import Page, Section
-from evoclaims.report.verdict_chart import VerdictChart
-from evoclaims.verdicts.history import key_of
 from evoclaims.verdicts.robustness import Robustness
 from evoclaims.verdicts.sentences import sentences
 
@@ -128,7 +125,6 @@ _CHAPTERS: Final = (
     ("faults", "Planted faults", "Which planted faults do the claims notice?"),
     ("across", "Releases", "Do other releases change a verdict?"),
     ("watch", "Nights", "Have trials changed, night by night?"),
-    ("history", "History", "Accepted verdicts by date and versions"),
     _FIGURES,
 )
 """The parts below the claims, as a `Page` and a template call them; what leads there; and their titles."""
@@ -209,7 +205,6 @@ def _environment() -> Environment:
     }
     environment.globals |= {"strip_svg": charts.strip_svg, "axis_svg": charts.axis_svg, "curves_svg": charts.curves_svg}
     environment.globals |= {"spark_svg": spark_svg, "plural": formatting.plural}
-    environment.globals |= {"history_svg": history_svg, "chart_svg": chart_svg, "profile_svg": charts.profile_svg}
     environment.globals |= {"replication": replication_cells, "across_legend": across.LEGEND}
     return environment
 
@@ -219,21 +214,10 @@ def _cleaned(value: object) -> object:
     return formatting.clean(value) if isinstance(value, str) and not isinstance(value, Markup) else value
 
 
-def history_svg(section: Section) -> Markup:
-    """Draw the accepted verdicts of one claim over dates and versions."""
-    entries = tuple(entry for era in section.history for entry in era)
-    return chart_svg(timeline_chart({key_of(section.report): entries}))
-
-
-def chart_svg(chart: VerdictChart) -> Markup:
-    """Draw a chart, whose texts are escaped there."""
-    return Markup(verdict_chart.svg(chart))  # noqa: S704
-
-
 def policy(style: str, script: str) -> str:
     """Return the page's Content-Security-Policy: nothing from outside, and no script or style but its own."""
     return (
-        f"default-src 'none'; img-src data:; style-src {exactly(style)}; script-src {exactly(script)}; "
+        f"default-src 'none'; img-src data:; style-src {_exactly(style)}; script-src {_exactly(script)}; "
         "base-uri 'none'; form-action 'none'"
     )
 
@@ -254,3 +238,8 @@ def _choices(values: Iterator[str]) -> list[str]:
 def _asset(name: str) -> Markup:
     """Return a file of the package as it is."""
     return Markup((resources.files("evoclaims.report") / "assets" / name).read_text(encoding="utf-8"))  # noqa: S704
+
+
+def _exactly(text: str) -> str:
+    """Return what a Content-Security-Policy allows exactly this script or style by."""
+    return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"

@@ -15,19 +15,10 @@ from evoclaims.report.fault_grid import FaultGrid
 from evoclaims.report.formatting import counted
 from evoclaims.report.training_curves import CurvePanel
 from evoclaims.report.trial_summary import Origin
-from evoclaims.report.verdict_chart import VerdictChart
 from evoclaims.report.watch_chart import WatchShown
 from evoclaims.verdicts.claim_report import APART, ClaimReport, Tally
 from evoclaims.verdicts.history import AcceptedVerdict
 from evoclaims.verdicts.robustness import Robustness
-
-
-@dataclass(frozen=True)
-class ShownChampion:
-    """The best individual of a condition's typical trial: which, or why it has no picture; an SVG's bytes, or none."""
-
-    says: str
-    picture: bytes = b""
 
 
 @dataclass(frozen=True)
@@ -39,14 +30,12 @@ class ConditionTrials:
         says: in words, how many trials with how many points each.
         settings: names and values of everything that was fixed.
         curves: panels over training.
-        champion: its best individual.
     """
 
     label: str
     says: str
     settings: tuple[tuple[str, str], ...]
     curves: tuple[CurvePanel, ...]
-    champion: ShownChampion
 
 
 @dataclass(frozen=True)
@@ -153,7 +142,6 @@ class Page:
         faults: which planted faults the claims notice, by tier.
         across: what `evoclaims across` has last found; None if it has not run.
         watch: the last series of nights at each tier.
-        history: accepted verdicts over dates and versions; None without any.
         generated: when, and by which version; free text.
     """
 
@@ -171,7 +159,6 @@ class Page:
     faults: tuple[FaultGrid, ...] = ()
     across: AcrossShown | None = None
     watch: tuple[WatchShown, ...] = ()
-    history: VerdictChart | None = None
     generated: str = ""
 
     @property

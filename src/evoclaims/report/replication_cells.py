@@ -8,7 +8,7 @@ from typing import Final
 from evoclaims.figures.replication import Replication, counts, counts_by_condition
 from evoclaims.judging.repetition import Agreement, Answer, Prediction, Spread
 from evoclaims.judging.verdict import Outcome
-from evoclaims.report.formatting import listed, number, plural
+from evoclaims.report.formatting import listed, literal, number, plural, table
 from evoclaims.report.table_cells import NONE
 from evoclaims.verdicts.claim_report import ClaimReport
 
@@ -79,6 +79,11 @@ def answer(one: Replication) -> str:
 def colour(one: Replication) -> str:
     """Return the verdict whose colour the answer takes."""
     return _COLOURS[one.agreement].name.lower()
+
+
+def markdown(found: Sequence[Replication]) -> str:
+    """Return the published numbers beside ours, as a table."""
+    return table(HEADINGS, (map(literal, cells(one)) for one in found))
 
 
 def totals(found: Sequence[Replication]) -> list[str]:

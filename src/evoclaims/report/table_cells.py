@@ -110,27 +110,21 @@ def counts(reports: Iterable[ClaimReport]) -> dict[Tally, int]:
     return {tally: found[tally] for tally in Tally if found[tally]}
 
 
-def counted(reports: Iterable[ClaimReport], each: str = "{count} {outcome}", between: str = ", ") -> str:
-    """Return how many claims count as what, such as "3 supported, 1 refuted"; empty if there are none.
-
-    Args:
-        reports: of the claims.
-        each: how one count is written.
-        between: what stands between two of them.
-    """
-    return between.join(each.format(count=count, outcome=tally) for tally, count in counts(reports).items())
+def counted(reports: Iterable[ClaimReport]) -> str:
+    """Return how many claims count as what, such as "3 supported, 1 refuted"; empty if there are none."""
+    return ", ".join(f"{count} {tally}" for tally, count in counts(reports).items())
 
 
-def totals(reports: Sequence[ClaimReport], each: str = "{count} {outcome}", between: str = ", ") -> str:
+def totals(reports: Sequence[ClaimReport]) -> str:
     """Return the same in one line, others apart: "3 supported, 1 refuted; controls: 2 supported; mechanisms: ..."."""
-    papers = counted((report for report in reports if not report.is_control), each, between)
-    return "; ".join(filter(None, (papers, others(reports, each, between)))) or "no verdicts"
+    papers = counted(report for report in reports if not report.is_control)
+    return "; ".join(filter(None, (papers, others(reports)))) or "no verdicts"
 
 
-def others(reports: Sequence[ClaimReport], each: str = "{count} {outcome}", between: str = ", ") -> str:
+def others(reports: Sequence[ClaimReport]) -> str:
     """Return the claims that are not the paper's: "controls: 2 supported; mechanisms: ..."; empty if there are none."""
     found = {kind: [report for report in reports if report.where == kind] for kind in (CONTROL, MECHANISM)}
-    return "; ".join(f"{kind}s: {counted(those, each, between)}" for kind, those in found.items() if those)
+    return "; ".join(f"{kind}s: {counted(those)}" for kind, those in found.items() if those)
 
 
 def faults(reports: Iterable[ClaimReport]) -> str:

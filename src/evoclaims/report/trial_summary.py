@@ -114,7 +114,7 @@ class TrialSummary:
 
     Attributes:
         trial: its id.
-        seed, status, champion: as in its record.
+        seed, status: as in its record.
         score: the "mean_success" metric; None without it.
         origin: where it was made.
         reports: how many points its curves have.
@@ -124,7 +124,6 @@ class TrialSummary:
     trial: str
     seed: int
     status: str
-    champion: str
     score: float | None
     origin: Origin
     reports: int
@@ -175,7 +174,6 @@ class Reader:
             trial=found.id,
             seed=found.seed,
             status=found.status,
-            champion=found.champion,
             score=found.metrics.get("mean_success"),
             origin=self._origins.setdefault(origin, origin),
             reports=reports,

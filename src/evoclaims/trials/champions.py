@@ -17,11 +17,6 @@ from evoclaims.core.provenance import what_fixes_bits
 from evoclaims.envs.base import Episode
 from evoclaims.kernels import kernel_prng
 from evoclaims.methods.base import Policy
-from evoclaims.methods.hyperneat import SubstrateNetwork
-from evoclaims.methods.neat.evolution import GenomeMethod
-from evoclaims.networks.genome import Genome
-from evoclaims.networks.graph import GraphNetwork
-from evoclaims.networks.substrate import Substrate
 from evoclaims.trials.devices import MATMUL_PRECISION
 from evoclaims.trials.layout import layout_on
 from evoclaims.trials.program import score_every_level
@@ -97,23 +92,6 @@ def replay(condition: Condition, result: TrialResult, parameters: Any, devices: 
         again={name: tuple(map(float, values)) for name, values in again.items()},
         elsewhere=tuple(sorted(name for name in here.keys() & there.keys() if here[name] != there[name])),
     )
-
-
-def network_of(condition: Condition, parameters: Any) -> GraphNetwork | None:
-    """Return the network of a champion that is a genome; None for any other champion."""
-    if not isinstance(parameters, Genome) or not isinstance(condition.method, GenomeMethod):
-        return None
-    return condition.method.network(condition.task)
-
-
-def substrate_of(condition: Condition, parameters: Any) -> tuple[Substrate, list[NDArray[Any]]] | None:
-    """Return a champion's substrate and the weights that it computes there, by layer; None without a substrate."""
-    method = condition.method
-    encoding = method.encoding(condition.task) if isinstance(method, GenomeMethod) else None
-    if not isinstance(encoding, SubstrateNetwork):
-        return None
-    with jax.default_matmul_precision(MATMUL_PRECISION):
-        return encoding.substrate, [np.asarray(weights) for weights in encoding.express(parameters)]
 
 
 def _policy(condition: Condition) -> Policy:

@@ -1,18 +1,13 @@
-"""The two sides of a comparison: verdicts and trials of a store, of a working tree, or of a git revision."""
+"""The two sides of a comparison: accepted verdicts with the reference trials, or verdicts and trials of a store."""
 
 from __future__ import annotations
 
-import os
-import re
-import subprocess
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path, PurePosixPath
-from typing import Final
 
-from evoclaims.core.errors import UserError
 from evoclaims.core.packages import Versions, depends_on
 from evoclaims.judging.drift_report import DriftReport
 from evoclaims.judging.tripwire import DigestCheck
@@ -27,92 +22,6 @@ from evoclaims.verdicts.other_code import listed
 from evoclaims.verdicts.source_trials import found_in, moved
 from evoclaims.verdicts.transitions import Standings
 
-GIT_SECONDS: Final = 60.0
-"""How long one call of git may take."""
-
-
-@dataclass(frozen=True)
-class GitRevision:
-    """A commit of the repository that contains a folder.
-
-    Attributes:
-        name: as the user wrote it.
-        sha: the commit's full name.
-        folder: paths are relative to it.
-    """
-
-    name: str
-    sha: str
-    folder: Path
-
-    def read(self, path: str) -> bytes | None:
-        """Return a file's content; None when the revision does not have it.
-
-        Raises:
-            UserError: when git fails.
-        """
-        return self._git("cat-file", "blob", f"{self.sha}:./{path}") if path in self.files(path) else None
-
-    def files(self, path: str) -> tuple[str, ...]:
-        """Return the files at and below a path, sorted.
-
-        Raises:
-            UserError: when git fails.
-        """
-        listed = self._git("ls-tree", "-r", "-z", "--name-only", self.sha, "--", path)
-        return tuple(sorted(os.fsdecode(name) for name in listed.split(b"\0") if name))
-
-    def _git(self, *arguments: str) -> bytes:
-        done = run_git(self.folder, *arguments)
-        if done.returncode:
-            reason = " ".join(done.stderr.decode(errors="replace").split())
-            raise UserError(f"git cannot read the revision {self.name}: {reason}.")
-        return done.stdout
-
-
-def find_revision(name: str, folder: Path) -> GitRevision | None:
-    """Return the commit that a name means (a branch, a tag, HEAD~3, …), or None.
-
-    Raises:
-        UserError: when git is missing or too slow, or `folder` is not in a repository.
-    """
-    inside = run_git(folder, "rev-parse", "--is-inside-work-tree")
-    if inside.returncode or inside.stdout.strip() != b"true":
-        raise UserError(
-            f"{folder} is not in a git repository, so there is no revision to compare with. Compare two "
-            "stores instead, or `evoclaims compare` alone: current verdicts with accepted ones."
-        )
-    if not name or "\0" in name:
-        return None
-    # A name that begins with a dash must not be taken for an option; from here on only the commit's hash is used.
-    found = run_git(folder, "rev-parse", "--verify", "--quiet", "--end-of-options", f"{name}^{{commit}}")
-    sha = found.stdout.decode(errors="replace").strip()
-    known = found.returncode == 0 and re.fullmatch(r"[0-9a-f]{40,64}", sha) is not None
-    return GitRevision(name, sha, folder) if known else None
-
-
-def run_git(folder: Path, *arguments: str) -> subprocess.CompletedProcess[bytes]:
-    """Run a read-only git command in a folder, without a shell.
-
-    Raises:
-        UserError: when git is missing or too slow.
-    """
-    try:
-        return subprocess.run(
-            ["git", "-c", "core.fsmonitor=false", *arguments],
-            cwd=folder,
-            capture_output=True,
-            stdin=subprocess.DEVNULL,
-            timeout=GIT_SECONDS,
-            check=False,
-            env={**os.environ, "GIT_OPTIONAL_LOCKS": "0", "LC_ALL": "C"},
-        )
-    except OSError as error:
-        raise UserError(f"Revisions are read by git, which does not start: {error.strerror or error}.") from error
-    except subprocess.TimeoutExpired as error:
-        raise UserError(f"git gave no answer within {GIT_SECONDS:g} seconds.") from error
-
-
 Trials = Mapping[str, Sequence[TrialResult]]
 """Trials by condition, named like its file of reference trials: "smoke/cma_es-n_parity"."""
 
@@ -122,7 +31,7 @@ class Side:
     """One side of a comparison.
 
     Attributes:
-        name: in words, such as "the revision HEAD~3".
+        name: in words, such as "the store old".
         verdicts: by tier and claim.
         trials: by condition.
         troubles: a line for each file that could not be read.
@@ -145,7 +54,7 @@ class Side:
         )
 
 
-def working_tree(reproduction: Reproduction) -> Side:
+def committed(reproduction: Reproduction) -> Side:
     """Return the accepted verdicts and the reference trials in the reproduction's folder.
 
     Raises:
@@ -154,32 +63,7 @@ def working_tree(reproduction: Reproduction) -> Side:
     top = reproduction.references
     trials = {_named(path.relative_to(top)): references.load(path) for path in sorted(top.rglob("*.jsonl"))}
     accepted = transitions.accepted(history.load(reproduction.folder / history.FILE))
-    return Side("the working tree", accepted, trials)
-
-
-def revision(reproduction: Reproduction, at: GitRevision) -> Side:
-    """Return the accepted verdicts and the reference trials that are committed at a revision.
-
-    Args:
-        reproduction: the current one; only its folders are used.
-        at: the revision, read in the reproduction's folder.
-
-    Raises:
-        UserError: when the revision has neither, or one of the files is damaged.
-    """
-    top = reproduction.references.relative_to(reproduction.folder).as_posix()
-    verdicts = at.read(history.FILE)
-    files = [path for path in at.files(top) if path.endswith(".jsonl")]
-    if verdicts is None and not files:
-        raise UserError(
-            f"The revision {at.name} has neither {history.FILE} nor reference trials in {reproduction.folder}."
-        )
-    accepted = history.parse(verdicts, f"{history.FILE} at {at.name}") if verdicts is not None else {}
-    trials = {
-        _named(PurePosixPath(path).relative_to(top)): references.records(at.read(path) or b"", f"{path} at {at.name}")
-        for path in files
-    }
-    return Side(f"the revision {at.name} ({at.sha[:12]})", transitions.accepted(accepted), trials)
+    return Side("accepted verdicts, and reference trials", accepted, trials)
 
 
 def store(reproduction: Reproduction, archive: Archive, reports: Iterable[ClaimReport]) -> Side:

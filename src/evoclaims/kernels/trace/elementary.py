@@ -93,10 +93,7 @@ def _sign(a: Algebra, x: Number) -> Number:
 ELEMENTARY: Final[dict[str, Callable[..., Number]]] = {
     "atan2": _atan2,
     "cos": partial(_circular, 1),
-    "erf": exponentials.erf,
-    "erf_inv": exponentials.erf_inv,
     "exp": exponentials.exp,
-    "exp2": exponentials.exp2,
     "expm1": exponentials.expm1,
     "is_finite": lambda a, x: a.apply("lt", a.apply("abs", x), x.dtype.type(np.inf)),
     "log": exponentials.log,

@@ -1,8 +1,7 @@
 """Exponentials, logarithms and what is made of them, from simple operations.
 
-Errors, in units of the result's last place, were measured against float64: exp, exp2, log, log1p 2; expm1, logistic 4;
-tanh, erf 6; pow 4; erf_inv 8 (and 3e-7 at least). A result below 1.2e-38 may be 0. NaN, infinities and signs are
-NumPy's, but a zero has no sign.
+Errors, in units of the result's last place, against float64: exp, log, log1p 2; expm1, logistic, pow 4; tanh 6.
+A result below 1.2e-38 may be 0. NaN, infinities and signs are NumPy's, but a zero has no sign.
 """
 
 from __future__ import annotations
@@ -23,7 +22,7 @@ SIGNIFICAND: Final = 23
 INFINITE: Final = F(np.inf).view(np.int32)
 ROOT_OF_HALF: Final = F(np.sqrt(0.5)).view(np.int32)
 """Floats above 0 are ordered as their bits are."""
-# Highest power first: Moshier's Cephes library (EXP, LOG), Eigen (TANH, ERF), Giles (ERF_INV).
+# Highest power first: Moshier's Cephes library (EXP, LOG), Eigen (TANH).
 EXP: Final = (1.9875691500e-4, 1.3981999507e-3, 8.3334519073e-3, 4.1665795894e-2, 1.6666665459e-1, 5.0000001201e-1)
 LOG: Final = (
     *(7.0376836292e-2, -1.1514610310e-1, 1.1676998740e-1, -1.2420140846e-1, 1.4249322787e-1),
@@ -37,27 +36,6 @@ TANH: Final = (
     (1.19825839466702e-06, 1.18534705686654e-04, 2.26843463243900e-03, 4.89352518554385e-03),
 )
 WIDEST_TANH: Final = 7.90531110763549805
-ERF: Final = (
-    (
-        *(-2.72614225801306e-10, 2.77068142495902e-08, -2.10102402082508e-06, -5.69250639462346e-05),
-        *(-7.34990630326855e-04, -2.95459980854025e-03, -1.60960333262415e-02),
-    ),
-    (
-        *(-1.45660718464996e-05, -2.13374055278905e-04, -1.68282697438203e-03),
-        *(-7.37332916720468e-03, -1.42647390514189e-02),
-    ),
-)
-WIDEST_ERF: Final = 4.0
-ERF_INV: Final = (
-    (
-        *(2.81022636e-08, 3.43273939e-07, -3.5233877e-06, -4.39150654e-06, 0.00021858087),
-        *(-0.00125372503, -0.00417768164, 0.246640727, 1.50140941),
-    ),
-    (
-        *(-0.000200214257, 0.000100950558, 0.00134934322, -0.00367342844, 0.00573950773),
-        *(-0.0076224613, 0.00943887047, 1.00167406, 2.83297682),
-    ),
-)
 
 
 def polynomial(a: Algebra, z: Number, coefficients: Sequence[float]) -> Number:
@@ -73,13 +51,6 @@ def exp(a: Algebra, x: Number) -> Number:
     x = _clamped(a, x, -104.0, 89.0)
     n, rest = _divided(a, x)
     return _scaled(a, a.apply("add", _exp_less_1(a, rest), F(1)), n)
-
-
-def exp2(a: Algebra, x: Number) -> Number:
-    """Return 2 to the x."""
-    x = _clamped(a, x, -151.0, 129.0)
-    n = a.apply("rint", x)
-    return _scaled(a, _exp2_near_0(a, a.apply("sub", x, n)), n)
 
 
 def expm1(a: Algebra, x: Number) -> Number:
@@ -121,23 +92,6 @@ def tanh(a: Algebra, x: Number) -> Number:
     """Return the hyperbolic tangent."""
     small = a.apply("lt", a.apply("abs", x), F(0.0004))
     return a.apply("select", small, x, _odd_quotient(a, _clamped(a, x, -WIDEST_TANH, WIDEST_TANH), *TANH))
-
-
-def erf(a: Algebra, x: Number) -> Number:
-    """Return the error function."""
-    value = _odd_quotient(a, _clamped(a, x, -WIDEST_ERF, WIDEST_ERF), *ERF)
-    return _clamped(a, value, -1.0, 1.0)
-
-
-def erf_inv(a: Algebra, x: Number) -> Number:
-    """Return the inverse of the error function."""
-    w = a.apply("neg", log(a, a.apply("mul", a.apply("sub", F(1), x), a.apply("add", x, F(1)))))
-    near = a.apply("lt", w, F(5))
-    centre = polynomial(a, a.apply("sub", w, F(2.5)), ERF_INV[0])
-    tail = polynomial(a, a.apply("sub", a.apply("sqrt", w), F(3)), ERF_INV[1])
-    value = a.apply("mul", x, a.apply("select", near, centre, tail))
-    at_end = a.apply("eq", a.apply("abs", x), F(1))
-    return a.apply("select", at_end, a.apply("mul", x, F(np.inf)), value)
 
 
 def power(a: Algebra, x: Number, y: Number) -> Number:

@@ -1,10 +1,9 @@
-"""`evoclaims export` and `evoclaims badge`: the files that they write."""
+"""`evoclaims export`: the files that it writes."""
 
 from __future__ import annotations
 
 import json
 from pathlib import Path
-from xml.etree import ElementTree
 
 import pandas
 import pandas.core.arrays.arrow.extension_types  # registers types, once: pytester forgets what tests import
@@ -56,13 +55,6 @@ def test_reference_trials_fill_in_what_the_store_lacks(exported: Evoclaims) -> N
     assert exported("export")[1] == "wrote report/trials.json: 12 trials\n"
 
 
-def test_verdicts_are_exported_one_row_a_claim(exported: Evoclaims) -> None:
-    assert exported("export", "--verdicts", "--tier=smoke")[:2] == (0, "wrote report/verdicts.json: 2 verdicts\n")
-    rows = json.loads(Path("report/verdicts.json").read_text())["rows"]
-    assert [(row["claim"], row["outcome"], row["n"]) for row in rows] == [("a", "supported", 10), ("b", "not run", 0)]
-    assert exported("export", "--verdicts")[1] == "wrote report/verdicts.json: 4 verdicts\n"
-
-
 def test_a_damaged_record_is_left_out_and_said(exported: Evoclaims) -> None:
     store = Store(Path(".evoclaims"))
     path = store.record_files(store.ids()[0])[-1]
@@ -72,14 +64,6 @@ def test_a_damaged_record_is_left_out_and_said(exported: Evoclaims) -> None:
     assert f"left out: Cannot use {path}: it is not one whole JSON text" in err
 
 
-def test_a_badge_counts_the_verdicts_of_a_tier(exported: Evoclaims) -> None:
-    assert exported("badge") == (0, "wrote report/claims-smoke.svg: supported 1 / not run 1\n", "")
-    root = ElementTree.parse("report/claims-smoke.svg").getroot()
-    assert root.get("aria-label") == "claims (smoke): supported 1 / not run 1"
-    assert exported("badge", "--tier=full", "--out=a/b.svg")[1] == "wrote a/b.svg: not run 2\n"
-    assert Path("a/b.svg").exists()
-
-
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
@@ -87,9 +71,6 @@ def test_a_badge_counts_the_verdicts_of_a_tier(exported: Evoclaims) -> None:
         (("export", "--tier=ful"), "There is no tier named 'ful'. Did you mean 'full'? Known: all, full, smoke."),
         (("export", "--storage=pyproject.toml"), "is a file, not a folder"),
         (("export",), "Neither .evoclaims nor the reference trials hold a trial"),
-        (("export", "--verdicts", "--out=claims"), "claims is a folder; name a file in it with --out."),
-        (("badge", "--tier=ful"), "There is no tier named 'ful'."),
-        (("badge", "--out=claims"), "claims is a folder; name a file in it with --out."),
     ],
 )
 def test_a_users_mistake_is_one_sentence(evoclaims: Evoclaims, arguments: tuple[str, ...], said: str) -> None:
@@ -99,10 +80,14 @@ def test_a_users_mistake_is_one_sentence(evoclaims: Evoclaims, arguments: tuple[
 
 
 def test_files_go_into_folders_that_git_leaves_alone(exported: Evoclaims) -> None:
-    exported("badge")
-    assert exported("badge", "--out=shown/it.svg")[0] == 0
+    exported("export")
+    assert exported("export", "--out=shown/it.json")[0] == 0
     assert Path("report/.gitignore").read_text() == "*\n"
     assert not Path("shown/.gitignore").exists()  # the user's own
     Path("report/.gitignore").unlink()
     assert exported("export")[0] == 0
     assert not Path("report/.gitignore").exists()  # who deletes it wants to commit the folder
+
+
+def test_a_folder_is_no_file(exported: Evoclaims) -> None:
+    assert "claims is a folder; name a file in it with --out." in exported("export", "--out=claims")[2]
