@@ -45,7 +45,7 @@ def test_workers_and_runs_that_are_killed_lose_and_repeat_nothing(laboratory: La
 
 def test_a_crowd_on_one_store_whose_processes_are_killed_loses_and_repeats_nothing(laboratory: Laboratory) -> None:
     def attack(laboratory: Laboratory, times: int, draw: random.Random) -> Tally:
-        return crowd.attack(laboratory, times, draw, seconds=3.0, life=3.0, pause=0.05)
+        return crowd.attack(laboratory, times, draw, seconds=3.0, life=3.0, pause=0.1)
 
     tally = make(attack, laboratory, 2)
     assert tally.done["kill -9"] + tally.done["SIGTERM"] >= 1
