@@ -7,19 +7,25 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
+from evoclaims.cli import main
+
 ROOT = Path(__file__).parents[2]
 SECTION = (ROOT / "docs" / "judging.md").read_text(encoding="utf-8").partition("## One verdict, by hand")[2]
 
 
-def test_the_verdict_computed_by_hand_is_that_of_the_records(tmp_path: Path) -> None:
+def test_the_verdict_computed_by_hand_is_that_of_the_records(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     (code,) = re.findall(r"```python\n(.*?)```", SECTION, re.DOTALL)
     told = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True).stdout
     assert code.rstrip().endswith(f"\n# {told.strip()}")
     (p,) = re.findall(r"p = \S+ against", told)
     asked = ["status", "--tier", "full", "--only", "O5", "--why", "--storage", str(tmp_path)]
-    judged = subprocess.run(
-        [sys.executable, "-m", "evoclaims", *asked], cwd=ROOT, capture_output=True, text=True
-    ).stdout
+    monkeypatch.chdir(ROOT)
+    main(asked)
+    judged = capsys.readouterr().out
     assert re.search(
         rf"O5\b.*smaller than claimed.*{re.escape(p)} an effect as large as claimed <= alpha = 0\.04", judged, re.DOTALL
     )
