@@ -10,6 +10,7 @@ import hashlib
 import os
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import replace
+from functools import lru_cache
 from itertools import takewhile
 from pathlib import Path
 from typing import Any
@@ -62,8 +63,12 @@ def load(path: Path) -> tuple[TrialResult, ...]:
     return records(data, str(path), _MEND)
 
 
+@lru_cache(maxsize=512)
 def records(data: bytes, name: str, advice: str = "") -> tuple[TrialResult, ...]:
-    """Return the reference trials in the contents of a file called `name`; raises as `load` does."""
+    """Return the reference trials in the contents of a file called `name`; raises as `load` does.
+
+    They are kept: a command reads the same file for several tiers, variants and costs, and a line takes a millisecond.
+    """
     results = []
     for number, line in enumerate(data.splitlines(), start=1):
         try:
