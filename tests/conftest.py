@@ -98,7 +98,7 @@ def all_imported() -> None:
         warnings.simplefilter("ignore", DeprecationWarning)  # of Brax's requirements
         for module in pkgutil.walk_packages(evoclaims.__path__, "evoclaims."):
             importlib.import_module(module.name)
-    for name in ("hypothesis", "statsmodels.stats.multitest"):
+    for name in ("brax.training.agents.ppo.losses", "hypothesis", "statsmodels.stats.multitest"):
         importlib.import_module(name)
 
 

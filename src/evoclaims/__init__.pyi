@@ -18,7 +18,7 @@ from evoclaims.paper.reproduction import Tier as Tier
 from evoclaims.paper.reproduction import Variant as Variant
 from evoclaims.paper.reproduction import changed as changed
 from evoclaims.paper.trial_group import TrialGroup as TrialGroup
+from evoclaims.trials.budget import Budget as Budget
 from evoclaims.trials.imported import Imported as Imported
-from evoclaims.trials.spec import Budget as Budget
 from evoclaims.trials.spec import Condition as Condition
 from evoclaims.trials.spec import Progression as Progression

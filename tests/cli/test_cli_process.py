@@ -76,9 +76,9 @@ def test_a_command_that_computes_nothing_waits_for_no_large_library(
     ("shell", "arguments", "ends", "out", "err"),
     [
         ("> /dev/full", "new made", 2, "", "evoclaims: Cannot write what is printed: No space left on device.\n"),
-        ("2> /dev/full", "status", 2, "", ""),
+        ("2> /dev/full", "report --storage=", 2, "", ""),
         (">&-", "new made", 0, "", ""),
-        ("2>&-", "status", 2, "", ""),
+        ("2>&-", "report --storage=", 2, "", ""),
         ("", "status", 2, "", "evoclaims: The current folder cannot be used (No such file or directory). If it was"),
     ],
 )

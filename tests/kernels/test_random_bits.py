@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from functools import cache
 from typing import Any, Final
 
 import jax
@@ -47,11 +48,27 @@ def _widths(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> 
 @pytest.mark.usefixtures("_widths")
 @pytest.mark.parametrize("shape", [(), (1,), (3,), (64,), (65,), (100, 3), (4, 0)])
 def test_every_draw_is_jaxs(shape: tuple[int, ...]) -> None:
-    for draw in DRAWS.values():
-        made, wanted = draw(kernel_prng(_keys()[1]), shape), draw(_keys()[1], shape)
-        np.testing.assert_array_equal(made, wanted)
-        many = jax.jit(jax.vmap(lambda key, draw=draw: draw(kernel_prng(key), shape)))(_keys())
-        np.testing.assert_array_equal(many, jax.vmap(lambda key, draw=draw: draw(key, shape))(_keys()))
+    def drawn(key: Any) -> Any:
+        return {name: draw(kernel_prng(key), shape) for name, draw in DRAWS.items()}
+
+    wanted = _by_jax(shape)
+    jax.tree.map(np.testing.assert_array_equal, jax.jit(jax.vmap(drawn))(_keys()), wanted)
+    jax.tree.map(
+        np.testing.assert_array_equal, jax.jit(drawn)(_keys()[1]), {name: of[1] for name, of in wanted.items()}
+    )
+
+
+@cache
+def _by_jax(shape: tuple[int, ...]) -> dict[str, Any]:
+    """Return what jax draws from each key, whatever the width of a kernel's vectors."""
+    return {
+        name: np.asarray(jax.vmap(lambda key, draw=draw: draw(key, shape))(_keys())) for name, draw in DRAWS.items()
+    }
+
+
+@pytest.mark.parametrize("name", DRAWS)
+def test_a_draw_outside_of_a_program_is_jaxs(name: str) -> None:
+    np.testing.assert_array_equal(DRAWS[name](kernel_prng(_keys()[1]), (5,)), DRAWS[name](_keys()[1], (5,)))
 
 
 @given(st.integers(0, 2**32 - 1), st.integers(0, 2**32 - 1), st.integers(0, 2**32 - 1))

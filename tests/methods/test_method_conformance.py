@@ -12,6 +12,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from small_methods import METHODS, Entry
+from usual_fusions import USUAL_FUSIONS
 from workbench import Workbench, close, same_bits
 
 import evoclaims.methods
@@ -72,7 +73,7 @@ def test_a_compiled_step_is_the_plain_step(bench: Workbench) -> None:
     state, _ = bench.run(1)
     close(
         bench.plain_step(jax.random.key(9), LEVEL, state),
-        bench.step(jax.random.key(9), LEVEL, state),
+        bench.usual_step(jax.random.key(9), LEVEL, state),
         tolerance=1e-4,  # XLA fuses multiplications and additions
     )
 
@@ -80,11 +81,12 @@ def test_a_compiled_step_is_the_plain_step(bench: Workbench) -> None:
 @pytest.mark.newest  # smoke compiles each method's trials side by side
 def test_trials_side_by_side_are_the_trials_one_by_one(bench: Workbench) -> None:
     seeds = (3, 8)
-    alone = [bench.run(1, seed=seed)[0] for seed in seeds]
+    alone = [bench.run(1, seed=seed, usual=True)[0] for seed in seeds]
     keys = jnp.stack([jax.random.fold_in(jax.random.key(seed + 1), 0) for seed in seeds])
     starts = jax.tree.map(lambda *leaf: jnp.stack(leaf), *[bench.init(seed) for seed in seeds])
+    side_by_side = jax.jit(jax.vmap(bench.plain_step, in_axes=(0, None, 0)), compiler_options=USUAL_FUSIONS)
     with jax.debug_key_reuse(False):  # jax takes the keys of any scan under vmap for used
-        together, _ = jax.jit(jax.vmap(bench.plain_step, in_axes=(0, None, 0)))(keys, LEVEL, starts)
+        together, _ = side_by_side(keys, LEVEL, starts)
     for i, one in enumerate(alone):
         close(one, jax.tree.map(lambda leaf, i=i: leaf[i], together), tolerance=1e-4)
 

@@ -14,13 +14,15 @@ from evoclaims.methods.base import Progress
 
 
 class Workbench:
-    """Runs a method's pure functions, its step compiled as for users; a seed stands for all the keys of a run."""
+    """Runs a method's pure functions; a seed stands for all the keys of a run.
+
+    `usual_step` is compiled as for users, to be compared with other programs; `step`, which most tests share, sooner.
+    """
 
     def __init__(self, method: Any, task: Any) -> None:
         self.method, self.task, self.traces = method, task, 0
-        self.step: Callable[[Any, Any, Any], tuple[Any, Progress]] = jax.jit(
-            self._traced, compiler_options=USUAL_FUSIONS
-        )
+        self.step: Callable[[Any, Any, Any], tuple[Any, Progress]] = jax.jit(self._traced)
+        self.usual_step = jax.jit(self._traced, compiler_options=USUAL_FUSIONS) if USUAL_FUSIONS else self.step
         self._init = jax.jit(lambda key: method.init(key, task))
         self._examine = jax.jit(lambda state, level: task.examine(method.best(task, state), jax.random.key(0), level))
 
@@ -34,13 +36,16 @@ class Workbench:
     def init(self, seed: int = 0) -> Any:
         return self._init(jax.random.key(seed))
 
-    def run(self, steps: int, seed: int = 0, level: int = 0, state: Any = None) -> tuple[Any, list[Progress]]:
-        """Take `steps` steps; the i-th uses the key `seed + 1` folded with i."""
+    def run(
+        self, steps: int, seed: int = 0, level: int = 0, state: Any = None, usual: bool = False
+    ) -> tuple[Any, list[Progress]]:
+        """Take `steps` steps, with the `usual_step` or the other; the i-th uses the key `seed + 1` folded with i."""
+        one_step = self.usual_step if usual else self.step
         state = self.init(seed) if state is None else state
         reports = []
         for step in range(steps):
             key = jax.random.fold_in(jax.random.key(seed + 1), step)
-            state, progress = self.step(key, jnp.asarray(level, jnp.int32), state)
+            state, progress = one_step(key, jnp.asarray(level, jnp.int32), state)
             reports.append(progress)
         return state, reports
 

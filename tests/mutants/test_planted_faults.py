@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Any
 
 import jax
@@ -41,9 +42,14 @@ def examined(fault: type[Any], policy: PolicyFn, level: int = 1) -> Episode:
     return plant(fault, PARITY).examine(policy, KEY, jnp.int32(level))  # type: ignore[no-any-return]
 
 
+@cache
+def step_of(method: Any, task: Any) -> Any:
+    """Return a compiled step; equal methods share it."""
+    return jax.jit(lambda key, state: method.step(key, task, LEVEL, state))
+
+
 def trained(method: Any, steps: int = 3, task: Any = PARITY, seed: int = 0) -> Any:
-    state = method.init(jax.random.key(seed), task)
-    step = jax.jit(lambda key, state: method.step(key, task, LEVEL, state))
+    state, step = method.init(jax.random.key(seed), task), step_of(method, task)
     for number in range(steps):
         state, progress = step(jax.random.key(100 * seed + number), state)
     return state, progress

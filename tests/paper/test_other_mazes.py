@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import json
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,7 +15,10 @@ import pytest
 
 import reproductions.nisioti2025 as paper
 from evoclaims.envs import ANT, DeceptiveMaze
+from evoclaims.envs.ecorobot import physics, robot_task
+from evoclaims.envs.ecorobot.physics import Body
 from evoclaims.envs.ecorobot.pose import Pose
+from evoclaims.envs.ecorobot.scene import Places, Scene
 from reproductions.nisioti2025.other_mazes import EasyMazeAsCoded, OffsetRanges, Recurrent, RememberingStones
 from reproductions.nisioti2025.other_stones import MetreRanges, OtherStones
 
@@ -26,6 +30,20 @@ def _at(x: float, y: float, turned: float = 0.0) -> Pose:
     cos, sin = np.cos(turned), np.sin(turned)
     rotation = jnp.asarray([[cos, -sin, 0], [sin, cos, 0], [0, 0, 1]], jnp.float32)
     return Pose(place=jnp.array([x, y, 0.2]), rotation=rotation)
+
+
+@pytest.fixture
+def gliding(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """Let robots go where their motors point: here it matters what they see and for how long, and not physics."""
+
+    def glide(scene: Scene, body: Body, control: jax.Array, places: Places) -> Body:
+        assert control.shape == (scene.model.nu,)
+        return replace(body, position=body.position.at[:2].add(0.1 * control[:2] + 0.01 * control[2:]))
+
+    monkeypatch.setattr(physics, "act", glide)
+    robot_task._step_kernel.cache_clear()
+    yield
+    robot_task._step_kernel.cache_clear()  # or tests of other files would get steps that glide
 
 
 def test_any_way_to_the_target_pays_8_75_metres() -> None:
@@ -59,6 +77,7 @@ def test_every_robot_sees_twelve_numbers(robot: object) -> None:
     np.testing.assert_allclose(seen[10:], np.array(task.start) - np.array(task.target), atol=1e-6)
 
 
+@pytest.mark.usefixtures("gliding")
 def test_an_examination_is_shorter_than_a_training_episode() -> None:
     task = replace(EASY, examined_steps=3, episode_steps=5, examined_episodes=2)
     still = lambda seen: jnp.zeros(4)  # noqa: E731
@@ -80,6 +99,7 @@ def test_a_recurrent_network_against_loops() -> None:
     np.testing.assert_allclose(answer, wanted, atol=1e-5)
 
 
+@pytest.mark.usefixtures("gliding")
 def test_what_is_remembered_is_seen_in_the_next_step_and_moves_no_motor() -> None:
     task, plain = RememberingStones(remembered=2, episode_steps=4), OtherStones(episode_steps=4)
     assert (task.action_size, task.observation_size) == (plain.action_size + 2, plain.observation_size + 2)

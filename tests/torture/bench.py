@@ -115,7 +115,7 @@ class Bench:
     """
 
     folder: Path
-    pause: float = 0.04
+    pause: float = 0.08
     further: int = 0
     lease: float = LEASE
     kept: bool = False
@@ -266,7 +266,7 @@ class Laboratory:
     _numbers: Iterator[int] = field(default_factory=itertools.count)
 
     @contextmanager
-    def bench(self, pause: float = 0.04, further: int = 0, lease: float = LEASE) -> Iterator[Bench]:
+    def bench(self, pause: float = 0.08, further: int = 0, lease: float = LEASE) -> Iterator[Bench]:
         """Give a new project; it goes when nothing was found, and stays to be looked at when something was."""
         bench = Bench(self.folder / f"bench-{next(self._numbers)}", pause, further, lease)
         try:

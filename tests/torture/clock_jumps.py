@@ -18,7 +18,7 @@ def attack(laboratory: Laboratory, times: int, draw: random.Random) -> Tally:
     tally = Tally("clocks that jump")
     for number in range(times):
         hosts = ("alpha", "beta") if number % 2 == 0 else ("alpha", "alpha")
-        with laboratory.bench(pause=0.06) as bench:
+        with laboratory.bench(pause=0.12) as bench:
             guard = Guard(bench, laboratory.truth, tally)
             clocks = [bench.folder / f"clock-{name}" for name in "ab"]
             for clock in clocks:

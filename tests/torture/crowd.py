@@ -31,23 +31,16 @@ BLOWS = {signal.SIGKILL: 4, signal.SIGTERM: 1}
 """Ways to strike, and how often each is drawn."""
 
 
-def attack(
-    laboratory: Laboratory,
-    times: int,
-    draw: random.Random,
-    seconds: float | None = None,
-    life: float = LIFE,
-    pause: float = PAUSE,
-) -> Tally:
+def attack(laboratory: Laboratory, times: int, draw: random.Random) -> Tally:
     """Let so many processes work on one store, which has more to do than they can finish; then finish undisturbed."""
-    seconds = laboratory.seconds if seconds is None else seconds
+    seconds = laboratory.seconds
     tally = Tally(f"{times} processes on one store for {seconds:.0f} s")
-    further = max(0, round(times * seconds / (REPORTS * pause)) - len(methods(0)))
+    further = max(0, round(times * seconds / (REPORTS * PAUSE)) - len(methods(0)))
     workers = min(further, os.cpu_count() or 1)
     truth = laboratory.undisturbed(further, workers) if further else laboratory.truth
-    with laboratory.bench(pause, further, lease=FRESH_SECONDS) as bench:
+    with laboratory.bench(PAUSE, further, lease=FRESH_SECONDS) as bench:
         guard = Guard(bench, truth, tally)
-        _Crowd(bench, guard, draw, times, life).work(seconds)
+        _Crowd(bench, guard, draw, times).work(seconds)
         tally.done["trials finished in the crowd"] = len(bench.records())
         bench.pause = 0.0
         running = bench.pytest(workers)
@@ -77,8 +70,8 @@ STARTS = {_run_one: 5, _judge_some: 4, _judge_all: 1}
 class _Crowd:
     """Processes on a bench, of which each that ends is followed by another."""
 
-    def __init__(self, bench: Bench, guard: Guard, draw: random.Random, size: int, life: float) -> None:
-        self._bench, self._guard, self._draw, self._size, self._life = bench, guard, draw, size, life
+    def __init__(self, bench: Bench, guard: Guard, draw: random.Random, size: int) -> None:
+        self._bench, self._guard, self._draw, self._size = bench, guard, draw, size
         self._living: list[Running] = []
         self._struck: set[int] = set()
         self._next_start = 0.0
@@ -104,14 +97,14 @@ class _Crowd:
         self._guard.look()
 
     def _interval(self) -> float:
-        return self._draw.uniform(0.5, 1.5) * self._life / self._size
+        return self._draw.uniform(0.5, 1.5) * LIFE / self._size
 
     def _filled(self) -> bool:
         """Start a process if one is lacking, and return whether any has ever reported."""
         self._collect()
         if len(self._living) < self._size and time.monotonic() >= self._next_start:
             self._living.append(self._started())
-            self._next_start = time.monotonic() + min(STAGGER, self._life / self._size)
+            self._next_start = time.monotonic() + min(STAGGER, LIFE / self._size)
         return bool(self._bench.events())
 
     def _collect(self) -> None:

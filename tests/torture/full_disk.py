@@ -14,6 +14,7 @@ from pathlib import Path
 from bench import Bench, Laboratory, Running
 from guard import Guard
 from tally import Tally
+from tortured_project import REPORTS
 
 SIZE = 1 << 20
 """Bytes of the small disk: a store of the toy trials takes about half of it."""
@@ -94,7 +95,7 @@ def _filled(
 ) -> Running:
     """Start, fill the disk in the middle, read the sentence, free the disk, and start again; return the last run."""
     running = start()
-    bench.until_said("training", running, times=draw.randrange(1, 60))
+    bench.until_said("training", running, times=draw.randrange(3) * REPORTS + draw.randrange(1, REPORTS // 2))
     with bench.held(running):
         free = strike(bench, running, draw)
     status = running.end()

@@ -34,7 +34,7 @@ def attack(laboratory: Laboratory, times: int, draw: random.Random) -> Tally:
 def _struck(bench: Bench, blows: list[str], draw: random.Random, guard: Guard) -> Running:
     """Run pytest, strike, and begin again until a run has come to its end unharmed; return that one."""
     while True:
-        running, harmed = bench.pytest(), False
+        running, harmed = bench.pytest(workers=2 if blows else 0), False
         while blows and (worker := _training(bench, running)) is not None:
             time.sleep(draw.uniform(0.0, 0.5))
             if not is_alive(worker):

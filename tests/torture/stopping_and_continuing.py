@@ -18,7 +18,7 @@ def attack(laboratory: Laboratory, times: int, draw: random.Random) -> Tally:
     """Stop and continue two processes so many times, first in a fixed order and then as it comes."""
     tally = Tally("processes stopped and continued")
     for number in range(times):
-        with laboratory.bench(pause=0.06) as bench:
+        with laboratory.bench(pause=0.12) as bench:
             guard = Guard(bench, laboratory.truth, tally, once=False)
             runs = {"a": _start(bench)}
             bench.until_said("training", runs["a"])

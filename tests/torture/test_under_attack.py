@@ -1,6 +1,6 @@
 """Nothing is lost, repeated or judged otherwise, whatever becomes of processes, machines, clocks and disks.
 
-The attacks in small; `python tests/torture/run.py` makes them in large.
+The attacks in small, but for a crowd; `python tests/torture/run.py` makes them in large.
 """
 
 from __future__ import annotations
@@ -11,7 +11,6 @@ from contextlib import suppress
 from pathlib import Path
 
 import clock_jumps
-import crowd
 import full_disk
 import killing
 import pytest
@@ -41,15 +40,6 @@ def make(attack: Attack, laboratory: Laboratory, times: int) -> Tally:
 def test_workers_and_runs_that_are_killed_lose_and_repeat_nothing(laboratory: Laboratory) -> None:
     tally = make(killing.attack, laboratory, 1)
     assert tally.done["batches gone on with"] >= 1
-
-
-def test_a_crowd_on_one_store_whose_processes_are_killed_loses_and_repeats_nothing(laboratory: Laboratory) -> None:
-    def attack(laboratory: Laboratory, times: int, draw: random.Random) -> Tally:
-        return crowd.attack(laboratory, times, draw, seconds=3.0, life=3.0, pause=0.05)
-
-    tally = make(attack, laboratory, 2)
-    assert tally.done["kill -9"] + tally.done["SIGTERM"] >= 1
-    assert (tally.done["finished trials compared"], tally.done["lost"], tally.done["repeated"]) == (30, 0, 0)
 
 
 def test_a_process_that_is_stopped_is_waited_for_and_then_taken_over_from(laboratory: Laboratory) -> None:

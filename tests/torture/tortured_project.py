@@ -5,7 +5,7 @@ from __future__ import annotations
 TRIALS = 10
 """Trials of a condition of the tortured paper."""
 
-REPORTS = 50
+REPORTS = 25
 """Reports of each."""
 
 PYPROJECT = """
@@ -14,7 +14,10 @@ reproduction = "tortured_paper"
 
 [tool.pytest.ini_options]
 testpaths = ["claims"]
-addopts = "--strict-markers --strict-config -p no:cacheprovider"
+addopts = [
+    "--strict-markers", "--strict-config", "-p", "no:cacheprovider",
+    "-p", "no:anyio", "-p", "no:benchmark", "-p", "no:hypothesispytest", "-p", "no:jaxtyping",
+]
 filterwarnings = ["error"]
 """
 

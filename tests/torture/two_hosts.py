@@ -20,7 +20,7 @@ def attack(laboratory: Laboratory, times: int, draw: random.Random, trees: bool 
         tally.notes.append("this system lets no process have a host name of its own, so that it is patched in Python")
     for number in range(times):
         end = ENDS[number % len(ENDS)]
-        with laboratory.bench(pause=0.06) as bench:
+        with laboratory.bench(pause=0.12) as bench:
             guard = Guard(bench, laboratory.truth, tally, once=end != "hangs")
             alpha = _start(bench, "alpha", trees)
             with bench.held(alpha):

@@ -119,15 +119,16 @@ def test_training_function_that_leaves_an_option_behind_is_told_before_its_exami
         examined(NParity(2), lambda observation: observation, 0)
 
 
-@pytest.mark.parametrize("variable", ["JAX_ENABLE_X64", "JAX_NO_EXECUTION", "JAX_DISABLE_JIT"])
-def test_variable_is_named_before_anything_runs(
-    project: Any, sentence: Any, monkeypatch: pytest.MonkeyPatch, variable: str
-) -> None:
+def test_variables_are_named_before_anything_runs(project: Any, sentence: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     project.write(a="supported")
-    monkeypatch.setenv(variable, "1")
+    variables = ("JAX_DISABLE_JIT", "JAX_ENABLE_X64", "JAX_NO_EXECUTION")
+    for variable in variables:
+        monkeypatch.setenv(variable, "1")
     result = project.run_apart()
     assert result.ret == pytest.ExitCode.USAGE_ERROR
-    sentence(
-        result,
-        f"{variable.lower()} is True (default: False). Trials are defined with jax's defaults. Unset {variable}.",
-    )
+    sentence(result, "These settings of jax change or forbid trials: ")
+    shown = " ".join("\n".join([*result.outlines, *result.errlines]).split())
+    pattern = r"forbid trials: (.*?)\. Trials are defined with jax's defaults\. Unset (.*?)\."
+    (told,) = re.findall(pattern, shown)
+    assert sorted(told[0].split(", ")) == [f"{variable.lower()} is True (default: False)" for variable in variables]
+    assert sorted(told[1].split(" and ")) == [*variables]

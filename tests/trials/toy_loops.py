@@ -41,7 +41,8 @@ def in_every_way(task: Any, seed: int, budget: Any, report: Callable[..., None])
         raise ValueError("the reactor is \x1b[31mred")
     if seed == 2:
         os.kill(os.getpid(), signal.SIGSEGV)
-    return {"last_fitness": float("nan") if seed == 3 else 7.5, "found": float("inf")}
+    fitness = float("nan") if seed == 3 else 7.5
+    return {"last_fitness": fitness, "found": float("inf"), "jax": "jax" in sys.modules}
 
 
 class Tensor:

@@ -58,7 +58,7 @@ def next_version(package: str) -> str:
 def install_changed(change: Change, site: Path) -> None:
     """Lay the changed library out in `site` as an installer does: its files, and what says its name and version."""
     installed = Path(str(importlib.metadata.distribution(change.package).locate_file("")))
-    left_out = shutil.ignore_patterns("__pycache__", "test_data", "testdata", "*_test.py")
+    left_out = shutil.ignore_patterns("test_data", "testdata", "*_test.py")  # what is compiled stays as new as its text
     shutil.copytree(installed / change.folder, site / change.folder, ignore=left_out)
     for shared in list(Path(change.folder).parents)[:-1]:  # of another library, which stays as it is
         for entry in (installed / shared).iterdir():

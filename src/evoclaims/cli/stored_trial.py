@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import jax
 import numpy as np
@@ -15,7 +15,6 @@ from evoclaims.cli.project import Project
 from evoclaims.core.errors import UserError
 from evoclaims.core.keys import EVALUATION, TRAINING, trial_key
 from evoclaims.core.printable import printable
-from evoclaims.envs.ecorobot.robot_task import RobotTask
 from evoclaims.paper import references
 from evoclaims.paper.cost import Estimator, Wanted
 from evoclaims.report.live_line import duration
@@ -25,6 +24,9 @@ from evoclaims.trials.failed import time_allowed, why
 from evoclaims.trials.imported import where_from
 from evoclaims.trials.result import COMPLETE, TrialResult
 from evoclaims.trials.spec import Condition, TrialSpec
+
+if TYPE_CHECKING:
+    from evoclaims.envs.ecorobot.robot_task import RobotTask  # which imports MuJoCo
 
 
 @dataclass(frozen=True)

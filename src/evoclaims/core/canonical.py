@@ -31,18 +31,19 @@ def as_plain(value: Any) -> Any:
     Raises:
         TypeError: for a value without a canonical form (an array, a function, a set, a key that is not a string).
     """
-    if type(value) in _UNCHANGED:  # most values: nothing slower is asked of them
+    exact = type(value)
+    if exact in _UNCHANGED:  # most values: nothing slower is asked of them
         return value
-    if type(value) is tuple:  # what `isinstance` finds below, sooner
+    if exact is tuple or exact is list:  # what `isinstance` finds below, sooner
         return [as_plain(item) for item in value]
-    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+    if exact is not float and exact is not dict and dataclasses.is_dataclass(value) and not isinstance(value, type):
         kind = {} if is_own(type(value)) else {"class": type(value).__qualname__}
         return {**kind, **fields_of(value)}
     if isinstance(value, dict):
         for key in value:
-            if not isinstance(key, str):  # JSON would write 1 and "1" alike
+            if type(key) is not str and not isinstance(key, str):  # JSON would write 1 and "1" alike
                 raise TypeError(f"a key of type {type(key).__name__} has no canonical JSON form: {key!r}")
-        return {key: as_plain(item) for key, item in value.items()}
+        return {key: item if type(item) in _UNCHANGED else as_plain(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
         return [as_plain(item) for item in value]
     if isinstance(value, float) and not math.isfinite(value):
@@ -76,17 +77,25 @@ def require_whole_numbers(value: Any) -> None:
     """
     if type(value) in _UNCHANGED or not dataclasses.is_dataclass(value) or isinstance(value, type):
         return
-    for field in dataclasses.fields(value):
-        given = getattr(value, field.name)
+    for name, declared, is_whole in _declared(type(value)):
+        given = getattr(value, name)
         items = given if isinstance(given, tuple) else (given,)
-        declared = field.type if isinstance(field.type, str) else formatannotation(field.type)
-        if WHOLE.fullmatch(declared) and any(isinstance(item, float) for item in items):
+        if is_whole and any(isinstance(item, float) for item in items):
             raise UserError(
-                f"{type(value).__name__} has {field.name}={given!r}. Write whole numbers without a decimal point "
+                f"{type(value).__name__} has {name}={given!r}. Write whole numbers without a decimal point "
                 f"({declared})."
             )
         for item in items:
-            require_whole_numbers(item)
+            if type(item) not in _UNCHANGED:
+                require_whole_numbers(item)
+
+
+@functools.cache
+def _declared(kind: type) -> tuple[tuple[str, str, bool], ...]:
+    """Return the names of a dataclass's fields, how they are declared, and whether that is as whole numbers."""
+    types = {one.name: one.type for one in dataclasses.fields(kind)}
+    words = {name: one if isinstance(one, str) else formatannotation(one) for name, one in types.items()}
+    return tuple((name, word, WHOLE.fullmatch(word) is not None) for name, word in words.items())
 
 
 def is_own(kind: type) -> bool:

@@ -4,12 +4,34 @@ from __future__ import annotations
 
 import contextlib
 import importlib
+import io
 import sys
+import threading
 from collections.abc import Iterator
 from types import ModuleType
-from typing import Any
+from typing import Any, Final
 
 import jax
+
+_importing: Final = threading.RLock()
+
+
+class Later(ModuleType):
+    """A module that is imported when one of its names is first asked for: some take a second.
+
+    That may be while a program is traced, so constants of the module are made outside of it. What the import prints is
+    dropped: MJX's has two lines where NVIDIA's warp is not installed.
+    """
+
+    def __getattr__(self, name: str) -> Any:
+        """Return what the module has of this name."""
+        if name.startswith("__"):  # who looks at all that a module names need not wait for this one
+            raise AttributeError(name)
+        with _importing:
+            if self.__name__ not in sys.modules:
+                with jax.ensure_compile_time_eval(), contextlib.redirect_stdout(io.StringIO()):
+                    importlib.import_module(self.__name__)
+        return getattr(importlib.import_module(self.__name__), name)
 
 
 @contextlib.contextmanager

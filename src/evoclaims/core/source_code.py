@@ -16,6 +16,7 @@ from typing import Any, Final
 
 from evoclaims.core.canonical import content_hash, is_own
 from evoclaims.core.errors import PACKAGE_FOLDERS
+from evoclaims.core.foreign import Later
 
 CODE: Final = "code_hashes"
 """Key under which a trial's provenance has these hashes."""
@@ -25,6 +26,9 @@ DIGITS: Final = 16
 
 _IN_THE_ID: Final = ("name", "revision", "packages")
 """Class variables of a method or task that its trials' ids or versions hold."""
+
+_WITHOUT_CODE: Final = frozenset((type(None), bool, int, float, str))
+"""Types of most fields."""
 
 _SAYS_NOTHING: Final = ("ctx", "kind", "type_comment")
 """Fields of a syntax tree that its place, or nothing that computes, decides."""
@@ -45,11 +49,14 @@ def code_of(*components: Any) -> dict[str, str]:
 
 def _code(component: Any) -> Iterator[Any]:
     """Yield the classes of a component and of the parts in its fields, and the function of a training loop."""
+    if type(component) in _WITHOUT_CODE:
+        return
     if isinstance(component, Mapping):
         component = tuple(component.values())
     if isinstance(component, tuple | list):
         for part in component:
-            yield from _code(part)
+            if type(part) not in _WITHOUT_CODE:  # of a long row of numbers nothing else is asked
+                yield from _code(part)
     elif dataclasses.is_dataclass(component) and not isinstance(component, type):
         yield type(component)
         module, _, name = str(getattr(component, "place", "")).partition(":")
@@ -182,8 +189,8 @@ def _named(tree: ast.Module, there: Mapping[str, Any]) -> Iterator[tuple[str, An
             continue
         name, value = held.id, there[held.id]
         for word in words:
-            if not isinstance(value, ModuleType) or not hasattr(value, word):
-                break
+            if not isinstance(value, ModuleType) or isinstance(value, Later) or not hasattr(value, word):
+                break  # a module that is imported later is no project's
             name, value = f"{name}.{word}", getattr(value, word)
         else:
             yield name, value

@@ -14,8 +14,6 @@ from enum import StrEnum
 from functools import lru_cache
 from typing import Final
 
-from scipy.stats import t as student
-
 from evoclaims.judging.exact import MAX_TRIALS, binomial_test
 from evoclaims.judging.telescope import POWER, detectable_a12
 
@@ -232,6 +230,8 @@ def _mean(
 @lru_cache
 def _t(level: float, freedom: int) -> float:
     """Return a quantile of Student's t."""
+    from scipy.stats import t as student  # as in `judging.exact`
+
     return float(student.ppf(level, freedom))
 
 

@@ -118,6 +118,14 @@ def checked(trial: TrialResult) -> TrialResult:
     """Return the trial with numbers that raise `UnreadableTrialError` for NaN or missing names."""
     if isinstance(trial.metrics, _Numbers):  # it has been checked, as trials are that are judged again and again
         return trial
+    known = vars(trial)  # a trial is read by many measures
+    if "_checked" not in known:
+        known["_checked"] = _checked(trial)
+    found: TrialResult = known["_checked"]
+    return found
+
+
+def _checked(trial: TrialResult) -> TrialResult:
     where = f"the finished trial of seed {trial.seed_in_words} (id {trial.id[:12]})"
     loop, of_metrics, of_levels = trial.provenance.get(TRAINED_BY), "", ""
     if loop:  # what its function or its policy's examination gives as NaN is no finished trial

@@ -1,14 +1,11 @@
-"""The parts of Brax that PPO is made of, imported in one place."""
+"""The parts of Brax that PPO is made of, imported in one place, when they are used."""
 
 from __future__ import annotations
 
-import contextlib
-import io
+from evoclaims.core.foreign import Later
 
-# MJX, which Brax imports, prints two lines when NVIDIA's warp is not installed; nothing here uses warp.
-with contextlib.redirect_stdout(io.StringIO()):
-    from brax.training.acme import running_statistics, specs
-    from brax.training.agents.ppo import losses, networks
-    from brax.training.types import Transition
-
-__all__ = ["Transition", "losses", "networks", "running_statistics", "specs"]
+losses = Later("brax.training.agents.ppo.losses")
+networks = Later("brax.training.agents.ppo.networks")
+running_statistics = Later("brax.training.acme.running_statistics")
+specs = Later("brax.training.acme.specs")
+types = Later("brax.training.types")

@@ -7,12 +7,11 @@ from dataclasses import dataclass
 from typing import Any, ClassVar, Final
 
 import jax.numpy as jnp
-from evosax.algorithms.distribution_based.cma_es import CMA_ES
 from jax.custom_batching import sequential_vmap
 from jaxtyping import Array, Float, Int, PRNGKeyArray
 
 from evoclaims.core.errors import UserError
-from evoclaims.core.foreign import implicit_promotions
+from evoclaims.core.foreign import Later, implicit_promotions
 from evoclaims.core.keys import streams
 from evoclaims.core.pytree import pytree, strong
 from evoclaims.envs.base import Task
@@ -20,6 +19,8 @@ from evoclaims.methods.base import Policy, Progress
 from evoclaims.methods.champion import Champion, champion_policy, evaluate_with_champion, first_champion
 from evoclaims.networks.all_skips import AllSkips
 from evoclaims.networks.base import Network
+
+evosax = Later("evosax.algorithms.distribution_based.cma_es")
 
 LARGE: Final = 1_000
 """Covariance matrices of so many rows are decomposed one after the other, not as a batch of trials.
@@ -108,7 +109,7 @@ class CmaEs:
         """Return the environment steps of one generation, at the longest episode, but for the champion's own."""
         return self.population * task.horizon
 
-    def _search(self, task: Task) -> tuple[CMA_ES, Any]:
+    def _search(self, task: Task) -> tuple[Any, Any]:
         """Build evosax's algorithm and its default parameters for the task's encoding."""
         size = self.network.size(task.observation_size, task.action_size)
         search = self._algorithm(
@@ -125,7 +126,7 @@ class CmaEs:
         return distribution.replace(B=jnp.zeros((0, 0)), D=jnp.zeros((0,)))
 
     @property
-    def _algorithm(self) -> Callable[..., CMA_ES]:
+    def _algorithm(self) -> Callable[..., Any]:
         """Return what makes the search."""
-        algorithm: Callable[..., CMA_ES] = CMA_ES
+        algorithm: Callable[..., Any] = evosax.CMA_ES
         return algorithm

@@ -12,7 +12,7 @@ from jaxtyping import Array, Int, PRNGKeyArray
 from evoclaims.core.keys import streams
 from evoclaims.core.pytree import pytree, select
 from evoclaims.envs.base import Task, TaskState
-from evoclaims.methods.brax_blocks import Transition
+from evoclaims.methods.brax_blocks import types
 
 Act = Callable[[Array, Array], tuple[Array, Any]]
 """A stochastic policy, as Brax's `make_inference_fn` gives it: (observations, key) -> (actions, extras)."""
@@ -53,7 +53,7 @@ class Interaction:
 
 def collect(
     task: Task, act: Act, key: PRNGKeyArray, interaction: Interaction, rounds: int, unroll_length: int
-) -> tuple[Interaction, Transition]:
+) -> tuple[Interaction, Any]:
     """Act for `rounds` × `unroll_length` steps in every environment.
 
     Returns:
@@ -61,12 +61,12 @@ def collect(
         trajectory per row, as Brax's loss expects.
     """
 
-    def one_step(interaction: Interaction, key: Array) -> tuple[Interaction, Transition]:
+    def one_step(interaction: Interaction, key: Array) -> tuple[Interaction, Any]:
         act_key, reset_key = streams(key, "act", "reset")
         states = interaction.states
         action, extras = act(states.observation, act_key)
         reached = jax.vmap(task.step)(states, action)
-        transition = Transition(
+        transition = types.Transition(
             observation=states.observation,
             action=action,
             reward=reached.reward,

@@ -12,17 +12,18 @@ from typing import Any, ClassVar
 
 import jax
 import jax.numpy as jnp
-import optax
 from jaxtyping import Array, Float, Int, PRNGKeyArray
 
 from evoclaims.core.errors import UserError, require_at_least
-from evoclaims.core.foreign import implicit_promotions
+from evoclaims.core.foreign import Later, implicit_promotions
 from evoclaims.core.keys import stream, streams
 from evoclaims.core.pytree import pytree, select, strong
 from evoclaims.envs.base import Episode, Task, share
 from evoclaims.methods.base import Policy, Progress
-from evoclaims.methods.brax_blocks import Transition, losses, networks, running_statistics, specs
+from evoclaims.methods.brax_blocks import losses, networks, running_statistics, specs
 from evoclaims.methods.collect import Act, Interaction, collect
+
+optax = Later("optax")
 
 
 @pytree
@@ -171,7 +172,7 @@ class Ppo:
 
     def collected(
         self, key: PRNGKeyArray, task: Task, level: Int[Array, ""], state: PpoState
-    ) -> tuple[Interaction, Transition]:
+    ) -> tuple[Interaction, Any]:
         """Return what a step with this key collects: the episodes afterwards, and transitions as `collect` has them."""
         reset_key, act_key = streams(key, "reset", "act")
         interaction = state.interaction.at_level(task, reset_key, self.trained_level(level))
@@ -206,7 +207,7 @@ class Ppo:
         """Return the environment steps collected in one training step."""
         return self.batch_size * self.minibatches * self.unroll_length
 
-    def _networks(self, task: Task) -> networks.PPONetworks:
+    def _networks(self, task: Task) -> Any:
         """Build Brax's policy and value networks for the task's sizes."""
         return networks.make_ppo_networks(
             task.observation_size,

@@ -7,14 +7,11 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any, ClassVar
 
-import jax
-import jax.numpy as jnp
-from evosax.algorithms.distribution_based.cma_es import CMA_ES, Params, State, eigen_decomposition
-from flax import struct
-from jaxtyping import Array, Float, Int, PRNGKeyArray
-
 from evoclaims.core.errors import UserError
+from evoclaims.core.foreign import Later
 from evoclaims.methods.cma_es import CmaEs
+
+aging_cma_es = Later("evoclaims.methods.aging_cma_es")
 
 
 @dataclass(frozen=True)
@@ -53,43 +50,6 @@ class SeldomDecomposedCmaEs(CmaEs):
         return distribution
 
     @property
-    def _algorithm(self) -> Callable[..., CMA_ES]:
+    def _algorithm(self) -> Callable[..., Any]:
         """Return what makes the search."""
-        return partial(_SeldomDecomposed, self.replaced)
-
-
-@struct.dataclass
-class _AgingState(State):  # type: ignore[misc]  # flax is not typed
-    """evosax's state, with the number of generations since the covariance matrix was decomposed."""
-
-    age: Int[Array, ""]
-
-
-class _SeldomDecomposed(CMA_ES):  # type: ignore[misc]  # evosax is not typed
-    """evosax's CMA-ES, which decomposes the covariance matrix where it samples, and nowhere else."""
-
-    def __init__(self, replaced: float, *arguments: Any, **settings: Any) -> None:
-        super().__init__(*arguments, **settings)
-        self.replaced = replaced
-
-    def _init(self, key: PRNGKeyArray, params: Params) -> _AgingState:
-        """Start from the identity, whose decomposition is known."""
-        return _AgingState(**vars(super()._init(key, params)), age=jnp.zeros((), jnp.int32))
-
-    def _ask(
-        self, key: PRNGKeyArray, state: _AgingState, params: Params
-    ) -> tuple[Float[Array, "population parameters"], _AgingState]:
-        """Sample a population (Hansen 2016, Eqs. 38 to 40)."""
-        is_due = state.age * (params.c_1 + params.c_mu) >= self.replaced
-        # A loop of at most one turn: in a batch of trials a conditional would decompose in every generation.
-        _, state = jax.lax.while_loop(lambda carry: carry[0], _decomposed, (is_due, state))
-        noise = jax.random.normal(key, (self.population_size, self.num_dims))
-        population = state.mean + state.std * ((noise * state.D) @ state.B.T)
-        return population, state.replace(age=state.age + 1)
-
-
-def _decomposed(carry: tuple[Array, _AgingState]) -> tuple[Array, _AgingState]:
-    """Decompose the covariance matrix; then it is no longer due."""
-    is_due, state = carry
-    covariance, axes, lengths = eigen_decomposition(state.C)
-    return jnp.zeros_like(is_due), state.replace(C=covariance, B=axes, D=lengths, age=jnp.zeros_like(state.age))
+        return partial(aging_cma_es.AgingCmaEs, self.replaced)

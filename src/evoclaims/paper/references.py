@@ -10,6 +10,7 @@ import hashlib
 import os
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import replace
+from functools import lru_cache
 from itertools import takewhile
 from pathlib import Path
 from typing import Any
@@ -59,6 +60,15 @@ def load(path: Path) -> tuple[TrialResult, ...]:
         if error.errno == errno.ENAMETOOLONG:  # no file has such a name
             return ()
         raise UserError(f"The reference trials {path} cannot be read: {error.strerror or error}. {_MEND}") from error
+    return _parsed(data, path)
+
+
+@lru_cache(maxsize=512)
+def _parsed(data: bytes, path: Path) -> tuple[TrialResult, ...]:
+    """Return the trials of a file's contents.
+
+    They are kept: a command reads the same file for several tiers, variants and costs, and a line takes a millisecond.
+    """
     results = []
     for number, line in enumerate(data.splitlines(), start=1):
         try:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import json
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
@@ -81,7 +81,7 @@ def save(folder: Path, header: Header, state: TrialState) -> None:
 
 def _text(header: Header) -> str:
     """Return a header as it is written; texts can be compared even if curves hold NaN."""
-    return json.dumps(asdict(header))
+    return json.dumps(vars(header))
 
 
 def find(folder: Path, condition: str, platform: str) -> list[Header]:
@@ -139,7 +139,7 @@ def _opened(path: Path) -> Iterator[tuple[Header, Packed]]:
                 raise DamagedFileError(path, "its header is longer than that of any batch of trials")
             header = Header(**json.loads(packed[_HEADER].tobytes()))
             if header.schema == SCHEMA:
-                header = convert(asdict(header), Header)
+                header = convert(vars(header), Header)
                 known = all(seed in header.batch for seed in header.seeds)  # as the runner relies on
                 if not (known and is_hash(header.condition) and header.curves.keys() == set(map(str, header.batch))):
                     raise DamagedFileError(path, "its header does not describe a batch of trials")

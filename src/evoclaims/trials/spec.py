@@ -16,49 +16,8 @@ from evoclaims.core.source_code import CODE, code_of
 from evoclaims.envs.base import Task
 from evoclaims.methods.base import Method
 from evoclaims.methods.training_loop import TrainingLoop
+from evoclaims.trials.budget import Budget
 from evoclaims.trials.result import TrialResult
-
-
-@dataclass(frozen=True)
-class Budget:
-    """The training length of one trial, in the method's own unit: set `generations` or `environment_steps`.
-
-    Attributes:
-        generations: steps of the method, for evolution (one generation per step).
-        environment_steps: interactions with the task, for reinforcement learning; rounded up to whole steps of
-            the method.
-        reports: points on the training curve.
-
-    Raises:
-        UserError: unless exactly one of the two lengths is given, and all numbers are whole and at least 1.
-    """
-
-    generations: int | None = None
-    environment_steps: int | None = None
-    reports: int = 50
-
-    def __post_init__(self) -> None:
-        """Reject budgets with no length, two lengths, or one below 1."""
-        lengths = [x for x in (self.generations, self.environment_steps) if x is not None]
-        whole = all(type(number) is int and number >= 1 for number in (*lengths, self.reports))
-        if len(lengths) != 1 or not whole:  # 1e3 would be another trial than 1000
-            raise UserError(
-                "A budget names exactly one of generations and environment_steps, a whole number of at least 1, and at "
-                f"least one report; this one has generations={self.generations}, "
-                f"environment_steps={self.environment_steps}, reports={self.reports}."
-            )
-
-    def steps(self, cost: int) -> int:
-        """Return the number of steps of a method that spends `cost` environment steps per step."""
-        if self.generations is not None:
-            return self.generations
-        assert self.environment_steps is not None
-        return -(-self.environment_steps // cost)
-
-    def chunk(self, cost: int) -> int:
-        """Return how many steps lie between two reports."""
-        return -(-self.steps(cost) // self.reports)
-
 
 Progression = Literal["curriculum", "direct", "whole_budget"]
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from importlib import resources
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, Final
 
@@ -53,12 +53,16 @@ def path_of(name: str, xml: str) -> str:
     """
     package, _, path = xml.partition(":")
     try:
-        found = resources.files(package) / path
-    except (ImportError, TypeError, ValueError) as error:
+        spec = find_spec(package)  # the package itself need not be imported: Brax takes seconds
+    except (ImportError, ValueError):
+        spec = None
+    folders = [Path(folder) for folder in (spec and spec.submodule_search_locations) or ()]
+    if not folders:
         raise UserError(
             f"The robot {name!r} has its model in {xml!r}, and there is no package {package!r}. Write PACKAGE:PATH, "
             "with a package that can be imported."
-        ) from error
+        )
+    found = next((folder / path for folder in folders if (folder / path).is_file()), folders[0] / path)
     if not found.is_file():
         raise UserError(
             f"The robot {name!r} has its model in {xml!r}, and there is no file {found}. Correct the path after the "

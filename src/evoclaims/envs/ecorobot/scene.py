@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
-import io
 import math
 from collections.abc import Mapping, Sequence
 from copy import copy
@@ -18,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evoclaims.core.errors import UserError
+from evoclaims.core.foreign import Later
 from evoclaims.envs.ecorobot import model_files
 from evoclaims.envs.ecorobot.boxes import Box
 from evoclaims.envs.ecorobot.robots import Robot
@@ -71,10 +70,8 @@ def touched_at_once(model: mujoco.MjModel, boxes: Sequence[Box]) -> int:
     return int(np.max(np.sum([box.distance(points) <= within for box in boxes], axis=0)))
 
 
-# MJX prints two lines when NVIDIA's warp is not installed; nothing here uses warp.
-with contextlib.redirect_stdout(io.StringIO()):
-    from mujoco import mjx as mjx
-    from mujoco.mjx._src.collision_driver import geom_pairs
+mjx = Later("mujoco.mjx")
+_collisions = Later("mujoco.mjx._src.collision_driver")
 
 WORLD_GROUP: Final = 1
 """The geom group of the scene's own geoms; sensors see it."""
@@ -253,7 +250,7 @@ def _require_contacts(name: str, model: mujoco.MjModel) -> None:
         UserError: naming the two kinds of geoms.
     """
     geoms = {int(kind): kind.name.removeprefix("mjGEOM_").lower() for kind in mujoco.mjtGeom.__members__.values()}
-    for one, other, _ in geom_pairs(model):
+    for one, other, _ in _collisions.geom_pairs(model):
         pair = tuple(geoms[int(model.geom_type[geom])] for geom in (one, other))
         if pair not in CONTACTS:
             boxes = set(box_geoms(model))
