@@ -153,8 +153,8 @@ def check(scene: Scene) -> None:
         made_with = versions()
         raise UserError(
             f"The robot {robot.name} does not move as MuJoCo in C says: of {len(wrong)} random frames "
-            f"{np.sum(~wrong)} are the same, and nine in ten with MuJoCo 3.17. MuJoCo is {made_with['mujoco']} and MJX "
-            f"{made_with['mujoco-mjx']}. Install other versions of mujoco and mujoco-mjx, or report it."
+            f"{np.sum(~wrong)} are the same, and with MuJoCo 3.17 at least 256. MuJoCo is {made_with['mujoco']} and "
+            f"MJX {made_with['mujoco-mjx']}. Install other versions of mujoco and mujoco-mjx, or report it."
         )
     worst = int(np.nanargmax(np.where(wrong, np.nan_to_num(off, nan=np.inf), -1.0)))
     crowded = wrong & (made.contacts > robot.contacts)
