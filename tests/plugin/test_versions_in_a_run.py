@@ -66,7 +66,6 @@ def test_trials_of_other_versions_run_again_and_the_summary_says_what_that_chang
     assert all(line.startswith("DRIFT in right on parity (smoke): ") for line in drift)
     assert any("mean_success is higher now: median 0.25 -> 1, A12 = 1.00, p = " in line for line in drift)
     assert lines[end].endswith(f" comparisons with the trials made before, {len(drift)} drifted")
-    assert lines[end + 1] == f"verdict changed: a (smoke): refuted -> supported (numpy 1.0 -> {HERE})"
     assert result.ret == 1  # supported, and yet something has drifted that nobody has looked at
     told = json.loads((project.path / "out.json").read_text())["upgrade"]["conditions"]
     assert [(one["condition"], one["again"], one["changed"]) for one in told] == [("right on parity (smoke)", 10, 10)]
@@ -80,7 +79,7 @@ def test_the_run_after_that_runs_nothing_and_passes(project: Any, aged: Callable
     assert result.ret == 0
     lines = _lines(result)
     assert "right on parity (smoke): run again before, 10 of 10 not the same to the bit as before" in lines
-    assert not [line for line in lines if "compiling" in line or line.startswith("verdict changed")]
+    assert not [line for line in lines if "compiling" in line]
 
 
 def test_a_part_of_a_conditions_trials_runs_again_alone(project: Any, aged: Callable[..., None]) -> None:

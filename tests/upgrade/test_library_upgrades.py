@@ -78,10 +78,6 @@ def test_changed_constants_of_libraries_are_told_with_their_names_and_nothing_el
         assert int(changed[1]) > 0
         if change.package == "evosax":  # a change that no trial survives
             assert f"DRIFT in {change.condition} (smoke): mean_success is lower now: median 1 -> 0." in told
-            assert (
-                f"verdict changed: L1[cma_es_on_parity] (smoke): supported -> refuted ({change.package} {old} ->"
-                in told
-            )
             assert ran.returncode == 1
     assert ran.stdout.count("versions changed: ") == len(changes)
     assert set(re.findall(r"(\w+ on \w+): compiling", ran.stdout)) <= {change.condition for change in changes}

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,8 +11,8 @@ import pytest
 from hand_made_verdicts import evidence, report, verdict
 
 from evoclaims.judging.sample import Sample
-from evoclaims.judging.verdict import Bound, Interval, Outcome
-from evoclaims.verdicts.claim_report import Attainable, ClaimReport, LastVerdict, save, succeeding
+from evoclaims.judging.verdict import Bound, Interval
+from evoclaims.verdicts.claim_report import Attainable, ClaimReport
 from evoclaims.verdicts.source_trials import SourceTrials
 
 OLDER = Path(__file__).with_name("verdict_of_0.1.0.json")
@@ -34,11 +33,10 @@ WHOLE = report(
     verdict=verdict("refuted", evidence=(PART, evidence(None)), deciding=1),
     sources=(SourceTrials("a", "b", "c" * 64, ("d" * 64,), {"jax": ("0.10.2",), "qdax": (None, "0.5")}, (3,)),),
     attainable=(Attainable(5, 0.01, 0.004, 0.5),),
-    before=LastVerdict(Outcome.SUPPORTED, "e" * 64, {"jax": ("0.10.1",)}),
 )
 
 
-@pytest.mark.parametrize("one", [WHOLE, report("G2", "error", verdict=None), replace(WHOLE, before=None)])
+@pytest.mark.parametrize("one", [WHOLE, report("G2", "error", verdict=None)])
 def test_a_report_crosses_processes_as_json_unchanged(one: ClaimReport) -> None:
     assert ClaimReport.from_json(json.loads(json.dumps(one.to_json(), allow_nan=False))) == one
 
@@ -61,20 +59,7 @@ def test_what_is_no_report_is_refused(torn: dict[str, Any]) -> None:
         ClaimReport.from_json({**WHOLE.to_json(), **torn})
 
 
-def test_a_file_of_an_earlier_release_is_read_as_what_came_before(tmp_path: Path) -> None:
+def test_a_file_of_an_earlier_release_is_read() -> None:
     older = ClaimReport.from_json(json.loads(OLDER.read_text()))
     assert older.verdict is not None
     assert older.verdict.evidence[0].samples[1].values == (0.1, 0.2, -math.inf)
-    saved = Path(save(replace(older, evidence=""), tmp_path).evidence)
-    saved.write_bytes(OLDER.read_bytes())
-    now = replace(WHOLE, claim=older.claim, case=older.case, tier=older.tier)
-    before = succeeding(now, tmp_path).before
-    assert before == LastVerdict(
-        older.outcome, older.fingerprint, {"jax": ("0.10.2",), "jaxlib": (None,), "numpy": (None,)}
-    )
-
-
-@pytest.mark.parametrize("content", [b"", b"[]", b"{}", b'{"outcome": "supported"}', b"\xff", b'{"claim": 1}'])
-def test_a_torn_file_is_as_good_as_none(content: bytes, tmp_path: Path) -> None:
-    Path(save(WHOLE, tmp_path).evidence).write_bytes(content)
-    assert succeeding(WHOLE, tmp_path) == WHOLE

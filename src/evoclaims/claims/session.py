@@ -33,7 +33,7 @@ from evoclaims.paper.trial_group import Fetch, TrialGroup
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.store import Store
 from evoclaims.verdicts import history, mutation_matrix
-from evoclaims.verdicts.claim_report import ClaimReport, located, save, succeeding
+from evoclaims.verdicts.claim_report import ClaimReport, located, save
 from evoclaims.verdicts.mutation_matrix import Matrix
 
 
@@ -172,8 +172,6 @@ class Session:
             complete = replace(complete, tried=mutation_matrix.tried(self.mutants, complete))
         if last is not None:
             complete = history.following(complete, last)
-        elif not self.reads:
-            complete = succeeding(complete, root)
         return located(complete, root) if self.reads else save(complete, root)
 
     def skipped(self, report: ClaimReport) -> ClaimReport:

@@ -248,7 +248,6 @@ class Summary:
         """Return lines on what comparisons found: with reference trials, trials of other versions, and verdicts."""
         from evoclaims.report import terminal_table
         from evoclaims.verdicts.history import changed_by_repetition
-        from evoclaims.verdicts.upgrade import verdict_changes
 
         notes = [line for report in self.reports if (line := changed_by_repetition(report))]
         if self._drift is not None:
@@ -258,7 +257,6 @@ class Summary:
             notes += terminal_table.drift_lines(drift, changed, digests.compared).splitlines()
         if self._upgrade is not None:
             notes += self._upgrade.lines
-        notes += verdict_changes(self.reports)
         return [*notes, *(self._regression.lines(self._reasons) if self._regression else ())]
 
     def _why_changed(self) -> dict[tuple[str, str], str]:

@@ -13,10 +13,10 @@ from msgspec import convert
 
 from evoclaims.core.canonical import as_plain
 from evoclaims.core.errors import UserError
-from evoclaims.core.files import file_name, read_json, write_atomically
+from evoclaims.core.files import file_name, write_atomically
 from evoclaims.judging.verdict import Outcome, Verdict
 from evoclaims.verdicts.readings import ReadAs, depends
-from evoclaims.verdicts.source_trials import Several, SourceTrials, versions_of
+from evoclaims.verdicts.source_trials import SourceTrials
 
 CONTROL: Final = "control"
 """What a claim says in `where` that is not the paper's, but a check of the benchmark itself."""
@@ -33,21 +33,6 @@ class Attainable:
     supported: float
     refuted: float
     smaller: float | None = None
-
-
-@dataclass(frozen=True)
-class LastVerdict:
-    """A claim's verdict in the store before a run.
-
-    Attributes:
-        outcome: how the claim ended.
-        fingerprint: hash of what was fixed beforehand; None if the test broke before judging.
-        versions: of packages that its trials were made with.
-    """
-
-    outcome: Outcome
-    fingerprint: str | None
-    versions: Several
 
 
 @dataclass(frozen=True)
@@ -112,7 +97,6 @@ class ClaimReport:
         evidence: path of the file that holds this report.
         variant: name of the variant of the protocol; empty for the protocol itself.
         unsaved: why that file could not be written; empty if it was, or need not be.
-        before: the verdict that the store held before this run, if any.
         tried: whether planted faults change the verdict, according to the committed matrix of mutants.
         has_test: whether the claim has a test at this tier.
         line: of the paper's source in which the sentence stands; None where the claim does not say.
@@ -139,7 +123,6 @@ class ClaimReport:
     evidence: str = ""
     variant: str = ""
     unsaved: str = ""
-    before: LastVerdict | None = None
     tried: Tried = Tried.NOT_TRIED
     has_test: bool = True
     line: int | None = None
@@ -235,16 +218,6 @@ def save(report: ClaimReport, root: Path) -> ClaimReport:
     except UserError as error:  # a full or read-only disk must not hide the verdict
         return replace(report, unsaved=str(error))
     return saved
-
-
-def succeeding(report: ClaimReport, root: Path) -> ClaimReport:
-    """Return the report with the claim's previous verdict, read from the file that this report will replace."""
-    try:
-        last = ClaimReport.from_json(read_json(evidence_path(report, root)))
-    except (OSError, ValueError):
-        return report  # no file, or one written by another release: nothing is judged from it
-    before = LastVerdict(last.outcome, last.fingerprint or None, versions_of(last.sources))
-    return replace(report, before=before)
 
 
 def located(report: ClaimReport, root: Path) -> ClaimReport:

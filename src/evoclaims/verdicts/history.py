@@ -173,7 +173,7 @@ def following(report: ClaimReport, last: ClaimReport | None) -> ClaimReport:
         return report
     known = (*last.earlier, EarlierRun(last.outcome, last.reason, last.p))
     own = report.earlier[len(known) :] if report.earlier[: len(known)] == known else report.earlier
-    return replace(report, earlier=(*known, *own), before=last.before)
+    return replace(report, earlier=(*known, *own))
 
 
 def last_runs(reports: Iterable[ClaimReport]) -> list[ClaimReport]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,13 +11,10 @@ from evoclaims.core.printable import printable
 from evoclaims.core.provenance import what_fixes_bits
 from evoclaims.judging.drift import DriftCase, check_drift
 from evoclaims.judging.drift_report import DriftReport
-from evoclaims.judging.verdict import Outcome
 from evoclaims.paper import references
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.store import newest
 from evoclaims.verdicts import source_trials
-from evoclaims.verdicts.claim_report import ClaimReport
-from evoclaims.verdicts.source_trials import versions_of
 
 
 @dataclass(frozen=True)
@@ -139,23 +136,6 @@ def predecessors(records: Sequence[TrialResult], packages: tuple[str, ...]) -> t
         return ()
     made_with = recorded(last.provenance, packages)
     return tuple(record for record in records if agree(record.provenance, made_with))
-
-
-def verdict_changes(reports: Iterable[ClaimReport]) -> list[str]:
-    """Return lines on verdicts that differ from the store's last run under the same rules."""
-    lines = []
-    for report in reports:
-        before = report.before
-        if before is None or before.outcome in (Outcome.NOT_RUN, report.outcome):
-            continue
-        if (before.fingerprint or "") != report.fingerprint:
-            continue
-        moved = source_trials.moved(before.versions, versions_of(report.sources))
-        by = f" ({moved})" if moved else ""
-        lines.append(
-            printable(f"verdict changed: {report.name} ({report.tier}): {before.outcome} -> {report.outcome}{by}")
-        )
-    return lines
 
 
 def _line(one: Succession) -> str:
