@@ -20,7 +20,6 @@ from evoclaims.envs.ecorobot.robots import HALF_CHEETAH as HALF_CHEETAH
 from evoclaims.envs.ecorobot.robots import ROBOTS as ROBOTS
 from evoclaims.envs.ecorobot.robots import SIMPLE_ROB as SIMPLE_ROB
 from evoclaims.envs.ecorobot.robots import Robot as Robot
-from evoclaims.envs.ecorobot.sensors import PieSlices as PieSlices
 from evoclaims.envs.ecorobot.sensors import Rangefinders as Rangefinders
 from evoclaims.envs.ecorobot.stones import STONES as STONES
 from evoclaims.envs.ecorobot.stones import SteppingStones as SteppingStones

@@ -11,13 +11,12 @@ import mujoco
 import numpy as np
 import pytest
 
-from evoclaims.core.canonical import as_plain
 from evoclaims.envs.ecorobot import deceptive, stones
 from evoclaims.envs.ecorobot.boxes import Box
 from evoclaims.envs.ecorobot.pose import Pose
 from evoclaims.envs.ecorobot.robots import ANT, SIMPLE_ROB, Robot
 from evoclaims.envs.ecorobot.scene import WORLD_GROUP, Scene, scene
-from evoclaims.envs.ecorobot.sensors import ARENA, PieSlices, Rangefinders, distances
+from evoclaims.envs.ecorobot.sensors import ARENA, Rangefinders, distances
 
 pytestmark = pytest.mark.newest
 
@@ -109,23 +108,3 @@ def test_rangefinders_go_from_right_to_left_and_reach_normalizes() -> None:
     ahead = Rangefinders(3, reach=4.6).read(world, _pose(heading=math.pi / 2))
     np.testing.assert_allclose(ahead, [1.0, 3.3 / 4.6, 1.0], atol=1e-6)
     np.testing.assert_allclose(Rangefinders(1, reach=4.6).read(world, _pose(heading=-math.pi / 2)), [0.5], atol=1e-6)
-
-
-def test_pie_slices_tell_the_sectors_in_which_something_lies() -> None:
-    ahead = Scene(SIMPLE_ROB, (Box((3.0, 0.0), (0.5, 0.5)),))
-    np.testing.assert_array_equal(PieSlices(4).read(ahead, _pose()), [1.0, 0.0, 0.0, 0.0])
-    np.testing.assert_array_equal(PieSlices(4).read(ahead, _pose(heading=math.pi / 2)), [0.0, 0.0, 0.0, 1.0])
-    # Half-way between front and left: both sectors end there.
-    between = Scene(SIMPLE_ROB, (Box((3.0, 3.0), (0.5, 0.5)),))
-    np.testing.assert_array_equal(PieSlices(4).read(between, _pose()), [1.0, 1.0, 0.0, 0.0])
-
-
-def test_pie_slices_see_no_further_than_their_reach() -> None:
-    ahead = Scene(SIMPLE_ROB, (Box((3.0, 0.0), (0.5, 0.5)),))  # 2.3 m from the robot's surface
-    np.testing.assert_array_equal(PieSlices(4, reach=2.29).read(ahead, _pose()), np.zeros(4))
-    np.testing.assert_array_equal(PieSlices(4, reach=2.31).read(ahead, _pose()), [1.0, 0.0, 0.0, 0.0])
-
-
-def test_conditions_with_different_sensors_have_different_ids() -> None:
-    """An id has the settings of a part, not its class."""
-    assert as_plain(PieSlices(5)) != as_plain(Rangefinders(5))

@@ -18,7 +18,7 @@ from evoclaims.envs.ecorobot.locomotion import Locomotion
 from evoclaims.envs.ecorobot.obstacles import Obstacles
 from evoclaims.envs.ecorobot.robots import SIMPLE_ROB, Robot
 from evoclaims.envs.ecorobot.scene import Scene
-from evoclaims.envs.ecorobot.sensors import PieSlices, Rangefinders
+from evoclaims.envs.ecorobot.sensors import Rangefinders
 from evoclaims.envs.ecorobot.stones import SteppingStones
 
 WRONG: Any = "steep"
@@ -75,11 +75,10 @@ def test_a_surface_has_numbers_that_a_simulation_can_use(numbers: dict[str, Any]
         Surface(**numbers)
 
 
-@pytest.mark.parametrize("sensor", [Rangefinders, PieSlices])
 @pytest.mark.parametrize("numbers", [{"count": 0}, {"reach": 0.0}, {"reach": math.inf}, {"reach": math.nan}])
-def test_a_sensor_has_rays_and_a_reach(sensor: Any, numbers: dict[str, Any]) -> None:
+def test_a_sensor_has_rays_and_a_reach(numbers: dict[str, Any]) -> None:
     with pytest.raises(UserError, match="at least 1 ray, and a finite reach above 0"):
-        sensor(**numbers)
+        Rangefinders(**numbers)
 
 
 def test_a_robot_without_a_file_says_so() -> None:

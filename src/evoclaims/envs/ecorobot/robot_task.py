@@ -65,7 +65,7 @@ class RobotTask(ABC):
         if not isinstance(self.robot, Robot):
             raise UserError(f"{self.name} has robot={self.robot!r}. Write a Robot, such as ANT.")
         if self.sensor is not None and not callable(getattr(self.sensor, "read", None)):
-            raise UserError(f"{self.name} has sensor={self.sensor!r}. Write Rangefinders(…), PieSlices(…) or None.")
+            raise UserError(f"{self.name} has sensor={self.sensor!r}. Write Rangefinders(…), your own sensor, or None.")
         # The built-in robots fit; to compile them takes longer than to load a paper.
         if not fits_as_built_in(self.robot):
             self._require_fit()

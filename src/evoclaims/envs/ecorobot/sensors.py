@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Final, Protocol
 
 import jax.numpy as jnp
@@ -26,10 +26,15 @@ class Sensor(Protocol):
 
 
 @dataclass(frozen=True)
-class _Rays:
-    """The base of sensors of several rays that reach equally far."""
+class Rangefinders:
+    """Distances to the nearest box or the floor, from the front half of the torso's surface outwards.
 
-    count: int
+    Attributes:
+        count: rays, spread evenly from the right (-90°) over the front, the torso's x axis, to the left (90°).
+        reach: the distance that reads 1, m; a ray reads 1 if and only if it meets nothing nearer.
+    """
+
+    count: int = 5
     reach: float = ARENA
 
     def __post_init__(self) -> None:
@@ -40,43 +45,10 @@ class _Rays:
                 "above 0, in m."
             )
 
-
-@dataclass(frozen=True)
-class Rangefinders(_Rays):
-    """Distances to the nearest box or the floor, from the front half of the torso's surface outwards.
-
-    Attributes:
-        count: rays, spread evenly from the right (-90°) over the front, the torso's x axis, to the left (90°).
-        reach: the distance that reads 1, m; a ray reads 1 if and only if it meets nothing nearer.
-    """
-
-    count: int = 5
-
     def read(self, scene: Scene, pose: Pose) -> Float[Array, " size"]:
         """Return distance / reach of each ray, 1 for nothing."""
         angles = np.linspace(-90.0, 90.0, self.count) if self.count > 1 else np.zeros(1)
         return jnp.minimum(distances(scene, pose, angles) / self.reach, 1.0)
-
-
-@dataclass(frozen=True)
-class PieSlices(_Rays):
-    """Whether there is anything in each sector around the robot.
-
-    Attributes:
-        count: sectors, the first one centred on the front, the others counterclockwise.
-        reach: how far it sees, m.
-        name: part of a condition's id, since the other sensor has the same settings.
-    """
-
-    count: int = 4
-    name: str = field(default="pie_slices", init=False)
-
-    def read(self, scene: Scene, pose: Pose) -> Float[Array, " size"]:
-        """Return 1 for each sector in which one of five rays (at -45°, -22.5°, 0, 22.5°, 45°) hits, else 0."""
-        centres = np.arange(self.count) * 360.0 / self.count
-        angles = centres[:, None] + np.array([-45.0, -22.5, 0.0, 22.5, 45.0])
-        hit = distances(scene, pose, angles.ravel()) <= self.reach
-        return jnp.any(hit.reshape(self.count, 5), axis=1).astype(jnp.float32)
 
 
 def distances(scene: Scene, pose: Pose, angles: np.ndarray) -> Float[Array, " rays"]:
