@@ -155,17 +155,6 @@ def test_a_gif_has_a_frame_for_each_step(trained: Evoclaims) -> None:
     assert image.n_frames == 5
 
 
-def test_the_map_of_elites_is_the_stored_one(trained: Evoclaims, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("evoclaims.cli.look.run_again", None)  # no episode is run for it
-    assert trained("look", "maze", "--method=map_elites", "--seed=4", "--as=elites")[0] == 0
-    trial = load(open_project(".evoclaims"), "smoke", "map_elites", "maze", 4)
-    _, fitnesses = trial.parameters
-    assert fitnesses.shape == (5, 4)
-    elites = int(np.isfinite(fitnesses).sum())
-    assert elites >= 1
-    assert any(text.startswith(f"{elites} elites; ") for text in _texts("figures/map_elites-maze-4-elites.svg"))
-
-
 CHAMPION = ("maze", "--method=random", "--seed=4")
 
 
@@ -191,16 +180,11 @@ CHAMPION = ("maze", "--method=random", "--seed=4")
         (("maze", "--method=random", "--seed=-1"), "A seed is a whole number from 0 to 2147483647, not -1."),
         (
             (*CHAMPION, "--as=gfi"),
-            "There is no way to look at a champion named 'gfi'. Did you mean 'gif'? Known: elites, gif, path.",
+            "There is no way to look at a champion named 'gfi'. Did you mean 'gif'? Known: gif, path.",
         ),
         ((*CHAMPION, "--episode=3"), "The evaluation has 3 episodes, 0 to 2; --episode is 3."),
         ((*CHAMPION, "--episode=-1"), "The evaluation has 3 episodes, 0 to 2; --episode is -1."),
         ((*CHAMPION, "--device=tpu"), "There is no device named 'tpu'."),
-        ((*CHAMPION, "--as=elites"), "random keeps no map of elites; on maze, map_elites does."),
-        (
-            ("course", "--method=random", "--as=elites"),
-            "random keeps no map of elites; on course, no method of this tier does here.",
-        ),
         (
             ("maze", "--out=maze.pdf"),
             "--out names a file that ends in .svg or .png, which selects its format; 'maze.pdf' does not.",

@@ -166,8 +166,7 @@ def _reading(add: _Add) -> None:
         "--as",
         dest="form",
         metavar="FORM",
-        help="path (default): a picture of the paths of all episodes; gif: an episode, animated; "
-        " elites: the map of MAP-Elites",
+        help="path (default): a picture of the paths of all episodes; gif: an episode, animated",
     )
     look.add_argument(
         "--episode", type=int, default=0, metavar="N", help="number of the evaluation's episode, from 0 (0)"

@@ -19,7 +19,6 @@ from evoclaims.core.errors import UnknownNameError, UserError
 from evoclaims.envs.ecorobot.robot_task import RobotTask
 from evoclaims.envs.ecorobot.views import pictures
 from evoclaims.envs.ecorobot.views.motion import Motion, marks, motion
-from evoclaims.methods.map_elites import MapElites
 from evoclaims.paper.reproduction import Tier
 from evoclaims.trials import devices
 
@@ -90,12 +89,10 @@ class Form:
     Attributes:
         endings: of the files that it writes, the first when none is named.
         make: returns a file's contents, given the trial and the ending.
-        episodes: whether it shows the evaluation's episodes.
     """
 
     endings: tuple[str, ...]
     make: Callable[[Subject, str], bytes]
-    episodes: bool = True
 
 
 def main(options: argparse.Namespace) -> int:
@@ -138,7 +135,7 @@ def _champion(options: argparse.Namespace, project: Project) -> tuple[Path, byte
     subject = Subject(options, project, task)
     data = form.make(subject, ending)
     print(f"{subject.trial.title}\n  {describe(subject.trial.result)}")
-    if form.episodes and subject.difference:
+    if subject.difference:
         print(subject.difference)
     return path, data
 
@@ -169,23 +166,7 @@ def _path(subject: Subject, ending: str) -> bytes:
     return pictures.draw(subject.task, outings.torsos, title, ending)
 
 
-def _elites(subject: Subject, ending: str) -> bytes:
-    """Draw the map of elites that MAP-Elites stores with its champion."""
-    method, on = subject.options.method, subject.options.task
-    tier = subject.project.reproduction.tier(subject.options.tier)
-    if not isinstance(tier.condition(method, on).method, MapElites):
-        conditions = tier.conditions.items()
-        known = [
-            name for (name, task), condition in conditions if task == on and isinstance(condition.method, MapElites)
-        ]
-        others = f"{', '.join(known)} does" if known else "no method of this tier does here"
-        raise UserError(f"{method} keeps no map of elites; on {on}, {others}.")
-    _, fitnesses = subject.trial.parameters
-    return pictures.draw_elites(subject.task, np.asarray(fitnesses), subject.title, ending)
-
-
 FORMS: Final[Mapping[str, Form]] = {
     "path": Form(PICTURE, _path),
     "gif": Form(("gif",), lambda one, _: pictures.film(one.task, one.motion, one.episode_title)),
-    "elites": Form(PICTURE, _elites, episodes=False),
 }

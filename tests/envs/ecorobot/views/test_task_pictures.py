@@ -1,4 +1,4 @@
-"""Pictures of tasks, paths and maps of elites: what is in them, and where."""
+"""Pictures of tasks, paths and elites: what is in them, and where."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import pytest
 from numpy.typing import NDArray
 
 from evoclaims.core.drawing import optional
-from evoclaims.core.errors import UnknownNameError, UserError
+from evoclaims.core.errors import UnknownNameError
 from evoclaims.envs.ecorobot.deceptive import DeceptiveMaze
 from evoclaims.envs.ecorobot.locomotion import Locomotion
 from evoclaims.envs.ecorobot.obstacles import Obstacles
@@ -23,7 +23,7 @@ from evoclaims.envs.ecorobot.views.pictures import (
     TARGET,
     WALL,
     draw,
-    draw_elites,
+    paint_elites,
     paint_ground,
     paint_paths,
 )
@@ -134,48 +134,18 @@ def test_a_hostile_title_stays_text() -> None:
     assert "&lt;script&gt;alert(1)" in svg
 
 
-def _with_elite(x: int, y: int) -> NDArray[np.float32]:
-    fitnesses = np.full((50, 50), -np.inf, np.float32)
-    fitnesses[x, y] = 3.0
-    return fitnesses
-
-
-def test_an_elite_is_drawn_where_its_episode_ended() -> None:
-    pictures = [_pixels(draw_elites(MAZE, _with_elite(*cell), "map", "png")) for cell in ((45, 5), (10, 45))]
-    rows, columns = np.nonzero((pictures[0] != pictures[1]).any(axis=-1))
-    # The first elite is at x = 3.28 m, y = 0.77 m, the other at x = -2.32 m, y = 6.37 m: one to the right and below.
-    right = columns > (columns.min() + columns.max()) / 2
-    assert (pictures[0][rows[right], columns[right]] != 255).any(axis=-1).all()
-    assert (pictures[1][rows[right], columns[right]] == 255).all()
-    assert rows[right].min() > rows[~right].max()
-    # A picture's metre has equal length on both axes; a cell is 0.16 m wide and 0.14 m high.
-    metre = (columns[right].mean() - columns[~right].mean()) / 5.6
-    assert rows[right].mean() - rows[~right].mean() == pytest.approx(5.6 * metre, rel=0.02)
-    assert np.ptp(columns[right]) + 1 == pytest.approx(0.16 * metre, abs=2)
-
-
-def test_a_map_of_elites_tells_how_many_there_are() -> None:
-    fitnesses = _with_elite(10, 8)
-    fitnesses[0, 0] = 1.0  # in the corner, where the walls are
-    reachable = int(MAZE.reachable((50, 50)).sum())
-    texts = _texts(draw_elites(MAZE, fitnesses, "a map", "svg"))
-    assert f"2 elites; 1 of {reachable:,} reachable cells hold one" in texts
-    assert "fitness of the elite whose episode ended here" in texts
-
-
-def test_an_empty_map_of_elites_is_drawn() -> None:
-    texts = _texts(draw_elites(MAZE, np.full((5, 4), -np.inf), "a map", "svg"))
-    assert any(text.startswith("0 elites; 0 of ") for text in texts)
-
-
-def test_only_a_maze_has_a_map_of_elites() -> None:
-    with pytest.raises(UserError, match="'obstacles' is not a maze"):
-        draw_elites(Obstacles(), np.zeros((2, 2)), "", "svg")
+def test_an_elite_is_painted_where_its_episode_ended() -> None:
+    for (x, y), place in {(45, 5): (3.28, 0.77), (10, 45): (-2.32, 6.37)}.items():
+        fitnesses = np.full((50, 50), -np.inf, np.float32)
+        fitnesses[x, y] = 3.0
+        mesh = paint_elites(_axis(), MAZE, fitnesses)
+        ((row, column),) = np.argwhere(~np.ma.getmaskarray(mesh.get_array()))
+        corners = mesh.get_coordinates()[row : row + 2, column : column + 2]
+        np.testing.assert_allclose(corners.mean(axis=(0, 1)), place, atol=1e-6)
+        np.testing.assert_allclose(np.ptp(corners, axis=(0, 1)), (0.16, 0.14), atol=1e-6)
 
 
 def test_a_format_that_is_not_known_is_told() -> None:
     sentence = "There is no format of a picture named 'pgn'. Did you mean 'png'?"
     with pytest.raises(UnknownNameError, match=re.escape(sentence)):
         draw(MAZE, [], "", "pgn")
-    with pytest.raises(UnknownNameError, match=re.escape(sentence)):
-        draw_elites(MAZE, np.zeros((2, 2)), "", "pgn")

@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evoclaims.core.drawing import optional, own_style, saved
-from evoclaims.core.errors import UserError
 from evoclaims.envs.ecorobot.maze import Maze
 from evoclaims.envs.ecorobot.robot_task import RobotTask
 from evoclaims.envs.ecorobot.views.motion import Mark, Motion, at_start, marks
@@ -141,39 +140,12 @@ def draw(task: RobotTask, paths: Sequence[NDArray[np.floating]], title: str, fil
     """
     seen = [path[np.isfinite(path).all(axis=1)] for path in paths]
     with own_style():
-        figure = _course(task, seen, title) if plane_of(task) == FROM_THE_SIDE else _ground(task, seen, title)[0]
+        figure = _course(task, seen, title) if plane_of(task) == FROM_THE_SIDE else _ground(task, seen, title)
         return saved(figure, file_format, bbox_inches="tight", pad_inches=0.12)
 
 
-def draw_elites(task: RobotTask, fitnesses: NDArray[np.floating], title: str, file_format: str) -> bytes:
-    """Draw the fitness of each elite where its episode ended.
-
-    Args:
-        task: a maze.
-        fitnesses: over the maze's area, shape [cells along x, cells along y]; -inf where there is no elite.
-        title: what to write above, before the counts.
-        file_format: "svg" or "png".
-
-    Raises:
-        UserError: for a task without an area, another format, or when matplotlib is not installed.
-    """
-    if not isinstance(task, Maze):
-        raise UserError(
-            f"{task.name!r} is not a maze, so it has no area on which elites can be drawn. Use a maze, such as "
-            "DeceptiveMaze or SteppingStones."
-        )
-    filled = np.isfinite(fitnesses)
-    ground = task.reachable(fitnesses.shape)
-    counts = f"{filled.sum():,} elites; {(filled & ground).sum():,} of {ground.sum():,} reachable cells hold one"
-    with own_style():
-        figure, axis = _ground(task, [], f"{title}\n{counts}")
-        mesh = paint_elites(axis, task, fitnesses)
-        figure.colorbar(mesh, ax=axis, pad=0.02, label="fitness of the elite whose episode ended here")
-        return saved(figure, file_format, bbox_inches="tight", pad_inches=0.12)
-
-
-def _ground(task: RobotTask, paths: Sequence[TorsoPath], title: str) -> tuple[Any, Any]:
-    """Build the picture from above; return figure and axis."""
+def _ground(task: RobotTask, paths: Sequence[TorsoPath], title: str) -> Any:
+    """Build the picture from above."""
     low, high = ground_shown(task, paths)
     size = (high - low) * WIDTH[FROM_ABOVE] / (high - low).max() + np.array([1.0, 1.9])
     figure = _figure(size)
@@ -183,7 +155,7 @@ def _ground(task: RobotTask, paths: Sequence[TorsoPath], title: str) -> tuple[An
     paint_paths(axis, paths, FROM_ABOVE)
     axis.set_title(title, fontsize=10)
     _legend(figure, task, len(paths), columns=2)
-    return figure, axis
+    return figure
 
 
 def _course(task: RobotTask, paths: Sequence[TorsoPath], title: str) -> Any:
