@@ -131,21 +131,6 @@ def test_another_python_with_pins_gets_this_program_first_and_then_the_release_o
     assert constraints.read_text() == kept  # uv checks the hashes that there are
 
 
-@pytest.mark.oldest
-def test_pip_takes_pins_with_hashes_though_the_project_has_none(
-    wheels: Path, make_one: Make, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """`ours` stands in for the project and this program, which have no hash and need what is pinned."""
-    write_wheel(wheels, "ours", "1.0", "import grain", "Requires-Dist: grain\n")
-    for version in ("2.0", "2.1"):
-        write_wheel(wheels, "grain", version, "")
-    monkeypatch.setattr(environments, "_requirements", lambda project: ["ours"])
-    monkeypatch.setattr(environments.shutil, "which", lambda name: None)  # no uv
-    pins = tmp_path / "pins.txt"
-    pins.write_text(f"grain==2.0 \\\n    --hash=sha256:{'0' * 64} \\\n    --hash=sha256:{'1' * 64}\n    # via ours\n")
-    assert make_one("", "", constraints=pins).versions["grain"] == "2.0"
-
-
 @pytest.mark.parametrize(
     ("origin", "asked"),
     [
@@ -164,9 +149,10 @@ def test_this_program_is_found_in_a_folder_with_a_space_in_its_name(
     assert environments._this_program() == asked
 
 
-def test_without_such_a_python_that_is_said(make_one: Make, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_uv_no_other_python_is_tried(make_one: Make, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("PATH", str(tmp_path))
-    with pytest.raises(NotInstallableError, match=r"there is no python3\.99 on the path, and no uv"):
+    monkeypatch.setattr(environments.sysconfig, "get_path", lambda *_: str(tmp_path))
+    with pytest.raises(NotInstallableError, match=r"not installed: pip install 'evoclaims\[releases\]'"):
         make_one("", "", python="3.99")
 
 

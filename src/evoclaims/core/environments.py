@@ -37,20 +37,12 @@ from evoclaims.core.files import file_name, read_json, read_text, write_atomical
 
 _NAME: Final = re.compile(r"\s*[\w.-]+")
 
-_HASH: Final = re.compile(r"(?:\s|\\\n)+--hash(?:=|(?:\s|\\\n)+)\w+:[0-9a-fA-F]+")
-"""A hash with what stands before it: "\\", the end of a line, and blanks."""
-
 
 def without(pins: str, package: str) -> str:
     """Return a file of pins without those of a package; no other character changes."""
     own = canonicalize_name(package)
     named = ((_NAME.match(entry), entry) for entry in _entries(pins))
     return "".join(entry for name, entry in named if not name or canonicalize_name(name[0].strip()) != own)
-
-
-def without_hashes(pins: str) -> str:
-    """Return a file of pins without hashes; no other character changes."""
-    return "".join(_HASH.sub("", entry) for entry in _entries(pins))
 
 
 def _entries(pins: str) -> Iterator[str]:
@@ -255,10 +247,11 @@ def _made(recipe: Recipe, empty: Environment, project: Path, pins: str) -> Envir
         _begin_layer(empty.folder)
         _run([str(empty.python), *PIP, "install", *recipe.release])
     else:
-        install, by_uv = _begin_apart(recipe, empty)
+        uv = _uv()
+        _run([uv, "venv", "--python", recipe.python or sys.executable, str(empty.folder)])
+        install = [uv, "pip", "install", "--python", str(empty.python)]
         constraints = empty.folder / "constraints.txt"
-        # Where a pin has a hash, pip asks for one of everything, of this program and the project, too; uv does not.
-        constraints.write_text(pins if by_uv else without_hashes(pins), encoding="utf-8")
+        constraints.write_text(pins, encoding="utf-8")
         constrained = ["--constraint", str(constraints)] if pins else []
         _run([*install, *constrained, *_requirements(project)])
         if recipe.package:  # apart from the rest, whose metadata may ask for another release
@@ -279,17 +272,13 @@ def _begin_layer(folder: Path) -> None:
     (_place(folder, "purelib") / "layer.pth").write_text("".join(lines), encoding="utf-8")
 
 
-def _begin_apart(recipe: Recipe, empty: Environment) -> tuple[list[str], bool]:
-    """Make an empty environment, by uv where there is one; return the command to install with, and if it is uv's."""
-    uv = shutil.which("uv")
-    if uv is not None:
-        _run([uv, "venv", "--python", recipe.python or sys.executable, str(empty.folder)])
-        return [uv, "pip", "install", "--python", str(empty.python)], True
-    python = shutil.which(f"python{recipe.python}") if recipe.python else sys.executable
-    if python is None:
-        raise NotInstallableError(f"there is no python{recipe.python} on the path, and no uv that would fetch one")
-    _run([python, "-m", "venv", str(empty.folder)])
-    return [str(empty.python), *PIP, "install"], False
+def _uv() -> str:
+    """Return the program that makes environments apart from this one: beside this Python, or on the path."""
+    beside = os.pathsep.join([sysconfig.get_path("scripts"), os.environ.get("PATH", os.defpath)])
+    uv = shutil.which("uv", path=beside)
+    if uv is None:
+        raise NotInstallableError("uv makes such environments, and is not installed: pip install 'evoclaims[releases]'")
+    return uv
 
 
 def _requirements(project: Path) -> list[str]:
