@@ -27,7 +27,7 @@ import numpy as np
 from evoclaims.core.foreign import implicit_promotions
 from evoclaims.envs.base import TaskState
 from evoclaims.envs.ecorobot.deceptive import DeceptiveMaze
-from evoclaims.envs.ecorobot.obstacles import Obstacles
+from evoclaims.envs.ecorobot.locomotion import Obstacles
 from evoclaims.envs.ecorobot.physics import Body
 from evoclaims.envs.ecorobot.robot_task import RobotTask
 from evoclaims.envs.ecorobot.robots import ANT

@@ -27,7 +27,7 @@ import numpy as np  # noqa: E402
 
 from evoclaims.core.keys import EVALUATION, TRAINING, trial_key  # noqa: E402
 from evoclaims.envs import Box, Obstacles, Surface  # noqa: E402
-from evoclaims.envs.ecorobot.obstacles import HALF_THICKNESS, PLACES  # noqa: E402
+from evoclaims.envs.ecorobot.locomotion import HALF_THICKNESS, PLACES  # noqa: E402
 from evoclaims.trials import champions  # noqa: E402
 from evoclaims.trials.devices import MATMUL_PRECISION  # noqa: E402
 from evoclaims.trials.result import TrialResult  # noqa: E402

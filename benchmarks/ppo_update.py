@@ -29,7 +29,7 @@ import jax.numpy as jnp  # noqa: E402
 import optax  # noqa: E402
 from brax.training.types import Transition  # noqa: E402
 
-from evoclaims.methods.brax_blocks import losses, networks, running_statistics, specs  # noqa: E402
+from evoclaims.methods.collect import losses, networks, running_statistics, specs  # noqa: E402
 
 PRECISIONS = ("highest", "TF32_TF32_F32_X3", "tensorfloat32")
 TRAJECTORIES, STEPS, OBSERVATION, ACTION = 2_048, 5, 18, 6

@@ -15,8 +15,8 @@ from evoclaims.core.errors import require_at_least
 from evoclaims.envs import DeceptiveMaze, Episode, Ruling
 from evoclaims.envs.base import TaskState
 from evoclaims.envs.ecorobot.deceptive import EASY, Approach
-from evoclaims.envs.ecorobot.outing import Outing
 from evoclaims.envs.ecorobot.pose import Pose
+from evoclaims.envs.ecorobot.robot_task import Outing
 from evoclaims.envs.ecorobot.scene import Scene
 from evoclaims.envs.ecorobot.sensors import Sensor
 from reproductions.nisioti2025.other_stones import MetreRanges, OtherStones

@@ -13,8 +13,7 @@ from evoclaims.core.foreign import implicit_promotions
 from evoclaims.core.pytree import pytree, select, static
 from evoclaims.envs.base import Task, TaskState
 from evoclaims.methods import Policy, Ppo
-from evoclaims.methods.brax_blocks import networks
-from evoclaims.methods.collect import Interaction
+from evoclaims.methods.collect import Interaction, networks
 from evoclaims.methods.ppo import PpoState
 from reproductions.nisioti2025.first_level_ppo import FirstLevelPpo
 

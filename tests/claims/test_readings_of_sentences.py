@@ -8,9 +8,9 @@ from typing import Any
 import pytest
 
 from evoclaims.claims.claim import Claim, ClaimTest, claim
+from evoclaims.claims.collected import VerdictFixture
 from evoclaims.claims.fetching import StoredOnly
 from evoclaims.claims.session import Session
-from evoclaims.claims.verdict_fixture import VerdictFixture
 from evoclaims.core.errors import UserError
 from evoclaims.judging.verdict import Outcome
 from evoclaims.paper.archive import Archive

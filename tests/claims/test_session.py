@@ -11,9 +11,9 @@ import pytest
 
 from evoclaims.claims import earlier_trials
 from evoclaims.claims.claim import Claim, ClaimTest
+from evoclaims.claims.collected import VerdictFixture
 from evoclaims.claims.fetching import NotStoredError, RunMissing, StoredOnly
 from evoclaims.claims.session import Session
-from evoclaims.claims.verdict_fixture import VerdictFixture
 from evoclaims.core.errors import UnknownNameError, UserError
 from evoclaims.core.packages import without_flags
 from evoclaims.core.provenance import changing_flags

@@ -32,11 +32,11 @@ for _module in ("backends.backend_agg", "backends.backend_svg", "collections", "
     optional(f"matplotlib.{_module}")
 for _module in ("Image", "GifImagePlugin", "PngImagePlugin"):
     optional(f"PIL.{_module}")
-for _module in ("cli.champion", "cli.look", "envs.ecorobot.obstacles", "methods.map_elites", "methods.random_search"):
+for _module in ("cli.champion", "cli.look", "envs.ecorobot.locomotion", "methods.map_elites", "methods.random_search"):
     optional(f"evoclaims.{_module}")
 
 MORE = """
-from evoclaims.envs.ecorobot.obstacles import Obstacles
+from evoclaims.envs.ecorobot.locomotion import Obstacles
 from evoclaims.envs.ecorobot.stones import SteppingStones
 from evoclaims.methods.map_elites import MapElites
 from evoclaims.methods.random_search import RandomSearch

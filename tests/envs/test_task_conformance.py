@@ -14,8 +14,7 @@ from probes import PROBES
 
 from evoclaims.core.canonical import canonical_json
 from evoclaims.envs.ecorobot.deceptive import DeceptiveMaze
-from evoclaims.envs.ecorobot.locomotion import Locomotion
-from evoclaims.envs.ecorobot.obstacles import Obstacles
+from evoclaims.envs.ecorobot.locomotion import Locomotion, Obstacles
 from evoclaims.envs.ecorobot.robots import SIMPLE_ROB
 from evoclaims.envs.ecorobot.stones import SteppingStones
 from evoclaims.envs.gates.alu import SimpleAlu

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from evoclaims.judging.tripwire import DigestChange, compare_digests
+from evoclaims.judging.drift_report import DigestChange, compare_digests
 
 MADE_BY: dict[str, Any] = {"device": {"kind": "cpu", "count": 1}, "machine": "x86_64", "versions": {"jax": "0.10.2"}}
 

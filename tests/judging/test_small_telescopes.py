@@ -10,9 +10,8 @@ import pytest
 from scipy.stats import mannwhitneyu, norm
 
 from evoclaims.core.errors import UserError
-from evoclaims.judging.design import FIXED_10, SEQUENTIAL
+from evoclaims.judging.design import FIXED_10, SEQUENTIAL, _u_distribution, comparison_power, detectable_a12
 from evoclaims.judging.judge import fingerprint
-from evoclaims.judging.telescope import _u_distribution, comparison_power, detectable_a12
 
 
 def test_ten_against_ten_give_the_margin_of_all_committed_fingerprints() -> None:

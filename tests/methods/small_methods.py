@@ -10,7 +10,7 @@ from workbench import Workbench
 
 from evoclaims.envs.ecorobot.stones import SteppingStones
 from evoclaims.envs.gates.parity import NParity
-from evoclaims.methods.cma_es import CmaEs
+from evoclaims.methods.cma_es import CmaEs, SeldomDecomposedCmaEs
 from evoclaims.methods.hand_built import HandBuilt
 from evoclaims.methods.hyperneat import CPPN_FUNCTIONS, HyperNeat
 from evoclaims.methods.hyperneat_tensorneat import HyperneatTensorneat
@@ -20,7 +20,6 @@ from evoclaims.methods.neat.settings import Attribute, Mutation, Settings, Speci
 from evoclaims.methods.ppo import Ppo
 from evoclaims.methods.random_policy import RandomPolicy
 from evoclaims.methods.random_search import RandomSearch
-from evoclaims.methods.seldom_decomposed_cma_es import SeldomDecomposedCmaEs
 from evoclaims.methods.tensorneat import NeatTensorneat
 from evoclaims.networks.all_skips import AllSkips
 from evoclaims.networks.mlp import Mlp

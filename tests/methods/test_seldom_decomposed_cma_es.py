@@ -13,8 +13,7 @@ from test_cma_es import POPULATION, Ellipsoid, Itself
 
 from evoclaims.core.errors import UserError
 from evoclaims.methods.champion import first_champion
-from evoclaims.methods.cma_es import CmaEs, CmaEsState
-from evoclaims.methods.seldom_decomposed_cma_es import SeldomDecomposedCmaEs
+from evoclaims.methods.cma_es import CmaEs, CmaEsState, SeldomDecomposedCmaEs
 
 pytestmark = pytest.mark.newest
 

@@ -11,7 +11,7 @@ import pytest
 from evoclaims.core.canonical import as_plain
 from evoclaims.core.errors import UserError
 from evoclaims.core.portable import from_plain, to_plain
-from evoclaims.envs.ecorobot.obstacles import Obstacles
+from evoclaims.envs.ecorobot.locomotion import Obstacles
 from evoclaims.envs.ecorobot.sensors import Rangefinders
 from evoclaims.envs.gates.parity import NParity
 from evoclaims.methods.training_loop import TrainingLoop

@@ -13,7 +13,7 @@ import pytest
 
 from evoclaims.core.errors import UserError
 from evoclaims.envs.ecorobot.deceptive import DeceptiveMaze
-from evoclaims.envs.ecorobot.outing import Outing
+from evoclaims.envs.ecorobot.robot_task import Outing
 from evoclaims.envs.ecorobot.robots import ANT
 from evoclaims.envs.ecorobot.stones import ARENA, BONUS, STONES, TARGET, SteppingStones
 from reproductions.nisioti2025.waypoints import Waypoints

@@ -11,7 +11,7 @@ import pytest
 
 from evoclaims.core.errors import UserError
 from evoclaims.envs.base import Numbered
-from evoclaims.envs.ecorobot.obstacles import Obstacles
+from evoclaims.envs.ecorobot.locomotion import Obstacles
 from evoclaims.envs.ecorobot.pose import Pose
 from evoclaims.envs.ecorobot.stones import SteppingStones, StonesCrossed
 from evoclaims.mutants import mutant

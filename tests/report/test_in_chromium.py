@@ -15,7 +15,7 @@ from laboratory import Laboratory, better_solves, better_wins
 from evoclaims.judging.verdict import Outcome
 from evoclaims.report.html import html
 from evoclaims.report.model import PaperFigure
-from evoclaims.verdicts.robustness import Robustness
+from evoclaims.verdicts.transitions import Robustness
 
 PLATE = (
     b'<svg xmlns="http://www.w3.org/2000/svg" width="40" height="30" viewBox="0 0 40 30">'

@@ -15,7 +15,7 @@ from evoclaims.report.charts import spark_svg
 from evoclaims.report.evidence import Dot, Part, Strip
 from evoclaims.report.html import findings, opening_lines
 from evoclaims.verdicts.claim_report import ClaimReport
-from evoclaims.verdicts.robustness import Robustness
+from evoclaims.verdicts.transitions import Robustness
 
 
 def _part(*samples: list[float], **changes: object) -> Part:

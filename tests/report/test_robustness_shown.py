@@ -10,7 +10,7 @@ from unpacked import whole
 from evoclaims.judging.verdict import Outcome
 from evoclaims.report.html import html
 from evoclaims.report.model import Board, Page, Section
-from evoclaims.verdicts.robustness import Robustness
+from evoclaims.verdicts.transitions import Robustness
 
 ROW = Robustness("G1[<b>]", "smoke", Outcome.REFUTED, {"network": Outcome.SUPPORTED, "rows": Outcome.REFUTED})
 OTHER = Robustness("G2", "smoke", Outcome.SUPPORTED, {"rows": Outcome.SUPPORTED})

@@ -8,7 +8,7 @@ import pytest
 
 from evoclaims.judging.verdict import Outcome
 from evoclaims.report.table_cells import totals
-from evoclaims.report.tally import tally
+from evoclaims.report.verdict_overview import tally
 from evoclaims.verdicts.claim_report import CONTROL, MECHANISM, ClaimReport, Tried
 
 

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 from climbers import run_climbers
 
-from evoclaims.trials import devices, memory
+from evoclaims.trials import devices
 from evoclaims.trials.lanes import Lanes
 from evoclaims.trials.store import Store
 
@@ -22,7 +22,7 @@ def test_memory_is_given_back_after_compiling_and_at_the_end_of_a_batch(
     tmp_path: Path, cpus: list[Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     events: list[str] = []
-    monkeypatch.setattr(memory, "_libc", lambda: SimpleNamespace(malloc_trim=lambda _: events.append("trim")))
+    monkeypatch.setattr(devices, "_libc", lambda: SimpleNamespace(malloc_trim=lambda _: events.append("trim")))
     for name in ("_lowered", "_finished", "advance"):
         monkeypatch.setattr(Lanes, name, noted(getattr(Lanes, name), name, events))
     run_climbers(Store(tmp_path), cpus)
@@ -45,28 +45,28 @@ def noted(function: Any, name: str, events: list[str]) -> Any:
 
 @pytest.mark.skipif(sys.platform != "linux", reason="glibc's allocator alone keeps what was freed")
 def test_freed_memory_goes_back_to_the_system() -> None:
-    if memory._libc() is None:
+    if devices._libc() is None:
         pytest.skip("another C library")
 
     def resident() -> int:
         return int(Path("/proc/self/statm").read_text().split()[1]) * 4096
 
-    memory.give_back()
+    devices.give_back()
     held = [bytes(10_000) for _ in range(20_000)]  # smaller than what is mapped by itself
     last = bytearray(10_000)  # keeps the heap from shrinking by itself
     full = resident()
     del held
-    memory.give_back()
+    devices.give_back()
     assert resident() < full - 100_000_000
     del last
 
 
 HEAPS = """
 import ctypes, sys, threading
-from evoclaims.trials import devices, memory
+from evoclaims.trials import devices
 
 if sys.argv[1:]:
-    memory.share_heaps()
+    devices.share_heaps()
 libc, all_there = ctypes.CDLL(None), threading.Barrier(8)
 libc.fopen.restype = ctypes.c_void_p
 
@@ -85,7 +85,7 @@ libc.fflush(None)
 
 
 def test_threads_share_two_heaps(monkeypatch: pytest.MonkeyPatch) -> None:
-    if memory._libc() is None:
+    if devices._libc() is None:
         pytest.skip("another C library")
 
     def heaps(*arguments: str) -> int:
@@ -94,6 +94,6 @@ def test_threads_share_two_heaps(monkeypatch: pytest.MonkeyPatch) -> None:
 
     assert (heaps() > 2, heaps("shared")) == (True, 2)
     calls: list[tuple[int, int]] = []
-    monkeypatch.setattr(memory, "_libc", lambda: SimpleNamespace(mallopt=lambda *which: calls.append(which)))
+    monkeypatch.setattr(devices, "_libc", lambda: SimpleNamespace(mallopt=lambda *which: calls.append(which)))
     devices.configure()  # before jax makes its threads
     assert calls == [(-8, 2)]

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from evoclaims.core.keys import trial_key
-from evoclaims.envs.ecorobot.obstacles import Heights, Obstacles
+from evoclaims.envs.ecorobot.locomotion import Heights, Obstacles
 from evoclaims.envs.ecorobot.stones import SteppingStones
 from evoclaims.methods.random_policy import RandomPolicy
 from evoclaims.networks.mlp import Mlp

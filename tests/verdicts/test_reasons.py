@@ -7,8 +7,7 @@ from dataclasses import replace
 import pytest
 from hand_made_verdicts import report
 
-from evoclaims.judging.drift_report import DriftReport, DriftRow
-from evoclaims.judging.tripwire import DigestChange, DigestCheck
+from evoclaims.judging.drift_report import DigestChange, DigestCheck, DriftReport, DriftRow
 from evoclaims.judging.verdict import Outcome
 from evoclaims.verdicts.history import AcceptedVerdict
 from evoclaims.verdicts.regression import reason

@@ -7,7 +7,7 @@ from hand_made_verdicts import report
 
 from evoclaims.judging.verdict import Outcome
 from evoclaims.verdicts.claim_report import ClaimReport
-from evoclaims.verdicts.robustness import matrix
+from evoclaims.verdicts.transitions import matrix
 
 
 def _report(claim: str, outcome: Outcome, variant: str = "", tier: str = "smoke") -> ClaimReport:

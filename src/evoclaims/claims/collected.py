@@ -1,4 +1,4 @@
-"""A claim's test called once without trials: what it asserts, and which trials it asks for."""
+"""A claim's test called once without trials: what it passes to `verdict`, and which trials it asks for."""
 
 from __future__ import annotations
 
@@ -14,8 +14,9 @@ from evoclaims.claims.claim import TIER, ClaimTest, Expectation, gap_of
 from evoclaims.claims.fetching import NotStoredError
 from evoclaims.claims.judge import Reading, unjudged
 from evoclaims.claims.session import Session
-from evoclaims.claims.verdict_fixture import VerdictFixture
+from evoclaims.core.errors import UserError
 from evoclaims.judging.assertion import Assertion
+from evoclaims.judging.measure import Event, Measure, Profile
 from evoclaims.judging.reading import TrialReading
 from evoclaims.judging.sample import Source
 from evoclaims.judging.verdict import Outcome
@@ -25,6 +26,61 @@ from evoclaims.trials.result import TrialResult
 from evoclaims.trials.spec import Condition
 from evoclaims.verdicts.claim_report import ClaimReport
 from evoclaims.verdicts.history import key_of
+from evoclaims.verdicts.readings import moment
+
+
+@dataclass
+class VerdictFixture:
+    """Takes exactly one assertion per test, settles it, and keeps its report."""
+
+    settle: Callable[[Assertion, Sequence[Reading]], object]
+    report: Any = None
+    readings: list[Reading] = field(default_factory=list)
+
+    def __call__(self, assertion: Assertion) -> None:
+        """Judge the claim's assertion.
+
+        Raises:
+            UserError: for a second assertion, or a value that is not one.
+        """
+        if not isinstance(assertion, Assertion):
+            alone = isinstance(assertion, Measure | Event | Profile)
+            if callable(assertion):
+                name = getattr(assertion, "__name__", type(assertion).__name__)
+                raise UserError(f"verdict(...) was given the function {name} itself: call it, as in {name}().")
+            raise UserError(
+                f"verdict(...) takes an assertion about trials, such as verdict(a.mean_success > b.mean_success), "
+                f"not {f'{assertion.name!r} alone: compare it with something' if alone else repr(assertion)}."
+            )
+        if self.report is not None:
+            raise UserError("A claim has one verdict: join several assertions with & (and) or | (or).")
+        self.report = self.settle(assertion, self.readings)
+
+    def reading(self, name: str, assertion: Assertion, *, because: str, since: str) -> None:
+        """Add another reading of the claim's sentence, before `verdict(...)`: the verdict shows whether it depends.
+
+        It counts where the paper's own sentence is judged, not at a tier with a smaller statement.
+
+        Args:
+            name: a few words.
+            assertion: what the sentence says if it is read so.
+            because: why it may be read so.
+            since: when the reading was written, such as "2026-11-26" or "2026-11-26 14:30" (UTC).
+
+        Raises:
+            UserError: after the verdict, for a name that is taken, a missing text, or something else than a date or an
+                assertion.
+        """
+        if self.report is not None:
+            raise UserError(f"The reading {name!r} comes after the verdict: write verdict.reading(...) before it.")
+        if not isinstance(assertion, Assertion):
+            raise UserError(
+                f"The reading {name!r} is {assertion!r}, which is not an assertion. Write one, as for verdict(...)."
+            )
+        if not (name.strip() and because.strip()) or name in (one.name for one in self.readings):
+            raise UserError(f"The reading {name!r} needs a unique name and because=...: why the sentence means this.")
+        moment(since)
+        self.readings.append(Reading(name, assertion, because, since))
 
 
 @dataclass(frozen=True)

@@ -14,8 +14,7 @@ from evoclaims.claims.session import Session
 from evoclaims.core.canonical import content_hash
 from evoclaims.core.packages import agree, recorded
 from evoclaims.judging.drift import changed_settings
-from evoclaims.judging.drift_report import DriftReport
-from evoclaims.judging.tripwire import DigestCheck
+from evoclaims.judging.drift_report import DigestCheck, DriftReport
 from evoclaims.paper import pilots, references
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.spec import Condition, TrialSpec

@@ -13,8 +13,7 @@ from evoclaims.claims.session import Session
 from evoclaims.cli.project import Project, open_project
 from evoclaims.cli.store_folder import open_store
 from evoclaims.core.errors import UserError
-from evoclaims.judging.drift_report import DriftReport
-from evoclaims.judging.tripwire import DigestCheck
+from evoclaims.judging.drift_report import DigestCheck, DriftReport
 from evoclaims.paper.archive import Archive
 from evoclaims.trials.store import Store
 from evoclaims.verdicts import comparison, transitions

@@ -9,9 +9,9 @@ import textwrap
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
-from evoclaims.cli.processes.execution import Execution
 from evoclaims.cli.processes.job import Job, jobs
 from evoclaims.cli.processes.worker import Ended, WorkOrder
+from evoclaims.cli.processes.workers import Execution
 from evoclaims.cli.project import Project, open_project
 from evoclaims.core.errors import UnknownNameError, UserError
 from evoclaims.core.files import write_atomically

@@ -9,9 +9,9 @@ from collections.abc import Mapping, Sequence
 from typing import Final
 
 from evoclaims.claims.power import ClaimPower, Pilots, only, with_test
-from evoclaims.cli.processes.execution import Execution
 from evoclaims.cli.processes.job import Job
 from evoclaims.cli.processes.worker import WorkOrder
+from evoclaims.cli.processes.workers import Execution
 from evoclaims.cli.project import Project, open_project
 from evoclaims.cli.terminal import styled
 from evoclaims.core.errors import UserError

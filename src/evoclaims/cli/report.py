@@ -17,13 +17,13 @@ from evoclaims.figures.replication import replications
 from evoclaims.figures.sheet import svg
 from evoclaims.paper.archive import Archive
 from evoclaims.paper.reproduction import Reproduction
-from evoclaims.report import across, table_cells, watch_chart
+from evoclaims.report import across, table_cells, training_curves
 from evoclaims.report.build import gather
 from evoclaims.report.formatting import listed
 from evoclaims.report.html import html
 from evoclaims.report.model import PaperFigure
 from evoclaims.verdicts import history, mutation_matrix, watch_file
-from evoclaims.verdicts.robustness import matrix
+from evoclaims.verdicts.transitions import matrix
 
 
 def paper_figures(
@@ -85,7 +85,7 @@ def main(options: argparse.Namespace) -> int:
         robustness=tuple(robustness),
         numbers=replications(archive, reproduction, tiers[0], ("", *reproduction.variants)),
         across=across.last({project.store.root.absolute(), project.config.root / APART["across"]}),
-        watch=watch_chart.shown(watch_file.load(reproduction.folder / watch_file.FILE)[1]),
+        watch=training_curves.by_night(watch_file.load(reproduction.folder / watch_file.FILE)[1]),
         generated=f"Written on {datetime.now(UTC):%Y-%m-%d %H:%M} UTC by evoclaims {metadata.version('evoclaims')}.",
     )
     out = Path(options.out or REPORT) / "index.html"

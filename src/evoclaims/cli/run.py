@@ -6,9 +6,9 @@ import argparse
 import sys
 from collections.abc import Sequence
 
-from evoclaims.cli.processes.execution import Execution
 from evoclaims.cli.processes.job import Job, choose
 from evoclaims.cli.processes.worker import WorkOrder
+from evoclaims.cli.processes.workers import Execution
 from evoclaims.cli.project import Project, open_project
 from evoclaims.cli.stored_trial import describe
 from evoclaims.core.errors import UserError
@@ -27,7 +27,7 @@ from evoclaims.trials.result import COMPLETE
 from evoclaims.trials.spec import Condition, TrialSpec
 from evoclaims.trials.store import Store
 from evoclaims.verdicts import other_code
-from evoclaims.verdicts.robustness import matrix
+from evoclaims.verdicts.transitions import matrix
 
 
 def to_run(running: Execution, names: Sequence[Names]) -> list[Names]:

@@ -18,7 +18,7 @@ from evoclaims.report import table_cells, terminal_table
 from evoclaims.report.run_summary import run_summary
 from evoclaims.verdicts import export, history
 from evoclaims.verdicts.claim_report import ClaimReport
-from evoclaims.verdicts.robustness import matrix
+from evoclaims.verdicts.transitions import matrix
 
 FORMS: Final[Mapping[str, Callable[[Sequence[ClaimReport]], str]]] = {
     "csv": lambda reports: export.as_csv(export.verdict_rows(reports)).decode(),

@@ -38,12 +38,11 @@ from evoclaims.paper.reported import uncovered
 from evoclaims.report import replication_cells, verdict_overview, vocabulary
 from evoclaims.report.formatting import literal, plural, table
 from evoclaims.report.table_cells import NONE
-from evoclaims.report.tally import by_sentence, tally
 from evoclaims.report.trial_summary import Reader
-from evoclaims.report.verdict_overview import marks, overview, short_sentences
+from evoclaims.report.verdict_overview import by_sentence, marks, overview, short_sentences, tally
 from evoclaims.verdicts.claim_report import ClaimReport
-from evoclaims.verdicts.robustness import Robustness, matrix
 from evoclaims.verdicts.sentences import sentences
+from evoclaims.verdicts.transitions import Robustness, matrix
 
 
 def reference() -> str:

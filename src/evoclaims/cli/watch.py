@@ -12,9 +12,9 @@ from typing import Final
 from msgspec import structs
 
 from evoclaims.claims.power import Pilots, with_test
-from evoclaims.cli.processes.execution import Execution
 from evoclaims.cli.processes.job import Job
 from evoclaims.cli.processes.worker import WorkOrder
+from evoclaims.cli.processes.workers import Execution
 from evoclaims.cli.project import Project, open_project
 from evoclaims.cli.terminal import REPORT, styled, write
 from evoclaims.core.errors import UnknownNameError, UserError

@@ -10,11 +10,11 @@ from evoclaims.envs.ecorobot.boxes import Surface as Surface
 from evoclaims.envs.ecorobot.brax_env import BraxEnv as BraxEnv
 from evoclaims.envs.ecorobot.deceptive import DeceptiveMaze as DeceptiveMaze
 from evoclaims.envs.ecorobot.locomotion import Locomotion as Locomotion
+from evoclaims.envs.ecorobot.locomotion import Obstacles as Obstacles
 from evoclaims.envs.ecorobot.maze import MazePlan as MazePlan
-from evoclaims.envs.ecorobot.obstacles import Obstacles as Obstacles
-from evoclaims.envs.ecorobot.outing import Ruling as Ruling
 from evoclaims.envs.ecorobot.robot_task import ROBOT_PACKAGES as ROBOT_PACKAGES
 from evoclaims.envs.ecorobot.robot_task import RobotTask as RobotTask
+from evoclaims.envs.ecorobot.robot_task import Ruling as Ruling
 from evoclaims.envs.ecorobot.robots import ANT as ANT
 from evoclaims.envs.ecorobot.robots import HALF_CHEETAH as HALF_CHEETAH
 from evoclaims.envs.ecorobot.robots import ROBOTS as ROBOTS
@@ -24,7 +24,7 @@ from evoclaims.envs.ecorobot.sensors import Rangefinders as Rangefinders
 from evoclaims.envs.ecorobot.stones import STONES as STONES
 from evoclaims.envs.ecorobot.stones import SteppingStones as SteppingStones
 from evoclaims.envs.foreign.brax_task import BraxTask as BraxTask
-from evoclaims.envs.foreign.gymnasium_env import GymnasiumEnv as GymnasiumEnv
+from evoclaims.envs.foreign.gymnasium_task import GymnasiumEnv as GymnasiumEnv
 from evoclaims.envs.foreign.gymnasium_task import GymnasiumTask as GymnasiumTask
 from evoclaims.envs.foreign.gymnax_task import GymnaxTask as GymnaxTask
 from evoclaims.envs.foreign.jax_task import Descriptor as Descriptor

@@ -14,8 +14,8 @@ from enum import StrEnum
 from functools import lru_cache
 from typing import Final
 
+from evoclaims.judging.design import POWER, detectable_a12
 from evoclaims.judging.exact import MAX_TRIALS, binomial_test
-from evoclaims.judging.telescope import POWER, detectable_a12
 
 LEVEL: Final = 0.95
 """How often a repetition falls inside."""

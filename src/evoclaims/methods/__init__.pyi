@@ -6,6 +6,7 @@ from evoclaims.methods.champion import champion_policy as champion_policy
 from evoclaims.methods.champion import evaluate_with_champion as evaluate_with_champion
 from evoclaims.methods.champion import first_champion as first_champion
 from evoclaims.methods.cma_es import CmaEs as CmaEs
+from evoclaims.methods.cma_es import SeldomDecomposedCmaEs as SeldomDecomposedCmaEs
 from evoclaims.methods.hand_built import HandBuilt as HandBuilt
 from evoclaims.methods.hyperneat import CPPN_FUNCTIONS as CPPN_FUNCTIONS
 from evoclaims.methods.hyperneat import HyperNeat as HyperNeat
@@ -16,5 +17,4 @@ from evoclaims.methods.ppo import LevelTest as LevelTest
 from evoclaims.methods.ppo import Ppo as Ppo
 from evoclaims.methods.random_policy import RandomPolicy as RandomPolicy
 from evoclaims.methods.random_search import RandomSearch as RandomSearch
-from evoclaims.methods.seldom_decomposed_cma_es import SeldomDecomposedCmaEs as SeldomDecomposedCmaEs
 from evoclaims.methods.tensorneat import NeatTensorneat as NeatTensorneat

@@ -1,4 +1,4 @@
-"""Collecting experience from parallel environments that reset themselves, in Brax's `Transition` layout."""
+"""Collecting experience from parallel environments that reset themselves, with parts of Brax and in its layout."""
 
 from __future__ import annotations
 
@@ -9,10 +9,17 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Int, PRNGKeyArray
 
+from evoclaims.core.foreign import Later
 from evoclaims.core.keys import streams
 from evoclaims.core.pytree import pytree, select
 from evoclaims.envs.base import Task, TaskState
-from evoclaims.methods.brax_blocks import types
+
+losses = Later("brax.training.agents.ppo.losses")
+networks = Later("brax.training.agents.ppo.networks")
+running_statistics = Later("brax.training.acme.running_statistics")
+specs = Later("brax.training.acme.specs")
+types = Later("brax.training.types")
+
 
 Act = Callable[[Array, Array], tuple[Array, Any]]
 """A stochastic policy, as Brax's `make_inference_fn` gives it: (observations, key) -> (actions, extras)."""

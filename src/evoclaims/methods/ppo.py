@@ -20,8 +20,7 @@ from evoclaims.core.keys import stream, streams
 from evoclaims.core.pytree import pytree, select, strong
 from evoclaims.envs.base import Episode, Task, share
 from evoclaims.methods.base import Policy, Progress
-from evoclaims.methods.brax_blocks import losses, networks, running_statistics, specs
-from evoclaims.methods.collect import Act, Interaction, collect
+from evoclaims.methods.collect import Act, Interaction, collect, losses, networks, running_statistics, specs
 
 optax = Later("optax")
 

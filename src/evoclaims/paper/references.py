@@ -22,8 +22,7 @@ from evoclaims.core.files import read_file, write_atomically
 from evoclaims.core.packages import agree, depends_on, differences, recorded
 from evoclaims.core.provenance import what_fixes_bits
 from evoclaims.judging.drift import DriftCase, check_drift
-from evoclaims.judging.drift_report import DriftReport
-from evoclaims.judging.tripwire import DigestCheck, compare_digests
+from evoclaims.judging.drift_report import DigestCheck, DriftReport, compare_digests
 from evoclaims.trials.arrays import unpack
 from evoclaims.trials.failed import is_final
 from evoclaims.trials.result import TrialResult

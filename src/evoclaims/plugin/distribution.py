@@ -93,7 +93,7 @@ class Distribution:
     def pytest_configure_node(self, node: Any) -> None:
         """Tell a worker where to leave what the claims need."""
         if self._folder is None:
-            from evoclaims.core.temporary import temporary_folder
+            from evoclaims.core.files import temporary_folder
 
             self._folder = temporary_folder()
         node.workerinput[FILE] = str(self._folder / "workload.json")

@@ -36,7 +36,7 @@ from evoclaims.trials.stopping import end_without, interrupted_by
 
 if TYPE_CHECKING:
     from evoclaims.claims.claim import ClaimTest
-    from evoclaims.claims.verdict_fixture import VerdictFixture
+    from evoclaims.claims.collected import VerdictFixture
     from evoclaims.paper.trial_group import TrialGroup
     from evoclaims.verdicts.claim_report import ClaimReport
 
@@ -319,7 +319,7 @@ def trials(request: pytest.FixtureRequest, _claim_tier: str) -> Callable[..., Tr
 def verdict(request: pytest.FixtureRequest, _claim_tier: str) -> VerdictFixture:
     """Return `verdict(assertion)`, which judges the claim."""
     from evoclaims.claims.claim import ClaimTest
-    from evoclaims.claims.verdict_fixture import VerdictFixture
+    from evoclaims.claims.collected import VerdictFixture
 
     session, test = make_session(request.config), ClaimTest.of(request.node)
     line = progress_of(request.config)

@@ -18,7 +18,7 @@ from evoclaims.plugin.options import make_session
 from evoclaims.plugin.summary import ATTRIBUTE
 
 if TYPE_CHECKING:
-    from evoclaims.claims.verdict_fixture import VerdictFixture
+    from evoclaims.claims.collected import VerdictFixture
     from evoclaims.verdicts.claim_report import ClaimReport
 
 

@@ -18,8 +18,7 @@ from evoclaims.core.tiers import TIERS
 from evoclaims.plugin.options import make_session
 
 if TYPE_CHECKING:
-    from evoclaims.judging.drift_report import DriftReport
-    from evoclaims.judging.tripwire import DigestCheck
+    from evoclaims.judging.drift_report import DigestCheck, DriftReport
     from evoclaims.verdicts.claim_report import ClaimReport
     from evoclaims.verdicts.regression import Regression
     from evoclaims.verdicts.upgrade import Upgrade

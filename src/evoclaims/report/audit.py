@@ -8,7 +8,7 @@ from evoclaims.paper.reported import Uncovered
 from evoclaims.paper.reproduction import NullAgent
 from evoclaims.report import replication_cells, table_cells
 from evoclaims.report.formatting import plural
-from evoclaims.report.tally import tally
+from evoclaims.report.verdict_overview import tally
 from evoclaims.verdicts.claim_report import ClaimReport
 from evoclaims.verdicts.readings import by_reading
 from evoclaims.verdicts.sentences import sentences

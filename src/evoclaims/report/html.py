@@ -23,8 +23,8 @@ from evoclaims.report.charts import spark_svg
 from evoclaims.report.fault_grid import LEGEND
 from evoclaims.report.formatting import plural
 from evoclaims.report.model import Page, Section
-from evoclaims.verdicts.robustness import Robustness
 from evoclaims.verdicts.sentences import sentences
+from evoclaims.verdicts.transitions import Robustness
 
 
 @dataclass(frozen=True)

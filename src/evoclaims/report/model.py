@@ -13,12 +13,11 @@ from evoclaims.report.across import AcrossShown
 from evoclaims.report.evidence import Part
 from evoclaims.report.fault_grid import FaultGrid
 from evoclaims.report.formatting import counted
-from evoclaims.report.training_curves import CurvePanel
+from evoclaims.report.training_curves import CurvePanel, WatchShown
 from evoclaims.report.trial_summary import Origin
-from evoclaims.report.watch_chart import WatchShown
 from evoclaims.verdicts.claim_report import APART, ClaimReport, Tally
 from evoclaims.verdicts.history import AcceptedVerdict
-from evoclaims.verdicts.robustness import Robustness
+from evoclaims.verdicts.transitions import Robustness
 
 
 @dataclass(frozen=True)

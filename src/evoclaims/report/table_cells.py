@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Sequence
 
-from evoclaims.judging.design import Look
+from evoclaims.judging.design import Look, comparison_power
 from evoclaims.judging.kinds.greater import Greater
 from evoclaims.judging.power import RATES, event_power
-from evoclaims.judging.telescope import comparison_power
 from evoclaims.judging.verdict import Direction, Outcome
 from evoclaims.report.formatting import p_value, place_key, places
 from evoclaims.verdicts import other_code

@@ -19,9 +19,8 @@ import numpy as np
 from jax.sharding import SingleDeviceSharding
 
 from evoclaims.core.waiting import working_time
-from evoclaims.trials.devices import MATMUL_PRECISION
+from evoclaims.trials.devices import MATMUL_PRECISION, give_back
 from evoclaims.trials.layout import layout_on
-from evoclaims.trials.memory import give_back
 from evoclaims.trials.program import Program, Report, Score, TrialState
 from evoclaims.trials.spec import Condition
 

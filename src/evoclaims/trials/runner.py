@@ -20,12 +20,11 @@ from evoclaims.core.waiting import working_time
 from evoclaims.trials import checkpoint
 from evoclaims.trials.batches import Batch, Run, StoredTrials, batches, drop_finished_checkpoints, halved, is_exhausted
 from evoclaims.trials.checkpoint import Header
-from evoclaims.trials.devices import single_threaded_linear_algebra
+from evoclaims.trials.devices import give_back, single_threaded_linear_algebra
 from evoclaims.trials.imported import into_store
 from evoclaims.trials.lanes import Lanes, picked
 from evoclaims.trials.lease import announced, shared
 from evoclaims.trials.loop_trials import LoopTrials
-from evoclaims.trials.memory import give_back
 from evoclaims.trials.program import Report
 from evoclaims.trials.progress import RunProgress, Watcher, ignore
 from evoclaims.trials.result import TrialResult, check_success

@@ -9,8 +9,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path, PurePosixPath
 
 from evoclaims.core.packages import Versions, depends_on
-from evoclaims.judging.drift_report import DriftReport
-from evoclaims.judging.tripwire import DigestCheck
+from evoclaims.judging.drift_report import DigestCheck, DriftReport
 from evoclaims.paper import references
 from evoclaims.paper.archive import Archive, names_of
 from evoclaims.paper.reproduction import Reproduction

@@ -8,8 +8,7 @@ from pathlib import Path
 from typing import Final
 
 from evoclaims.core.errors import UserError
-from evoclaims.judging.drift_report import DriftReport
-from evoclaims.judging.tripwire import DigestCheck
+from evoclaims.judging.drift_report import DigestCheck, DriftReport
 from evoclaims.judging.verdict import Outcome
 from evoclaims.verdicts import history, transitions
 from evoclaims.verdicts.acceptance import changes

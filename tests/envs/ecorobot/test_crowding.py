@@ -16,7 +16,7 @@ from jaxtyping import Array
 
 from evoclaims.envs.ecorobot import deceptive, physics, stones
 from evoclaims.envs.ecorobot.boxes import Box
-from evoclaims.envs.ecorobot.obstacles import Obstacles
+from evoclaims.envs.ecorobot.locomotion import Obstacles
 from evoclaims.envs.ecorobot.pose import torso
 from evoclaims.envs.ecorobot.robots import ANT, HALF_CHEETAH, ROBOTS, SIMPLE_ROB, Robot
 from evoclaims.envs.ecorobot.scene import Scene, on_device, reach, touched_at_once

@@ -13,8 +13,7 @@ from custom_robots import BASE, Texts
 
 from evoclaims.core.errors import UserError
 from evoclaims.envs.ecorobot.boxes import Box
-from evoclaims.envs.ecorobot.locomotion import Locomotion
-from evoclaims.envs.ecorobot.obstacles import Obstacles
+from evoclaims.envs.ecorobot.locomotion import Locomotion, Obstacles
 from evoclaims.envs.ecorobot.robots import ANT, Robot
 from evoclaims.envs.ecorobot.scene import Scene, box_geoms
 from evoclaims.envs.ecorobot.stones import SteppingStones

@@ -16,8 +16,7 @@ from evoclaims.core.errors import UserError
 from evoclaims.envs.ecorobot import fidelity, physics
 from evoclaims.envs.ecorobot.boxes import Box
 from evoclaims.envs.ecorobot.fidelity import check, require_fidelity, require_likeness
-from evoclaims.envs.ecorobot.locomotion import Locomotion
-from evoclaims.envs.ecorobot.obstacles import Obstacles
+from evoclaims.envs.ecorobot.locomotion import Locomotion, Obstacles
 from evoclaims.envs.ecorobot.physics import Body
 from evoclaims.envs.ecorobot.robots import ANT
 from evoclaims.envs.ecorobot.scene import Scene

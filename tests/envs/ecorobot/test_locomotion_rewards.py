@@ -12,8 +12,7 @@ import jax
 import jax.numpy as jnp
 import pytest
 
-from evoclaims.envs.ecorobot.locomotion import Locomotion
-from evoclaims.envs.ecorobot.obstacles import FurthestRun, Obstacles
+from evoclaims.envs.ecorobot.locomotion import FurthestRun, Locomotion, Obstacles
 from evoclaims.envs.ecorobot.pose import Pose
 from evoclaims.envs.ecorobot.robots import ANT, HOPPER, HUMANOID, ROBOTS, WALKER2D, Robot
 

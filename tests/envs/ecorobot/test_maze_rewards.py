@@ -15,8 +15,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from evoclaims.envs.ecorobot.deceptive import DIFFICULT, EASY, DeceptiveMaze
-from evoclaims.envs.ecorobot.outing import Ruling
 from evoclaims.envs.ecorobot.pose import Pose
+from evoclaims.envs.ecorobot.robot_task import Ruling
 from evoclaims.envs.ecorobot.stones import ARENA, STONES, SteppingStones, StonesCrossed
 
 TASK = SteppingStones()

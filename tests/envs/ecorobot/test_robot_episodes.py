@@ -17,9 +17,9 @@ from evoclaims.envs.base import Episode, TaskState
 from evoclaims.envs.ecorobot import physics, robot_task
 from evoclaims.envs.ecorobot.deceptive import DeceptiveMaze
 from evoclaims.envs.ecorobot.locomotion import Locomotion
-from evoclaims.envs.ecorobot.outing import Outing
 from evoclaims.envs.ecorobot.physics import Body
 from evoclaims.envs.ecorobot.pose import torso
+from evoclaims.envs.ecorobot.robot_task import Outing
 from evoclaims.envs.ecorobot.robots import ANT, HOPPER, SIMPLE_ROB, Robot
 from evoclaims.envs.ecorobot.scene import Places, Scene
 from evoclaims.envs.ecorobot.stones import STONES, SteppingStones, StonesCrossed

@@ -14,8 +14,7 @@ import pytest
 from evoclaims.core.errors import UserError
 from evoclaims.envs.ecorobot.boxes import Box, Surface
 from evoclaims.envs.ecorobot.deceptive import DeceptiveMaze
-from evoclaims.envs.ecorobot.locomotion import Locomotion
-from evoclaims.envs.ecorobot.obstacles import Obstacles
+from evoclaims.envs.ecorobot.locomotion import Locomotion, Obstacles
 from evoclaims.envs.ecorobot.robots import SIMPLE_ROB, Robot
 from evoclaims.envs.ecorobot.scene import Scene
 from evoclaims.envs.ecorobot.sensors import Rangefinders

@@ -13,7 +13,7 @@ from plain_mujoco import quickly_compiled
 
 from evoclaims.envs.base import TaskState
 from evoclaims.envs.ecorobot import robot_task
-from evoclaims.envs.ecorobot.obstacles import Obstacles
+from evoclaims.envs.ecorobot.locomotion import Obstacles
 from evoclaims.envs.ecorobot.robot_task import RobotTask
 from evoclaims.envs.ecorobot.robots import ANT
 from evoclaims.envs.ecorobot.stones import SteppingStones

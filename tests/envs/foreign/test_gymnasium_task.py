@@ -16,8 +16,7 @@ import numpy as np
 from gymnasium.utils.env_checker import check_env
 
 from evoclaims.core.errors import UserError
-from evoclaims.envs.foreign.gymnasium_env import GymnasiumEnv
-from evoclaims.envs.foreign.gymnasium_task import GymnasiumTask
+from evoclaims.envs.foreign.gymnasium_task import GymnasiumEnv, GymnasiumTask
 from evoclaims.envs.foreign.scoring import ForeignTask
 from evoclaims.envs.gates.parity import NParity
 from evoclaims.methods.random_search import RandomSearch

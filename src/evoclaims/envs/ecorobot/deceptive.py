@@ -13,9 +13,8 @@ from evoclaims.core.pytree import pytree
 from evoclaims.envs.ecorobot import stones
 from evoclaims.envs.ecorobot.boxes import Box
 from evoclaims.envs.ecorobot.maze import Maze, MazePlan
-from evoclaims.envs.ecorobot.outing import Outing, Ruling
 from evoclaims.envs.ecorobot.pose import Pose
-from evoclaims.envs.ecorobot.robot_task import ROBOT_PACKAGES
+from evoclaims.envs.ecorobot.robot_task import ROBOT_PACKAGES, Outing, Ruling
 
 Difficulty = Literal["easy", "difficult"]
 

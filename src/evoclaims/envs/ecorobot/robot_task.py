@@ -17,17 +17,54 @@ from jaxtyping import Array, Bool, Float, Int, PRNGKeyArray
 
 from evoclaims.core.errors import UserError, require_at_least
 from evoclaims.core.keys import streams
-from evoclaims.core.pytree import select, strong
+from evoclaims.core.pytree import pytree, select, strong
 from evoclaims.envs.base import Episode, PolicyFn, TaskState, averaged, fitting, played
 from evoclaims.envs.ecorobot import physics
 from evoclaims.envs.ecorobot.boxes import Box
 from evoclaims.envs.ecorobot.fidelity import require_fidelity, require_likeness
-from evoclaims.envs.ecorobot.outing import Outing, Ruling
+from evoclaims.envs.ecorobot.physics import Body
 from evoclaims.envs.ecorobot.pose import Pose, torso
 from evoclaims.envs.ecorobot.robots import SIMPLE_ROB, Robot, fits_as_built_in
 from evoclaims.envs.ecorobot.scene import Places, Scene, scene
 from evoclaims.envs.ecorobot.sensors import Sensor
 from evoclaims.kernels import one_kernel
+
+
+@pytree
+class Outing:
+    """The inner state of an episode.
+
+    Attributes:
+        body: the moving state.
+        pose: the torso's.
+        time: environment steps made.
+        memory: the rule's memory.
+        effort: sum of the squared actions so far.
+        overturned: steps spent upside-down.
+    """
+
+    body: Body
+    pose: Pose
+    time: Int[Array, ""]
+    memory: Any
+    effort: Float[Array, ""]
+    overturned: Float[Array, ""]
+
+
+@pytree
+class Ruling:
+    """The rule's result for one step.
+
+    Attributes:
+        memory: the rule's new memory.
+        reward: of the step.
+        ended: whether the task is over.
+    """
+
+    memory: Any
+    reward: Float[Array, ""]
+    ended: Bool[Array, ""]
+
 
 ROBOT_PACKAGES: Final = ("llvmlite", "mujoco", "mujoco-mjx")
 """Packages that every robot task depends on; a task declares these and any others it needs."""

@@ -13,9 +13,8 @@ from jaxtyping import Array, Float, Int, PRNGKeyArray
 from evoclaims.core.keys import streams
 from evoclaims.envs.base import Task, TaskState, share
 from evoclaims.envs.ecorobot.boxes import Box
-from evoclaims.envs.ecorobot.outing import Ruling
 from evoclaims.envs.ecorobot.pose import Pose
-from evoclaims.envs.ecorobot.robot_task import ROBOT_PACKAGES, RobotTask
+from evoclaims.envs.ecorobot.robot_task import ROBOT_PACKAGES, RobotTask, Ruling
 from evoclaims.envs.ecorobot.sensors import Rangefinders, Sensor
 from evoclaims.methods.base import Policy, Progress
 

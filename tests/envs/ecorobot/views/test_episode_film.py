@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from evoclaims.core.drawing import optional
-from evoclaims.envs.ecorobot.obstacles import Obstacles
+from evoclaims.envs.ecorobot.locomotion import Obstacles
 from evoclaims.envs.ecorobot.stones import SteppingStones
 from evoclaims.envs.ecorobot.views import pictures as films
 from evoclaims.envs.ecorobot.views.motion import motion

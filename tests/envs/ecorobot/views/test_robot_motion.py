@@ -10,7 +10,7 @@ import pytest
 from evoclaims.core.errors import UserError
 from evoclaims.envs.ecorobot.boxes import Box
 from evoclaims.envs.ecorobot.deceptive import DeceptiveMaze
-from evoclaims.envs.ecorobot.obstacles import PLACES, Obstacles
+from evoclaims.envs.ecorobot.locomotion import PLACES, Obstacles
 from evoclaims.envs.ecorobot.robots import ANT
 from evoclaims.envs.ecorobot.scene import scene
 from evoclaims.envs.ecorobot.stones import PLAN, SteppingStones

@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 from evoclaims.core.drawing import optional
 from evoclaims.core.errors import UnknownNameError
 from evoclaims.envs.ecorobot.deceptive import DeceptiveMaze
-from evoclaims.envs.ecorobot.locomotion import Locomotion
-from evoclaims.envs.ecorobot.obstacles import Obstacles
+from evoclaims.envs.ecorobot.locomotion import Locomotion, Obstacles
 from evoclaims.envs.ecorobot.robots import ANT
 from evoclaims.envs.ecorobot.stones import STONES, SteppingStones
 from evoclaims.envs.ecorobot.views.pictures import (
