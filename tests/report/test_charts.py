@@ -15,8 +15,9 @@ import pytest
 from hypothesis import assume, example, given
 from hypothesis import strategies as st
 
+from evoclaims.judging.exact import MAX_TRIALS
 from evoclaims.judging.verdict import Bound, Interval
-from evoclaims.report.charts import MOST_DOTS, WIDTH, axis_svg, curves_svg, strip_svg, ticks
+from evoclaims.report.charts import HEIGHT, WIDTH, axis_svg, curves_svg, strip_svg, ticks
 from evoclaims.report.evidence import Dot, Part, Strip
 from evoclaims.report.training_curves import CurvePanel, Line
 
@@ -62,16 +63,6 @@ def test_equal_values_share_a_block_around_their_place_and_overlap_nowhere() -> 
     assert nearest > 2 * radius
 
 
-def test_very_many_trials_are_drawn_as_quantiles() -> None:
-    assert len(_titles(_drawn(_part(*np.linspace(0, 1, MOST_DOTS))), "circle")) == MOST_DOTS
-    svg = _drawn(_part(*np.linspace(0, 1, MOST_DOTS + 1)))
-    assert _titles(svg, "circle") == []
-    assert _titles(svg, "rect") == [
-        f"{name} percentile of {MOST_DOTS + 1} trials: {ends}"
-        for name, ends in (("5th to 95th", "0.05 to 0.95"), ("25th to 75th", "0.25 to 0.75"))
-    ]
-
-
 def test_trials_without_a_number_stand_in_a_column_of_their_own() -> None:
     part = _part(0.5, 0.75)
     part = replace(part, strips=(replace(part.strips[0], apart=((7, "diverged"), (8, "NaN"))),))
@@ -82,6 +73,13 @@ def test_trials_without_a_number_stand_in_a_column_of_their_own() -> None:
     assert max(float(circle.get("cx", "")) for circle in svg.iter("circle")) < wall
     assert min(float(path.get("d", "")[1:].split()[0]) for path in crosses) > wall
     assert "no number" in axis_svg(part)
+    every = tuple((seed, "NaN") for seed in range(MAX_TRIALS))
+    svg = _drawn(replace(part, strips=(replace(part.strips[0], apart=every),)))
+    places = [
+        path.get("d", "")[1:].partition("l")[0].split() for path in svg.iter("path") if path.get("class") == "broken"
+    ]
+    assert len(places) == MAX_TRIALS
+    assert all(wall < float(x) < WIDTH - 4 and 4 < float(y) < HEIGHT - 4 for x, y in places)
 
 
 def test_bounds_and_intervals_of_an_event_are_drawn() -> None:

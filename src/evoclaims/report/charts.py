@@ -17,9 +17,6 @@ WIDTH, HEIGHT, EDGE, APART = 340.0, 44.0, 24.0, 70.0
 """Size of a strip of dots; `APART` is the width of the column of trials without a finite value."""
 
 AXIS: Final = 30.0
-MOST_DOTS: Final = 200
-"""Most trials that are drawn one by one; beyond that, quantiles are drawn."""
-
 MOST: Final = 1e300
 """The largest number that an axis shows, so that differences stay finite."""
 
@@ -65,10 +62,7 @@ def strip_svg(part: Part, strip: Strip) -> Markup:
         pieces.append(_mark("share", diamond, f"holds in {share:.0%} of trials"))
     elif strip.median is not None and math.isfinite(strip.median):
         pieces.append(_mark("median", f"M{_at(scale(strip.median))} 4V{HEIGHT - 4}", f"median {number(strip.median)}"))
-    if len(strip.dots) <= MOST_DOTS:
-        pieces.append(Markup('<g class="dots">{}</g>').format(Markup("").join(_dots(strip.dots, scale))))
-    else:
-        pieces += _quantiles(strip.dots, scale)
+    pieces.append(Markup('<g class="dots">{}</g>').format(Markup("").join(_dots(strip.dots, scale))))
     if _right(part) < WIDTH - EDGE:
         pieces.append(Markup('<path class="wall" d="M{0} 1V{1}"/>').format(WIDTH - APART + 3, HEIGHT))
         pieces += _apart(strip.apart)
@@ -186,31 +180,8 @@ def _numbers_alone(drawn: str) -> Markup:
     return Markup(drawn)  # noqa: S704
 
 
-def _quantiles(dots: Sequence[Dot], scale: _Scale) -> Iterator[Markup]:
-    """Draw quantiles in place of very many dots."""
-    low, first, third, high = np.quantile([dot.value for dot in dots], [0.05, 0.25, 0.75, 0.95])
-    middle = (HEIGHT - 8) / 2
-    for name, ends, half in (("5th to 95th", (low, high), 4.0), ("25th to 75th", (first, third), 9.0)):
-        x = [scale(float(end)) for end in ends]
-        yield Markup(
-            '<rect class="band" x="{}" y="{}" width="{}" height="{}"><title>'
-            "{} percentile of {} trials: {} to {}</title></rect>"
-        ).format(
-            _at(x[0]),
-            middle - half,
-            _at(max(x[1] - x[0], 1.0)),
-            2 * half,
-            name,
-            len(dots),
-            *map(number, map(float, ends)),
-        )
-
-
 def _apart(trials: Sequence[tuple[int, str]]) -> Iterator[Markup]:
-    """Draw trials without a finite value as crosses in a column of their own; a count where there are many."""
-    if len(trials) > MOST_DOTS // 4:
-        yield _text("tick", WIDTH - APART / 2, HEIGHT / 2, plural(len(trials), "trial"))
-        return
+    """Draw trials without a finite value as crosses in a column of their own; no side has more than `MAX_TRIALS`."""
     room = min(9.0, math.sqrt((HEIGHT - 10) * (APART - 12) / max(len(trials), 1)))
     across = max(int((APART - 12) / room), 1)
     for index, (seed, why) in enumerate(trials):
@@ -283,9 +254,6 @@ def _svg(width: float, height: float, pieces: Sequence[Markup], name: str) -> Ma
 
 
 SPARK_WIDTH, SPARK_HEIGHT, SPARK_EDGE = 36, 14, 2.5
-SPARK_DOTS: Final = 40
-"""Most trials a strip that are drawn one by one; beyond that, the span of the middle nine tenths and the median."""
-
 MOST_STRIPS: Final = 4
 
 
@@ -327,10 +295,5 @@ def _rows(part: Part) -> Iterator[Markup]:
         rows = [[strip.median] if strip.median is not None else [] for strip in part.strips]
     for index, values in enumerate(rows):
         up = f"{(index + 0.5) * SPARK_HEIGHT / len(rows):.3g}"
-        if len(values) <= SPARK_DOTS:
-            places = "".join(f"M{place} {up}h0" for place in dict.fromkeys(map(at, sorted(values))))
-        else:
-            first, middle, last = (at(float(one)) for one in np.quantile(values, [0.05, 0.5, 0.95]))
-            yield Markup('<path class="middle" d="M{} {}H{}"/>').format(first, up, last)
-            places = f"M{middle} {up}h0"
+        places = "".join(f"M{place} {up}h0" for place in dict.fromkeys(map(at, sorted(values))))
         yield Markup('<path class="trials" d="{}"/>').format(places)
