@@ -148,7 +148,6 @@ class _SoundOnly(StoredOnly):
 
 
 def _read(reports: Sequence[ClaimReport]) -> list[Names]:
-    """Return the conditions that claims read."""
     return sorted({(source.method, source.task) for report in reports for source in report.sources})
 
 
@@ -202,7 +201,6 @@ def _print_spent(console: PlainSpokenConsole, tier: Tier, costs: Costs) -> None:
 
 
 def _kinds(costs: Costs) -> list[str]:
-    """Return the kinds of accelerators that reference trials were made on."""
     return sorted({kind for trials in costs.values() for kind in took(trials)})
 
 

@@ -113,7 +113,6 @@ class Project:
 
     @cached_property
     def _collected(self) -> dict[tuple[str, str], list[Collected]]:
-        """The claims by variant and tier."""
         return {}
 
     def as_published(self, tier: str) -> Session:

@@ -226,5 +226,4 @@ def _sentences(
 
 
 def _markdown(title: str, sentences: Sequence[str]) -> str:
-    """Return the text of an issue."""
     return "\n\n".join([f"# {literal(title)}", "\n".join(f"* {literal(line)}" for line in sentences)]) + "\n"

@@ -355,7 +355,6 @@ def reason(output: str) -> str:
 
 
 def _normalized(versions: Mapping[str, str]) -> dict[str, str]:
-    """Return versions by normalized name, in order."""
     return dict(sorted((str(canonicalize_name(name)), version) for name, version in versions.items()))
 
 

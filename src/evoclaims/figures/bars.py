@@ -176,5 +176,4 @@ def _rows(measured: Measured) -> list[dict[str, Any]]:
 
 
 def _place(measured: Measured, bar: Bar) -> dict[str, str]:
-    """Return the columns that identify a bar."""
     return {"panel": measured.panel.title, "at": bar.at, "series": bar.series.label}

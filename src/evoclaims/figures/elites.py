@@ -139,7 +139,6 @@ def _summary(numbers: TrialNumbers) -> str:
 
 
 def _text(value: float) -> str:
-    """Return a number with about three digits."""
     return f"{value:,.0f}" if abs(value) >= 100 else f"{value:.2f}"
 
 

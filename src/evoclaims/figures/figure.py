@@ -53,7 +53,6 @@ class Scope:
         return self.reproduction.trials(method, task, self.tier.condition(method, task), self._present)
 
     def _present(self, condition: Condition, seeds: Sequence[int]) -> list[TrialResult]:
-        """Return the trials of these seeds that the archive holds."""
         return [trial for trial in self.archive.trials(condition, seeds) if trial is not None]
 
 

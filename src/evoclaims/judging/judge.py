@@ -170,7 +170,6 @@ def decide(assertion: Assertion, design: Design, fetch: Fetch = fetch_from) -> E
 
 
 def _in_time(trials: Trials) -> Trials:
-    """Return the trials that did not run out of time."""
     return {mark: tuple(trial for trial in of if trial.status != "timeout") for mark, of in trials.items()}
 
 
@@ -211,7 +210,6 @@ def needed_trials(assertion: Assertion, design: Design) -> int | None:
 
 
 def _decidable(attainable: PValues, alpha: float) -> bool:
-    """Whether at least one direction can be decided."""
     return min(attainable.supported, attainable.size) <= alpha
 
 
@@ -307,7 +305,6 @@ def _settled(
 
 
 def _stopped(look: Look) -> str:
-    """Return the note of a curtailed verdict."""
     return f"stopped early: no outcome of the trials up to n = {look.n} could change the verdict; "
 
 

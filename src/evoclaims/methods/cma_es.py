@@ -173,5 +173,4 @@ class SeldomDecomposedCmaEs(CmaEs):
 
     @property
     def _algorithm(self) -> Callable[..., Any]:
-        """Return what makes the search."""
         return partial(aging_cma_es.AgingCmaEs, self.replaced)

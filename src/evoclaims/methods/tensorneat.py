@@ -132,7 +132,6 @@ class NeatTensorneat:
         return self.settings.population * task.horizon
 
     def _algorithm(self, task: Task) -> Any:
-        """Build TensorNEAT's algorithm for networks of the task's size."""
         return neat(self.settings, task.observation_size, task.action_size)
 
 
@@ -250,7 +249,6 @@ def _without_records(state: Any, forget: Bool[Array, ""]) -> Any:
 
 
 def _count(genes: Float[Array, "population rows columns"]) -> Float[Array, " population"]:
-    """Count each genome's genes."""
     return jnp.sum(~jnp.isnan(genes[:, :, 0]), axis=1, dtype=jnp.int32).astype(jnp.float32)
 
 

@@ -111,7 +111,6 @@ class FaultyTask(Fault):
         return lambda observation: self.done(fitting(self.sound, policy(self.seen(observation))))
 
     def _settled(self, episode: Episode, key: PRNGKeyArray) -> Episode:
-        """Return an episode with its fitness replaced."""
         return replace(episode, fitness=self.paid(episode.fitness, stream(key, "paid")))
 
 

@@ -164,7 +164,6 @@ class GraphNetwork:
         return result
 
     def _kernel_for(self, wiring: Wiring) -> GroupKernel:
-        """Return the kernel for networks of the same capacity."""
         return _kernel(self, (wiring.bias.shape[-1], wiring.weight.shape[-1]))
 
     def matrices(self, wiring: Wiring) -> Graph:

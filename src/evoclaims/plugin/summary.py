@@ -234,7 +234,6 @@ class Summary:
         return self._drawn(shown(text))
 
     def _drawn(self, text: str) -> str:
-        """Return rich's output in characters that the terminal has."""
         return spelled(text, self._encoding)
 
     @property

@@ -130,7 +130,6 @@ class _Scale:
 
 
 def _shown(value: float) -> float:
-    """Limit an end of an axis to what can be shown."""
     return min(max(value, -MOST), MOST)
 
 
@@ -242,7 +241,6 @@ def _text(kind: str, x: float, y: float, text: str, anchor: str = "middle") -> M
 
 
 def _at(place: float) -> str:
-    """Return a coordinate with at most one decimal."""
     return f"{place:.1f}".removesuffix(".0")
 
 

@@ -236,7 +236,6 @@ def _choices(values: Iterator[str]) -> list[str]:
 
 
 def _asset(name: str) -> Markup:
-    """Return a file of the package as it is."""
     return Markup((resources.files("evoclaims.report") / "assets" / name).read_text(encoding="utf-8"))  # noqa: S704
 
 

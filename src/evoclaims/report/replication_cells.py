@@ -96,7 +96,6 @@ def totals(found: Sequence[Replication]) -> list[str]:
 
 
 def _counted(by_answer: Mapping[Agreement, int]) -> str:
-    """Return how many have each answer."""
     return ", ".join(f"{by_answer[one]} {one}" for one in Agreement if by_answer.get(one))
 
 

@@ -159,7 +159,6 @@ def check_scores(task: Task, final: Episode) -> None:
 
 
 def _key(seed: Int[Array, ""]) -> Array:
-    """Return a key for tracing."""
     return kernel_prng(trial_key(seed, TRAINING))
 
 

@@ -157,7 +157,6 @@ def _settled(path: Path) -> bool:
 
 
 def _quarantine(store: Store) -> Path:
-    """Return the folder that bad files are moved to."""
     return store.root / "quarantine"
 
 

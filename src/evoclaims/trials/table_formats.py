@@ -219,7 +219,6 @@ def _are_counted(names: Iterable[str]) -> bool:
 
 
 def _shown(value: Any) -> str:
-    """Return how something begins, for an error."""
     return repr(value)[:80]
 
 

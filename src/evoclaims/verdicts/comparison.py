@@ -140,5 +140,4 @@ def version_changes(old: Side, new: Side) -> list[str]:
 
 
 def _named(path: PurePosixPath | Path) -> str:
-    """Return a condition's name from the path of its reference trials."""
     return path.with_suffix("").as_posix()

@@ -163,7 +163,6 @@ def _table(value: object, name: str, part: str) -> dict[str, Any]:
 
 
 def _torn(name: str, reason: str) -> UserError:
-    """Return the error for a file without a history."""
     return UserError(f"{name} holds no accepted verdicts: {reason}. {_MEND}")
 
 

@@ -299,5 +299,4 @@ class JaxTask(ForeignTask):
 
 
 def _flat(observation: Array) -> Float[Array, " observation"]:
-    """Return an observation as our methods take it."""
     return jnp.ravel(jnp.asarray(observation)).astype(jnp.float32)

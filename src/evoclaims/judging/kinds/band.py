@@ -83,7 +83,6 @@ class Band(Assertion):
         )
 
     def _outside(self, values: Sequence[float]) -> tuple[int, int]:
-        """Return how many values are below and above the band."""
         return sum(value < self.lo for value in values), sum(value > self.hi for value in values)
 
 

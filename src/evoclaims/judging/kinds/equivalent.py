@@ -79,5 +79,4 @@ def equivalence_tests(a: Sequence[float], b: Sequence[float], margin: float) -> 
 
 
 def _shifted(values: Sequence[float], by: float) -> list[float]:
-    """Return values that are all moved by a margin."""
     return [total(value, by) for value in values]

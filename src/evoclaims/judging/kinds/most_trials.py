@@ -65,7 +65,6 @@ class MostTrials(Assertion):
         )
 
     def _null(self, design: Design) -> float:
-        """Return the p0 to use."""
         return design.p0 if self.p0 is None else self.p0
 
     def _p(self, k: int, n: int, design: Design) -> PValues:

@@ -52,12 +52,10 @@ BY_PLATFORM.multiple_results = True
 
 
 def _alone(*leaves: Array, function: Leaves, on_gpu: Leaves, outputs: Shapes) -> Sequence[Array]:
-    """Run outside of compiled programs."""
     return function(*leaves)
 
 
 def _shapes(*leaves: ShapedArray, function: Leaves, on_gpu: Leaves, outputs: Shapes) -> list[ShapedArray]:
-    """Return the results' shapes."""
     return [ShapedArray(out.shape, out.dtype) for out in outputs]
 
 
@@ -76,7 +74,6 @@ def _batched(
 
 
 def _derivative(values: Sequence[Any], tangents: Sequence[Any], function: Leaves, **_: Any) -> Any:
-    """Return the results and their derivatives, both of the function itself."""
     return jax.jvp(function, tuple(values), tuple(map(ad.instantiate_zeros, tangents)))
 
 

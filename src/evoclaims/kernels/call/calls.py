@@ -97,7 +97,6 @@ def _alone(*leaves: Array, kernel: Callee) -> list[Array]:
 
 
 def _shapes(*leaves: ShapedArray, kernel: Callee) -> list[ShapedArray]:
-    """Return the results' shapes."""
     return [ShapedArray((*kernel.batch(leaves), *out.shape), out.dtype) for out in kernel.outputs]
 
 
@@ -108,7 +107,6 @@ def _batched(leaves: Sequence[Array], axes: Sequence[int | None], kernel: Callee
 
 
 def _derivative(values: Sequence[Any], tangents: Sequence[Any], kernel: Callee) -> Any:
-    """Return the results and their derivatives, both of the function itself."""
     return jax.jvp(kernel.as_it_is, tuple(values), tuple(map(ad.instantiate_zeros, tangents)))
 
 

@@ -108,7 +108,6 @@ class GpuInstructions(Instructions):
         return self._product(root, self._either(small, SHRUNK, np.float32(1)))
 
     def _either(self, condition: str, yes: Number, no: Number) -> str:
-        """Write a choice between two known floats."""
         return self.put(f"select i1 {condition}, float {literal(yes)}, float {literal(no)}")
 
     def _corrected(self, value: str, rough: str) -> str:
@@ -117,11 +116,9 @@ class GpuInstructions(Instructions):
         return self.put(f"select i1 {usual}, float {value}, float {rough}")
 
     def _size(self, value: str) -> str:
-        """Write the absolute value."""
         return self.call("llvm.fabs.f32", "float", [("float", value)])
 
     def _approximate(self, name: str, x: str) -> str:
-        """Write an approximation that GPUs have: "rcp", "rsqrt" or "sqrt"."""
         return self.call(f"llvm.nvvm.{name}.approx.ftz.f", "float", [("float", x)])
 
     def _product(self, a: str, b: str) -> str:
@@ -131,5 +128,4 @@ class GpuInstructions(Instructions):
         return self.put(f"fneg float {a}")
 
     def _fma(self, a: str, b: str, c: str) -> str:
-        """Write a times b plus c, rounded once."""
         return self.call("llvm.fma.f32", "float", [("float", a), ("float", b), ("float", c)])

@@ -194,5 +194,4 @@ def _loops(sizes: Sizes, together: int) -> str:
 
 
 def _address(name: str, row: str, size: int) -> list[str]:
-    """Return instructions for the address of a row."""
     return [f"{name}.begin = mul i64 {row}, {size}", f"{name} = getelementptr float, ptr {name}.all, i64 {name}.begin"]

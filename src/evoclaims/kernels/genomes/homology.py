@@ -187,5 +187,4 @@ def write_look_up(
 
 
 def _is_place(page: Instructions, number: str) -> str:
-    """Return whether a number is a place, or -1 for none."""
     return page.put(f"icmp sge i32 {number}, 0")

@@ -74,7 +74,6 @@ def network_kernel(
 
 
 def _array(dtype: Any, *shape: int) -> jax.ShapeDtypeStruct:
-    """Return an array's shape and type."""
     return jax.ShapeDtypeStruct(shape, dtype)
 
 
@@ -148,11 +147,9 @@ class _Walk:
         return self.page.operand(function, registers)
 
     def _sum(self, a: str, b: str, c: str) -> str:
-        """Return a · b + c, rounded once."""
         return self.page.call(self.page.mangled("fma", "f32"), self.floats, [(self.floats, each) for each in (a, b, c)])
 
     def _emits(self, value: str) -> str:
-        """Return whether a node emits its value."""
         return self.page.put(f"fcmp ord {self.floats} {value}, {self.zero}")
 
     def _is_finite(self, value: str) -> str:
@@ -161,7 +158,6 @@ class _Walk:
         return self.page.put(f"fcmp olt {self.floats} {size}, {self.page.splat('float', INFINITE)}")
 
     def _chosen(self, condition: str, yes: str, no: str) -> str:
-        """Return one of two numbers."""
         return self.page.put(f"select {self.bits} {condition}, {self.floats} {yes}, {self.floats} {no}")
 
     def _number(self, type_: str, array: str, place: str) -> str:

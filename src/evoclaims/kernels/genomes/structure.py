@@ -31,7 +31,6 @@ ONE: Final = jax.ShapeDtypeStruct((), jnp.int32)
 
 
 def _whole_numbers(size: int) -> jax.ShapeDtypeStruct:
-    """Return the shape of that many whole numbers."""
     return jax.ShapeDtypeStruct((size,), jnp.int32)
 
 
@@ -154,5 +153,4 @@ def _write_removal(
 
 
 def _is(page: Instructions, number: str, relation: str, other: str) -> str:
-    """Return whether two int32 are in a relation, named as LLVM does."""
     return page.put(f"icmp {relation} i32 {number}, {other}")

@@ -112,7 +112,6 @@ def _of_one_rank(operands: Sequence[Lanes]) -> list[Lanes]:
 
 
 def _along(row: NDArray[Any], dimension: int, ndim: int) -> NDArray[Any]:
-    """Return numbers along one dimension of an array for one input."""
     return row.reshape([-1 if d == dimension else 1 for d in range(-1, ndim)])
 
 

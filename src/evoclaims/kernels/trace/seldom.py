@@ -26,7 +26,6 @@ SELDOM: Final = Primitive("seldom")
 
 
 def _derivative(values: Any, tangents: Any) -> Any:
-    """A condition has no derivative."""
     return SELDOM.bind(*values), np.zeros(np.shape(values[0]), jax.dtypes.float0)
 
 

@@ -224,7 +224,6 @@ class PpoMechanisms(Observed):
 
 
 def _each(function: Callable[..., Any], axes: Any = 0) -> Callable[..., Any]:
-    """Return a function of every step of every trajectory."""
     return jax.vmap(jax.vmap(function, axes), axes)
 
 

@@ -28,7 +28,6 @@ def switch_together(index: Int[Array, ""], branches: Sequence[Callable[..., Any]
 
 
 def _apply(function: Callable[..., Any], place: int, closed_over: Sequence[Any], *operands: Any) -> Any:
-    """Call the branch at `place`."""
     return function(*operands, *closed_over[place])
 
 

@@ -253,7 +253,6 @@ def delete_connection(happens: Bool[Array, ""], u: Float[Array, ""], genome: Gen
 
 
 def _one_if(condition: Bool[Array, "*shape"]) -> Int[Array, "*shape"]:
-    """Return 1 where the condition holds, else 0."""
     return condition.astype(jnp.int32)
 
 

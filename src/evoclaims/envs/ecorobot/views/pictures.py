@@ -187,7 +187,6 @@ def _course(task: RobotTask, paths: Sequence[TorsoPath], title: str) -> Any:
 
 
 def _figure(size: Any) -> Any:
-    """Return an empty figure of this size, in inches."""
     return optional("matplotlib.figure").Figure(figsize=size, dpi=130, layout="compressed")
 
 
