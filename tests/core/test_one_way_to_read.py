@@ -23,7 +23,7 @@ ELSEWHERE = {
     "report/html.py": ["(resources.files('evoclaims.report') / 'assets' / name).read_text"],
     # what the system says
     "core/provenance.py": ["Path('/proc/cpuinfo').read_text", "distribution.read_text", "distribution.read_text"],
-    "cli/cluster/submissions.py": ["Path(f'/proc/{job}/cmdline').read_bytes"],
+    "cluster/submissions.py": ["Path(f'/proc/{job}/cmdline').read_bytes"],
     "trials/lease.py": ["Path(f'/proc/{owner.pid}/stat').read_text", "open"],
     "trials/loop_messages.py": ["Path(f'/proc/{pid}/environ').read_bytes"],
     "core/environments.py": ["distribution.read_text"],

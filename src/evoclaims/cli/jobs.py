@@ -9,7 +9,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from evoclaims.cli.cluster.submissions import (
+from evoclaims.cli.project import Project, open_project
+from evoclaims.cluster.submissions import (
     GONE,
     Seen,
     State,
@@ -20,7 +21,6 @@ from evoclaims.cli.cluster.submissions import (
     log_of,
     states,
 )
-from evoclaims.cli.project import Project, open_project
 from evoclaims.core.errors import UserError
 from evoclaims.core.files import open_file
 from evoclaims.trials.batches import StoredTrials

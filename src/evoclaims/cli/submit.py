@@ -14,8 +14,11 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
-from evoclaims.cli.cluster.job import SIGNAL_SECONDS, BatchJob, JobRequest, clock, requested
-from evoclaims.cli.cluster.submissions import (
+from evoclaims.cli.jobs import active
+from evoclaims.cli.processes.job import Job, MissingBatch, choose, missing_batches
+from evoclaims.cli.project import Project, open_project
+from evoclaims.cluster.job import SIGNAL_SECONDS, BatchJob, JobRequest, clock, requested
+from evoclaims.cluster.submissions import (
     JOB_NAME,
     SCHEMA,
     Submission,
@@ -25,9 +28,6 @@ from evoclaims.cli.cluster.submissions import (
     new_name,
     save,
 )
-from evoclaims.cli.jobs import active
-from evoclaims.cli.processes.job import Job, MissingBatch, choose, missing_batches
-from evoclaims.cli.project import Project, open_project
 from evoclaims.core.canonical import content_hash
 from evoclaims.core.errors import UserError
 from evoclaims.report.formatting import plural

@@ -21,9 +21,8 @@ from typing import Any, Final
 
 from msgspec import ValidationError, convert
 
-from evoclaims.cli.cluster.submissions import Cluster
+from evoclaims.cluster.submissions import Cluster
 from evoclaims.core.errors import UnknownNameError, UserError
-from evoclaims.report.formatting import plural
 from evoclaims.trials.failed import seconds_of
 
 DEFAULT_MINUTES: Final = 120
@@ -77,8 +76,8 @@ class JobRequest:
 
     def summary(self) -> str:
         """Return what a job asks for, as part of a sentence."""
-        asks = [plural(self.gpus, "GPU")] * (self.gpus > 0)
-        asks += [plural(self.cpus, "CPU core")] * (self.cpus > 0)
+        asks = [f"{self.gpus} GPU{'s' * (self.gpus > 1)}"] * (self.gpus > 0)
+        asks += [f"{self.cpus} CPU core{'s' * (self.cpus > 1)}"] * (self.cpus > 0)
         if self.cluster == "slurm":
             asks += [f"partition {self.partition}"] * bool(self.partition) + [f"{clock(self.minutes)} of time"]
             asks += [key.replace("_", "-") + ("" if value is True else f"={value}") for key, value in self.more.items()]
