@@ -309,7 +309,7 @@ def test_a_lost_support_comes_with_how_often_draws_from_the_pilots_lose_it(
     for lead, low, high in ((1.0, 0.0, 0.0), (0.0, 0.5, 1.0)):
         for name, group, shift in (("better", better, lead), ("worse", worse, 0.0)):
             trials = [made(group.condition, 100 + seed, seed / 100 + shift) for seed in range(20)]
-            place = pilots.path_of(session.reproduction.folder, "smoke", name, "small")
+            place = pilots.path_of(session.reproduction.folder, "smoke", name, "small", second=False)
             pilots.write(place, trials, [group.mean_success])
         found = chance()
         assert found is not None

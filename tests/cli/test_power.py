@@ -62,6 +62,26 @@ def test_a_pilot_is_run_once_and_read_ever_after(piloted: Evoclaims, stored: Sto
     assert not Path(".evoclaims").exists()
 
 
+def test_a_second_pilot_has_other_seeds_and_power_is_read_from_it_alone(piloted: Evoclaims, stored: Store) -> None:
+    assert "from its first pilot" in piloted("power")[1]
+    first = {path: path.read_bytes() for path in PILOT.iterdir()}
+    status, out, err = piloted(*MAKE, "--pilot=second", "--first-seed=105", "--run")
+    assert (status, out) == (2, "")
+    assert "The seeds 105 to 116 overlap those of the other pilot (105 to 111)" in err
+    status, out, _ = piloted(*MAKE, "--pilot=second", "--run", "--only=a")
+    assert (status, out.count("wrote"), "from its second pilot" in out) == (0, 1, True)
+    assert {trial.seed for trial in stored.results([])} == {*range(10), *range(100, 112), *range(150, 162)}
+    assert {path: path.read_bytes() for path in PILOT.iterdir()} == first
+    status, out, err = piloted("power")
+    assert (status, rows(out)["a"][1], rows(out)["b"][1]) == (1, "1.000", "unknown")
+    assert "b: no pilot of wrong on parity (it has not been made)" in out
+    assert piloted("power", "--pilot=first")[1].count("unknown") == 0
+    shutil.copy(PILOT / "right-parity.jsonl", "second_pilot/smoke/right-parity.jsonl")
+    assert (
+        "a: no pilot of right on parity (it has seeds of the first pilot (100, 101, " in piloted("power", "--only=a")[2]
+    )
+
+
 def test_a_refutation_is_what_an_accepted_claim_is_expected_to_end_as(piloted: Evoclaims, project: Project) -> None:
     project.write(
         """

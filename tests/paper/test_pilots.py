@@ -45,7 +45,7 @@ def trials(group: TrialGroup, made: Callable[..., TrialResult]) -> list[TrialRes
 @pytest.fixture
 def path(reproduction: Reproduction) -> Path:
     """Where the pilot of "better on small" belongs."""
-    return pilots.path_of(reproduction.folder, "smoke", "better", "small")
+    return pilots.path_of(reproduction.folder, "smoke", "better", "small", second=False)
 
 
 def test_a_pilot_is_read_as_it_was_written_with_what_claims_read(
@@ -115,3 +115,22 @@ def test_trials_that_are_no_pilot_of_a_condition_say_why(
     assert "5 trials and a verdict looks at 6" in why(trials[:5])
     assert "seeds 102 crashed" in why([replace(trials[0], status="crashed"), *trials[1:]])
     assert "no 'furthest_solved'" in why([replace(trials[0], metrics={"mean_success": 1.0}), *trials[1:]])
+
+
+def test_new_trials_are_compared_with_those_of_both_pilots(
+    path: Path, group: TrialGroup, trials: list[TrialResult], readings: list[TrialReading]
+) -> None:
+    def both() -> list[int]:
+        found = pilots.both(path.parents[2], "smoke", "better", "small", group.condition.id)
+        return [trial.seed for trial in found]
+
+    assert (both(), pilots.has_second(path.parents[2], "smoke")) == ([], False)
+    pilots.write(path, trials, readings)
+    assert (both(), pilots.has_second(path.parents[2], "smoke")) == ([*range(100, 107)], False)
+    later = [replace(trials[0], seed=seed, spec={**trials[0].spec, "seed": seed}) for seed in (107, 108)]
+    second = pilots.path_of(path.parents[2], "smoke", "better", "small", second=True)
+    pilots.write(second, later, readings)
+    assert (both(), pilots.has_second(path.parents[2], "smoke")) == ([*range(100, 109)], True)
+    assert pilots.not_second(later, trials) == ""
+    assert pilots.not_second([*later, trials[0]], trials) == "it has seeds of the first pilot (102)"
+    assert pilots.both(path.parents[2], "smoke", "better", "small", "f" * 64) == ()

@@ -80,7 +80,7 @@ def test_a_changed_verdict_is_listed_and_fails_the_run_where_it_is_asked_to(
     )
     assert result.outlines[-5:-1] == [
         "claims: 1 supported, 1 inconclusive",
-        "failed: nothing",
+        f"failed: {'a (smoke), regression' if mark else 'nothing'}",
         "changed: a (smoke)",
         "next: evoclaims compare   (every change), then evoclaims accept   (the current verdicts)",
     ]

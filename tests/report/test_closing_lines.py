@@ -15,19 +15,36 @@ ACCEPTED = report("G3", "refuted", expected="refuted", because="known")
 
 
 @pytest.mark.parametrize(
-    ("reports", "changed", "drifted", "lines"),
+    ("reports", "changed", "drifted", "regressed", "lines"),
     [
-        ([GREEN, ACCEPTED], [], [], ("nothing", "nothing", "evoclaims report ")),
-        ([GREEN], None, [], ("nothing", "nothing to compare with: no verdict has been accepted", "evoclaims accept ")),
-        ([GREEN, RED], ["G1 (smoke)"], [], ("G2 (refuted)", "G1 (smoke)", "evoclaims status --tier smoke --only G2 ")),
-        ([GREEN], [], ["a on b"], ("nothing", "trials of a on b (drift)", "evoclaims compare ")),
-        ([GREEN], None, ["a on b"], ("nothing", "trials of a on b (drift)", "evoclaims compare ")),
+        ([GREEN, ACCEPTED], [], [], [], ("nothing", "nothing", "evoclaims report ")),
+        (
+            [GREEN],
+            None,
+            [],
+            [],
+            ("nothing", "nothing to compare with: no verdict has been accepted", "evoclaims accept "),
+        ),
+        (
+            [GREEN, RED],
+            ["G1 (smoke)"],
+            [],
+            [],
+            ("G2 (refuted)", "G1 (smoke)", "evoclaims status --tier smoke --only G2 "),
+        ),
+        ([GREEN], ["G1 (smoke)"], [], ["G1 (smoke)"], ("G1 (smoke), regression", "G1 (smoke)", "evoclaims compare ")),
+        ([GREEN], [], ["a on b"], [], ("trials of a on b (drift)", "trials of a on b (drift)", "evoclaims compare ")),
+        ([GREEN], None, ["a on b"], [], ("trials of a on b (drift)", "trials of a on b (drift)", "evoclaims compare ")),
     ],
 )
 def test_each_line_names_what_there_is(
-    reports: list[object], changed: list[str] | None, drifted: list[str], lines: tuple[str, str, str]
+    reports: list[object],
+    changed: list[str] | None,
+    drifted: list[str],
+    regressed: list[str],
+    lines: tuple[str, str, str],
 ) -> None:
-    shown = closing_lines(reports, changed, drifted)  # type: ignore[arg-type]
+    shown = closing_lines(reports, changed, drifted, regressed)  # type: ignore[arg-type]
     assert [line.partition(": ")[0] for line in shown] == ["failed", "changed", "next"]
     assert [line.partition(": ")[2] for line in shown[:2]] == list(lines[:2])
     assert shown[2].partition(": ")[2].startswith(lines[2])

@@ -45,6 +45,7 @@ class _Used:
 
 def drift(session: Session, reports: Sequence[ClaimReport]) -> tuple[DriftReport, DigestCheck]:
     """Compare the trials behind `reports` with the committed reference trials of their tiers."""
+    folder = session.reproduction.folder
     cases = [
         references.paired(
             f"{used.method} on {used.task} ({used.tier})",
@@ -52,7 +53,7 @@ def drift(session: Session, reports: Sequence[ClaimReport]) -> tuple[DriftReport
             _reference(session, used),
             method=f"{used.method} ({used.tier})",
             reads=used.reads,
-            pilot=_pilot(session, used),
+            pilot=pilots.both(folder, used.tier, used.method, used.task, used.condition.id),
         )
         for used in _used(session, reports)
         if (trials := _trials(session, used))
@@ -106,12 +107,6 @@ def _reference(session: Session, used: _Used) -> tuple[TrialResult, ...]:
     if any(trial.condition == used.condition.id for trial in own):
         return own
     return references.of_condition(session.reproduction.references, *names, used.condition.id) or own
-
-
-def _pilot(session: Session, used: _Used) -> tuple[TrialResult, ...]:
-    """Return the committed pilot of a condition; empty without one."""
-    found = pilots.load(pilots.path_of(session.reproduction.folder, used.tier, used.method, used.task))
-    return found if found and found[0].condition == used.condition.id else ()
 
 
 def _trials(session: Session, used: _Used) -> list[TrialResult]:

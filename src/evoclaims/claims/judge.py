@@ -114,11 +114,14 @@ def read_as(reading: Reading, design: Design, trials: Fetch, outcome: Outcome | 
 def chance_of_inconclusive(assertion: Assertion, design: Design, paper: Reproduction, tier: str) -> float | None:
     """Return how often an assertion is inconclusive in draws from its pilots; None if one lacks a sound pilot."""
     found: dict[str, tuple[TrialResult, ...]] = {}
+    second = pilots.has_second(paper.folder, tier)
     for group in assertion.sources():
         if not isinstance(group, TrialGroup):
             return None
         readings = [one for one in assertion.readings() if one.source.fingerprint == group.fingerprint]
-        found[group.fingerprint] = pilots.load(pilots.path_of(paper.folder, tier, group.method, group.task))
+        found[group.fingerprint] = pilots.load(
+            pilots.path_of(paper.folder, tier, group.method, group.task, second=second)
+        )
         if pilots.unfit(found[group.fingerprint], group.condition, design, readings):
             return None
     outcomes = list(Draws(found).outcomes(assertion, design))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 from evoclaims.claims.claim_names import selected
 from evoclaims.claims.collected import Collected
@@ -50,15 +51,15 @@ def only(claims: Sequence[Collected], wanted: str | None) -> tuple[Collected, ..
 
 
 class Pilots:
-    """The pilots of a tier: committed trials of its conditions, with other seeds than its own."""
+    """The first or the second pilots of a tier: committed trials of its conditions, with other seeds than its own."""
 
-    def __init__(self, reproduction: Reproduction, tier: str, claims: Sequence[Collected]) -> None:
+    def __init__(self, reproduction: Reproduction, tier: str, claims: Sequence[Collected], *, second: bool) -> None:
         """Read the pilots of all conditions that `claims` are about: all claims of the tier.
 
         Raises:
             UserError: when a pilot cannot be read.
         """
-        self._folder, self._tier = reproduction.folder, tier
+        self._folder, self._tier, self.second = reproduction.folder, tier, second
         self._design = reproduction.tier(tier).design
         self.groups = {names: group for one in claims for names, group in one.groups.items()}
         self._readings: dict[Names, list[TrialReading]] = {names: [] for names in self.groups}
@@ -81,17 +82,26 @@ class Pilots:
 
     def write(self, names: Names, trials: Collection[TrialResult]) -> str:
         """Write trials (at least one) as the pilot of a condition, and return the file's path."""
-        path = pilots.path_of(self._folder, self._tier, *names)
+        path = self._path(names)
         pilots.write(path, trials, self._readings[names])
         self._read(names)
         return str(path)
 
+    def _path(self, names: Names) -> Path:
+        return pilots.path_of(self._folder, self._tier, *names, second=self.second)
+
     def _read(self, names: Names) -> None:
-        found = pilots.load(pilots.path_of(self._folder, self._tier, *names))
+        found = pilots.load(self._path(names))
         self._unfit[names] = pilots.unfit(found, self.groups[names].condition, self._design, self._readings[names])
         if self.groups[names].condition.existing:
             self._unfit[names] = "its trials are imported, and there are no others"
+        if self.second and not self._unfit[names]:
+            self._unfit[names] = pilots.not_second(found, self.other(names))
         self.trials[names] = found
+
+    def other(self, names: Names) -> tuple[TrialResult, ...]:
+        """Return the trials of a condition's other pilot: of the first, if these are second ones."""
+        return pilots.load(pilots.path_of(self._folder, self._tier, *names, second=not self.second))
 
     def powers(self, claims: Sequence[Collected], draws: int) -> list[ClaimPower]:
         """Return the power of each claim, by so many draws."""

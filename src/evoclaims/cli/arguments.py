@@ -122,13 +122,18 @@ def _running(add: _Add) -> None:
         help="first run the trials of missing pilots, and write them; commit what it writes",
     )
     made.add_argument("--stored", action="store_true", help="first write missing pilots from trials that have run")
+    power.add_argument(
+        "--pilot",
+        choices=("first", "second"),
+        help="the pilot to make and to read (second if the tier has one, else first): bounds may be chosen from the "
+        "first pilot, so power is better read from the second",
+    )
     power.add_argument("--trials", type=int, default=50, metavar="N", help="trials per condition of a new pilot (50)")
     power.add_argument(
         "--first-seed",
         type=int,
-        default=100,
         metavar="SEED",
-        help="first seed of a new pilot, not one of the tier's (100)",
+        help="first seed of a new pilot, not one of the tier's or of the other pilot's (100; second: 150)",
     )
     power.add_argument("--draws", type=int, default=1000, metavar="N", help="draws from the pilot (1000)")
 
@@ -225,7 +230,7 @@ def _comparing(add: _Add) -> None:
         "run new seeds, and report whether all nights together show that results differ from the committed trials; "
         "writes watch.toml, which you commit; exit status 1 on an alarm",
     )
-    watch.add_argument("--trials", type=int, metavar="N", help="new trials per condition (default: the tier's)")
+    watch.add_argument("--trials", type=int, default=20, metavar="N", help="new trials per condition (20)")
     watch.add_argument(
         "--restart", action="store_true", help="begin a new series of nights, such as after an alarm was examined"
     )

@@ -21,6 +21,7 @@ from evoclaims.judging.exact import MAX_TRIALS
 from evoclaims.judging.power import ENOUGH
 from evoclaims.judging.verdict import Outcome
 from evoclaims.paper import references
+from evoclaims.paper.pilots import has_second
 from evoclaims.paper.reproduction import Names
 from evoclaims.report.console import PlainSpokenConsole, plain_table
 from evoclaims.report.formatting import number, plural
@@ -30,6 +31,9 @@ from evoclaims.trials.spec import Condition, TrialSpec
 from evoclaims.verdicts.source_trials import change
 
 _OUTCOMES: Final = tuple(outcome for outcome in Outcome if outcome.judged)
+
+FIRST_SEEDS: Final = {False: 100, True: 150}
+"""Of the first pilot, and of the second."""
 
 HEADINGS: Final = ("claim", "expected", "power", "95%", *(one.symbol for one in _OUTCOMES), "flips", "needs")
 
@@ -52,8 +56,8 @@ def cells(one: ClaimPower) -> tuple[str, ...]:
     )
 
 
-def about(claims: Sequence[ClaimPower], n: int) -> list[str]:
-    """Say how to read the table, and how many verdicts of a run end otherwise."""
+def about(claims: Sequence[ClaimPower], n: int, which: str) -> list[str]:
+    """Say how to read the table, and how many verdicts of a run end otherwise; `which` is "first" or "second"."""
     known = [one.power for one in claims if one.power]
     if not known:
         return []
@@ -62,8 +66,8 @@ def about(claims: Sequence[ClaimPower], n: int) -> list[str]:
     outcomes = ", ".join(f"{outcome.symbol} {outcome}" for outcome in _OUTCOMES)
     return [
         f"Power: the share of {known[0].draws:,} draws of {plural(n, 'trial')} a condition, with replacement from its "
-        f"pilot, in which the claim ends as expected ({outcomes}); flips: in which it ends the other way; needs: about "
-        f"how many trials {ENOUGH:g} takes. The interval is what draws leave open, not the pilot's size.",
+        f"{which} pilot, in which the claim ends as expected ({outcomes}); flips: in which it ends the other way; "
+        f"needs: about how many trials {ENOUGH:g} takes. The interval is what draws leave open, not the pilot's size.",
         f"Of {plural(len(known), 'verdict')} of a run, {number(missed)} end otherwise than expected on average, "
         f"{number(flipped)} of them the other way. {plural(below, 'claim')} below {ENOUGH:g}.",
     ]
@@ -83,7 +87,8 @@ def main(options: argparse.Namespace) -> int:
     (collected,) = project.collect([("", options.tier)])
     every = with_test(collected)
     chosen = only(every, options.only)
-    pilots = Pilots(project.reproduction, options.tier, every)
+    which = options.pilot or ("second" if has_second(project.reproduction.folder, options.tier) else "first")
+    pilots = Pilots(project.reproduction, options.tier, every, second=which == "second")
     wanted = {names: group.condition for one in chosen for names, group in one.groups.items()}
     if options.run or options.stored:
         _make(project, pilots, {names: one for names, one in wanted.items() if pilots.unfit(names)}, design, options)
@@ -95,7 +100,7 @@ def main(options: argparse.Namespace) -> int:
         raise UserError(" ".join([f"No power can be computed at the {options.tier} tier: {first}.", *advice]))
     console = PlainSpokenConsole(file=styled())
     console.print_whole(plain_table(HEADINGS, map(cells, powers)))
-    for sentence in (*about(powers, design.last.n), *troubles(powers)):
+    for sentence in (*about(powers, design.last.n, which), *troubles(powers)):
         console.print(sentence)
     for sentence in _versions(pilots, wanted):
         print(sentence)
@@ -112,7 +117,8 @@ def _make(
     options: argparse.Namespace,
 ) -> None:
     """Make the pilots that are missing: run their trials unless they are stored, and write each that is complete."""
-    seeds = range(options.first_seed, options.first_seed + options.trials)
+    first_seed = options.first_seed if options.first_seed is not None else FIRST_SEEDS[pilots.second]
+    seeds = range(first_seed, first_seed + options.trials)
     if not design.last.n <= options.trials <= MAX_TRIALS:
         raise UserError(
             f"--trials takes {design.last.n} (as many as a verdict reads) to {MAX_TRIALS} trials per "
@@ -123,6 +129,12 @@ def _make(
             f"The seeds {seeds[0]} to {seeds[-1]} overlap the {options.tier} tier's own "
             f"({design.first_seed} to {design.seeds(design.last.n)[-1]}), and a pilot must not use trials "
             "that verdicts read. Choose other seeds with --first-seed."
+        )
+    taken = {trial.seed for names in wanted for trial in pilots.other(names)} & set(seeds)
+    if taken:
+        raise UserError(
+            f"The seeds {seeds[0]} to {seeds[-1]} overlap those of the other pilot ({min(taken)} to {max(taken)}), and "
+            "no trial is in both. Choose other seeds with --first-seed."
         )
     for condition in list(wanted.values())[:1]:  # an invalid seed is so for every condition: it is reported at once
         _ = [TrialSpec(condition, seed) for seed in seeds]
@@ -169,5 +181,6 @@ def _versions(pilots: Pilots, wanted: Mapping[Names, Condition]) -> list[str]:
 def _advice(options: argparse.Namespace) -> str:
     """Return the sentence that says how pilots are made."""
     chosen = f" --tier {options.tier}" * (options.tier != "smoke")
+    chosen += f" --pilot {options.pilot}" * bool(options.pilot)
     chosen += "" if options.only is None else f" --only {shlex.quote(options.only)}"
     return f"`evoclaims power{chosen} --run` runs and writes the pilots that are missing."

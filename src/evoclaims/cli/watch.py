@@ -44,7 +44,7 @@ def main(options: argparse.Namespace) -> int:
         raise UnknownNameError("form", options.form, ("markdown",))
     project = open_project(options.storage)
     tier = project.reproduction.tier(options.tier)
-    n = options.trials if options.trials is not None else tier.design.last.n
+    n = options.trials
     if not 1 <= n <= MAX_TRIALS:
         raise UserError(f"--trials takes 1 to {MAX_TRIALS} trials per condition, not {n}.")
     path = project.reproduction.folder / watch_file.FILE
@@ -90,15 +90,15 @@ def watch_of(project: Project, tier: str) -> tuple[Watch, list[str]]:
             f"Nothing is watched, since it is not known which conditions {plural(len(broke), 'broken claim')} of the "
             f"{tier} tier would read: {', '.join(broke)}. Mend each, or mark it with pytest.mark.skip."
         )
-    pilots = Pilots(reproduction, tier, every)
+    first, second = (Pilots(reproduction, tier, every, second=second) for second in (False, True))
     found: list[Watched] = []
     left_out: list[str] = []
-    for names, group in sorted(pilots.groups.items()):
+    for names, group in sorted(first.groups.items()):
         if group.condition.existing:  # an imported table has no new seeds
             continue
         mine = references.of_condition(reproduction.references, tier, *names, group.condition.id)
-        pilot = () if pilots.unfit(names) else pilots.trials[names]
-        one = watched(names, group.condition, mine, pilot, partial(pilots.reads, names))
+        pilot = [trial for those in (first, second) if not those.unfit(names) for trial in those.trials[names]]
+        one = watched(names, group.condition, mine, pilot, partial(first.reads, names))
         if one is None:
             left_out.append(" on ".join(names))
         else:

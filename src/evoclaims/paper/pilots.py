@@ -1,5 +1,8 @@
 """Committed pilots: trials with other seeds than a tier's, in pilot/<tier>/<method>-<task>.jsonl of a reproduction.
 
+Bounds may be chosen from the first pilot. By trials that have chosen its bounds a claim looks too sure. So its power is
+read from a second pilot of other seeds, in second_pilot/, as soon as there is one. New trials are compared with both.
+
 Only the numbers that claims read are kept. The first line has what all trials share, each other line is a trial.
 """
 
@@ -50,9 +53,25 @@ class _Trial(Struct):
     curves: dict[str, tuple[float, ...]]
 
 
-def path_of(folder: Path, tier: str, method: str, task: str) -> Path:
-    """Return the path of the pilot of a method on a task, in the folder of a reproduction."""
-    return folder / "pilot" / tier / f"{method}-{task}.jsonl"
+def path_of(folder: Path, tier: str, method: str, task: str, *, second: bool) -> Path:
+    """Return the path of the first or the second pilot of a method on a task, in the folder of a reproduction."""
+    return _of_tier(folder, tier, second=second) / f"{method}-{task}.jsonl"
+
+
+def has_second(folder: Path, tier: str) -> bool:
+    """Whether a tier has a second pilot, from which power is read."""
+    return _of_tier(folder, tier, second=True).is_dir()
+
+
+def _of_tier(folder: Path, tier: str, *, second: bool) -> Path:
+    return folder / ("second_pilot" if second else "pilot") / tier
+
+
+def both(folder: Path, tier: str, method: str, task: str, condition: str) -> tuple[TrialResult, ...]:
+    """Return the trials of both pilots that are of a condition, by its id; a seed of both counts once."""
+    read = (load(path_of(folder, tier, method, task, second=second)) for second in (False, True))
+    found = {trial.seed: trial for trials in read for trial in trials if trial.condition == condition}
+    return tuple(found[seed] for seed in sorted(found))
 
 
 def write(path: Path, trials: Collection[TrialResult], readings: Sequence[TrialReading]) -> None:
@@ -110,6 +129,12 @@ def unfit(trials: Sequence[TrialResult], condition: Condition, design: Design, r
     except UnreadableTrialError as error:
         return f"a claim reads what it lacks: {str(error).removesuffix('.')}"
     return ""
+
+
+def not_second(trials: Iterable[TrialResult], first: Iterable[TrialResult]) -> str:
+    """Return a clause that says why trials are no second pilot beside a first one; empty if they are."""
+    shared = {trial.seed for trial in trials} & {trial.seed for trial in first}
+    return f"it has seeds of the first pilot ({', '.join(map(str, sorted(shared)))})" if shared else ""
 
 
 class _Noting(UserDict[str, Any]):

@@ -179,11 +179,17 @@ def paired(
     if "imported" not in new[0].spec:
         mine = [trial for trial in reference if trial.condition == condition]
         moved = _moved(mine[0], new[0]) if mine else ""
-        fits = bool(mine and pilot) and not _moved(mine[0], pilot[0])
-        case = DriftCase(
-            label, condition, tuple(new), tuple(reference), measures(new, reads), method=method, group=moved
+        fitting = tuple(trial for trial in pilot if mine and not _moved(mine[0], trial))
+        return DriftCase(
+            label,
+            condition,
+            tuple(new),
+            tuple(reference),
+            measures(new, reads),
+            method=method,
+            group=moved,
+            pilot=fitting,
         )
-        return replace(case, pilot=tuple(pilot)) if fits else case
     alike = [old for old in reference if _read_alike(old, new[0])]
     others = [old for old in reference if not _read_alike(old, new[0])]
     earlier = (*(replace(old, condition=condition) for old in alike), *others)

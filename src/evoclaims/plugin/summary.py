@@ -207,11 +207,13 @@ class Summary:
         """Return what failed, what changed, and what to do next."""
         from evoclaims.report.run_summary import closing_lines
 
-        changed = None
+        changed, regressed = None, []
         if self._regression and self._regression.transitions:
             changed = [f"{name} ({tier})" for tier, name in self._regression.changed]
-        drifted = dict.fromkeys(row.label for row in self._drift[0].rows if row.drifted) if self._drift else ()
-        return closing_lines(self.reports, changed, list(drifted))
+            regressed = [f"{one.claim} ({one.tier})" for one in self._regression.matched]
+        drifted = [row.label for row in self._drift[0].rows if row.drifted] if self._drift else []
+        drifted += self._upgrade.drifted if self._upgrade else []
+        return closing_lines(self.reports, changed, list(dict.fromkeys(drifted)), regressed)
 
     def _choices(self) -> str:
         """Say how claims are selected, where none was."""

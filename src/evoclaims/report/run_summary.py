@@ -53,19 +53,27 @@ def without_smoke_test(reports: Sequence[ClaimReport]) -> str:
     return f"{plural(len(claims), 'claim')} {have} no smoke test: evoclaims status --why"
 
 
-def closing_lines(reports: Sequence[ClaimReport], changed: Sequence[str] | None, drifted: Sequence[str]) -> list[str]:
-    """Return three lines.
+def closing_lines(
+    reports: Sequence[ClaimReport],
+    changed: Sequence[str] | None,
+    drifted: Sequence[str],
+    regressed: Sequence[str] = (),
+) -> list[str]:
+    """Return three lines; the first names all that makes the run fail.
 
     Args:
         reports: of the run.
         changed: claims whose verdicts differ from the accepted ones; None if nothing has been accepted yet.
         drifted: conditions whose trials have drifted.
+        regressed: those of `changed` that make the run fail.
     """
     failed = [report for report in reports if report.failed]
-    changes = [*(changed or ()), *(f"trials of {label} (drift)" for label in drifted)]
+    drifts = [f"trials of {label} (drift)" for label in drifted]
+    changes = [*(changed or ()), *drifts]
     nothing = "nothing" if changed is not None else "nothing to compare with: no verdict has been accepted"
+    failures = [f"{one.name} ({one.outcome})" for one in failed]
     return [
-        _line("failed: ", [f"{one.name} ({one.outcome})" for one in failed], "nothing"),
+        _line("failed: ", [*failures, *(f"{name}, regression" for name in regressed), *drifts], "nothing"),
         _line("changed: ", changes, nothing),
         f"next: {_next(failed, changes, changed is None)}",
     ]

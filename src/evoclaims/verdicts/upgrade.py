@@ -70,10 +70,10 @@ class Upgrade:
         return sum(one.again for one in self.successions)
 
     @property
-    def drifted(self) -> bool:
-        """Whether a condition that this run repeated has drifted; later runs report it but do not fail."""
+    def drifted(self) -> list[str]:
+        """The conditions that this run repeated and that have drifted; later runs report them but do not fail."""
         drifted = {row.label for row in self.drift.rows if row.drifted}
-        return any(one.again and one.label in drifted for one in self.successions)
+        return [one.label for one in self.successions if one.again and one.label in drifted]
 
     @property
     def lines(self) -> list[str]:
