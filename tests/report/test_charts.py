@@ -119,7 +119,7 @@ def test_ticks_are_few_rising_and_within_the_axis(one: float, other: float) -> N
 def _corners(values: list[float]) -> list[np.ndarray[Any, Any]]:
     """Return the corners of each stretch of a curve that is drawn, from steps relative to the corner before."""
     line = Line("seed <0>", np.arange(float(len(values))), np.array(values))
-    svg = ElementTree.fromstring(curves_svg(CurvePanel("success", (line,), None, 1), "success over training"))
+    svg = ElementTree.fromstring(curves_svg(CurvePanel("success", (line,), 1), "success over training"))
     paths = [path for path in svg.iter("path") if path.get("class") == "line"]
     assert all(path.findtext("title") == "seed <0>" for path in paths)
     stretches = [one for path in paths for one in path.get("d", "").split("M")[1:]]
@@ -153,5 +153,4 @@ def test_a_curve_passes_each_value_within_a_quarter_of_a_unit(values: list[float
 @given(st.lists(st.floats(width=64), min_size=2, max_size=20))
 def test_any_curve_makes_a_sound_drawing(values: list[float]) -> None:
     line = Line("seed 0", np.arange(len(values), dtype=float), np.array(values))
-    ends = Line("low", line.x, line.y), Line("high", line.x, line.y)
-    ElementTree.fromstring(curves_svg(CurvePanel("success", (line,), ends, 0), "success over training"))
+    ElementTree.fromstring(curves_svg(CurvePanel("success", (line,), 0), "success over training"))

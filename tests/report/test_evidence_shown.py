@@ -11,6 +11,7 @@ from laboratory import Laboratory
 from unpacked import whole
 
 from evoclaims.judging.assertion import Assertion
+from evoclaims.judging.exact import MAX_TRIALS
 from evoclaims.judging.sample import Sample
 from evoclaims.judging.verdict import Bound
 from evoclaims.report.evidence import Part, judged_parts
@@ -79,7 +80,7 @@ def test_of_a_refuted_part_the_p_against_it_comes_first(filled: Laboratory) -> N
     ]
 
 
-def test_values_are_written_out_by_seed_up_to_fifty_trials() -> None:
+def test_values_are_written_out_by_seed() -> None:
     def part(n: int) -> Part:
         values = (*[0.5] * (n - 1), -math.inf)
         sample = Sample("a: x", tuple(range(n)), values, 0.5, (n - 1,), ("timeout",))
@@ -87,8 +88,7 @@ def test_values_are_written_out_by_seed_up_to_fifty_trials() -> None:
         return shown
 
     assert part(3).rows == ((0, ("0.5",)), (1, ("0.5",)), (2, ("timeout",)))
-    assert len(part(50).rows) == 50
-    assert part(51).rows == ()
+    assert len(part(MAX_TRIALS).rows) == MAX_TRIALS
 
 
 def test_of_several_parts_the_one_that_decided_is_marked(filled: Laboratory) -> None:

@@ -11,8 +11,7 @@ from unpacked import whole
 
 from evoclaims.judging.verdict import Outcome
 from evoclaims.report import table_cells
-from evoclaims.report.fault_grid import fault_grid
-from evoclaims.report.model import Board, Page, Section
+from evoclaims.report.model import Board, Page, Section, fault_grid
 from evoclaims.report.run_summary import run_summary
 from evoclaims.report.terminal_table import verdict_table
 from evoclaims.verdicts.claim_report import CONTROL, MECHANISM, ClaimReport, Tally, Tried

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 from laboratory import CONDITIONS, Laboratory, record
 
-from evoclaims.report.training_curves import MOST_LINES, CurvePanel, panels
+from evoclaims.judging.exact import MAX_TRIALS
+from evoclaims.report.training_curves import CurvePanel, panels
 from evoclaims.report.trial_summary import POINTS, Reader, TrialSummary
 
 
@@ -49,19 +50,9 @@ def test_long_curves_keep_their_ends_and_at_most_a_hundred_points(read: Any) -> 
     assert len(read(_curve(range(7)))[0].curves["gain"]) == 7
 
 
-def test_few_trials_are_drawn_one_by_one_and_many_as_quantiles(read: Any) -> None:
-    few = _only(panels(read(*(_curve([0, i]) for i in range(MOST_LINES)))))
-    assert (len(few.lines), few.band) == (MOST_LINES, None)
-    many = _only(panels(read(*(_curve([0, i, i]) for i in range(101)))))
-    assert [line.label for line in many.lines] == ["median of 101 trials"]
-    assert many.band is not None
-    assert [line.y[-1] for line in (many.band[0], *many.lines, many.band[1])] == [10.0, 50.0, 90.0]
-
-
-def test_a_trial_that_ended_early_keeps_its_last_value_among_many(read: Any) -> None:
-    trials = read(*(_curve([0, 0, 0, 0]) for _ in range(MOST_LINES // 2)), *(_curve([0, 9]) for _ in range(MOST_LINES)))
-    panel = _only(panels(trials))
-    assert panel.lines[0].y[-1] == 9.0
+def test_each_trial_has_a_line(read: Any) -> None:
+    lines = _only(panels(read(*(_curve([0, i, i]) for i in range(MAX_TRIALS))))).lines
+    assert [(line.label, line.y[-1]) for line in lines] == [(f"seed {i}", i) for i in range(MAX_TRIALS)]
 
 
 def test_values_that_are_no_numbers_leave_gaps_and_are_counted(read: Any) -> None:
@@ -69,9 +60,6 @@ def test_values_that_are_no_numbers_leave_gaps_and_are_counted(read: Any) -> Non
     panel = _only(panels(read(_curve([0, nan, 2]), _curve([1, 1, float("inf")]), _curve([0, 1, 2]))))
     assert panel.broken == 2
     assert np.isnan(panel.lines[0].y[1])
-    many = _only(panels(read(*(_curve([0, nan, i]) for i in range(MOST_LINES + 1)))))
-    assert np.isnan(many.lines[0].y).any()
-    assert np.isfinite(many.lines[0].y[[0, -1]]).all()
 
 
 def test_what_never_changes_is_said_and_not_drawn(read: Any) -> None:

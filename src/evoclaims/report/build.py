@@ -14,9 +14,8 @@ from evoclaims.paper.archive import Archive
 from evoclaims.paper.reproduction import Reproduction
 from evoclaims.report import audit, replication_cells, table_cells, training_curves, trial_summary
 from evoclaims.report.evidence import Part, judged_parts, unjudged_part
-from evoclaims.report.fault_grid import fault_grid
 from evoclaims.report.formatting import Anchors, clean, counted, listed, places, plural
-from evoclaims.report.model import Board, ConditionTrials, Page, Section
+from evoclaims.report.model import Board, ConditionTrials, Page, Section, fault_grid
 from evoclaims.report.trial_summary import Reader, TrialSummary
 from evoclaims.verdicts import other_code
 from evoclaims.verdicts.claim_report import ClaimReport

@@ -90,9 +90,8 @@ def axis_svg(part: Part) -> Markup:
 def curves_svg(panel: CurvePanel, name: str) -> Markup:
     """Draw a panel of training curves; `name` says what it shows."""
     width, height = PANEL
-    lines = [*panel.lines, *(panel.band or ())]
-    xs = _ends([line.x for line in lines])
-    ys = _ends([line.y for line in lines])
+    xs = _ends([line.x for line in panel.lines])
+    ys = _ends([line.y for line in panel.lines])
     x = _Scale(0.0, xs[1] or 1.0, LEFT, width - RIGHT)
     y = _Scale(*ys, height - BOTTOM, TOP)
     pieces = [Markup('<path class="rule" d="M{0} {1}V{2}H{3}"/>').format(LEFT, TOP, height - BOTTOM, width - RIGHT)]
@@ -100,8 +99,6 @@ def curves_svg(panel: CurvePanel, name: str) -> Markup:
         pieces.append(_text("small", LEFT - 4, y(value) + 3, large(value), "end"))
     for value, anchor in ((0.0, "start"), (xs[1], "end")):
         pieces.append(_text("small", x(value), height - 8, large(value), anchor))
-    if panel.band is not None:
-        pieces += _band(*panel.band, x, y)
     pieces += [_mark("line", path, line.label) for line in panel.lines if (path := _path(line, x, y))]
     return _svg(width, height, pieces, name)
 
@@ -218,15 +215,6 @@ def _path(line: Line, x: _Scale, y: _Scale) -> str:
         path.append(f"{pen}{(place[0] - before[0]) / 2:g} {(place[1] - before[1]) / 2:g}")
         pen, last = "l" if pen == "M" else " ", place
     return "".join(path)
-
-
-def _band(low: Line, high: Line, x: _Scale, y: _Scale) -> Iterator[Markup]:
-    """Draw the area between two quantiles where both are finite."""
-    good = np.isfinite(low.y) & np.isfinite(high.y)
-    if good.any():
-        there = [f"{_at(x(a))} {_at(y(b))}" for a, b in zip(low.x[good], low.y[good], strict=True)]
-        back = [f"{_at(x(a))} {_at(y(b))}" for a, b in zip(high.x[good][::-1], high.y[good][::-1], strict=True)]
-        yield _mark("band", f"M{'L'.join([*there, *back])}Z", "lower to upper decile")
 
 
 def _mark(kind: str, path: str, title: str) -> Markup:

@@ -6,16 +6,12 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from statistics import median
-from typing import Final
 
 from evoclaims.judging.effect import iqm, iqm_interval
 from evoclaims.judging.sample import Sample
 from evoclaims.judging.verdict import Bound, Direction, Evidence, Interval, Outcome, Verdict
 from evoclaims.report.formatting import clean, number, p_value
 from evoclaims.report.trial_summary import TrialSummary
-
-MOST_ROWS: Final = 50
-"""Most trials whose values are written out."""
 
 
 @dataclass(frozen=True)
@@ -83,13 +79,11 @@ class Part:
 
     @property
     def rows(self) -> tuple[tuple[int, tuple[str, ...]], ...]:
-        """Every trial's value as text, one row per seed and one column per strip; empty if there are too many."""
+        """Every trial's value as text, one row per seed and one column per strip."""
         columns = [
             {**{dot.seed: number(dot.value) for dot in strip.dots}, **dict(strip.apart)} for strip in self.strips
         ]
         seeds = sorted({seed for column in columns for seed in column})
-        if len(seeds) > MOST_ROWS:
-            return ()
         return tuple((seed, tuple(column.get(seed, "–") for column in columns)) for seed in seeds)
 
 

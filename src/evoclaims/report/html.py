@@ -20,9 +20,8 @@ from markupsafe import Markup
 from evoclaims.judging.verdict import Outcome
 from evoclaims.report import across, charts, formatting, replication_cells
 from evoclaims.report.charts import spark_svg
-from evoclaims.report.fault_grid import LEGEND
 from evoclaims.report.formatting import plural
-from evoclaims.report.model import Page, Section
+from evoclaims.report.model import FATES, Page, Section
 from evoclaims.verdicts.sentences import sentences
 from evoclaims.verdicts.transitions import Robustness
 
@@ -166,7 +165,7 @@ def _pieces(page: Page) -> Iterator[tuple[str, str]]:
         yield f"trials {names[key]}", render("trials.html.j2").render(condition=condition)
         yield f"settings {names[key]}", render("settings.html.j2").render(condition=condition)
     for name, _, _ in _chapters(page):
-        yield f"all {name}", render(f"{name}.html.j2").render(page=page, legend=LEGEND)
+        yield f"all {name}", render(f"{name}.html.j2").render(page=page, legend=FATES)
 
 
 def _chapters(page: Page) -> list[tuple[str, str, str]]:

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
 from evoclaims.report.formatting import clean, number, plural
@@ -20,15 +19,12 @@ AXES: Final = ("environment_steps", "steps")
 FIRST: Final = ("success", "fitness", "level")
 """Curves that every method has; they come first."""
 
-MOST_LINES: Final = 30
-"""Most trials that are drawn one by one."""
-
 MOST_PANELS: Final = 8
 
 
 @dataclass(frozen=True, eq=False)
 class Line:
-    """One trial's curve, or a quantile over trials.
+    """One trial's curve.
 
     Attributes:
         label: such as "seed 3".
@@ -46,14 +42,12 @@ class CurvePanel:
 
     Attributes:
         name: of the quantity.
-        lines: one per trial, or only the median over trials.
-        band: lower and upper decile over trials; None where each trial has its line.
+        lines: one per trial.
         broken: how many curves hold a value that is not finite, which leaves a gap.
     """
 
     name: str
     lines: tuple[Line, ...]
-    band: tuple[Line, Line] | None
     broken: int
 
 
@@ -87,27 +81,8 @@ def _constant(trials: Sequence[TrialSummary], name: str) -> float | None:
 
 def _panel(trials: Sequence[TrialSummary], name: str) -> CurvePanel:
     broken = sum(not np.isfinite(trial.curves[name]).all() for trial in trials)
-    if len(trials) <= MOST_LINES:
-        lines = tuple(Line(f"seed {t.seed}", t.curves[AXES[0]], t.curves[name]) for t in trials)
-        return CurvePanel(clean(name), lines, None, broken)
-    ends = [trial.curves[AXES[0]] for trial in trials]
-    x = np.unique(np.linspace(min(axis[0] for axis in ends), max(axis[-1] for axis in ends), POINTS))
-    held = pd.DataFrame([_held(trial, name, x) for trial in trials])
-    low, middle, high = held.quantile([0.1, 0.5, 0.9]).to_numpy()  # of the finite values; NaN where there are none
-    count = len(trials)
-    return CurvePanel(
-        clean(name),
-        (Line(f"median of {count} trials", x, middle),),
-        (Line("lower decile", x, low), Line("upper decile", x, high)),
-        broken,
-    )
-
-
-def _held(trial: TrialSummary, name: str, x: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return a curve at other positions: each value holds until the next, the last forever; NaN before the first."""
-    places = np.searchsorted(trial.curves[AXES[0]], x, side="right") - 1
-    held = np.where(places >= 0, trial.curves[name][np.maximum(places, 0)], np.nan)
-    return np.where(np.isfinite(held), held, np.nan)
+    lines = tuple(Line(f"seed {t.seed}", t.curves[AXES[0]], t.curves[name]) for t in trials)
+    return CurvePanel(clean(name), lines, broken)
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,4 +122,4 @@ def _last_series(every: Sequence[Night]) -> WatchShown:
         f"last night: {name} with {last.evidence[name]:.2g}. Alarms: {', '.join(alarms) or 'none'}."
     )
     says = " ".join([says, *standing(every)])
-    return WatchShown(last.tier, says, CurvePanel(f"log10 of evidence ({last.tier})", (*lines, alarm), None, 0))
+    return WatchShown(last.tier, says, CurvePanel(f"log10 of evidence ({last.tier})", (*lines, alarm), 0))
