@@ -105,7 +105,8 @@ def test_a_run_goes_on_to_the_other_claims_and_says_whose_time_was_over(
         supported="supported",
         better="verdict(trials('right', on='parity').mean_success > trials('looping', on='parity').mean_success)",
     )
-    done = project.run_apart(f"--claims-time-limit={LIMIT}", *workers)
+    limit = f"--claims-time-limit={LIMIT}"
+    done = project.run(limit, *workers, own_store=True) if workers else project.run_apart(limit)
     shown = " ".join("\n".join(done.outlines).split())
     ended = "10 of 10 trials of looping on parity ran out of time (seeds 0, 1, 2, 3, 4, 5, 6, 7, 8, 9)"
     assert "claims: 1 supported, 2 inconclusive" in shown
