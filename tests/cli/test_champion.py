@@ -19,23 +19,22 @@ from evoclaims.trials.result import TrialResult
 from evoclaims.trials.store import Store
 
 # What the command imports late: pytester forgets the modules that a test has imported, and would load them twice.
-for _module in ("evoclaims.cli.champion", "evoclaims.methods.cma_es", "evoclaims.methods.hyperneat"):
+for _module in ("evoclaims.cli.champion", "evoclaims.methods.cma_es"):
     optional(_module)
 
 MORE = """
 from evoclaims.methods.cma_es import CmaEs
-from evoclaims.methods.hyperneat import HyperNeat
 from evoclaims.methods.neat.evolution import Neat
 from evoclaims.methods.neat.settings import Settings, Species
 from evoclaims.networks.all_skips import AllSkips
 
 SMALL = Settings(population=8, nodes=8, connections=12, activations=("tanh", "sin"), species=Species(most=2))
-METHODS |= {"neat": Neat(SMALL), "hyperneat": HyperNeat(SMALL, hidden=(2,)), "cma_es": CmaEs(4, AllSkips(hidden=1))}
+METHODS |= {"neat": Neat(SMALL), "cma_es": CmaEs(4, AllSkips(hidden=1))}
 REPRODUCTION = replace(REPRODUCTION, tiers={"smoke": Tier(conditions(3), Design.fixed(10))})
 """
 
 OWN = Path(".evoclaims")
-TRAINED = ("neat", "hyperneat", "cma_es", "right")
+TRAINED = ("neat", "cma_es", "right")
 
 
 @pytest.fixture(autouse=True)

@@ -161,6 +161,7 @@ def test_a_wheel_is_enough_to_judge_the_paper_s_claims(tmp_path: Path) -> None:
         "install",
         "--no-index",
         "--no-deps",
+        "--no-compile",
         f"--find-links={tmp_path}",
         "-t",
         str(site),

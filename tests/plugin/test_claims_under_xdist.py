@@ -70,7 +70,7 @@ def test_workers_give_the_verdicts_of_one_process_and_run_each_trial_once(
 
 def test_a_claim_whose_process_dies_is_not_missing_without_a_word(project: Any) -> None:
     project.write(a="supported", killed="import os, signal; os.kill(os.getpid(), signal.SIGKILL)")
-    apart = project.run_apart("-n1", "--claims-json=out.json")
+    apart = project.run("-n1", own_store=True)
     assert apart.ret == pytest.ExitCode.TESTS_FAILED
     shown = " ".join(apart.stdout.str().split())
     assert "error: The process that judged claims/test_claims.py::test_killed[killed-smoke] died" in shown
@@ -104,7 +104,7 @@ def test_what_keeps_workers_from_beginning_is_one_sentence_of_the_controllers(
     project.write(**claims)
     with (project.path / "tiny_paper.py").open("a") as file:
         file.write(paper)
-    result = project.run_apart(*(["-n2"] if paper else ["-n1", "--claims-only=nope"]))
+    result = project.run(*(["-n2"] if paper else ["-n1", "--claims-only=nope"]), own_store=True)
     assert result.ret == pytest.ExitCode.USAGE_ERROR
     sentence(result, text)
     assert " ".join(result.stdout.str().split()).count(text) == 1
@@ -150,7 +150,7 @@ def test_a_worker_that_dies_while_starting_is_one_sentence(project: Any, monkeyp
     project.write(a="supported")
     monkeypatch.delenv("PYTEST_XDIST_WORKER", raising=False)  # or the main process of a test in a worker would die
     (project.path / "conftest.py").write_text("import os\n\nif 'PYTEST_XDIST_WORKER' in os.environ:\n    os._exit(3)\n")
-    result = project.run_apart("-n1", "--max-worker-restart=0")
+    result = project.run("-n1", "--max-worker-restart=0", own_store=True)
     assert result.ret == pytest.ExitCode.USAGE_ERROR
     shown = " ".join(result.stdout.str().split())
     assert "ERROR: The worker gw0 of pytest-xdist died while starting, so that no test has run (Not properly" in shown

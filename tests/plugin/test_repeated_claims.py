@@ -156,7 +156,7 @@ def test_repeated_claim_is_one_row_of_a_command(project: Any, capsys: pytest.Cap
 def test_claim_repeated_on_workers_is_counted_once(project: Any) -> None:
     project.write(a="supported", b="refuted")
     (project.path / "conftest.py").write_text(PARAMETERS.replace("HOW", "trylast=True").replace("INDIRECT", "True"))
-    result = project.run_apart("-n2", "--claims-json=out.json", f"--claims-storage={project.store}")
+    result = project.run("-n2", "--claims-json=out.json")
     assert result.ret == 1
     result.stdout.fnmatch_lines(["claims: 1 supported, 1 refuted"])
     claims = json.loads((project.path / "out.json").read_text())["claims"]

@@ -19,11 +19,10 @@ from hypothesis import strategies as st
 from usual_fusions import USUAL_FUSIONS
 from without_kernels import BREEDING, without_kernels
 
-from evoclaims.envs.gates.parity import NParity
 from evoclaims.kernels.emit import group_kernel
 from evoclaims.kernels.emit.gpu_kernel import GpuProgram
-from evoclaims.methods.neat.evolution import Neat
 from evoclaims.methods.neat.mutation import _ordering, _removal, order_for, without_node
+from evoclaims.methods.neat.population import first_population, next_population
 from evoclaims.methods.neat.settings import Attribute, Mutation, Settings, Species
 from evoclaims.networks.genome import Genome
 
@@ -46,6 +45,7 @@ def _changes(happens: Any, u: Any, v: Any, genome: Genome) -> Any:
 
 
 VISIBLE = 4
+INPUTS, OUTPUTS = 3, 1
 CHANGES = _both_ways(jax.vmap(_changes))
 NUMBERS = st.integers(0, 2**31)
 
@@ -116,7 +116,6 @@ def test_nvidias_assembler_takes_the_kernels(tmp_path: Path) -> None:
 )
 def test_thirty_generations_are_the_same_to_the_bit(most_nodes: int) -> None:
     """Of genomes that reach the limits of their arrays, in several species; two trials at once."""
-    task = NParity(3)
     chosen = Settings(
         population=24,
         nodes=most_nodes,
@@ -125,20 +124,22 @@ def test_thirty_generations_are_the_same_to_the_bit(most_nodes: int) -> None:
         species=Species(most=5, threshold=1.5, exempt=1, survival=0.4),
     )
 
-    method = Neat(chosen)
+    def evolution(start: Any, key: Any, fitness: Any) -> Any:
+        def generation(population: Any, drawn: Any) -> Any:
+            following = next_population(drawn[0], chosen, population, drawn[1], INPUTS, OUTPUTS)
+            return following, following.species.count
 
-    def evolution(key: Any) -> Any:
-        def generation(state: Any, key: Any) -> Any:
-            state, progress = method.step(key, task, jnp.zeros((), jnp.int32), state)
-            return state, (progress, state.population.species.count)
+        return jax.lax.scan(generation, start, (jax.random.split(key, 30), fitness))
 
-        first, rest = jax.random.split(key)
-        return jax.lax.scan(generation, method.init(first, task), jax.random.split(rest, 30))
-
+    fitness = np.random.default_rng(5).integers(0, 8, (2, 30, 24)).astype(np.float32)
+    start = jax.jit(jax.vmap(lambda key: first_population(key, chosen, INPUTS, OUTPUTS)))(
+        jax.random.split(jax.random.key(5))
+    )
     by_kernels, without = (
-        jax.device_get(each(jax.random.split(jax.random.key(5), 2))) for each in _both_ways(jax.vmap(evolution))
+        jax.device_get(each(start, jax.random.split(jax.random.key(6)), fitness))
+        for each in _both_ways(jax.vmap(evolution))
     )
     assert same(by_kernels, without)
-    (state, (_, species)) = by_kernels
-    assert (state.population.genomes.node_count.max(axis=1) >= NODES).all()
+    population, species = by_kernels
+    assert (population.genomes.node_count.max(axis=1) >= NODES).all()
     assert (species.max(axis=1) > 1).all()
