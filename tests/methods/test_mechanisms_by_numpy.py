@@ -5,11 +5,12 @@ from __future__ import annotations
 from itertools import pairwise
 from typing import Any
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 
 from evoclaims.methods.mechanisms import HyperNeatMechanisms, PpoMechanisms
-from evoclaims.methods.mechanisms.gradients import Batch
+from evoclaims.methods.mechanisms.gradients import Batch, _log_slope
 from evoclaims.methods.mechanisms.substrates import placed
 from evoclaims.networks.genome import Connections, Genome, Nodes
 
@@ -94,3 +95,12 @@ def test_weights_are_what_a_recursion_through_the_cppn_answers() -> None:
     found = HyperNeatMechanisms()._weights(placed((4, 3, 2)), genome)
     np.testing.assert_allclose(found, expected, rtol=1e-4, atol=1e-4)
     assert 0 < np.count_nonzero(expected) < len(expected)
+
+
+def test_the_slope_of_tanh_has_a_logarithm_wherever_a_policy_may_act() -> None:
+    """Cosh of 90 is beyond float32; a first policy with a large spread, seed 173 of a pilot, has acted so."""
+    raw = np.array([-1e4, -90.0, -21.0, -19.0, -1.0, 0.0, 2.0, 20.5, 89.0, 300.0])
+    exact = 2 * (np.log(2) - np.abs(raw) - np.log1p(np.exp(-2 * np.abs(raw))))
+    found, gradient = jax.vmap(jax.value_and_grad(_log_slope))(jnp.asarray(raw, jnp.float32))
+    np.testing.assert_allclose(found, exact, rtol=1e-6, atol=1e-6)
+    np.testing.assert_allclose(gradient, -2 * np.tanh(raw), rtol=1e-6)

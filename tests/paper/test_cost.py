@@ -198,6 +198,20 @@ def test_what_has_not_run_on_such_a_device_counts_by_its_budget_at_the_pace_of_t
     assert longer == 2.0 + 4 * 20.0
 
 
+def test_what_has_not_run_counts_at_the_pace_of_its_own_method(tmp_path: Path, store: Store) -> None:
+    wanted, longer = {}, replace(CONDITION, task=NParity(3))
+    paper = Reproduction("tiny", "A Tiny Paper", tmp_path, {"full": Tier({}, Design.fixed(10))})
+    for method, run in (("slow", 1000.0), ("quick", 1.0), ("quicker", 0.5)):
+        references.write(references.path_of(paper.references, "full", method, "2"), _trials(run))
+        wanted |= {(method, "2"): CONDITION, (method, "3"): longer}
+    asked = {names: Wanted(names, condition, range(4)) for names, condition in wanted.items()}
+    found = {names: one.cost for names, one in Estimator(store, paper, "full", "cpu").owed(asked).items()}
+    assert found["slow", "3"].basis == "budget"
+    share = longer.environment_steps / CONDITION.environment_steps
+    for method in ("slow", "quick", "quicker"):
+        assert found[method, "3"].work == pytest.approx(share * found[method, "2"].work)
+
+
 def test_where_nothing_has_run_longer_budgets_come_out_longer(seconds_of: Seconds) -> None:
     short, long = seconds_of("cpu", (CONDITION, 4, []), (LONGER, 4, []))
     assert COMPILE_SECONDS < short < long

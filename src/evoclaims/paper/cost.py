@@ -147,7 +147,7 @@ class Estimator:
 
         Trials of this machine come first, then those of others, by how much longer conditions take here where that is
         known. Trials of another condition of the same names count by their pace, and what has never run on such a
-        device by its budget, at the median pace of the others.
+        device by its budget, at the median pace of the others: of the same method's, if any of these has run.
         """
         layout = layout_on(self.platform)
         lacking = {
@@ -161,13 +161,15 @@ class Estimator:
         scale = sum(here for here, _ in both) / sum(there for _, there in both) if both else None
         known = {key: one.at(scale) for key, one in found.items()}
         steps = {key: one.condition.environment_steps * layout.calls(counts[key]) for key, one in wanted.items()}
-        paces = [one.work / max(steps[key], 1) for key, one in known.items() if one]
-        pace = statistics.median(paces) if paces else STEP_SECONDS
+        paces = [(wanted[key].names[0], one.work / max(steps[key], 1)) for key, one in known.items() if one]
         compiling = statistics.median(one.compile for one in known.values() if one) if paces else COMPILE_SECONDS
-        return {
-            key: Owed(lacking[key], one or Cost(compiling, pace * steps[key], counts[key], layout, "budget"))
-            for key, one in known.items()
-        }
+
+        def unknown(key: Key) -> Cost:
+            own = [pace for method, pace in paces if method == wanted[key].names[0]]
+            pace = statistics.median(own or [pace for _, pace in paces] or [STEP_SECONDS])
+            return Cost(compiling, pace * steps[key], counts[key], layout, "budget")
+
+        return {key: Owed(lacking[key], one or unknown(key)) for key, one in known.items()}
 
     def _by_earlier(self, one: Wanted, trials: int, read: Committed) -> _Known:
         """Return what so many trials cost by earlier ones: of the condition itself, or else of its names."""

@@ -292,8 +292,9 @@ def _log_density(
 
 
 def _log_slope(raw: Float[Array, "*n"]) -> Float[Array, "*n"]:
-    """Return the logarithm of tanh's derivative."""
-    return -2 * jnp.log(jnp.cosh(raw))
+    """Return the logarithm of tanh's derivative, also where cosh is beyond float32."""
+    far = jnp.abs(raw) > 20  # there, cosh is half of exp to the last bit
+    return jnp.where(far, 2 * math.log(2) - 2 * jnp.abs(raw), -2 * jnp.log(jnp.cosh(jnp.where(far, 0.0, raw))))
 
 
 def _entropy(middle: Float[Array, " action"], spread: Float[Array, " action"]) -> Float[Array, ""]:
