@@ -26,7 +26,7 @@ from evoclaims.judging.e_process import standardized_ranks, uniform
 from evoclaims.verdicts.watch import ALPHA, Family, Watch, Watched
 from evoclaims.verdicts.watch_file import Night
 
-EACH = 20
+EACH = 30
 
 
 def main() -> None:

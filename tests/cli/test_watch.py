@@ -31,9 +31,9 @@ def watching(evoclaims: Evoclaims, stored: Store, kept: Path) -> Evoclaims:
     else:
         status, out, err = evoclaims("watch")
         assert (status, err) == (0, "")
-        assert "Night 1 of series 1 (smoke): seeds 10000 to 10019 of 2 conditions." in out
+        assert "Night 1 of series 1 (smoke): seeds 10000 to 10029 of 2 conditions." in out
         assert "Alarm at an evidence of 60 (3 families / α 0.05)." in out
-        assert "No alarm. Next: commit watch.toml; the next night goes on with seed 10020." in out
+        assert "No alarm. Next: commit watch.toml; the next night goes on with seed 10030." in out
         shutil.copytree(stored.root, kept / "store")
         shutil.copy(FILE, kept)
     return evoclaims
@@ -52,9 +52,9 @@ def test_each_night_adds_an_entry_of_fresh_seeds(watching: Evoclaims, stored: St
     assert watching("watch", "--trials=3")[0] == 0
     assert FILE.read_bytes().startswith(before)
     first, second = load(FILE)[1]
-    assert (first.seeds, second.seeds) == (tuple(range(10_000, 10_020)), (10_020, 10_021, 10_022))
-    assert seeds(stored) == [*range(10), *range(10_000, 10_023)]
-    assert first.values["right on parity"]["mean_success"] == (1.0,) * 20
+    assert (first.seeds, second.seeds) == (tuple(range(10_000, 10_030)), (10_030, 10_031, 10_032))
+    assert seeds(stored) == [*range(10), *range(10_000, 10_033)]
+    assert first.values["right on parity"]["mean_success"] == (1.0,) * 30
     assert 0 < second.evidence["right"] < first.evidence["right"] < 1
     assert {"jax", "numpy"} <= second.versions.keys()
 
@@ -80,11 +80,11 @@ def test_a_kill_in_a_night_repeats_nothing_and_counts_nothing_twice(
     assert (status, "the same command goes on from the last checkpoint" in err) == (130, True)
     assert FILE.read_bytes() == before
     ran = {trial.id: trial.timing for trial in stored.results([])}
-    assert len(ran) == 100
+    assert len(ran) == 140
     assert watching("watch")[0] == 0
     assert {trial.id: trial.timing for trial in stored.results([])} == ran
-    assert seeds(stored) == [*range(10), *range(10_000, 10_040)]
-    assert [night.seeds[0] for night in load(FILE)[1]] == [10_000, 10_020]
+    assert seeds(stored) == [*range(10), *range(10_000, 10_060)]
+    assert [night.seeds[0] for night in load(FILE)[1]] == [10_000, 10_030]
 
 
 def test_trials_of_a_killed_night_do_not_count_once_their_code_is_edited(

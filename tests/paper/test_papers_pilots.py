@@ -10,15 +10,17 @@ from evoclaims.paper import pilots
 from reproductions.nisioti2025 import REPRODUCTION
 
 SMOKE = REPRODUCTION.tier("smoke")
-PILOTS = sorted((REPRODUCTION.folder / "pilot" / "smoke").iterdir())
+PILOTS = sorted(path for name in ("pilot", "second_pilot") for path in (REPRODUCTION.folder / name / "smoke").iterdir())
 
 
-@pytest.mark.parametrize("path", PILOTS, ids=[path.stem for path in PILOTS])
+@pytest.mark.parametrize("path", PILOTS, ids=["-".join((path.parts[-3], path.stem)) for path in PILOTS])
 def test_a_committed_pilot_has_fifty_other_seeds_of_todays_condition(path: Path) -> None:
     trials = pilots.load(path)
     method, _, task = path.stem.partition("-")
     condition = SMOKE.condition(method, task)
     design = SMOKE.design
-    assert pilots.path_of(REPRODUCTION.folder, "smoke", method, task) == path
+    second = path.parts[-3] == "second_pilot"
+    assert pilots.path_of(REPRODUCTION.folder, "smoke", method, task, second=second) == path
     assert {trial.condition for trial in trials} == {condition.id}
-    assert len({trial.seed for trial in trials} - set(design.seeds(design.last.n))) == 50
+    assert {trial.seed for trial in trials} == {*range(150, 200)} if second else {*range(100, 150)}
+    assert not {trial.seed for trial in trials} & {*design.seeds(design.last.n)}

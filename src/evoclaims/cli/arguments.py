@@ -230,7 +230,7 @@ def _comparing(add: _Add) -> None:
         "run new seeds, and report whether all nights together show that results differ from the committed trials; "
         "writes watch.toml, which you commit; exit status 1 on an alarm",
     )
-    watch.add_argument("--trials", type=int, default=20, metavar="N", help="new trials per condition (20)")
+    watch.add_argument("--trials", type=int, default=30, metavar="N", help="new trials per condition (30)")
     watch.add_argument(
         "--restart", action="store_true", help="begin a new series of nights, such as after an alarm was examined"
     )

@@ -193,8 +193,8 @@ class Family:
     def nights_to_find(self, shift: float, each: int, level: float) -> int | None:
         """Return the median number of nights to an alarm if all its measures get better by `shift` SD.
 
-        None if all of the sum are constant: then, against 60 committed trials, one night with
-        another value in six of ten new ones is an alarm.
+        None if all of the sum are constant: then, against 110 committed trials, one night with
+        another value in seven of twenty new ones is an alarm.
         """
         if not self.moves:
             return None
