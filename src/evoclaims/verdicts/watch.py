@@ -194,7 +194,7 @@ class Family:
         """Return the median number of nights to an alarm if all its measures get better by `shift` SD.
 
         None if all of the sum are constant: then, against 110 committed trials, one night with
-        another value in seven of twenty new ones is an alarm.
+        another value in eight of thirty new ones is an alarm.
         """
         if not self.moves:
             return None
