@@ -47,6 +47,6 @@ def test_the_readme_counts_contradicted_numbers() -> None:
     contradicted = list(found.values()).count("contradicted")
     readme = " ".join((ROOT / "README.md").read_text(encoding="utf-8").split())
     assert (
-        f"Of {len(found)} published numbers the scripts contradict {contradicted}, the text "
+        f"Of {len(found)} published numbers the scripts' trials contradict {contradicted}, the text's "
         f"{_contradicted_by_text(PUBLISHED)}."
     ) in readme
