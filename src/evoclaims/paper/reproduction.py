@@ -52,7 +52,7 @@ Numbers = Mapping[str, Mapping[str, Any]]
 class NullAgent:
     """Something that has not learnt what claims are about, such as a robot that takes no action.
 
-    An assertion that its trials satisfy is vacuous. It has numbers of its own, or the trials of a method.
+    An assertion that its trials satisfy is vacuous, unless a planted fault is known to change its verdict. It has numbers of its own, or the trials of a method.
 
     Attributes:
         says: what it is, in a few words.
@@ -150,7 +150,7 @@ class Reproduction:
         trials: class that `trials(...)` returns: `TrialGroup`, or a subclass with the paper's own measures.
         mutants: module with the paper's own planted faults; it holds MUTANTS, `evoclaims.mutants.Mutant` by name, and
             is imported only when they are tried.
-        null_agents: by name, what has learnt nothing: an assertion that one of them satisfies is vacuous.
+        null_agents: by name, what has learnt nothing (see `NullAgent`).
 
     Tables of imported trials are looked for in `folder`.
 

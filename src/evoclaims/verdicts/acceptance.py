@@ -35,7 +35,7 @@ class Acceptance:
 def accept(history: History, reports: Sequence[ClaimReport], archive: Archive, today: str) -> Acceptance:
     """Append an entry for every claim whose outcome, fingerprint, versions or device is not the last one's.
 
-    So it is where other trials gave another reason.
+    An entry is also appended if other trials have changed the printed reason, such as its p.
 
     A claim without a test at its tier has no verdicts there: those accepted earlier were about another sentence.
 
