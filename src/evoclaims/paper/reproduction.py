@@ -52,7 +52,8 @@ Numbers = Mapping[str, Mapping[str, Any]]
 class NullAgent:
     """Something that has not learnt what claims are about, such as a robot that takes no action.
 
-    An assertion that its trials satisfy is vacuous, unless a planted fault is known to change its verdict. It has numbers of its own, or the trials of a method.
+    An assertion that its trials satisfy is vacuous, unless a planted fault is known to change its verdict. It has
+    numbers of its own, or the trials of a method.
 
     Attributes:
         says: what it is, in a few words.
