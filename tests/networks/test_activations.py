@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from evoclaims.core.errors import UnknownNameError
-from evoclaims.networks.graph import ACTIVATIONS, apply_activation, check_activations
+from evoclaims.networks.activations import ACTIVATIONS, apply_activation, check_activations
 
 Z = np.array([-100.0, -2.0, -0.5, 0.0, 0.5, 2.0, 100.0])
 WANTED = {

@@ -88,6 +88,8 @@ def _equations(program: Any) -> Iterator[Any]:
 def _computing(condition: Condition) -> tuple[set[str], set[str]]:
     """Trace a condition's programs; return the files whose lines made equations, and those whose functions ran."""
     ran, programs, shapes = set(), [], None
+    warm = Program(condition)  # libraries are imported when they are used, and an import calls functions of others
+    jax.eval_shape(warm.advance, jax.eval_shape(warm.start, np.int32(0), np.bool_(False)), np.int32(1))
     jax.clear_caches()  # a function traced before keeps the lines that called it then
     robot_task._start_kernel.cache_clear()
     robot_task._step_kernel.cache_clear()

@@ -13,7 +13,7 @@ from evoclaims.envs.base import Task
 from evoclaims.methods.hyperneat import PAPER, check_weights
 from evoclaims.methods.neat.settings import Settings
 from evoclaims.methods.tensorneat import NeatTensorneat, library, neat
-from evoclaims.networks.graph import ACTIVATIONS
+from evoclaims.networks.activations import ACTIVATIONS
 from evoclaims.networks.substrate import Extent, layered
 
 

@@ -24,8 +24,8 @@ from evoclaims.envs.base import Episode, PolicyFn, Task
 from evoclaims.methods.base import Policy, Progress
 from evoclaims.methods.champion import no_episode
 from evoclaims.methods.neat.settings import PAPER, Settings
+from evoclaims.networks.activations import ACTIVATIONS
 from evoclaims.networks.genome import Genome
-from evoclaims.networks.graph import ACTIVATIONS
 
 INSTALL = 'pip install "tensorneat @ git+https://github.com/EMI-Group/tensorneat"'
 

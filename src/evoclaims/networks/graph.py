@@ -1,4 +1,4 @@
-"""The network that a genome describes, its activations, and its forward pass.
+"""The network that a genome describes, and its forward pass.
 
 Node i computes z = bias + response · Σ w x over its connections (TensorNEAT, Wang et al. 2024). A hidden node emits
 its activation function of z. An output emits z to other nodes, and its result is the output function of z. A node
@@ -11,50 +11,18 @@ Machines without the kernel compute the pass by matrices.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
-from types import MappingProxyType
 
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int
 
-from evoclaims.core.errors import require_known
 from evoclaims.core.pytree import pytree
 from evoclaims.kernels import GroupKernel
 from evoclaims.kernels.genomes.network import network_kernel, sorting_kernel
+from evoclaims.networks.activations import ACTIVATIONS, apply_activation, check_activations
 from evoclaims.networks.genome import Genome
-
-ACTIVATIONS: Mapping[str, Callable[[Array], Array]] = MappingProxyType(
-    {
-        "tanh": jnp.tanh,
-        "sigmoid": jax.nn.sigmoid,
-        "sin": jnp.sin,
-        "gauss": lambda z: jnp.exp(-z * z),
-        "abs": jnp.abs,
-        "identity": lambda z: z,
-    }
-)
-
-
-def check_activations(names: Sequence[str]) -> None:
-    """Raise an `UnknownNameError`, which lists the known names, for any other name."""
-    for name in names:
-        require_known("activation function", name, ACTIVATIONS)
-
-
-def apply_activation(
-    names: Sequence[str], index: Int[Array, "*slots"], z: Float[Array, "*shape"]
-) -> Float[Array, "*shape"]:
-    """Apply function `names[index]` to each element of `z`; `index` broadcasts against `z`.
-
-    All functions of the set are computed and one is kept, as sets are small.
-    """
-    value = ACTIVATIONS[names[0]](z)
-    for i, name in enumerate(names[1:], start=1):
-        value = jnp.where(index == i, ACTIVATIONS[name](z), value)
-    return value
 
 
 @pytree

@@ -9,7 +9,7 @@ from dataclasses import dataclass, fields
 from typing import Literal, get_args
 
 from evoclaims.core.errors import UserError, require_at_least, require_known
-from evoclaims.networks.graph import check_activations
+from evoclaims.networks.activations import check_activations
 
 LevelUp = Literal["reset", "keep"]
 
