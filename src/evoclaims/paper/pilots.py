@@ -29,7 +29,10 @@ from evoclaims.trials.spec import Condition
 
 SCHEMA: Final = 1
 
-_MEND: Final = "Restore the file from version control, or remove it and make it anew with `evoclaims power --run`."
+_MEND: Final = (
+    "Restore the file from version control, or remove it and make it anew with `evoclaims power --run` "
+    "(`--pilot first` or `second` chooses which)."
+)
 
 
 class _Shared(Struct):
