@@ -7,8 +7,8 @@ from pathlib import Path
 import jax
 from tiny_project import Evoclaims
 
-from evoclaims.cli.processes.job import named
 from evoclaims.cli.project import open_project
+from evoclaims.cli.running import named
 from evoclaims.trials.result_making import make_unfinished
 from evoclaims.trials.spec import TrialSpec
 from evoclaims.trials.store import Store

@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 from tiny_project import REPRODUCTION, Evoclaims, Project
 
-from evoclaims.cli.processes.job import Job, sharing_programs
 from evoclaims.envs.gates.parity import NParity
+from evoclaims.execution.job import Job, sharing_programs
 from evoclaims.methods.hand_built import HandBuilt
 from evoclaims.trials.spec import Budget, Condition
 from evoclaims.trials.store import Store

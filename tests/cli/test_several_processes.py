@@ -16,13 +16,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from tiny_project import REPRODUCTION, Evoclaims, Project
 
-from evoclaims.cli.processes import workers
-from evoclaims.cli.processes.host import AUTO, Host, host_of
-from evoclaims.cli.processes.job import Job, MissingBatch
-from evoclaims.cli.processes.worker import Ended, WorkOrder
-from evoclaims.cli.processes.workers import ATTEMPTS, Seat, Workers, in_queue, seats_of, useful_processes
 from evoclaims.core.errors import UserError
 from evoclaims.envs.gates.parity import NParity
+from evoclaims.execution import workers
+from evoclaims.execution.host import AUTO, Host, host_of
+from evoclaims.execution.job import Job, MissingBatch
+from evoclaims.execution.worker import Ended, WorkOrder
+from evoclaims.execution.workers import ATTEMPTS, Seat, Workers, in_queue, seats_of, useful_processes
 from evoclaims.methods.hand_built import HandBuilt
 from evoclaims.paper.cost import Cost
 from evoclaims.trials import gpus

@@ -21,11 +21,11 @@ from hypothesis import strategies as st
 from tiny_project import PYPROJECT, Evoclaims
 
 from evoclaims.cli import jobs, submit
-from evoclaims.cli.processes.job import Job, MissingBatch
 from evoclaims.cli.submit import dealt
 from evoclaims.cluster import submissions
 from evoclaims.cluster.job import BatchJob, minutes_of
 from evoclaims.cluster.submissions import Seen, State, load_all
+from evoclaims.execution.job import Job, MissingBatch
 from evoclaims.paper.cost import Cost
 from evoclaims.trials.layout import Layout
 from evoclaims.trials.lease import announced, lease_path

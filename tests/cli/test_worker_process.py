@@ -13,9 +13,9 @@ import msgspec
 import pytest
 from tiny_project import REPRODUCTION, Evoclaims, Project
 
-from evoclaims.cli.processes.job import Job
-from evoclaims.cli.processes.worker import WorkOrder
-from evoclaims.cli.processes.workers import Process
+from evoclaims.execution.job import Job
+from evoclaims.execution.worker import WorkOrder
+from evoclaims.execution.workers import Process
 
 SLOW = """
 
@@ -40,7 +40,7 @@ def test_a_worker_ends_with_the_command_that_has_started_it(evoclaims: Evoclaims
     tail = tail.split("\n", 1)[1].replace('method == "right"', "False")
     project.pytester.makepyfile(tiny_paper=head + SLOW + tail)
     worker = subprocess.Popen(
-        [sys.executable, "-m", "evoclaims.cli.processes.worker"],
+        [sys.executable, "-m", "evoclaims.execution.worker"],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         stderr=subprocess.DEVNULL,

@@ -63,4 +63,4 @@ def test_the_reproduction_is_imported_without_drawing_or_judging() -> None:
 
 
 def test_a_worker_process_is_ready_without_what_judges() -> None:
-    assert not {"pandas", "scipy", "statsmodels"} & _imported("import evoclaims.cli.processes.worker", ROOT)
+    assert not {"pandas", "scipy", "statsmodels"} & _imported("import evoclaims.execution.worker", ROOT)

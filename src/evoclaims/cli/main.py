@@ -88,7 +88,7 @@ def _done(options: argparse.Namespace) -> int:
 
     options.storage = storage_of(options.storage, options.command)
     if "numprocesses" in options:
-        from evoclaims.cli.processes.host import host_of
+        from evoclaims.execution.host import host_of
 
         options.host = host_of(options.numprocesses, options.device)
     command = importlib.import_module(f"evoclaims.cli.{options.command}")  # only now: --help waits for no jax

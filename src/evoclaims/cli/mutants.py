@@ -9,12 +9,12 @@ import textwrap
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
-from evoclaims.cli.processes.job import Job, jobs
-from evoclaims.cli.processes.worker import Ended, WorkOrder
-from evoclaims.cli.processes.workers import Execution
 from evoclaims.cli.project import Project, open_project
+from evoclaims.cli.running import Execution
 from evoclaims.core.errors import UnknownNameError, UserError
 from evoclaims.core.files import write_atomically
+from evoclaims.execution.job import Job, jobs
+from evoclaims.execution.worker import Ended, WorkOrder
 from evoclaims.mutants.mutant import Planted, load, plantings
 from evoclaims.mutants.trying import Comparison, merged, noticed, under_faults
 from evoclaims.trials.spec import Condition

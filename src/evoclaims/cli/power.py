@@ -9,13 +9,13 @@ from collections.abc import Mapping, Sequence
 from typing import Final
 
 from evoclaims.claims.power import ClaimPower, Pilots, only, with_test
-from evoclaims.cli.processes.job import Job
-from evoclaims.cli.processes.worker import WorkOrder
-from evoclaims.cli.processes.workers import Execution
 from evoclaims.cli.project import Project, open_project
+from evoclaims.cli.running import Execution
 from evoclaims.cli.terminal import styled
 from evoclaims.core.errors import UserError
 from evoclaims.core.packages import recorded
+from evoclaims.execution.job import Job
+from evoclaims.execution.worker import WorkOrder
 from evoclaims.judging.design import Design
 from evoclaims.judging.exact import MAX_TRIALS
 from evoclaims.judging.power import ENOUGH

@@ -6,12 +6,12 @@ import argparse
 import sys
 from collections.abc import Sequence
 
-from evoclaims.cli.processes.job import Job, choose
-from evoclaims.cli.processes.worker import WorkOrder
-from evoclaims.cli.processes.workers import Execution
 from evoclaims.cli.project import Project, open_project
+from evoclaims.cli.running import Execution, choose
 from evoclaims.cli.stored_trial import describe
 from evoclaims.core.errors import UserError
+from evoclaims.execution.job import Job
+from evoclaims.execution.worker import WorkOrder
 from evoclaims.judging.exact import MAX_TRIALS
 from evoclaims.judging.verdict import Outcome
 from evoclaims.paper import references

@@ -15,8 +15,8 @@ from pathlib import Path
 from typing import Any, Final
 
 from evoclaims.cli.jobs import active
-from evoclaims.cli.processes.job import Job, MissingBatch, choose, missing_batches
 from evoclaims.cli.project import Project, open_project
+from evoclaims.cli.running import choose
 from evoclaims.cluster.job import SIGNAL_SECONDS, BatchJob, JobRequest, clock, requested
 from evoclaims.cluster.submissions import (
     JOB_NAME,
@@ -30,6 +30,7 @@ from evoclaims.cluster.submissions import (
 )
 from evoclaims.core.canonical import content_hash
 from evoclaims.core.errors import UserError
+from evoclaims.execution.job import Job, MissingBatch, missing_batches
 from evoclaims.report.formatting import plural
 from evoclaims.report.live_line import duration
 from evoclaims.trials.devices import usable_cores
@@ -71,7 +72,7 @@ def _plan(
     seeds, limit = design.seeds(design.last.n), project.config.seconds(None)
     has_gpu = request.gpus or (request.cluster == "local" and gpus("auto"))  # jobs here see what this process sees
     platform = "gpu" if options.device == "gpu" or (options.device == "auto" and has_gpu) else "cpu"
-    lacking = missing_batches(project, options.tier, conditions, seeds, limit, platform)
+    lacking = missing_batches(project.store, project.reproduction, options.tier, conditions, seeds, limit, platform)
     busy = active(project)
     for one in lacking:
         if conditions[one.job].id in busy:

@@ -12,12 +12,12 @@ from typing import Final
 from msgspec import structs
 
 from evoclaims.claims.power import Pilots, with_test
-from evoclaims.cli.processes.job import Job
-from evoclaims.cli.processes.worker import WorkOrder
-from evoclaims.cli.processes.workers import Execution
 from evoclaims.cli.project import Project, open_project
+from evoclaims.cli.running import Execution
 from evoclaims.cli.terminal import REPORT, styled, write
 from evoclaims.core.errors import UnknownNameError, UserError
+from evoclaims.execution.job import Job
+from evoclaims.execution.worker import WorkOrder
 from evoclaims.judging.exact import MAX_TRIALS
 from evoclaims.paper import references
 from evoclaims.report.console import PlainSpokenConsole, plain_table

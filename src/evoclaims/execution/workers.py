@@ -9,7 +9,6 @@ import signal
 import subprocess
 import sys
 import threading
-import time
 from collections import Counter, deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -17,16 +16,11 @@ from typing import IO, Any, Final
 
 import msgspec
 
-from evoclaims.claims.fetching import RunMissing
-from evoclaims.cli.processes.host import AUTO, Host
-from evoclaims.cli.processes.job import Job, MissingBatch, missing_batches, sharing_programs
-from evoclaims.cli.processes.worker import Ended, Reply, Told, WorkOrder, run_jobs
-from evoclaims.cli.project import Project
-from evoclaims.cli.terminal import terminal
+from evoclaims.execution.host import AUTO, Host
+from evoclaims.execution.job import Job, MissingBatch, sharing_programs
+from evoclaims.execution.worker import Ended, Reply, Told, WorkOrder
 from evoclaims.paper.reproduction import Conditions
-from evoclaims.report.live_line import LiveLine, duration
 from evoclaims.trials import devices, gpus
-from evoclaims.trials.spec import Condition
 
 
 class Process:
@@ -38,11 +32,12 @@ class Process:
         blocked = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
         try:
             self._process = subprocess.Popen(
-                [sys.executable, "-m", "evoclaims.cli.processes.worker"],
+                [sys.executable, "-m", "evoclaims.execution.worker"],
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 stderr=subprocess.PIPE,
                 env={**os.environ, **environment},
+                cwd=order.root,
             )
         finally:
             signal.pthread_sigmask(signal.SIG_SETMASK, blocked)
@@ -132,14 +127,25 @@ def in_queue(batches: Sequence[MissingBatch], sound: Conditions, processes: int)
     return sorted([*kept, *split], key=total, reverse=True)
 
 
+def _print_error(text: str) -> None:
+    print(f"evoclaims: {text}", file=sys.stderr, flush=True)
+
+
 class Workers:
     """Runs conditions in a process for each seat, several at a time."""
 
-    def __init__(self, order: WorkOrder, seats: Sequence[Seat], tell: Callable[[str], None]) -> None:
-        """Start nothing yet; `tell` receives lines of progress."""
+    def __init__(
+        self,
+        order: WorkOrder,
+        seats: Sequence[Seat],
+        tell: Callable[[str], None],
+        warn: Callable[[str], None] = _print_error,
+    ) -> None:
+        """Start nothing yet; `tell` receives lines of progress, `warn` which processes have died."""
         self._order = order
         self._seats = seats
         self._tell = tell
+        self._warn = warn
         self._changed = threading.Condition()  # of all that follows
         self._left: deque[tuple[Job, ...]] = deque()
         self._running = 0
@@ -231,7 +237,7 @@ class Workers:
             return process
         self._dismiss(process)
         if not self._stopping:
-            print(f"evoclaims: a worker process did not start: {process.why()}.", file=sys.stderr, flush=True)
+            self._warn(f"a worker process did not start: {process.why()}.")
         return None
 
     def _run(self, process: Process, group: tuple[Job, ...]) -> tuple[Job, ...]:
@@ -247,7 +253,7 @@ class Workers:
             self._deaths[job] += 1
             died = f"its process died ({process.why()})"
             if self._deaths[job] < ATTEMPTS:
-                print(f"evoclaims: {job.label}: {died}; it is begun again.", file=sys.stderr, flush=True)
+                self._warn(f"{job.label}: {died}; it is begun again.")
                 return group[place:]
             self._ended.put(Ended(job, f"{died}, {ATTEMPTS} times"))
             return group[place + 1 :]
@@ -320,65 +326,3 @@ def _a_gpu_each(found: Sequence[str], batches: Sequence[MissingBatch]) -> list[S
         taken, free = free[:wide], free[wide:]
         seats.append(Seat(gpus.only(taken), batch.job, tuple(Seat(gpus.only([one])) for one in taken)))
     return [*seats, *(Seat(gpus.only([one])) for one in free)]
-
-
-@dataclass(frozen=True)
-class Execution:
-    """How a command runs trials: whose, in which order, and with which processes and GPUs."""
-
-    project: Project
-    order: WorkOrder
-    host: Host
-    line: LiveLine = field(default_factory=lambda: LiveLine(*terminal()))
-
-    @property
-    def limit(self) -> float:
-        """Seconds that a batch may take."""
-        return self.project.config.seconds(self.order.time_limit)
-
-    @property
-    def device(self) -> str:
-        """What this process itself may look at: GPUs that workers share are theirs alone."""
-        return "cpu" if self.host.gpus and not self.host.alone else self.order.device
-
-    @property
-    def platform(self) -> str:
-        """Where trials run: "cpu" or "gpu"."""
-        return "gpu" if self.host.gpus else devices.choose(self.device)[0].platform
-
-    def check(self) -> None:
-        """Check before the first trial that the store can be written and the device exists; raise a `UserError`."""
-        RunMissing(self.project.store, self.device, self.line, self.limit).check()
-
-    def run(self, wanted: Mapping[Job, Condition], tell: Callable[[str], None]) -> Iterator[Ended]:
-        """Run what the store lacks of some conditions, and yield each when it has ended; say which have failed.
-
-        With several processes those that lack nothing come first, then each as it ends, with a line on the time left.
-
-        Args:
-            wanted: the conditions.
-            tell: receives the progress of worker processes; a process that runs everything draws its line.
-        """
-        alone = run_jobs(self.project, self.order, wanted, self.line)
-        for ended in alone if self.host.alone else self._in_processes(wanted, tell):
-            if ended.error:
-                print(f"evoclaims: {ended.job.label} ({self.order.tier}) failed: {ended.error}.", file=sys.stderr)
-            yield ended
-
-    def _in_processes(self, wanted: Mapping[Job, Condition], tell: Callable[[str], None]) -> Iterator[Ended]:
-        seeds, tier = self.order.seeds, self.order.tier
-        batches = missing_batches(self.project, tier, wanted, seeds, self.limit, self.platform)
-        seconds = {batch.job: batch.cost.seconds() for batch in batches}
-        yield from (Ended(job) for job in wanted if job not in seconds)
-        seats = seats_of(self.host, batches)
-        sound = self.project.reproduction.tier(tier, self.order.variant).conditions
-        total, done, began = sum(seconds.values()), 0.0, time.monotonic()
-        ended_jobs = Workers(self.order, seats, tell).run(in_queue(batches, sound, len(seats)))
-        for number, ended in enumerate(ended_jobs, start=1):
-            done += seconds[ended.job]
-            left = (time.monotonic() - began) * (total - done) / max(done, 1e-9)
-            print(
-                f"  {number} of {len(batches)} conditions have ended, {duration(left)} left: {ended.job.label}",
-                flush=True,
-            )
-            yield ended

@@ -1,6 +1,6 @@
-"""The running of named conditions one after the other, in this process or in a worker process of `--numprocesses N`.
+"""The running of named conditions one after the other, in this process or in a worker process.
 
-A worker (`python -m evoclaims.cli.processes.worker`) reads a `WorkOrder` and then conditions from its standard input, a
+A worker (`python -m evoclaims.execution.worker`) reads a `WorkOrder` and then conditions from its standard input, a
 line of JSON each, and answers on its standard output when each has ended; it judges nothing. It ends with its input.
 """
 
@@ -14,20 +14,24 @@ import sys
 import threading
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any, Final
 
 import msgspec
 
 from evoclaims.claims.fetching import RunMissing
-from evoclaims.cli.processes.job import Job, jobs
-from evoclaims.cli.project import Project, open_project
 from evoclaims.core.errors import StorageError, UserError, in_one_line
 from evoclaims.core.printable import printable
+from evoclaims.execution.job import Job, jobs
 from evoclaims.mutants import mutant
 from evoclaims.mutants.mutant import plantings
+from evoclaims.paper.config import SuiteConfig, find_root, load_config, load_reproduction
+from evoclaims.paper.reproduction import Reproduction
 from evoclaims.report.live_line import LiveLine
+from evoclaims.trials import devices
 from evoclaims.trials.progress import RunProgress
 from evoclaims.trials.spec import Condition
+from evoclaims.trials.store import Store
 
 USER_ERROR: Final = 2
 
@@ -45,6 +49,8 @@ class WorkOrder:
         first_seed, trials: of each condition.
         variant: of the protocol; empty for itself.
         time_limit: of a batch, as --time-limit says; None for the project's own.
+        any_version: whether stored trials count whatever versions they were made with.
+        root: the project's folder; None for that around the current one.
     """
 
     storage: str
@@ -54,6 +60,8 @@ class WorkOrder:
     trials: int
     variant: str = ""
     time_limit: str | None = None
+    any_version: bool = False
+    root: str | None = None
 
     @property
     def seeds(self) -> range:
@@ -86,31 +94,52 @@ class Ended(msgspec.Struct, frozen=True, tag=True):
 Reply = Told | Ended
 
 
-def condition_of(project: Project, order: WorkOrder, job: Job) -> Condition:
+@dataclass(frozen=True)
+class Opened:
+    """A project as far as its conditions are run: its settings, its reproduction and where trials are kept."""
+
+    config: SuiteConfig
+    reproduction: Reproduction
+    store: Store
+
+    @classmethod
+    def here(cls, storage: str) -> Opened:
+        """Open the project around the current folder.
+
+        Raises:
+            UserError: when there is none, or something else than a store is in the folder `storage`.
+        """
+        devices.configure()
+        config, store = load_config(find_root(Path.cwd())), Store(Path(storage))
+        store.check()
+        return cls(config, load_reproduction(config), store)
+
+
+def condition_of(reproduction: Reproduction, order: WorkOrder, job: Job) -> Condition:
     """Return the condition that a job names.
 
     Raises:
         UserError: for unknown names.
     """
-    sound = {job.names: project.reproduction.tier(order.tier, order.variant).condition(*job.names)}
+    sound = {job.names: reproduction.tier(order.tier, order.variant).condition(*job.names)}
     if not job.fault:
         return sound[job.names]
-    return jobs(sound, plantings(sound, mutant.load(project.reproduction)))[job]
+    return jobs(sound, plantings(sound, mutant.load(reproduction)))[job]
 
 
-def run_jobs(project: Project, order: WorkOrder, asked: Iterable[Job], line: LiveLine) -> Iterator[Ended]:
+def run_jobs(opened: Opened, order: WorkOrder, asked: Iterable[Job], line: LiveLine) -> Iterator[Ended]:
     """Run the missing trials of conditions one after the other; an error in one does not stop the others."""
-    limit = project.config.seconds(order.time_limit)
+    limit = opened.config.seconds(order.time_limit)
     for job in asked:
-        fetch = RunMissing(project.store, order.device, _named(line, job), limit)
+        fetch = RunMissing(opened.store, order.device, _named(line, job), limit, order.any_version)
         try:
-            condition = condition_of(project, order, job)
+            condition = condition_of(opened.reproduction, order, job)
             with contextlib.closing(line):
                 fetch(condition, order.seeds)
         except (KeyboardInterrupt, BrokenPipeError):  # the user, or the reader of the output, has stopped
             raise
         except BaseException as error:  # an error in a method or a task must not stop the other conditions
-            yield Ended(job, printable(in_one_line(error, project.config.root)), isinstance(error, StorageError))
+            yield Ended(job, printable(in_one_line(error, opened.config.root)), isinstance(error, StorageError))
         else:
             yield Ended(job, again=len(fetch.again.get(condition.id, ())))
 
@@ -131,7 +160,7 @@ def main() -> int:
 
     order = msgspec.json.decode(sys.stdin.buffer.readline(), type=WorkOrder)
     try:
-        project = open_project(order.storage)
+        opened = Opened.here(order.storage)
     except UserError as error:
         print(error, file=sys.stderr)
         return USER_ERROR
@@ -139,7 +168,7 @@ def main() -> int:
     threading.Thread(target=_read, args=(asked,), daemon=True).start()
     reply(Told())
     line = LiveLine(lambda text: reply(Told(text.strip())), None, log_seconds=TOLD_SECONDS)
-    for ended in run_jobs(project, order, iter(asked.get, None), line):
+    for ended in run_jobs(opened, order, iter(asked.get, None), line):
         reply(ended)
     return 0
 

@@ -1,1 +1,0 @@
-"""Missing trials, run by this process or by several on this host."""

@@ -1,0 +1,1 @@
+"""Missing trials of conditions, run by this process or by several: for commands and for claims."""
