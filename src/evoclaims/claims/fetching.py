@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 from evoclaims.core.errors import UserError
@@ -38,6 +38,7 @@ class RunMissing:
         time_limit: seconds that a batch of trials may take.
         any_version: accept a stored trial made with any versions; else one made with versions other than this
             environment's is run again.
+        wait: waits until other processes have run the trials that they run ahead.
         again: seeds run again because of their versions, by the condition's id; filled in as trials are fetched.
     """
 
@@ -46,6 +47,7 @@ class RunMissing:
     watch: Watcher
     time_limit: float = math.inf
     any_version: bool = False
+    wait: Callable[[Condition, Sequence[int]], None] = lambda condition, seeds: None
     again: dict[str, set[int]] = field(default_factory=dict, compare=False)
 
     def check(self) -> None:
@@ -65,10 +67,10 @@ class RunMissing:
 
     def __call__(self, condition: Condition, seeds: Sequence[int]) -> Sequence[TrialResult]:
         """Return one trial per seed."""
-        chosen, again = devices.choose(self.device), set[int]()
-        if not self.any_version:
-            again = {seed for seed in seeds if self._is_outdated(TrialSpec(condition, seed))}
-        results = run(
+        chosen = devices.choose(self.device)
+        self.note_outdated(condition, seeds)
+        self.wait(condition, seeds)
+        return run(
             condition,
             seeds,
             self.store,
@@ -77,9 +79,12 @@ class RunMissing:
             time_limit=self.time_limit,
             any_version=self.any_version,
         )
+
+    def note_outdated(self, condition: Condition, seeds: Sequence[int]) -> None:
+        """Note which trials are about to be run again because of their versions."""
+        again = {seed for seed in seeds if not self.any_version and self._is_outdated(TrialSpec(condition, seed))}
         if again:
             self.again.setdefault(condition.id, set()).update(again)
-        return results
 
     def _is_outdated(self, spec: TrialSpec) -> bool:
         """Whether every record of a trial was made with versions other than this environment's."""

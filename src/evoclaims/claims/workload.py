@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Hashable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Generic, TypeVar
 
 import pytest
 
@@ -16,6 +15,7 @@ from evoclaims.claims.collected import Collected, Recorder
 from evoclaims.claims.fetching import RunMissing
 from evoclaims.claims.session import Session
 from evoclaims.paper.cost import Cost, Estimator, Wanted
+from evoclaims.paper.reproduction import Names
 from evoclaims.paper.trial_group import TrialGroup
 from evoclaims.trials import devices
 from evoclaims.trials.devices import usable_cores
@@ -29,18 +29,25 @@ class Work:
     """A condition that claims of a run need.
 
     Attributes:
-        label: its name in claims, such as "cma_es on n_parity".
+        names: under which claims ask for it.
+        tier: of these claims.
         programs: what it has in common with conditions that probably share its compiled programs.
         stored: how many of its trials need not be run.
-        missing: files of the records of those that must be run, below the store's folder.
+        missing: those that must be run: by seed, the file of the record, below the store's folder.
         cost: of the missing trials, or of all if none is missing.
     """
 
-    label: str
+    names: Names
+    tier: str
     programs: str
     stored: int
-    missing: tuple[str, ...]
+    missing: Mapping[int, str]
     cost: Cost
+
+    @property
+    def label(self) -> str:
+        """A name such as "cma_es on n_parity"."""
+        return " on ".join(self.names)
 
     @property
     def seconds(self) -> float:
@@ -63,8 +70,11 @@ class Workload:
     conditions: Mapping[str, Work]
 
 
-def workload(session: Session, tests: Mapping[pytest.Item, ClaimTest]) -> Workload | None:
-    """Return what a run of these claim tests has to do; None for a session that runs nothing."""
+def workload(session: Session, tests: Mapping[pytest.Item, ClaimTest], platform: str | None = None) -> Workload | None:
+    """Return what a run of these claim tests has to do; None for a session that runs nothing.
+
+    Trials run on this `platform`; None for that of this process.
+    """
     if not isinstance(session.fetch, RunMissing):
         return None
     claims, groups = dict[str, tuple[str, ...]](), dict[str, dict[str, tuple[TrialGroup, Sequence[int]]]]()
@@ -83,7 +93,7 @@ def workload(session: Session, tests: Mapping[pytest.Item, ClaimTest]) -> Worklo
                 if condition not in known or len(known[condition][1]) < len(seeds):
                     known[condition] = group, seeds
             claims[item.nodeid] = tuple(needed)
-    platform = devices.choose(session.fetch.device)[0].platform
+    platform = platform or devices.choose(session.fetch.device)[0].platform
     works: dict[str, Work] = {}
     for tier, known in groups.items():
         works |= _works(session, session.fetch, tier, known, platform)
@@ -116,79 +126,22 @@ def _works(
     works = {}
     for name, owed in estimator.owed(wanted).items():
         (group, seeds), condition = groups[name], wanted[name].condition
-        files = (store.record_path(TrialSpec(condition, seed).id, condition.versions) for seed in owed.seeds)
-        missing = tuple(str(path.relative_to(store.root)) for path in files)
-        works[name] = Work(group.label, condition.programs, len(seeds) - len(missing), missing, owed.cost)
+        files = {seed: store.record_path(TrialSpec(condition, seed).id, condition.versions) for seed in owed.seeds}
+        missing = {seed: str(path.relative_to(store.root)) for seed, path in files.items()}
+        stored, names = len(seeds) - len(missing), (group.method, group.task)
+        works[name] = Work(names, tier, condition.programs, stored, missing, owed.cost)
     return works
 
 
-W = TypeVar("W", bound=Hashable)
-
-
-class Order(Generic[W]):
-    """Chooses the next claim for a worker.
-
-    The first claim is the one with trials that is judged soonest, so that a verdict is there early. Then come those
-    whose trials are there; then those with the longest condition, and nothing besides it if possible, so that the
-    workers end together; or, for one worker alone, those that take the least. A worker that has begun with a condition
-    keeps the claims on it, and on conditions that share its compiled programs, while others have anything else to do.
-    """
-
-    def __init__(self, load: Workload, workers: int) -> None:
-        """Give out nothing yet."""
-        self._needs = load.claims
-        self._alone = workers < 2
-        self._seconds = {name: work.seconds for name, work in load.conditions.items()}
-        self._programs = {name: work.programs for name, work in load.conditions.items()}
-        self._begun: dict[str, W] = {}
-        self._ended: set[str] = set()
-        self._first = True
-
-    def knows(self, claim: str) -> bool:
-        """Whether `claim` is the name of a claim test of this run."""
-        return claim in self._needs
-
-    def next(self, worker: W, claims: Sequence[str]) -> str:
-        """Return which of the claims that nobody has yet (at least one) a worker is to judge next."""
-        soonest = [claim for claim in claims if self._needs[claim]] if self._first else []
-        if soonest:
-            self._first = False
-            claim = min(soonest, key=lambda one: self._new_seconds(self._needs[one]))
-        else:
-            claim = min(claims, key=lambda one: self._rank(worker, one))
-        for condition in self._needs[claim]:
-            self._begun.setdefault(condition, worker)
-        return claim
-
-    def ended(self, claim: str) -> None:
-        """Note that a claim has been judged, so that the trials that it needs are there."""
-        self._ended.update(self._needs[claim])
-
-    def lost(self, worker: W) -> None:
-        """Note that a worker has died: another one may run what it had begun."""
-        self._begun = {name: one for name, one in self._begun.items() if one != worker or name in self._ended}
-
-    def _rank(self, worker: W, claim: str) -> tuple[int, float, float]:
-        """Return the place of a claim among those that a worker could judge next; the lowest comes first."""
-        needs = self._needs[claim]
-        new = self._new_seconds(needs)
-        if any(self._begun.get(name, worker) != worker and name not in self._ended for name in needs):
-            conflict = 2  # the worker would wait for another one's trials
-        elif new and any(self._owner(name) not in (None, worker) for name in needs if name not in self._begun):
-            conflict = 1  # another one has the programs
-        else:
-            conflict = 0
-        longest = max((self._seconds[name] for name in needs if name not in self._begun), default=0.0)
-        return conflict, 0.0 if self._alone or not new else 1 / longest, new
-
-    def _new_seconds(self, needs: Sequence[str]) -> float:
-        """Return the seconds of what nobody has begun with."""
-        return sum(self._seconds[name] for name in needs if name not in self._begun)
-
-    def _owner(self, condition: str) -> W | None:
-        """Return the worker that was the first to begin with a condition of the same programs."""
-        programs = self._programs[condition]
-        return next((one for name, one in self._begun.items() if self._programs[name] == programs), None)
+def soonest_first(load: Workload) -> list[str]:
+    """Return the claims in the order for one process: each time the one whose trials take the least that is left."""
+    left, begun, ordered = list(load.claims), set[str](), list[str]()
+    while left:
+        claim = min(left, key=lambda one: sum(load.conditions[name].seconds for name in {*load.claims[one]} - begun))
+        left.remove(claim)
+        begun.update(load.claims[claim])
+        ordered.append(claim)
+    return ordered
 
 
 @dataclass(frozen=True)
@@ -219,7 +172,7 @@ class Watching:
         self._workers = workers
         self._store = Store(Path(load.storage))
         self._waiting = set(load.claims)
-        self._missing = {name: list(work.missing) for name, work in load.conditions.items()}
+        self._missing = {name: list(work.missing.values()) for name, work in load.conditions.items()}
         share = max(usable_cores() // workers, 1)
         self._seconds = {name: work.cost.seconds(share) for name, work in load.conditions.items()}
         self._took: dict[str, float] = {}
@@ -256,7 +209,7 @@ class Watching:
     def _learn(self, name: str) -> None:
         """Note how long a condition took, whose last trial has been stored."""
         with suppress(DamagedFileError):
-            record = self._store.read(self._store.root / self._load.conditions[name].missing[-1])
+            record = self._store.read(self._store.root / [*self._load.conditions[name].missing.values()][-1])
             if record is not None:
                 self._took[name] = float(record.timing["compile"]) + float(record.timing["run"])
 

@@ -1,6 +1,6 @@
-"""What a command may use of this host: how many processes, and which GPUs.
+"""What may be used of this host: how many processes, and which GPUs.
 
-It is found out before the command's module and the project are imported: libraries make arrays as they are imported,
+It is found out before the project is imported: libraries make arrays as they are imported,
 and with the first array jax takes most of a GPU's memory.
 """
 
@@ -18,7 +18,7 @@ AUTO: Final = 0
 
 @dataclass(frozen=True)
 class Host:
-    """What a command may use of this host.
+    """What a command or a run of claims may use of this host.
 
     Attributes:
         processes: how many are asked for; 0 for as many as are useful.
@@ -34,15 +34,15 @@ class Host:
         return self.processes == 1 or (self.processes == AUTO and len(self.gpus) == 1)
 
 
-def host_of(numprocesses: str, device: str) -> Host:
-    """Return what a command may use; if processes are to share GPUs, jax in this process keeps off these.
+def host_of(numprocesses: str, device: str, option: str = "--numprocesses") -> Host:
+    """Return what may be used; if processes are to share GPUs, jax in this process keeps off these.
 
     Raises:
         UserError: for an invalid number of processes.
     """
     if numprocesses != "auto" and (not numprocesses.isdecimal() or int(numprocesses) < 1):
         raise UserError(
-            f"--numprocesses takes a number from 1 up, or auto (one for each GPU; without GPUs as many as the cores "
+            f"{option} takes a number from 1 up, or auto (one for each GPU; without GPUs as many as the cores "
             f"are enough for), not {numprocesses!r}."
         )
     host = Host(AUTO if numprocesses == "auto" else int(numprocesses), gpus.gpus(device))

@@ -20,11 +20,13 @@ class Job:
     Attributes:
         fault: name of what is planted, such as "cma_es: minimizes"; empty for the sound condition.
         method, task: its names.
+        seeds: if not those of the order.
     """
 
     fault: str
     method: str
     task: str
+    seeds: tuple[int, ...] = ()
 
     @property
     def names(self) -> Names:

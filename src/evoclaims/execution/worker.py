@@ -135,7 +135,7 @@ def run_jobs(opened: Opened, order: WorkOrder, asked: Iterable[Job], line: LiveL
         try:
             condition = condition_of(opened.reproduction, order, job)
             with contextlib.closing(line):
-                fetch(condition, order.seeds)
+                fetch(condition, job.seeds or order.seeds)
         except (KeyboardInterrupt, BrokenPipeError):  # the user, or the reader of the output, has stopped
             raise
         except BaseException as error:  # an error in a method or a task must not stop the other conditions

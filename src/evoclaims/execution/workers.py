@@ -127,6 +127,10 @@ def in_queue(batches: Sequence[MissingBatch], sound: Conditions, processes: int)
     return sorted([*kept, *split], key=total, reverse=True)
 
 
+class StoppedError(Exception):
+    """Work was stopped before its end."""
+
+
 def _print_error(text: str) -> None:
     print(f"evoclaims: {text}", file=sys.stderr, flush=True)
 
@@ -157,7 +161,11 @@ class Workers:
         self._ended: queue.SimpleQueue[Ended | BaseException] = queue.SimpleQueue()
 
     def run(self, groups: Sequence[Sequence[Job]]) -> Iterator[Ended]:
-        """Run groups of conditions in their order; yield each condition once, when it has ended."""
+        """Run groups of conditions in their order; yield each condition once, when it has ended.
+
+        Raises:
+            StoppedError: when `stop` is called meanwhile.
+        """
         expected = {job for group in groups for job in group}
         first = {seat.first for seat in self._seats}
         self._left.extend(filter(None, (tuple(job for job in group if job not in first) for group in groups)))
@@ -171,6 +179,10 @@ class Workers:
                 yield ended
         finally:
             self._stop()
+
+    def stop(self) -> None:
+        """Let a run on another thread end with `StoppedError`."""
+        self._ended.put(StoppedError())
 
     def _sit(self, seats: Sequence[Seat]) -> None:
         with self._changed:

@@ -11,6 +11,7 @@ import os
 import signal
 import unittest
 from collections.abc import Callable, Generator, Sequence
+from contextlib import suppress
 from fnmatch import fnmatch
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -20,10 +21,9 @@ import pytest
 from evoclaims.core.errors import UserError
 from evoclaims.core.tiers import TIERS
 from evoclaims.plugin import options
-from evoclaims.plugin.dead_workers import DeadWorkers
-from evoclaims.plugin.distribution import Distribution, prepare
-from evoclaims.plugin.options import import_from_root, make_session
+from evoclaims.plugin.options import AHEAD, import_from_root, make_session
 from evoclaims.plugin.options import pytest_addoption as pytest_addoption
+from evoclaims.plugin.order import prepare
 from evoclaims.plugin.outcomes import VERDICTS
 from evoclaims.plugin.outcomes import pytest_report_teststatus as pytest_report_teststatus
 from evoclaims.plugin.outcomes import pytest_runtest_call as pytest_runtest_call
@@ -31,7 +31,7 @@ from evoclaims.plugin.outcomes import pytest_runtest_makereport as pytest_runtes
 from evoclaims.plugin.outcomes import pytest_runtest_setup as pytest_runtest_setup
 from evoclaims.plugin.progress import QUIET, ProgressLine, progress_of
 from evoclaims.plugin.summary import COLLECTED, KNOWN, TROUBLE, Summary
-from evoclaims.trials.gpus import environment_of_worker, gpus
+from evoclaims.trials.gpus import gpus
 from evoclaims.trials.stopping import end_without, interrupted_by
 
 if TYPE_CHECKING:
@@ -134,17 +134,13 @@ def _is_left_out(collector: pytest.Module | pytest.Class, name: str, one: type) 
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_load_initial_conftests(early_config: pytest.Config) -> None:
-    """Let a worker of a project with claims see its GPU alone, before anything can import jax; options are parsed."""
-    environment = environment_of_worker(early_config.known_args_namespace.claims_device, os.environ)
-    if environment and _has_claims(early_config):
-        os.environ.update(environment)
+    """Keep this process off GPUs that are for others, before anything can make an array; options are parsed."""
+    known = early_config.known_args_namespace
+    if known.claims_processes != "1" and gpus(known.claims_device) and _has_claims(early_config):
+        from evoclaims.execution.host import host_of
 
-
-@pytest.hookimpl(optionalhook=True)
-def pytest_xdist_auto_num_workers(config: pytest.Config) -> int | None:
-    """Return how many workers `-n auto` means in a project with claims: one for each GPU; None without GPUs."""
-    found = gpus(config.getoption("claims_device"))
-    return len(found) if found and _has_claims(config) else None
+        with suppress(UserError):  # `options.check` reports it
+            host_of(known.claims_processes, known.claims_device)
 
 
 def _has_claims(config: pytest.Config) -> bool:
@@ -174,10 +170,7 @@ def pytest_configure(config: pytest.Config) -> None:
     ):
         config.addinivalue_line("markers", line)
     if not hasattr(config, "workerinput"):  # an xdist worker leaves the summary to its controller
-        summary = Summary(config)
-        config.pluginmanager.register(summary, "claims-summary")
-        config.pluginmanager.register(DeadWorkers(config, summary.report_trouble), "claims-dead-workers")
-        config.pluginmanager.register(Distribution(config), "claims-distribution")
+        config.pluginmanager.register(Summary(config), "claims-summary")
         if config.pluginmanager.has_plugin("terminal") and config.get_verbosity() > QUIET:
             config.pluginmanager.register(ProgressLine(config), "claims-progress")
     options.check(config)
@@ -266,7 +259,7 @@ def pytest_collection_finish(session: pytest.Session) -> None:
     from evoclaims.claims.claim_names import claim_tests
 
     try:
-        prepare(session, make_session(config), claim_tests(session.items))
+        prepare(session, claim_tests(session.items))
     except UserError as error:
         _refuse(config, session.items, error)
 
@@ -280,9 +273,11 @@ def pytest_runtestloop(session: pytest.Session) -> Generator[None, object, objec
         return (yield)
 
 
-@pytest.hookimpl(trylast=True)
+@pytest.hookimpl(tryfirst=True)
 def pytest_sessionfinish(session: pytest.Session) -> None:
-    """Keep the session, which knows the exit status, for `pytest_unconfigure`."""
+    """End the processes that run trials; keep the session, which knows the exit status, for `pytest_unconfigure`."""
+    if AHEAD in session.config.stash:
+        session.config.stash[AHEAD].stop()
     session.config.stash[_ended] = session
 
 

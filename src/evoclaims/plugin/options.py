@@ -22,7 +22,12 @@ from evoclaims.plugin.progress import progress_of
 if TYPE_CHECKING:
     from evoclaims.claims.claim import ClaimTest
     from evoclaims.claims.session import Session
+    from evoclaims.execution.ahead import Ahead
+    from evoclaims.paper.reproduction import Reproduction
+    from evoclaims.trials.store import Store
 
+AHEAD: Final[pytest.StashKey[Ahead]] = pytest.StashKey()
+"""Where a run keeps what runs its trials in processes of their own."""
 
 _PATHS: Final = ("--claims-storage", "--claims-json")
 """Options whose values are paths."""
@@ -34,6 +39,13 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     group.addoption("--claims-storage", metavar="DIR", help="folder of trials (.evoclaims in the project's root)")
     group.addoption("--claims-trials", metavar="N", type=int, help="judge by one look at N trials a condition")
     group.addoption("--claims-only", metavar="IDS", help="judge only these claims, such as G1,G7 or G6[neat-ppo]")
+    group.addoption(
+        "--claims-processes",
+        metavar="N",
+        default="1",
+        help="processes that run trials while claims wait for theirs (1: this one, on all devices); auto: one per GPU, "
+        "or without GPUs as many as keep the cores busy",
+    )
     group.addoption("--claims-device", metavar="DEVICE", default="auto", help="auto (default), cpu or gpu")
     group.addoption(
         "--claims-time-limit",
@@ -164,8 +176,14 @@ def make_session(config: pytest.Config) -> Session:
     store = Store(_storage(config))
     project = load_config(config.rootpath)
     limit, any_version = project.seconds(config.getoption("claims_time_limit")), config.getoption("claims_any_version")
-    run = RunMissing(store, config.getoption("claims_device"), progress_of(config) or ignore, limit, any_version)
     reproduction = load_reproduction(project)
+    device, watch = config.getoption("claims_device"), progress_of(config) or ignore
+    ahead = _ahead(config, reproduction, store, limit)
+    if ahead is None:
+        run = RunMissing(store, device, watch, limit, any_version)
+    else:
+        config.stash[AHEAD] = ahead
+        run = RunMissing(store, "cpu" if ahead.host.gpus else device, watch, limit, any_version, ahead.wait)
     folder = reproduction.references if config.getoption("claims_committed") else None
     read = StoredOnly(Archive(store, folder, reproduction.imported))
     fetch = read if config.getoption("claims_stored") else run
@@ -178,6 +196,33 @@ def make_session(config: pytest.Config) -> Session:
     fetch.check()
     config.stash[SESSION] = made
     return made
+
+
+def _ahead(config: pytest.Config, reproduction: Reproduction, store: Store, limit: float) -> Ahead | None:
+    """Return what runs trials in processes of their own; None where this process runs them, or nothing is run."""
+    from evoclaims.execution.ahead import Ahead
+    from evoclaims.execution.host import host_of
+    from evoclaims.execution.worker import WorkOrder
+
+    asked, device = config.getoption("claims_processes"), config.getoption("claims_device")
+    host = host_of(asked, device, "--claims-processes")
+    if host.alone or config.getoption("claims_stored"):
+        return None
+    if hasattr(config, "workerinput"):
+        raise UserError("Workers of pytest-xdist run trials themselves: leave out -n, or --claims-processes.")
+    line = progress_of(config)
+    order = WorkOrder(
+        storage=str(store.root.resolve()),
+        tier="",
+        device=device,
+        first_seed=0,
+        trials=0,
+        variant=config.getoption("claims_variant"),
+        time_limit=config.getoption("claims_time_limit"),
+        any_version=config.getoption("claims_any_version"),
+        root=str(config.rootpath),
+    )
+    return Ahead(host, order, reproduction, store, limit, line.remark if line else lambda text: None)
 
 
 def import_from_root(config: pytest.Config) -> None:

@@ -1,4 +1,4 @@
-"""The progress line of a run, in the process that writes the output: xdist's controller, or the only process.
+"""The progress line of a run of claims, but for one by xdist's workers.
 
 Nothing heavy is imported here at the top: pytest loads this file in every run of an environment that has evoclaims.
 """
@@ -18,14 +18,14 @@ if TYPE_CHECKING:
     from evoclaims.trials.progress import RunProgress
 
 TICK_SECONDS: Final = 0.5
-"""Time between two looks at what xdist's workers do."""
+"""Time between two looks at what other processes run."""
 
 QUIET: Final = -2
 """From this verbosity on (-qq), no progress is shown."""
 
 
 def progress_of(config: pytest.Config) -> ProgressLine | None:
-    """Return the progress line of a run; None if the run shows none, or this process does not write its output."""
+    """Return the progress line of a run; None if it shows none, as under xdist."""
     return config.pluginmanager.get_plugin("claims-progress")
 
 
@@ -67,6 +67,12 @@ class ProgressLine:
         with self._lock:
             self._made().show(text, progress.remark)
 
+    def remark(self, text: str) -> None:
+        """Say something on a line of its own."""
+        with self._lock:
+            self.close()
+            self._write(f"\nevoclaims: {text}\n")
+
     def close(self) -> None:
         """Leave the line, so that other output starts on a fresh one."""
         with self._lock:
@@ -89,7 +95,7 @@ class ProgressLine:
             self._config.get_terminal_writer().write(text, flush=True)
 
     def _tick(self) -> None:
-        """Show what the workers do, until the run ends."""
+        """Show what other processes do, until the run ends."""
         from evoclaims.report.live_line import describe_all
 
         def text() -> str:

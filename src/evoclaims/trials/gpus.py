@@ -9,7 +9,7 @@ from __future__ import annotations
 import importlib.metadata
 import os
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
@@ -56,16 +56,3 @@ def shared(found: Sequence[str], processes: int) -> list[dict[str, str]]:
 def only(found: Sequence[str]) -> dict[str, str]:
     """Return the environment of a process that sees these GPUs alone."""
     return {VISIBLE: ",".join(found)}
-
-
-def environment_of_worker(device: str, environment: Mapping[str, str]) -> dict[str, str]:
-    """Return what a worker of pytest-xdist sets before jax starts there, so that each worker has its own GPU.
-
-    pytest-xdist has put the worker's number into its environment, and how many there are.
-    """
-    worker = re.fullmatch(r"gw(\d+)", environment.get("PYTEST_XDIST_WORKER", ""))
-    count = int(environment.get("PYTEST_XDIST_WORKER_COUNT", "1"))
-    found = gpus(device)
-    if worker is None or not found:
-        return {}
-    return shared(found, max(count, 1))[int(worker[1]) % max(count, 1)]
