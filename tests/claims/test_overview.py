@@ -55,12 +55,17 @@ def took(seconds: float, basis: Basis = "here") -> Cost:
     return Cost(0.0, seconds, 10, Layout.VECTOR, basis)
 
 
+def work(name: str, stored: int, *missing: str, cost: Cost) -> Work:
+    """Return a method on a task of the same name."""
+    return Work((name, name), "smoke", "", stored, dict(enumerate(missing)), cost)
+
+
 def watching(store: Store, workers: int = 2) -> Watching:
     """Watch three claims: on x, of which two trials are stored, on x and y, and on z."""
     works = {
-        X: Work("x", "", 2, ("x1", "x2"), took(40.0)),
-        Y: Work("y", "", 0, ("y1", "y2", "y3"), took(80.0)),
-        Z: Work("z", "", 0, ("z1",), took(10.0)),
+        X: work("x", 2, "x1", "x2", cost=took(40.0)),
+        Y: work("y", 0, "y1", "y2", "y3", cost=took(80.0)),
+        Z: work("z", 0, "z1", cost=took(10.0)),
     }
     return Watching(Workload(str(store.root), {"one": (X,), "two": (X, Y), "three": (Z,)}, works), workers)
 
@@ -91,8 +96,8 @@ def test_a_condition_that_ends_tells_how_fast_the_others_will_be_here(store: Sto
     assert store.put(record, {}) == "stored"
     (path,) = store.record_paths()
     works = {
-        X: Work("x", "", 0, (str(path.relative_to(store.root)),), took(10.0, "elsewhere")),
-        Y: Work("y", "", 0, ("y1",), took(20.0, "elsewhere")),
+        X: work("x", 0, str(path.relative_to(store.root)), cost=took(10.0, "elsewhere")),
+        Y: work("y", 0, "y1", cost=took(20.0, "elsewhere")),
     }
     path.rename(store.root / "aside")
     watched = Watching(Workload(str(store.root), {"one": (X,), "two": (Y,)}, works), 1)
@@ -105,5 +110,5 @@ def test_what_any_process_runs_is_shown_under_the_name_that_claims_have_for_it(s
     with announced(store.root, X), shared(store.root, X, lambda progress: None) as tell:
         tell(RunProgress("hand_built on n_parity", "training", 4, seconds_left=123.0))
         seen = watching(store).look()
-        assert [one.progress.condition for one in seen.running] == ["x"]
+        assert [one.progress.condition for one in seen.running] == ["x on x"]
         assert seen.seconds_left == pytest.approx(123)

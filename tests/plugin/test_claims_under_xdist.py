@@ -121,48 +121,24 @@ importlib.metadata.entry_points = lambda **names: (
 os.environ.setdefault("CUDA_VISIBLE_DEVICES", "GPU-a,GPU-b")
 """
 
-SEEN = """
-import os
-from pathlib import Path
 
-Path("seen-" + os.environ.get("PYTEST_XDIST_WORKER", "controller")).write_text(os.environ["CUDA_VISIBLE_DEVICES"])
-"""
-
-
-def test_each_worker_has_its_own_gpu_before_a_conftest_is_loaded(project: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    """`-n auto` starts one for each GPU; jax's plugin for CUDA is planted."""
-    project.write("def test_nothing():\n    pass\n\n\ndef test_nothing_else():\n    pass\n")
+def test_workers_that_would_share_gpus_run_nothing(
+    project: Any, sentence: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """jax's plugin for CUDA is planted."""
+    project.write(a="supported", b="refuted")
     (project.path / "fake_host.py").write_text(FAKE_HOST)
-    (project.path / "conftest.py").write_text(SEEN)
     for name in ("JAX_PLATFORMS", "CUDA_VISIBLE_DEVICES", "PYTEST_XDIST_WORKER"):  # the run around may set it
         monkeypatch.delenv(name, raising=False)
     monkeypatch.setenv("PYTHONPATH", str(project.path), prepend=":")
-    result = project.run_apart("-p", "fake_host", "-n", "auto")
-    result.assert_outcomes(passed=2)
-    assert {path.name: path.read_text() for path in project.path.glob("seen-*")} == {
-        "seen-controller": "GPU-a,GPU-b",
-        "seen-gw0": "GPU-a",
-        "seen-gw1": "GPU-b",
-    }
-
-
-def test_a_worker_that_dies_while_starting_is_one_sentence(project: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    project.write(a="supported")
-    monkeypatch.delenv("PYTEST_XDIST_WORKER", raising=False)  # or the main process of a test in a worker would die
-    (project.path / "conftest.py").write_text("import os\n\nif 'PYTEST_XDIST_WORKER' in os.environ:\n    os._exit(3)\n")
-    result = project.run("-n1", "--max-worker-restart=0", own_store=True)
+    result = project.run_apart("-p", "fake_host", "-n2")
     assert result.ret == pytest.ExitCode.USAGE_ERROR
-    shown = " ".join(result.stdout.str().split())
-    assert "ERROR: The worker gw0 of pytest-xdist died while starting, so that no test has run (Not properly" in shown
-    assert "Traceback" not in shown
+    sentence(result, "Each worker of pytest-xdist would take the memory of this host's GPUs. Leave out -n")
+    assert not (project.path / ".evoclaims").exists()
 
 
-def test_a_worker_whose_process_does_not_start_is_one_sentence(project: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_workers_start_no_processes_of_their_own(project: Any, sentence: Any) -> None:
     project.write(a="supported")
-    (project.path / "sitecustomize.py").write_text("import os, sys\nif '-c' in sys.orig_argv:\n    os._exit(1)\n")
-    monkeypatch.setenv("PYTHONPATH", str(project.path), prepend=":")
-    result = project.run_apart("-n1")
+    result = project.run("-n1", "--claims-processes=2", own_store=True)
     assert result.ret == pytest.ExitCode.USAGE_ERROR
-    shown = result.stdout.str() + result.stderr.str()
-    assert "A worker of pytest-xdist died while starting, so that no test has run (EOFError: " in shown
-    assert "Traceback" not in shown
+    sentence(result, "Workers of pytest-xdist run trials themselves: leave out -n, or --claims-processes.")

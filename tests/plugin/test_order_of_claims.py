@@ -49,10 +49,10 @@ def order(result: pytest.RunResult) -> list[str]:
 
 
 def test_claims_whose_trials_are_there_come_first_and_other_tests_keep_their_places(project: Any, stored: Any) -> None:
-    """`coin` needs trials, so it is last; nothing is known of `own`, which has a fixture of its own."""
+    """`coin` needs trials, so it is last; what `own` needs is not known, since it has a fixture of its own."""
     project.write(CLAIMS.replace(".greater(", ".__gt__("))
     result = project.run("-v", own_store=True)
-    assert order(result) == ["wrong", "plain", "own", "right", "last", "coin"]
+    assert order(result) == ["wrong", "plain", "right", "own", "last", "coin"]
     result = project.run("-v", "-k", "not own", own_store=True)
     assert order(result) == ["coin", "plain", "wrong", "last", "right"]  # as written: all are stored by now
 
@@ -81,19 +81,16 @@ def test_a_log_without_a_terminal_has_one_line_about_the_progress_and_none_when_
     assert " claims, " not in project.run("-qq", own_store=True).stdout.str()
 
 
-def test_xdists_workers_get_claims_in_an_order_of_their_own_and_the_controller_tells_how_far_they_are(
-    project: Any, stored: Any
-) -> None:
-    """One worker, so that the order in which tests begin is known."""
+def test_processes_run_trials_ahead_and_the_line_tells_how_far_they_are(project: Any, stored: Any) -> None:
     project.write(CLAIMS.replace(".greater(", ".__gt__("))
     (project.path / "conftest.py").write_text(
         "import evoclaims.plugin.progress as progress\nprogress.TICK_SECONDS = 0.01\n"
     )
-    result = project.run_apart("-n1", "--claims-json=out.json", "-v")
+    result = project.run_apart("--claims-processes=2", "--claims-json=out.json", "-v")
     assert result.ret == 0
     plain = json.loads(Path("out.json").read_text())
     assert [claim["claim"] for claim in plain["claims"]] == ["coin", "own", "right", "wrong"]
-    assert order(result) == ["wrong", "plain", "own", "right", "last", "coin"]
+    assert order(result) == ["wrong", "plain", "right", "own", "last", "coin"]
     (line,) = [line for line in result.outlines if " claims, " in line]
     assert re.match(r"  [0-3]/4 claims, 20/30 trials; coin on parity: ", line)
 

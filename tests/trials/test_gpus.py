@@ -68,16 +68,3 @@ def test_processes_have_gpus_of_their_own_or_share_one_and_its_memory(count: int
 def test_a_share_of_memory_that_a_user_has_set_stays(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv(gpus.MEMORY, "0.2")
     assert gpus.shared(["0"], 2) == [{gpus.VISIBLE: "0"}] * 2
-
-
-@pytest.mark.usefixtures("host")
-def test_each_worker_of_xdist_sets_its_own_gpu() -> None:
-    def worker(name: str, count: int) -> dict[str, str]:
-        there = {"PYTEST_XDIST_WORKER": name, "PYTEST_XDIST_WORKER_COUNT": str(count)}
-        return gpus.environment_of_worker("auto", there)
-
-    assert [worker(f"gw{number}", 3)[gpus.VISIBLE] for number in range(3)] == ["0", "1", "2"]
-    assert worker("gw3", 3)[gpus.VISIBLE] == "0"  # in place of a worker that died
-    assert [worker(f"gw{number}", 4).get(gpus.MEMORY) for number in range(4)] == ["0.450", None, None, "0.450"]
-    assert gpus.environment_of_worker("auto", {}) == {}  # no worker: all GPUs, as ever
-    assert gpus.environment_of_worker("cpu", {"PYTEST_XDIST_WORKER": "gw0"}) == {}

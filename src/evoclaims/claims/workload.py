@@ -134,10 +134,18 @@ def _works(
 
 
 def soonest_first(load: Workload) -> list[str]:
-    """Return the claims in the order for one process: each time the one whose trials take the least that is left."""
+    """Return the claims in the order for one process: each time the one whose missing trials take the least.
+
+    Of two that take the same, one whose trials are not known comes later.
+    """
     left, begun, ordered = list(load.claims), set[str](), list[str]()
+
+    def rank(claim: str) -> tuple[float, bool]:
+        needs = load.claims[claim]
+        return sum(load.conditions[name].seconds for name in needs if name not in begun), not needs
+
     while left:
-        claim = min(left, key=lambda one: sum(load.conditions[name].seconds for name in {*load.claims[one]} - begun))
+        claim = min(left, key=rank)
         left.remove(claim)
         begun.update(load.claims[claim])
         ordered.append(claim)

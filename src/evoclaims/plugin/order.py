@@ -32,9 +32,11 @@ def prepare(session: pytest.Session, tests: dict[pytest.Item, ClaimTest]) -> Non
     """
     from evoclaims.claims.workload import soonest_first, workload
 
-    config, judging = session.config, make_session(session.config)
+    config = session.config
     if hasattr(config, "workerinput"):
-        _refuse_shared_gpus(config)
+        _refuse_shared_gpus(config)  # before jax takes their memory
+    judging = make_session(config)
+    if hasattr(config, "workerinput"):
         return
     ahead = config.stash.get(AHEAD, None)
     load = workload(judging, tests, ahead.platform if ahead else None)
@@ -47,7 +49,7 @@ def prepare(session: pytest.Session, tests: dict[pytest.Item, ClaimTest]) -> Non
         claims, workers = ahead.start(load, seeds), ahead.processes
     line = progress_of(config)
     if line is not None:
-        line.begin(load, workers, tick=workers > 1)
+        line.begin(load, workers, tick=ahead is not None)
     if not any(config.getoption(name, False) for name in _OTHER_ORDERS):
         session.items[:] = in_order(session.items, claims)
 
