@@ -150,10 +150,7 @@ def test_a_condition_that_breaks_does_not_stop_the_others(piloted: Evoclaims, pr
     ("arguments", "said"),
     [
         (("--run", "--first-seed=5"), "The seeds 5 to 54 overlap the smoke tier's own (0 to 9)"),
-        (
-            ("--run", "--trials=9"),
-            "--trials takes 10 (as many as a verdict reads) to 100 trials per condition, not 9.",
-        ),
+        (("--run", "--trials=9"), "--trials takes 10 (as many as a verdict reads) to 100 trials per condition, not 9."),
         (("--stored", "--trials=101"), "to 100 trials per condition, not 101."),
         (("--run", "--first-seed=2147483647"), "A seed is a whole number from 0 to 2147483647"),
         (("--draws=0",), "--draws takes a number from 1 up, not 0."),
