@@ -139,14 +139,6 @@ def test_a_damaged_file_that_is_there_stays_for_verify_to_move(store: Store, oth
     assert record.read_bytes() == b"torn"
 
 
-def test_an_edited_record_is_not_copied(
-    store: Store, other: Store, trial_files: Any, edit_record: Callable[..., None]
-) -> None:
-    record, _ = trial_files(other, 1)
-    edit_record(record, reseal=False, metrics={"mean_success": 1.0})
-    assert Counter(one.fate for one in _merge(other, store)) == {"copied": 2, "damaged": 1}
-
-
 @pytest.fixture
 def trial_files(make_result: Make) -> Callable[[Store, int], tuple[Path, Path]]:
     """A function that returns the files of record and champion of a seed."""
