@@ -67,18 +67,6 @@ def test_it_does_not_matter_where_such_options_are_set(
     assert (status, out.splitlines()[-1]) == (1, VERDICTS)
 
 
-def test_no_verdict_is_left_unaccepted_for_such_options(evoclaims: Evoclaims, monkeypatch: pytest.MonkeyPatch) -> None:
-    _set("-x")
-    monkeypatch.setenv("PYTEST_ADDOPTS", "-k a")
-    status, out, _ = evoclaims("accept", "--tier=smoke")
-    assert status == 1
-    assert [line for line in out.splitlines() if line.startswith("accepted")] == [
-        "accepted: a (smoke): refuted, the first verdict",
-        "accepted: b (smoke): supported, the first verdict",
-        "accepted: c (smoke): supported, the first verdict",
-    ]
-
-
 def test_the_environment_is_as_before_once_claims_are_judged(
     evoclaims: Evoclaims, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -135,21 +123,17 @@ def test_a_plugin_that_the_project_requires_is_not_missed(evoclaims: Evoclaims) 
         "def pytest_runtest_setup(item):\n    item.session.shouldstop = 'enough'\n",
     ],
 )
-@pytest.mark.parametrize("command", ["status", "accept"])
-def test_claims_that_something_leaves_out_are_an_error_and_not_forgotten(
-    evoclaims: Evoclaims, hook: str, command: str
-) -> None:
+def test_claims_that_something_leaves_out_are_an_error_and_not_forgotten(evoclaims: Evoclaims, hook: str) -> None:
     Path("conftest.py").write_text(hook)
-    status, _, err = evoclaims(command, "--tier=smoke")
+    status, _, err = evoclaims("accept", "--tier=smoke")
     assert (status, err.count("\n")) == (2, 1)
     assert " of 3 claims of the smoke tier were collected and not judged (claims/test_claims.py::test_" in err
     assert not Path("verdicts.toml").exists()
 
 
-@pytest.mark.parametrize("command", ["status", "accept"])
-def test_claims_in_a_file_that_is_not_collected_are_missed_in_a_sentence(evoclaims: Evoclaims, command: str) -> None:
+def test_claims_in_a_file_that_is_not_collected_are_missed_in_a_sentence(evoclaims: Evoclaims) -> None:
     Path("claims/test_claims.py").rename("claims/hill.py")
-    status, out, err = evoclaims(command)
+    status, out, err = evoclaims("status")
     assert (status, out, err.count("\n")) == (2, "", 1)
     assert f"No claim found in {Path('claims').resolve()}: claims are in files test_*.py or *_test.py, on fun" in err
     assert "on functions test*, each with @claim(...)." in err

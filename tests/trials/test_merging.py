@@ -64,11 +64,6 @@ def test_a_second_merge_copies_nothing(store: Store, other: Store) -> None:
     assert {path: path.stat().st_mtime_ns for path in store.root.rglob("*")} == times
 
 
-def test_a_dry_run_says_the_same_and_writes_nothing(store: Store, other: Store) -> None:
-    assert Counter(one.fate for one in _merge(other, store, dry_run=True)) == {"copied": 3}
-    assert not store.root.exists()
-
-
 def test_of_two_different_records_the_existing_one_stays_and_both_are_named(
     store: Store, other: Store, make_result: Make
 ) -> None:

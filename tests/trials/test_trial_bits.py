@@ -49,12 +49,6 @@ def test_a_trial_alone_equals_the_same_trial_in_a_batch_on_two_devices(
     assert alone[0].digest == _digests(batch)[SEEDS[1]]
 
 
-def test_one_device_gives_the_bits_that_two_give(tmp_path: Path, cpus: list[Any]) -> None:
-    one = run(CONDITIONS["walker"], SEEDS, Store(tmp_path / "one"), cpus[:1])
-    two = run(CONDITIONS["walker"], SEEDS, Store(tmp_path / "two"), cpus)
-    assert _digests(one) == _digests(two)
-
-
 def test_the_champion_beside_a_record_is_the_one_of_the_same_trial_alone(tmp_path: Path, cpus: list[Any]) -> None:
     batch, alone = Store(tmp_path / "batch"), Store(tmp_path / "alone")
     wanted = run(CONDITIONS["walker"], SEEDS, batch, cpus)[1]

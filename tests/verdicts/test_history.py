@@ -122,8 +122,3 @@ def test_a_claim_without_any_verdict_is_said_without_steering_the_terminal() -> 
     with pytest.raises(UserError) as caught:
         parse(b'schema = 1\n[verdicts.smoke]\n"G\\u001b1" = []', "x")
     assert str(caught.value).startswith(r"x holds no accepted verdicts: G\x1b1 (smoke) has no list of verdicts.")
-
-
-def test_a_folder_in_the_files_place_is_said(tmp_path: Path) -> None:
-    with pytest.raises(UserError, match="Cannot read .*: Is a directory"):
-        load(tmp_path)
