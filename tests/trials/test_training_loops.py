@@ -298,7 +298,7 @@ def test_stored_trials_of_any_version_are_read_where_their_package_is_not_instal
     monkeypatch.setattr("evoclaims.core.packages.version_of", lambda name: None)
     assert run(noting, [0], store, cpus, any_version=True) == [made]
     for seeds, any_version in (([0], False), ([0, 1], True)):
-        with pytest.raises(UserError, match="needs pytest, which is not installed"):
+        with pytest.raises(UserError, match="needs pytest, which is not installed. Install it: pip install pytest"):
             run(noting, seeds, store, cpus, any_version=any_version)
 
 
