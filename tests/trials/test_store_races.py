@@ -78,6 +78,16 @@ def test_the_first_record_keeps_its_own_champion_in_every_order(
     assert not list(store.root.rglob("*.tmp"))
 
 
+@pytest.mark.parametrize("order", ORDERS)
+def test_equal_trials_are_stored_once_in_every_order(
+    store: Store, make_result: Make, parameters: dict[str, Any], monkeypatch: pytest.MonkeyPatch, order: str
+) -> None:
+    puts = {name: lambda: store.put(make_result(), parameters) for name in "AB"}
+    assert sorted(_interleaved(monkeypatch, order, puts).values()) == ["present", "stored"]
+    assert store.champion_of(store.get(make_result().id)).keys() == parameters.keys()
+    assert verify(store, repair=False) == []
+
+
 @pytest.fixture
 def raced(store: Store, make_result: Make) -> TrialResult:
     """A trial whose champion lies beside the usual place, where a killed process has left another one."""
